@@ -1,0 +1,45 @@
+# Two commands matter: `make demo` and `make test`. Both set up everything they need in .venv first.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
+
+.PHONY: demo test test-rust test-python lint format accuracy clean
+
+demo: $(VENV)/.installed ## Reconstruct the solder ball that ships with bgars
+	$(BIN)/bgars demo -o demo-output
+
+test: test-rust test-python ## All tests, Rust and Python
+
+test-rust:
+	@if command -v cargo >/dev/null; then cargo test --locked; \
+	else echo "SKIPPED: the Rust tests need cargo on the PATH (the Python tests run without it)"; fi
+
+test-python: $(VENV)/.installed
+	$(BIN)/python -m pytest
+
+lint: $(VENV)/.installed ## Formatting, clippy, ruff, mypy, and the stub against the compiled module
+	cargo fmt --check --all
+	cargo clippy --locked --workspace --all-targets -- -D warnings
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/stubtest bgars._bgars
+
+format: $(VENV)/.installed
+	cargo fmt --all
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+accuracy: $(VENV)/.installed ## Rewrite the tables of docs/accuracy.md (needs BGARS_DATA)
+	$(BIN)/python docs/make_accuracy.py
+
+clean:
+	rm -rf $(VENV) target demo-output
+
+# The compiled module is rebuilt when a Rust source changes; Python sources are used in place.
+$(VENV)/.installed: $(RUST_SOURCES)
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --quiet --editable '.[test,lint]'
+	touch $@

@@ -1,0 +1,70 @@
+"""Photometric stereo for shiny parts: one camera, several lights, one image a light.
+
+The data flows one way: a capture becomes normals, normals become a height map, a height map becomes a mesh.
+
+>>> import bgars
+>>> capture = bgars.read_capture(bgars.sample_capture())
+>>> field = bgars.estimate_normals(capture)
+>>> height = bgars.integrate_normals(field)
+>>> mesh = bgars.mesh_from_height(height, field)
+"""
+
+from importlib.metadata import version
+
+from bgars.errors import (
+    BgarsError,
+    CalibrationError,
+    ConvergenceError,
+    FileFormatError,
+    InputError,
+    UnsupportedImageError,
+)
+from bgars.evaluate import Evaluation, angular_error_deg, evaluate
+from bgars.integrate import integrate_normals
+from bgars.io.capture import read_capture
+from bgars.io.height import read_height, write_height
+from bgars.io.mesh_files import write_mesh
+from bgars.io.normal_map import read_normal_map, write_normal_map
+from bgars.io.truth import Truth, read_truth
+from bgars.mesh import mesh_from_height
+from bgars.normals import estimate_normals
+from bgars.pipeline import Reconstruction, reconstruct
+from bgars.records import Capture, Component, HeightMap, NormalField
+from bgars.report.overview import write_overview
+from bgars.rig import LightRig
+from bgars.samples import sample_capture
+
+__version__ = version("bgars")
+
+__all__ = [
+    "BgarsError",
+    "CalibrationError",
+    "Capture",
+    "Component",
+    "ConvergenceError",
+    "Evaluation",
+    "FileFormatError",
+    "HeightMap",
+    "InputError",
+    "LightRig",
+    "NormalField",
+    "Reconstruction",
+    "Truth",
+    "UnsupportedImageError",
+    "__version__",
+    "angular_error_deg",
+    "estimate_normals",
+    "evaluate",
+    "integrate_normals",
+    "mesh_from_height",
+    "read_capture",
+    "read_height",
+    "read_normal_map",
+    "read_truth",
+    "reconstruct",
+    "sample_capture",
+    "write_height",
+    "write_mesh",
+    "write_normal_map",
+    "write_overview",
+]

@@ -1,0 +1,78 @@
+"""The compiled core. Arrays must be C-contiguous and of the dtypes given here; the public functions see to that."""
+
+from collections.abc import Callable, Sequence
+from os import PathLike
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+DEBUG_BUILD: Final[bool]
+
+def decode_stack(
+    paths: Sequence[str | PathLike[str]],
+    *,
+    channel: str,
+    response: NDArray[np.float32] | None,
+    gains: NDArray[np.float32] | None,
+    max_megapixels: float,
+) -> tuple[Any, bool, int]: ...
+def estimate_normals(
+    images: NDArray[Any],
+    *,
+    lights: NDArray[np.float64],
+    lights_are_positions: bool,
+    reference_px: Sequence[float],
+    intensities: Sequence[float],
+    response: NDArray[np.float32] | None,
+    dark: NDArray[Any] | None,
+    black_level: float,
+    saturation: float,
+    full_scale: float,
+    mask: NDArray[np.bool_] | None,
+    method: str,
+    threshold: float,
+    keep_sets: bool,
+    progress: Callable[[float], object] | None,
+) -> tuple[
+    NDArray[np.float32],
+    NDArray[np.float32],
+    NDArray[np.bool_],
+    NDArray[np.float32],
+    NDArray[np.uint16],
+    NDArray[np.bool_] | None,
+]: ...
+def integrate_normals(
+    normals: NDArray[np.float32],
+    mask: NDArray[np.bool_],
+    weights: NDArray[np.float32] | None,
+    *,
+    difference: str,
+    relative_tolerance: float,
+    absolute_tolerance: float,
+    max_iters: int,
+    progress: Callable[[int, float], object] | None,
+) -> tuple[NDArray[np.float32], NDArray[np.int32], list[tuple[int, int, int]], int, float]: ...
+def read_rgb16(path: str | PathLike[str], max_megapixels: float) -> NDArray[np.uint16]: ...
+def triangulate(
+    height_px: NDArray[np.float32], mask: NDArray[np.bool_], pitch: float
+) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32]]: ...
+def write_obj(
+    path: str | PathLike[str],
+    vertices: NDArray[np.float32],
+    faces: NDArray[np.uint32],
+    *,
+    normals: NDArray[np.float32] | None = None,
+    colors: NDArray[np.uint8] | None = None,
+    comments: Sequence[str] = ...,
+) -> None: ...
+def write_ply(
+    path: str | PathLike[str],
+    vertices: NDArray[np.float32],
+    faces: NDArray[np.uint32],
+    *,
+    normals: NDArray[np.float32] | None = None,
+    colors: NDArray[np.uint8] | None = None,
+    comments: Sequence[str] = ...,
+) -> None: ...
+def write_png16(path: str | PathLike[str], rgb: NDArray[np.uint16]) -> None: ...

@@ -1,0 +1,5 @@
+"""The command ``bgars``."""
+
+from bgars.cli.app import main
+
+__all__ = ["main"]

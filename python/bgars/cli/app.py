@@ -1,0 +1,301 @@
+"""The commands and their options."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+
+import bgars
+from bgars.cli.console import EXIT_BAD_INPUT, fail, print_json, say, stage_progress
+from bgars.cli.outputs import write_normals, write_reconstruction
+from bgars.errors import BgarsError
+from bgars.io.mesh_files import MESH_SUFFIXES
+from bgars.normals import DEFAULT_METHOD
+
+__all__ = ["main"]
+
+MethodName = Literal["lambertian", "specular-filter", "robust-filter"]
+ChannelOption = Literal["luminance", "mean", "red", "green", "blue"]
+
+app = typer.Typer(
+    name="bgars",
+    help=(
+        "Photometric stereo for shiny parts: one camera, several lights, one image a light. "
+        "Start with 'bgars demo'; then 'bgars reconstruct FOLDER -o OUT' on your own photographs."
+    ),
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+FolderArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="FOLDER",
+        help="Capture folder: images, and capture.toml, or light_directions.txt (DiLiGenT), or one .lp file (RTI).",
+        show_default=False,
+    ),
+]
+OutOption = Annotated[
+    Path, typer.Option("--output", "-o", metavar="OUT", help="Folder for the results; made if missing.", show_default=False)
+]
+MethodOption = Annotated[
+    MethodName,
+    typer.Option(
+        "--method",
+        "-m",
+        help="lambertian: all lights. specular-filter: the published sorted-gap filter. "
+        "robust-filter: the largest consistent set of lights, shadows and highlights left out.",
+    ),
+]
+ThresholdOption = Annotated[
+    float, typer.Option(help="Gap of specular-filter, in grey levels of 255; scaled with the bit depth.")
+]
+ChannelChoice = Annotated[
+    ChannelOption | None,
+    typer.Option(help="How colour becomes one value (linear); the recipe's choice by default.", show_default=False),
+]
+DirectxOption = Annotated[bool, typer.Option("--directx", help="Write normals.png with green = y down.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")]
+
+
+@app.callback(invoke_without_command=True)
+def top(
+    version: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False,
+) -> None:
+    """Options of the command itself."""
+    if version:
+        say(f"bgars {bgars.__version__}")
+        raise typer.Exit
+
+
+@app.command()
+def demo(
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="OUT", help="Folder for the results.")
+    ] = Path("bgars-demo"),
+    as_json: JsonOption = False,
+) -> None:
+    """Reconstruct a solder ball that ships with bgars, and say what to open."""
+    folder = bgars.sample_capture()
+    summary, files = _reconstruct_to(folder, output, DEFAULT_METHOD, 50.0, None, "ply", False)
+    scores = {
+        name: bgars.evaluate(bgars.read_capture(folder), method=name).to_dict()["normals"]
+        for name in ("lambertian", DEFAULT_METHOD)
+    }
+    summary["evaluation"] = scores
+    if as_json:
+        print_json(summary)
+        return
+    say("A solder ball of 600 um diameter on its board, photographed (rendered) under 8 lights, one at a time.")
+    say(
+        f"Mean error of its normals: {scores[DEFAULT_METHOD]['mean_deg']:.2f} deg with {DEFAULT_METHOD}, "
+        f"{scores['lambertian']['mean_deg']:.2f} deg with plain least squares: highlights are not diffuse light."
+    )
+    say("The height of the ball above its board is not in the normals: between both the surface jumps unseen.")
+    say()
+    say("Open these:")
+    _list_files(output, files)
+    say()
+    say(f"Next: bgars evaluate {_shown(folder)}    or, on your own images: bgars reconstruct FOLDER -o OUT")
+
+
+@app.command()
+def reconstruct(
+    folder: FolderArgument,
+    output: OutOption,
+    method: MethodOption = DEFAULT_METHOD,
+    threshold: ThresholdOption = 50.0,
+    channel: ChannelChoice = None,
+    mesh_format: Annotated[
+        Literal["ply", "obj", "stl", "glb"], typer.Option(help="Format of the mesh file.")
+    ] = "ply",
+    directx: DirectxOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """The main job: a folder of photographs becomes normals, a height map, a mesh and an overview picture.
+
+    Writes overview.png, normals.png (16 bit), height.tif and height.npy (float32, um when the pixel pitch is known),
+    mesh.ply and summary.json. Heights between parts that do not touch, such as a ball above its board, are not measured.
+    """
+    summary, files = _reconstruct_to(folder, output, method, threshold, channel, mesh_format, directx)
+    if as_json:
+        print_json(summary)
+        return
+    height = summary["height"]
+    low, high = height[f"height_range_{height['unit']}"]
+    say(
+        f"{summary['capture']}: {summary['normals']['valid_pixels']} normals ({method}), height {low:.1f} to {high:.1f} "
+        f"{height['unit']} in {height['components']} connected part(s), {height['iterations']} solver iterations."
+    )
+    _list_files(output, files)
+
+
+@app.command()
+def normals(
+    folder: FolderArgument,
+    output: OutOption,
+    method: MethodOption = DEFAULT_METHOD,
+    threshold: ThresholdOption = 50.0,
+    channel: ChannelChoice = None,
+    directx: DirectxOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Only the normals: normals.png (16 bit), albedo.tif, confidence.tif, lights_kept.png."""
+    capture = bgars.read_capture(folder, channel=channel)
+    with stage_progress() as report:
+        field = bgars.estimate_normals(
+            capture, method=method, threshold=threshold, progress=lambda fraction: report("normals", fraction)
+        )
+    summary, files = write_normals(field, output, directx=directx)
+    if as_json:
+        print_json({"capture": capture.name, **summary})
+        return
+    say(
+        f"{capture.name}: {summary['valid_pixels']} normals ({method}), {summary['mean_lights_kept']:.1f} of "
+        f"{len(capture.rig)} lights kept on average, mean confidence {summary['mean_confidence']:.2f}."
+    )
+    _list_files(output, files)
+
+
+@app.command()
+def mesh(
+    source: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="normals.png, or a height map (.tif, .npy; NaN = invalid).", show_default=False),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", metavar="MESH", help=f"Mesh file: {', '.join(MESH_SUFFIXES)}.", show_default=False),
+    ],
+    pixel_pitch_um: Annotated[
+        float | None,
+        typer.Option(help="Pixel pitch; a height map is then taken as um. A .tif of bgars brings its own.", show_default=False),
+    ] = None,
+    directx: Annotated[bool, typer.Option("--directx", help="The normal map has green = y down.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Turn a normal map or a height map into a mesh."""
+    with stage_progress() as report:
+        height = _height_from(source, pixel_pitch_um, directx, report)
+    surface = bgars.mesh_from_height(height)
+    bgars.write_mesh(surface, output)
+    summary = {"vertices": len(surface.vertices), "faces": len(surface.faces), "unit": height.unit, "file": str(output)}
+    if as_json:
+        print_json(summary)
+        return
+    say(f"{output}: {summary['vertices']} vertices, {summary['faces']} faces, in {height.unit}")
+
+
+@app.command()
+def info(folder: FolderArgument, channel: ChannelChoice = None, as_json: JsonOption = False) -> None:
+    """Read a capture and say what is in it: images, lights, scale, clipped pixels."""
+    from bgars.cli.describe import describe, describe_in_words  # noqa: PLC0415 - keeps this file to options
+
+    capture = bgars.read_capture(folder, channel=channel)
+    facts = describe(capture)
+    if as_json:
+        print_json(facts)
+        return
+    for line in describe_in_words(facts):
+        say(line)
+
+
+@app.command()
+def evaluate(
+    folder: FolderArgument,
+    method: Annotated[
+        MethodName | None, typer.Option("--method", "-m", help="Estimator; every one by default.", show_default=False)
+    ] = None,
+    images: Annotated[
+        Path | None,
+        typer.Option(help="Text file of image names, one a line: use only these (such as ring8.txt).", show_default=False),
+    ] = None,
+    channel: ChannelChoice = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Compare with truth (gt.npz of a rendered scene, Normal_gt.npy of a photograph).
+
+    Scenes are judged over ball pixels with true n_z > 0.3, photographs over their mask. A pixel without a solution counts
+    as (0, 0, 1).
+    """
+    from bgars.light_files import read_filenames  # noqa: PLC0415 - only here
+    from bgars.normals import METHODS  # noqa: PLC0415 - only here
+
+    names = None if images is None else read_filenames(images)
+    capture = bgars.read_capture(folder, channel=channel, images=names)
+    truth = bgars.read_truth(folder)
+    with stage_progress() as report:
+        results = [
+            bgars.evaluate(capture, method=name, truth=truth, progress=lambda fraction, name=name: report(name, fraction))
+            for name in (METHODS if method is None else (method,))
+        ]
+    if as_json:
+        print_json({"capture": capture.name, "lights": len(capture.rig), "results": [r.to_dict() for r in results]})
+        return
+    say(f"{capture.name}, {len(capture.rig)} lights, {results[0].region}: {results[0].normals.pixels} pixels")
+    say("method             mean    median  95th pct  (deg)   no solution   board mean (deg)   ball height RMSE (um)")
+    for result in results:
+        errors = result.normals
+        board = "-" if result.board is None else f"{result.board.mean_deg:.3f}"
+        rmse = "-" if result.ball_height_rmse_um is None else f"{result.ball_height_rmse_um:.2f}"
+        say(
+            f"{result.method:<16} {errors.mean_deg:>7.3f} {errors.median_deg:>7.3f} {errors.p95_deg:>9.3f}"
+            f" {errors.invalid:>19} {board:>18} {rmse:>23}"
+        )
+
+
+def main() -> None:
+    """Run the command; an error becomes one line and exit code 2 (wrong use: 2 too, Ctrl-C: 130)."""
+    try:
+        app()
+    except BgarsError as error:
+        fail(str(error))
+        sys.exit(EXIT_BAD_INPUT)
+
+
+def _reconstruct_to(
+    folder: Path,
+    output: Path,
+    method: MethodName,
+    threshold: float,
+    channel: ChannelOption | None,
+    mesh_format: str,
+    directx: bool,
+) -> tuple[dict[str, Any], dict[str, str]]:
+    capture = bgars.read_capture(folder, channel=channel)
+    with stage_progress() as report:
+        return write_reconstruction(
+            lambda: bgars.reconstruct(capture, method=method, threshold=threshold, progress=report),
+            output,
+            mesh_format=mesh_format,
+            directx=directx,
+        )
+
+
+def _height_from(source: Path, pixel_pitch_um: float | None, directx: bool, report: Any) -> bgars.HeightMap:
+    if source.suffix.lower() == ".png":
+        return bgars.integrate_normals(
+            bgars.read_normal_map(source, directx=directx),
+            pixel_pitch_um=pixel_pitch_um,
+            progress=lambda _, residual: report("height", min(1.0, max(0.0, -residual))),
+        )
+    values, stored_pitch_um = bgars.read_height(source)
+    return bgars.HeightMap.from_array(values, pixel_pitch_um=pixel_pitch_um or stored_pitch_um)
+
+
+def _list_files(folder: Path, files: dict[str, str]) -> None:
+    width = max(len(_shown(folder / name)) for name in files)
+    for name, meaning in files.items():
+        say(f"  {_shown(folder / name):<{width}}  {meaning}")
+
+
+def _shown(path: Path) -> str:
+    """A path as short as it can be typed from here."""
+    try:
+        return str(path.resolve().relative_to(Path.cwd()))
+    except ValueError:
+        return str(path)

@@ -1,0 +1,55 @@
+"""What every command shares: where words go, progress on a terminal, exit codes."""
+
+from __future__ import annotations
+
+import json
+import sys
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+__all__ = ["EXIT_BAD_INPUT", "error_console", "fail", "print_json", "say", "stage_progress"]
+
+EXIT_BAD_INPUT = 2
+
+output_console = Console(highlight=False, soft_wrap=True)
+error_console = Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+def say(text: str = "") -> None:
+    """Print a line of a command's result; brackets are taken literally."""
+    output_console.print(text, markup=False)
+
+
+def print_json(values: dict[str, Any]) -> None:
+    """Print a result for machines: one JSON object, nothing else."""
+    sys.stdout.write(json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def fail(message: str) -> None:
+    """Print an error for people."""
+    error_console.print("error:", style="bold red", end=" ")
+    error_console.print(message, markup=False)
+
+
+@contextmanager
+def stage_progress() -> Iterator[Callable[[str, float], None]]:
+    """Yield ``report(stage, fraction)``; bars on a terminal, silence in pipes."""
+    if not error_console.is_terminal:
+        yield lambda _stage, _fraction: None
+        return
+    columns = (TextColumn("{task.description:<10}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=error_console, transient=True) as progress:
+        tasks: dict[str, Any] = {}
+
+        def report(stage: str, fraction: float) -> None:
+            if stage not in tasks:
+                tasks[stage] = progress.add_task(stage, total=1.0)
+            progress.update(tasks[stage], completed=fraction)
+
+        yield report

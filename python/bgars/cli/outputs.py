@@ -1,0 +1,67 @@
+"""The files that commands leave behind, each folder whole or not at all."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import imageio.v3 as iio
+import numpy as np
+import tifffile
+
+import bgars
+from bgars.io.atomic import atomic_folder
+from bgars.pipeline import summarise_field
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from bgars.pipeline import Reconstruction
+    from bgars.records import NormalField
+
+__all__ = ["write_normals", "write_reconstruction"]
+
+
+def write_reconstruction(
+    run: Callable[[], Reconstruction], output: Path, *, mesh_format: str, directx: bool
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Run a reconstruction and write its results; return its summary and what each file is.
+
+    The output folder is tried first, so that no work is lost to an unwritable one.
+    """
+    with atomic_folder(output) as folder:
+        result = run()
+        unit = result.height.unit
+        files = {
+            "overview.png": "the picture to look at first",
+            f"mesh.{mesh_format}": f"the surface in 3-D, in {unit} (MeshLab, Blender, CloudCompare)",
+            "normals.png": f"normals, 16 bit, {'DirectX' if directx else 'OpenGL'} (green = y {'down' if directx else 'up'})",
+            "height.tif": f"heights, float32, in {unit}",
+            "height.npy": "the same for numpy",
+            "summary.json": "the numbers of this run",
+        }
+        bgars.write_overview(result, folder / "overview.png")
+        bgars.write_mesh(result.mesh, folder / f"mesh.{mesh_format}")
+        bgars.write_normal_map(result.field, folder / "normals.png", directx=directx)
+        bgars.write_height(result.height, folder / "height.tif")
+        bgars.write_height(result.height, folder / "height.npy")
+        summary = {"bgars": bgars.__version__, **result.summary(), "files": list(files)}
+        (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    return summary, files
+
+
+def write_normals(field: NormalField, output: Path, *, directx: bool) -> tuple[dict[str, Any], dict[str, str]]:
+    """Write a normal field as pictures; return its summary and what each file is."""
+    files = {
+        "normals.png": f"normals, 16 bit, {'DirectX' if directx else 'OpenGL'} (green = y {'down' if directx else 'up'})",
+        "albedo.tif": "diffuse reflectance times light, float32, 1 = full scale",
+        "confidence.tif": "trust in each normal, float32, 0 to 1",
+        "lights_kept.png": "number of lights in each fit",
+    }
+    with atomic_folder(output) as folder:
+        bgars.write_normal_map(field, folder / "normals.png", directx=directx)
+        tifffile.imwrite(folder / "albedo.tif", field.albedo)
+        tifffile.imwrite(folder / "confidence.tif", field.confidence)
+        iio.imwrite(folder / "lights_kept.png", np.minimum(field.lights_kept, 255).astype(np.uint8))
+    return {**summarise_field(field), "files": list(files)}, files

@@ -1,0 +1,182 @@
+"""Compare a method with known truth."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bgars.errors import ConvergenceError, InputError
+from bgars.integrate import integrate_normals
+from bgars.io.truth import Truth, read_truth
+from bgars.normals import DEFAULT_METHOD, Method, estimate_normals
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from bgars.records import BoolArray, Capture, FloatArray, NormalField
+
+__all__ = ["AngularErrors", "Evaluation", "angular_error_deg", "evaluate"]
+
+MIN_N_Z = 0.3
+"""Balls are judged where the true n_z is above this: nearer the rim a pixel mixes ball and board."""
+
+
+@dataclass(frozen=True)
+class AngularErrors:
+    """Angular errors over some pixels, in degrees; pixels without a solution count as (0, 0, 1).
+
+    Attributes
+    ----------
+    mean_deg, median_deg, p95_deg : float
+        Mean, median, 95th percentile.
+    pixels : int
+        Number of pixels judged.
+    invalid : int
+        Those among them without a solution.
+    """
+
+    mean_deg: float
+    median_deg: float
+    p95_deg: float
+    pixels: int
+    invalid: int
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Result of :func:`evaluate`.
+
+    Attributes
+    ----------
+    name, method : str
+        Capture and estimator.
+    region : str
+        What was judged: "balls, n_z > 0.3" of a scene, "mask" of a photograph.
+    normals : AngularErrors
+        Over that region.
+    board : AngularErrors or None
+        Over the board of a scene.
+    ball_height_rmse_um : float or None
+        Root mean square height error over the judged ball pixels, each ball integrated alone with its mean height
+        removed: no integrator knows the height across the jump between ball and board.
+    """
+
+    name: str
+    method: str
+    region: str
+    normals: AngularErrors
+    board: AngularErrors | None
+    ball_height_rmse_um: float | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain Python values, for JSON."""
+        return asdict(self)
+
+
+def evaluate(
+    capture: Capture,
+    *,
+    method: Method = DEFAULT_METHOD,
+    truth: Truth | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> Evaluation:
+    """Run a method on a capture that has truth and report its errors.
+
+    Parameters
+    ----------
+    capture : Capture
+        From :func:`bgars.read_capture`.
+    method : str
+        See :func:`bgars.estimate_normals`.
+    truth : Truth, optional
+        By default read from the capture's folder.
+    progress : callable, optional
+        Called with the fraction done.
+
+    Raises
+    ------
+    FileFormatError
+        The folder has no truth.
+    InputError
+        Truth and images differ in size.
+    """
+    if truth is None:
+        if capture.folder is None:
+            msg = "truth: needed for a capture that was not read from a folder"
+            raise InputError(msg)
+        truth = read_truth(capture.folder)
+    if truth.mask.shape != capture.mask.shape:
+        msg = f"truth: has shape {truth.mask.shape}, but the images have {capture.mask.shape}"
+        raise InputError(msg)
+    field = estimate_normals(capture, method=method, progress=progress)
+    judged = truth.mask & capture.mask
+    board = None
+    if truth.ball_ids is not None:
+        judged = judged & (truth.normals[..., 2] > MIN_N_Z)
+        board = _errors(field, truth.normals, (truth.ball_ids == 0) & capture.mask)
+    errors = _errors(field, truth.normals, judged)
+    if errors is None:
+        msg = f"{capture.name}: no pixel to judge: truth and mask do not overlap"
+        raise InputError(msg)
+    return Evaluation(
+        name=capture.name,
+        method=method,
+        region=f"balls, n_z > {MIN_N_Z}" if truth.ball_ids is not None else "mask",
+        normals=errors,
+        board=board,
+        ball_height_rmse_um=_ball_height_rmse_um(field, truth, judged),
+    )
+
+
+def angular_error_deg(estimate: FloatArray, truth: FloatArray) -> NDArray[np.float64]:
+    """Angle between two arrays of unit vectors (..., 3), degrees, accurate for small angles too.
+
+    NaN in `estimate` counts as (0, 0, 1).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> angular_error_deg(np.float32([[0, 0.6, 0.8]]), np.float32([[0, 0, 1]])).round(2).tolist()
+    [36.87]
+    """
+    filled = np.where(np.isfinite(estimate).all(axis=-1, keepdims=True), estimate, [0.0, 0.0, 1.0]).astype(np.float64)
+    known = truth.astype(np.float64)
+    sine = np.linalg.norm(np.cross(filled, known), axis=-1)
+    cosine = (filled * known).sum(axis=-1)
+    degrees: NDArray[np.float64] = np.degrees(np.arctan2(sine, cosine))
+    return degrees
+
+
+def _errors(field: NormalField, truth: FloatArray, judged: BoolArray) -> AngularErrors | None:
+    if not judged.any():
+        return None
+    error_deg = angular_error_deg(field.normals[judged], truth[judged])
+    return AngularErrors(
+        mean_deg=float(error_deg.mean()),
+        median_deg=float(np.median(error_deg)),
+        p95_deg=float(np.percentile(error_deg, 95)),
+        pixels=int(judged.sum()),
+        invalid=int((~field.mask[judged]).sum()),
+    )
+
+
+def _ball_height_rmse_um(field: NormalField, truth: Truth, judged: BoolArray) -> float | None:
+    pitch = field.pixel_pitch_um
+    if truth.height_um is None or truth.ball_ids is None or pitch is None:
+        return None
+    if not (field.mask & judged).any():
+        return None
+    try:
+        height = integrate_normals(field, mask=judged)
+    except ConvergenceError:
+        return None
+    # Balls do not touch, so components are balls; a stray pixel that lost its neighbours is its own component.
+    labels = height.labels[height.mask]
+    error_um = height.height_px[height.mask].astype(np.float64) * pitch - truth.height_um[height.mask]
+    counts = np.bincount(labels)
+    means = np.bincount(labels, weights=error_um) / counts
+    return float(np.sqrt(np.mean((error_um - means[labels]) ** 2)))

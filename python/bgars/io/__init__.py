@@ -1,0 +1,1 @@
+"""Files in and out: captures, normal maps, height maps, meshes, truth."""

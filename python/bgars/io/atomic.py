@@ -1,0 +1,86 @@
+"""Outputs appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bgars.errors import FileFormatError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+__all__ = ["atomic_file", "atomic_folder"]
+
+
+@contextmanager
+def _write_errors(path: Path) -> Iterator[None]:
+    """Turn what the system says into one message that names the output."""
+    try:
+        yield
+    except FileFormatError:
+        raise
+    except OSError as error:
+        msg = f"{path}: cannot be written ({error.strerror or error})"
+        raise FileFormatError(msg) from error
+
+
+@contextmanager
+def atomic_file(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Yield a temporary path beside `path` (same suffix); rename it to `path` when the block succeeds.
+
+    Raises
+    ------
+    FileFormatError
+        The folder is missing or not writable.
+    """
+    path = Path(path)
+    if path.is_dir():
+        msg = f"{path}: cannot be written (it is a folder)"
+        raise FileFormatError(msg)
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
+    with _write_errors(path):
+        temporary.touch()
+        try:
+            yield temporary
+            temporary.replace(path)
+        finally:
+            temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def atomic_folder(folder: str | os.PathLike[str]) -> Iterator[Path]:
+    """Yield a temporary folder; when the block succeeds, move its files into `folder`, replacing files of the same name.
+
+    Other files of an existing `folder` stay. The folder is tried before the block runs, so that long work is not lost.
+
+    Raises
+    ------
+    FileFormatError
+        `folder` cannot be made or written.
+    """
+    folder = Path(folder)
+    if folder.exists() and not folder.is_dir():
+        msg = f"{folder}: cannot be written (it is a file, not a folder)"
+        raise FileFormatError(msg)
+    parent = folder if folder.is_dir() else folder.absolute().parent
+    made = [place for place in (parent, *parent.parents) if not place.exists()]
+    with _write_errors(folder):
+        parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(prefix=".bgars-partial-", dir=parent))
+        try:
+            yield temporary
+            folder.mkdir(exist_ok=True)
+            for path in sorted(temporary.iterdir()):
+                path.replace(folder / path.name)
+        except BaseException:
+            shutil.rmtree(temporary, ignore_errors=True)
+            for place in made:
+                with suppress(OSError):
+                    place.rmdir()
+            raise
+        temporary.rmdir()

@@ -1,0 +1,90 @@
+"""Normal maps as 16-bit PNG."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bgars import _bgars
+from bgars.errors import InputError
+from bgars.io.atomic import atomic_file
+from bgars.io.images import MAX_MEGAPIXELS
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from bgars.records import FloatArray, NormalField
+
+__all__ = ["read_normal_map", "write_normal_map"]
+
+FULL = 65535.0
+NORMALS_NDIM = 3
+
+
+def write_normal_map(
+    normals: NormalField | FloatArray, path: str | PathLike[str], *, directx: bool = False
+) -> None:
+    """Write normals as a 16-bit RGB PNG: ``round((n + 1) / 2 * 65535)``, R = x, G = y up (OpenGL), B = z.
+
+    Invalid pixels (NaN) are black, which no unit normal encodes to.
+
+    Parameters
+    ----------
+    normals : NormalField or (H, W, 3) float32
+        Unit normals.
+    path : path
+        File to write, ending in .png.
+    directx : bool
+        Write G = y down, as DirectX tools expect.
+
+    Raises
+    ------
+    InputError
+        Wrong shape or suffix.
+    FileFormatError
+        The file cannot be written.
+    """
+    path = Path(path)
+    vectors = np.asarray(getattr(normals, "normals", normals), dtype=np.float32)
+    if vectors.ndim != NORMALS_NDIM or vectors.shape[2] != NORMALS_NDIM:
+        msg = f"normals: must have shape (H, W, 3), got {vectors.shape}"
+        raise InputError(msg)
+    if path.suffix.lower() != ".png":
+        msg = f"{path}: a normal map file must end in .png"
+        raise InputError(msg)
+    signs = np.array([1.0, -1.0 if directx else 1.0, 1.0], dtype=np.float32)
+    codes = np.rint((vectors * signs + 1.0) / 2.0 * FULL)
+    rgb = np.where(np.isfinite(codes), np.clip(codes, 0.0, FULL), 0.0).astype(np.uint16)
+    with atomic_file(path) as temporary:
+        _bgars.write_png16(temporary, rgb)
+
+
+def read_normal_map(path: str | PathLike[str], *, directx: bool = False) -> FloatArray:
+    """Read a normal map of 8 or 16 bits a channel.
+
+    Parameters
+    ----------
+    path : path
+        RGB image, R = x, G = y up (OpenGL), B = z.
+    directx : bool
+        The file has G = y down.
+
+    Returns
+    -------
+    (H, W, 3) float32
+        Unit normals; NaN where the file is black.
+
+    Raises
+    ------
+    FileFormatError
+        The file is not an RGB image.
+    """
+    rgb = _bgars.read_rgb16(Path(path), MAX_MEGAPIXELS)
+    vectors = rgb.astype(np.float32) / np.float32(FULL) * 2.0 - 1.0
+    if directx:
+        vectors[..., 1] *= -1.0
+    vectors /= np.maximum(np.linalg.norm(vectors, axis=2, keepdims=True), 1e-6)
+    vectors[(rgb == 0).all(axis=2)] = np.nan
+    return vectors

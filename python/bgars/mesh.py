@@ -1,0 +1,66 @@
+"""Height maps as triangle meshes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import trimesh
+
+from bgars import _bgars
+from bgars.errors import InputError
+
+if TYPE_CHECKING:
+    from bgars.records import HeightMap, NormalField
+
+__all__ = ["mesh_from_height"]
+
+
+def mesh_from_height(height: HeightMap, field: NormalField | None = None) -> trimesh.Trimesh:
+    """Triangulate a height map: a vertex a pixel, faces between neighbours; masked pixels are left out.
+
+    Parameters
+    ----------
+    height : HeightMap
+        Heights; vertices are in micrometres when its pixel pitch is known, else in pixels.
+    field : NormalField, optional
+        Gives each vertex its estimated normal and its albedo as grey; without it, normals follow from the faces.
+
+    Returns
+    -------
+    trimesh.Trimesh
+        x right, y up, z toward the camera, origin at the image centre; ``metadata["unit"]`` is "um" or "px".
+
+    Raises
+    ------
+    InputError
+        The field has another size than the height map, or no two neighbouring pixels are valid.
+
+    Examples
+    --------
+    >>> import bgars, numpy as np
+    >>> flat = bgars.integrate_normals(np.tile(np.float32([0, 0, 1]), (2, 2, 1)), pixel_pitch_um=10.0)
+    >>> mesh = bgars.mesh_from_height(flat)
+    >>> mesh.vertices[0].tolist(), len(mesh.faces), mesh.metadata["unit"]
+    ([-5.0, 5.0, 0.0], 2, 'um')
+    """
+    if field is not None and field.mask.shape != height.mask.shape:
+        msg = f"field: must have the shape of the height map {height.mask.shape}, got {field.mask.shape}"
+        raise InputError(msg)
+    pitch = 1.0 if height.pixel_pitch_um is None else height.pixel_pitch_um
+    vertices, faces, pixels = _bgars.triangulate(height.height_px, height.mask, pitch)
+    if len(faces) == 0:
+        msg = f"height: no three neighbouring pixels are valid ({len(vertices)} in all), so there is no face to make"
+        raise InputError(msg)
+    metadata = {"unit": height.unit, "components": len(height.components)}
+    if field is None:
+        return trimesh.Trimesh(vertices, faces, process=False, metadata=metadata)
+    normals = field.normals.reshape(-1, 3)[pixels]
+    grey = field.albedo.ravel()[pixels]
+    known = np.isfinite(grey)
+    top = float(np.percentile(grey[known], 99.0)) if known.any() else 1.0
+    level = np.where(known, np.clip(grey / max(top, 1e-12), 0.0, 1.0) * 255.0, 128.0).astype(np.uint8)
+    colors = np.column_stack([level, level, level, np.full_like(level, 255)])
+    return trimesh.Trimesh(
+        vertices, faces, vertex_normals=normals, vertex_colors=colors, process=False, metadata=metadata
+    )

@@ -1,0 +1,215 @@
+"""Normals from a light stack (the Rust kernels, with plain arguments)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+
+from bgars import _bgars
+from bgars.errors import InputError
+from bgars.records import Capture, NormalField
+from bgars.rig import LightRig
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from bgars.records import PixelArray
+
+__all__ = ["DEFAULT_METHOD", "METHODS", "Method", "estimate_normals"]
+
+Method = Literal["lambertian", "specular-filter", "robust-filter"]
+METHODS: tuple[Method, ...] = get_args(Method)
+DEFAULT_METHOD: Method = "robust-filter"
+DEFAULT_THRESHOLD = 50.0
+STACK_NDIM = 3
+
+
+def estimate_normals(
+    images: Capture | ArrayLike,
+    light_directions: ArrayLike | None = None,
+    *,
+    method: Method = DEFAULT_METHOD,
+    mask: ArrayLike | None = None,
+    light_intensities: ArrayLike | None = None,
+    saturation: float | None = None,
+    threshold: float = DEFAULT_THRESHOLD,
+    keep_sets: bool = False,
+    progress: Callable[[float], object] | None = None,
+) -> NormalField:
+    """Estimate the surface normal of every pixel.
+
+    Every method solves ``I_k = rho l_k . n`` by least squares over the lights it keeps at a pixel (Woodham 1980); the
+    methods differ in which lights they keep.
+
+    Parameters
+    ----------
+    images : Capture or (L, H, W) array_like of uint8, uint16 or float32
+        A capture, or one image a light. Arrays are used as they are; they are copied only when they are not C-contiguous
+        or when they are float64.
+    light_directions : (L, 3) array_like
+        Unit vectors from the surface to the light; only with plain arrays.
+    method : {"lambertian", "specular-filter", "robust-filter"}
+        ``lambertian`` keeps every light. ``specular-filter`` is the published filter: sort the values, cut at the first gap
+        over `threshold` with at least 3 values kept. ``robust-filter`` keeps the largest consistent set of lights, shadows
+        and highlights left out.
+    mask : (H, W) array_like of bool, optional
+        True = use; combined with the capture's own mask.
+    light_intensities : (L,) array_like, optional
+        Relative intensities, divided out; only with plain arrays.
+    saturation : float, optional
+        Grey level that counts as clipped; only with plain arrays. Full scale of an integer dtype by default, none for
+        floats.
+    threshold : float
+        Gap of ``specular-filter`` in grey levels of 255; scaled with the bit depth.
+    keep_sets : bool
+        Also return which lights were kept: `NormalField.kept_sets`, (H, W, L) bool.
+    progress : callable, optional
+        Called with the fraction done, at most ten times a second.
+
+    Returns
+    -------
+    NormalField
+        A pixel whose kept lights are coplanar, whose solution is zero or faces away from the camera is invalid: NaN, mask
+        False.
+
+    Raises
+    ------
+    InputError
+        Counts or shapes that do not fit, fewer than 3 or coplanar lights, an empty mask, NaN inside the mask.
+
+    References
+    ----------
+    R. J. Woodham, "Photometric method for determining surface orientation from multiple images", Opt. Eng. 19 (1980).
+
+    Examples
+    --------
+    >>> import bgars, numpy as np
+    >>> rig = bgars.LightRig.ring(4)
+    >>> images = np.full((4, 1, 1), 100, np.uint8)  # one pixel, equally bright under all lights: it faces the camera
+    >>> bgars.estimate_normals(images, rig.directions).normals[0, 0].round(6).tolist()
+    [0.0, 0.0, 1.0]
+    """
+    if method not in METHODS:
+        msg = f"method: must be one of {', '.join(METHODS)}; got {method!r}"
+        raise InputError(msg)
+    if isinstance(images, Capture):
+        for name, value in (
+            ("light_directions", light_directions),
+            ("light_intensities", light_intensities),
+            ("saturation", saturation),
+        ):
+            if value is not None:
+                msg = f"{name}: the capture brings its own; leave it out, or give plain arrays"
+                raise InputError(msg)
+        capture = images
+    else:
+        capture = _capture_from_arrays(images, light_directions, light_intensities, saturation)
+    use = _combined_mask(capture, mask)
+    normals, albedo, valid, confidence, lights_kept, kept_sets = _bgars.estimate_normals(
+        capture.images,
+        **_light_arguments(capture),
+        response=capture.response,
+        dark=capture.dark,
+        black_level=capture.black_level,
+        saturation=capture.saturation,
+        full_scale=capture.full_scale,
+        mask=use,
+        method=method,
+        threshold=threshold,
+        keep_sets=keep_sets,
+        progress=progress,
+    )
+    return NormalField(
+        normals=normals,
+        albedo=albedo,
+        mask=valid,
+        confidence=confidence,
+        measured=valid.copy(),
+        lights_kept=lights_kept,
+        method=method,
+        pixel_pitch_um=capture.pixel_pitch_um,
+        kept_sets=kept_sets,
+    )
+
+
+def _capture_from_arrays(
+    images: ArrayLike,
+    light_directions: ArrayLike | None,
+    light_intensities: ArrayLike | None,
+    saturation: float | None,
+) -> Capture:
+    if light_directions is None:
+        msg = "light_directions: needed with plain image arrays, shape (L, 3)"
+        raise InputError(msg)
+    stack = pixel_stack(images)
+    rig = LightRig.from_directions(light_directions, intensities=light_intensities)
+    if len(rig) != len(stack):
+        msg = f"images and light_directions: {len(stack)} images but {len(rig)} lights; they must be equal in number"
+        raise InputError(msg)
+    if stack.dtype.kind == "u":
+        full_scale = float(np.iinfo(stack.dtype).max)
+        clip = full_scale if saturation is None else saturation
+    else:
+        finite = stack[np.isfinite(stack)]
+        full_scale = saturation or max(float(finite.max(initial=0.0)), 1e-30)
+        clip = float("inf") if saturation is None else saturation
+    return Capture(
+        images=stack,
+        rig=rig,
+        mask=np.ones(stack.shape[1:], dtype=np.bool_),
+        saturation=clip,
+        full_scale=full_scale,
+    )
+
+
+def pixel_stack(images: ArrayLike) -> PixelArray:
+    """Return a C-contiguous (L, H, W) stack of a supported dtype, without a copy where possible."""
+    stack = np.asarray(images)
+    if stack.ndim != STACK_NDIM:
+        msg = f"images: must have shape (L, H, W), got {stack.shape}"
+        raise InputError(msg)
+    if stack.dtype == np.float64:
+        stack = stack.astype(np.float32)
+    if stack.dtype not in (np.uint8, np.uint16, np.float32):
+        msg = f"images: must be uint8, uint16 or float32, got {stack.dtype}"
+        raise InputError(msg)
+    return np.ascontiguousarray(stack)
+
+
+def _combined_mask(capture: Capture, mask: ArrayLike | None) -> NDArray[np.bool_]:
+    if mask is None:
+        return np.ascontiguousarray(capture.mask)
+    given = np.asarray(mask)
+    if given.dtype != np.bool_ or given.shape != capture.images.shape[1:]:
+        expected = tuple(capture.images.shape[1:])
+        msg = f"mask: must be bool of shape {expected}, got {given.dtype} of shape {given.shape}"
+        raise InputError(msg)
+    combined: NDArray[np.bool_] = np.ascontiguousarray(given & capture.mask)
+    if not combined.any():
+        msg = "mask: no pixel to use (all False)"
+        raise InputError(msg)
+    return combined
+
+
+def _light_arguments(capture: Capture) -> dict[str, Any]:
+    """The rig in the units of the kernel: unit vectors, or positions in pixels."""
+    rig = capture.rig
+    if rig.positions_um is None or rig.intensity_distance_um is None:
+        return {
+            "lights": rig.directions,
+            "lights_are_positions": False,
+            "reference_px": [],
+            "intensities": rig.intensities.tolist(),
+        }
+    if capture.pixel_pitch_um is None:
+        msg = "pixel_pitch_um: needed with near lights, to place pixels and lights together"
+        raise InputError(msg)
+    return {
+        "lights": rig.positions_um / capture.pixel_pitch_um,
+        "lights_are_positions": True,
+        "reference_px": (rig.intensity_distance_um / capture.pixel_pitch_um).tolist(),
+        "intensities": rig.intensities.tolist(),
+    }

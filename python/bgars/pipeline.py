@@ -1,0 +1,126 @@
+"""The main job: capture -> normals -> height -> mesh, joined here and nowhere else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from bgars.integrate import Difference, integrate_normals
+from bgars.mesh import mesh_from_height
+from bgars.normals import DEFAULT_METHOD, Method, estimate_normals
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import trimesh
+
+    from bgars.records import Capture, HeightMap, NormalField
+
+__all__ = ["Reconstruction", "reconstruct", "summarise_field"]
+
+Stage = Literal["normals", "height", "mesh"]
+
+
+@dataclass(frozen=True, eq=False)
+class Reconstruction:
+    """What the main job makes of a capture: one record a stage.
+
+    Attributes
+    ----------
+    capture : Capture
+    field : NormalField
+    height : HeightMap
+    mesh : trimesh.Trimesh
+    """
+
+    capture: Capture
+    field: NormalField
+    height: HeightMap
+    mesh: trimesh.Trimesh
+
+    def summary(self) -> dict[str, Any]:
+        """Return the scalars of every stage as plain Python values, for JSON."""
+        return {
+            "capture": self.capture.name,
+            "lights": len(self.capture.rig),
+            "image_size_px": [int(self.capture.images.shape[2]), int(self.capture.images.shape[1])],
+            "pixel_pitch_um": self.capture.pixel_pitch_um,
+            "normals": summarise_field(self.field),
+            "height": self.height.summary(),
+            "mesh": {"vertices": len(self.mesh.vertices), "faces": len(self.mesh.faces)},
+        }
+
+
+def summarise_field(field: NormalField) -> dict[str, Any]:
+    """Return the scalars of a normal field as plain Python values."""
+    return {
+        "method": field.method,
+        "valid_pixels": int(field.mask.sum()),
+        "mean_confidence": float(field.confidence[field.mask].mean()) if field.mask.any() else 0.0,
+        "mean_lights_kept": float(field.lights_kept[field.mask].mean()) if field.mask.any() else 0.0,
+    }
+
+
+def reconstruct(
+    capture: Capture,
+    *,
+    method: Method = DEFAULT_METHOD,
+    threshold: float = 50.0,
+    difference: Difference = "trapezoid",
+    weights: Literal["confidence"] | None = None,
+    progress: Callable[[Stage, float], object] | None = None,
+) -> Reconstruction:
+    """Turn a capture into normals, a height map and a mesh.
+
+    Parameters
+    ----------
+    capture : Capture
+        From :func:`bgars.read_capture`.
+    method, threshold
+        See :func:`bgars.estimate_normals`.
+    difference, weights
+        See :func:`bgars.integrate_normals`.
+    progress : callable, optional
+        Called with (stage, fraction done of that stage); the solver's fraction is logarithmic in its residual.
+
+    Raises
+    ------
+    InputError
+        See the stages.
+    ConvergenceError
+        The integration did not reach its tolerance.
+
+    Examples
+    --------
+    >>> import bgars
+    >>> result = bgars.reconstruct(bgars.read_capture(bgars.sample_capture()))
+    >>> result.height.unit, len(result.height.components)
+    ('um', 1)
+    """
+
+    def report(stage: Stage, fraction: float) -> None:
+        if progress is not None:
+            progress(stage, fraction)
+
+    report("normals", 0.0)
+    field = estimate_normals(
+        capture, method=method, threshold=threshold, progress=lambda fraction: report("normals", fraction)
+    )
+    report("normals", 1.0)
+    height = integrate_normals(
+        field,
+        difference=difference,
+        weights=weights,
+        progress=lambda _, residual: report("height", _solver_fraction(residual)),
+    )
+    report("height", 1.0)
+    mesh = mesh_from_height(height, field)
+    report("mesh", 1.0)
+    return Reconstruction(capture, field, height, mesh)
+
+
+def _solver_fraction(residual: float, tolerance: float = 1e-8) -> float:
+    """How far a residual has come on its way from 1 to the tolerance, on a log scale."""
+    return float(np.clip(np.log(max(residual, tolerance)) / np.log(tolerance), 0.0, 1.0))

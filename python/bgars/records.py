@@ -1,0 +1,210 @@
+"""The records that flow from stage to stage: one frozen dataclass an arrow.
+
+Conventions: image arrays index [row, col]; world axes x right, y up (-row), z toward the camera; lengths in micrometres
+where a name ends in ``_um`` and in pixels where it ends in ``_px``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from bgars.rig import LightRig
+
+__all__ = ["BoolArray", "Capture", "Component", "FloatArray", "HeightMap", "NormalField", "PixelArray"]
+
+PixelArray = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32]
+FloatArray = NDArray[np.float32]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Capture:
+    """One part, photographed under one light at a time.
+
+    Attributes
+    ----------
+    images : (L, H, W) uint8, uint16 or float32
+        One image a light, grey levels as the camera gave them.
+    rig : LightRig
+        The L lights, in the order of the images.
+    mask : (H, W) bool
+        True = use.
+    pixel_pitch_um : float or None
+        Size of a pixel on the board; None when unknown (lengths then stay in pixels).
+    dark : (H, W) of the images' dtype, or None
+        Image with all lights off.
+    response : (256,) or (65536,) float32, or None
+        Linear grey level of every code (the camera's inverse response); None for a linear camera.
+    black_level : float
+        Grey level of no light, used where there is no dark frame.
+    saturation : float
+        Grey level at and above which a pixel counts as clipped.
+    full_scale : float
+        Grey level of full scale; thresholds "of 255" scale with it and albedo 1 means it.
+    files : tuple of Path
+        The image files, for messages and reports.
+    folder : Path or None
+        Where the capture was read from.
+    """
+
+    images: PixelArray
+    rig: LightRig
+    mask: BoolArray
+    pixel_pitch_um: float | None = None
+    dark: PixelArray | None = None
+    response: FloatArray | None = None
+    black_level: float = 0.0
+    saturation: float = float("inf")
+    full_scale: float = 255.0
+    files: tuple[Path, ...] = ()
+    folder: Path | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the capture's folder, or "capture"."""
+        return "capture" if self.folder is None else self.folder.resolve().name
+
+
+@dataclass(frozen=True, eq=False)
+class NormalField:
+    """Estimated normals.
+
+    Attributes
+    ----------
+    normals : (H, W, 3) float32
+        Unit normals, x right, y up, z toward the camera, n_z > 0; NaN where invalid.
+    albedo : (H, W) float32
+        Diffuse reflectance times light intensity, 1 = full scale of the camera; NaN where invalid.
+    mask : (H, W) bool
+        True where the normal is valid.
+    confidence : (H, W) float32
+        ``1 / (1 + (s / 5 deg)^2)`` with s the standard error of the direction; 0 where invalid.
+    measured : (H, W) bool
+        False where a normal is a prior fill or invalid.
+    lights_kept : (H, W) uint16
+        Number of lights that entered the pixel's least squares.
+    method : str
+        Estimator that was used.
+    pixel_pitch_um : float or None
+        Size of a pixel on the board.
+    """
+
+    normals: FloatArray
+    albedo: FloatArray
+    mask: BoolArray
+    confidence: FloatArray
+    measured: BoolArray
+    lights_kept: NDArray[np.uint16]
+    method: str
+    pixel_pitch_um: float | None = None
+    kept_sets: BoolArray | None = field(default=None, repr=False)
+
+
+@dataclass(frozen=True)
+class Component:
+    """One connected part of a height map; its mean height is 0, its height against other parts is unknown.
+
+    Attributes
+    ----------
+    pixels : int
+        Number of pixels.
+    first_row, first_col : int
+        Its first pixel in reading order.
+    """
+
+    pixels: int
+    first_row: int
+    first_col: int
+
+
+@dataclass(frozen=True, eq=False)
+class HeightMap:
+    """Integrated heights, zero mean in each connected component.
+
+    Attributes
+    ----------
+    height_px : (H, W) float32
+        Height toward the camera in pixels; NaN outside the mask.
+    mask : (H, W) bool
+        True where there is a height.
+    pixel_pitch_um : float or None
+        Size of a pixel on the board.
+    iterations : int
+        Iterations of the solver.
+    residual : float
+        True residual of the normal equations relative to the right side.
+    components : tuple of Component
+        The connected parts, in reading order.
+    labels : (H, W) int32
+        Index into `components` of each pixel, -1 outside the mask.
+    """
+
+    height_px: FloatArray
+    mask: BoolArray
+    pixel_pitch_um: float | None
+    iterations: int
+    residual: float
+    components: tuple[Component, ...]
+    labels: NDArray[np.int32]
+
+    @classmethod
+    def from_array(cls, height: NDArray[np.floating], *, pixel_pitch_um: float | None = None) -> HeightMap:
+        """Wrap heights that come from elsewhere, as one part.
+
+        Parameters
+        ----------
+        height : (H, W) floating
+            Heights in micrometres when a pixel pitch is given, else in pixels; NaN = invalid.
+        pixel_pitch_um : float, optional
+            Size of a pixel.
+        """
+        height_px = (height / (1.0 if pixel_pitch_um is None else pixel_pitch_um)).astype(np.float32)
+        mask: BoolArray = np.isfinite(height_px)
+        rows, cols = np.nonzero(mask)
+        first = (int(rows[0]), int(cols[0])) if rows.size else (0, 0)
+        return cls(
+            height_px=height_px,
+            mask=mask,
+            pixel_pitch_um=pixel_pitch_um,
+            iterations=0,
+            residual=0.0,
+            components=(Component(int(mask.sum()), *first),),
+            labels=np.where(mask, 0, -1).astype(np.int32),
+        )
+
+    @property
+    def height_um(self) -> FloatArray | None:
+        """(H, W) float32 heights in micrometres, or None when the pixel pitch is unknown."""
+        if self.pixel_pitch_um is None:
+            return None
+        return (self.height_px * self.pixel_pitch_um).astype(np.float32)
+
+    @property
+    def unit(self) -> str:
+        """Unit of :attr:`height`: "um" when the pixel pitch is known, else "px"."""
+        return "px" if self.pixel_pitch_um is None else "um"
+
+    @property
+    def height(self) -> FloatArray:
+        """(H, W) float32 heights in :attr:`unit`."""
+        height_um = self.height_um
+        return self.height_px if height_um is None else height_um
+
+    def summary(self) -> dict[str, Any]:
+        """Return the record's scalars as plain Python values."""
+        height = self.height[self.mask]
+        return {
+            "unit": self.unit,
+            f"height_range_{self.unit}": [float(height.min()), float(height.max())],
+            "pixels": int(self.mask.sum()),
+            "components": len(self.components),
+            "iterations": self.iterations,
+            "residual": self.residual,
+        }

@@ -1,0 +1,311 @@
+//! Image files to a stack, files in parallel.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
+use rayon::prelude::*;
+
+use crate::{Error, Result};
+
+/// How a colour pixel becomes one value; always on linear values, never with a hidden gamma.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Channel {
+    /// Rec. 709 luminance: 0.2126 R + 0.7152 G + 0.0722 B.
+    Luminance,
+    /// (R + G + B) / 3.
+    Mean,
+    /// Red alone.
+    Red,
+    /// Green alone.
+    Green,
+    /// Blue alone.
+    Blue,
+}
+
+impl Channel {
+    /// Weights of red, green and blue.
+    #[must_use]
+    pub fn weights(self) -> [f32; 3] {
+        match self {
+            Self::Luminance => [0.2126, 0.7152, 0.0722],
+            Self::Mean => [1.0 / 3.0; 3],
+            Self::Red => [1.0, 0.0, 0.0],
+            Self::Green => [0.0, 1.0, 0.0],
+            Self::Blue => [0.0, 0.0, 1.0],
+        }
+    }
+}
+
+/// What the colour of a stack needs before it is one value a pixel.
+#[derive(Clone, Debug)]
+pub struct Color<'a> {
+    /// The combination of the channels.
+    pub channel: Channel,
+    /// Inverse response by code, applied to each channel; `None` for a linear camera.
+    pub response: Option<&'a [f32]>,
+    /// Factor of each channel of each image (1 / intensity); `None` for 1.
+    pub gains: Option<&'a [[f32; 3]]>,
+}
+
+impl Color<'_> {
+    /// True when the combined values do not fit the file's own integer type.
+    fn needs_float(&self) -> bool {
+        self.response.is_some() || self.gains.is_some()
+    }
+}
+
+/// Pixels of a stack, image after image.
+#[derive(Clone, Debug)]
+pub enum StackData {
+    /// 8-bit grey levels.
+    U8(Vec<u8>),
+    /// 16-bit grey levels.
+    U16(Vec<u16>),
+    /// Linear values of colour images, in the grey levels of their files.
+    F32(Vec<f32>),
+}
+
+/// A decoded stack and what its files were.
+#[derive(Clone, Debug)]
+pub struct DecodedStack {
+    /// `paths.len() * height * width` values.
+    pub data: StackData,
+    /// Rows of an image.
+    pub height: usize,
+    /// Columns of an image.
+    pub width: usize,
+    /// True when response and gains are in the values already (colour files).
+    pub linear: bool,
+    /// Bits a channel of the files (8, 16 or 32).
+    pub bits: u16,
+}
+
+/// What a header says.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Header {
+    width: u32,
+    height: u32,
+    color: ColorType,
+}
+
+impl Header {
+    fn describe(self) -> String {
+        let bits = self.color.bits_per_pixel() / u16::from(self.color.channel_count());
+        let kind = if self.color.has_color() { "colour" } else { "grey" };
+        format!("{} x {} pixels, {bits} bit {kind}", self.width, self.height)
+    }
+
+    fn bits(self) -> u16 {
+        self.color.bits_per_pixel() / u16::from(self.color.channel_count())
+    }
+
+    fn pixels(self) -> usize {
+        self.width as usize * self.height as usize
+    }
+}
+
+/// Decodes PNG, TIFF, JPEG, BMP and PNM files of equal size and depth to one stack, grey values as they are stored.
+///
+/// # Inputs
+/// `paths` one file an image; `color` for colour files; `max_megapixels` bounds what a header may claim, checked before
+/// anything is allocated.
+///
+/// # Errors
+/// [`Error::Io`], [`Error::Decode`], [`Error::UnsupportedImage`] (float grey, palette oddities: let another library try),
+/// [`Error::ImageTooLarge`], [`Error::StackMismatch`], each naming the file.
+///
+/// # Cost
+/// Grey files are decoded in place: one stack of memory. Colour files pass through one image a thread.
+pub fn decode_stack(paths: &[PathBuf], color: &Color<'_>, max_megapixels: f64) -> Result<DecodedStack> {
+    let Some(first_path) = paths.first() else {
+        return Err(Error::TooFewLights { count: 0 });
+    };
+    let headers = paths.par_iter().map(|path| read_header(path, max_megapixels)).collect::<Result<Vec<_>>>()?;
+    let first = headers[0];
+    for (path, &header) in paths.iter().zip(&headers) {
+        let alike = header.width == first.width
+            && header.height == first.height
+            && header.bits() == first.bits()
+            && header.color.has_color() == first.color.has_color();
+        if !alike {
+            return Err(Error::StackMismatch {
+                path: path.clone(),
+                first: first_path.clone(),
+                expected: first.describe(),
+                actual: header.describe(),
+            });
+        }
+    }
+    let limit = |path: &Path| Reader { path: path.to_path_buf(), max_megapixels };
+    let pixels = first.pixels();
+    let colored = first.color.has_color();
+    let linear = colored && color.needs_float();
+    let data = match (first.bits(), linear || first.bits() == 32) {
+        (8, false) => {
+            let mut data = vec![0u8; pixels * paths.len()];
+            fill(paths, &mut data, pixels, |index, out| limit(&paths[index]).read_u8(out, color.channel))?;
+            StackData::U8(data)
+        }
+        (16, false) => {
+            let mut data = vec![0u16; pixels * paths.len()];
+            fill(paths, &mut data, pixels, |index, out| limit(&paths[index]).read_u16(out, color.channel))?;
+            StackData::U16(data)
+        }
+        _ => {
+            let mut data = vec![0f32; pixels * paths.len()];
+            fill(paths, &mut data, pixels, |index, out| limit(&paths[index]).read_f32(out, color, index))?;
+            StackData::F32(data)
+        }
+    };
+    Ok(DecodedStack { data, height: first.height as usize, width: first.width as usize, linear, bits: first.bits() })
+}
+
+/// Runs `read` on every image's part of `data`, in parallel.
+fn fill<T: Send>(
+    paths: &[PathBuf],
+    data: &mut [T],
+    pixels: usize,
+    read: impl Fn(usize, &mut [T]) -> Result<()> + Sync,
+) -> Result<()> {
+    debug_assert_eq!(data.len(), paths.len() * pixels);
+    data.par_chunks_mut(pixels.max(1)).enumerate().try_for_each(|(index, out)| read(index, out))
+}
+
+pub(super) fn open(path: &Path, max_megapixels: f64) -> Result<impl ImageDecoder + use<>> {
+    let io_error = |source| Error::Io { path: path.to_path_buf(), source };
+    let file = File::open(path).map_err(io_error)?;
+    let mut reader = ImageReader::new(BufReader::new(file)).with_guessed_format().map_err(io_error)?;
+    if reader.format().is_none() {
+        return Err(Error::UnsupportedImage { path: path.to_path_buf(), reason: "unknown file format".to_owned() });
+    }
+    if reader.format() == Some(ImageFormat::Jpeg) && !jpeg_is_whole(&std::fs::read(path).map_err(io_error)?) {
+        let reason = "truncated: the end-of-image marker is missing".to_owned();
+        return Err(Error::Decode { path: path.to_path_buf(), reason });
+    }
+    let mut limits = Limits::default();
+    // 16 bytes a pixel (RGBA f32) is the most a decoder of this crate asks for; the claim itself is checked in `read_header`.
+    // A limit is a positive count of bytes far below 2^63.
+    #[allow(clippy::cast_sign_loss)]
+    let bytes = (max_megapixels * 16e6) as u64;
+    limits.max_alloc = Some(bytes);
+    reader.limits(limits);
+    reader.into_decoder().map_err(|error| translate(path, error))
+}
+
+/// True when an end-of-image marker follows the last start of scan: the decoder fills what a truncated JPEG lacks with grey
+/// and says nothing. (Inside a scan, 0xFF is always followed by 0x00 or a restart marker.)
+fn jpeg_is_whole(bytes: &[u8]) -> bool {
+    let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
+    last([0xFF, 0xDA]).is_some_and(|scan| last([0xFF, 0xD9]).is_some_and(|end| end > scan))
+}
+
+/// Refuses a file whose header claims too many pixels.
+pub(super) fn check_size(path: &Path, max_megapixels: f64) -> Result<()> {
+    read_header(path, max_megapixels).map(|_| ())
+}
+
+fn read_header(path: &Path, max_megapixels: f64) -> Result<Header> {
+    let decoder = open(path, max_megapixels)?;
+    let (width, height) = decoder.dimensions();
+    let megapixels = f64::from(width) * f64::from(height) / 1e6;
+    if megapixels > max_megapixels {
+        let limit_megapixels = max_megapixels;
+        return Err(Error::ImageTooLarge { path: path.to_path_buf(), width, height, megapixels, limit_megapixels });
+    }
+    if width == 0 || height == 0 {
+        return Err(Error::Decode { path: path.to_path_buf(), reason: format!("{width} x {height} pixels") });
+    }
+    Ok(Header { width, height, color: decoder.color_type() })
+}
+
+pub(super) fn translate(path: &Path, error: ImageError) -> Error {
+    let path = path.to_path_buf();
+    match error {
+        ImageError::Unsupported(reason) => Error::UnsupportedImage { path, reason: reason.to_string() },
+        other => Error::Decode { path, reason: other.to_string() },
+    }
+}
+
+/// One file of the stack.
+struct Reader {
+    path: PathBuf,
+    max_megapixels: f64,
+}
+
+impl Reader {
+    fn read_u8(&self, out: &mut [u8], channel: Channel) -> Result<()> {
+        let decoder = open(&self.path, self.max_megapixels)?;
+        if decoder.color_type() == ColorType::L8 {
+            return decoder.read_image(out).map_err(|error| translate(&self.path, error));
+        }
+        let image = self.decode(decoder)?;
+        if image.color().has_color() {
+            let weights = channel.weights();
+            for (out, pixel) in out.iter_mut().zip(image.to_rgb8().pixels()) {
+                *out = weigh(pixel.0.map(f32::from), weights).round() as u8;
+            }
+        } else {
+            out.copy_from_slice(&image.to_luma8());
+        }
+        Ok(())
+    }
+
+    fn read_u16(&self, out: &mut [u16], channel: Channel) -> Result<()> {
+        let decoder = open(&self.path, self.max_megapixels)?;
+        if decoder.color_type() == ColorType::L16 {
+            let bytes = bytemuck::cast_slice_mut(out);
+            return decoder.read_image(bytes).map_err(|error| translate(&self.path, error));
+        }
+        let image = self.decode(decoder)?;
+        if image.color().has_color() {
+            let weights = channel.weights();
+            for (out, pixel) in out.iter_mut().zip(image.to_rgb16().pixels()) {
+                *out = weigh(pixel.0.map(f32::from), weights).round() as u16;
+            }
+        } else {
+            out.copy_from_slice(&image.to_luma16());
+        }
+        Ok(())
+    }
+
+    fn read_f32(&self, out: &mut [f32], color: &Color<'_>, index: usize) -> Result<()> {
+        let image = self.decode(open(&self.path, self.max_megapixels)?)?;
+        let mut weights = color.channel.weights();
+        if let Some(gains) = color.gains {
+            for (weight, gain) in weights.iter_mut().zip(gains[index]) {
+                *weight *= gain;
+            }
+        }
+        let linear = |code: u16| color.response.map_or(f32::from(code), |table| table[usize::from(code)]);
+        match &image {
+            DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
+                for (out, pixel) in out.iter_mut().zip(image.to_rgb32f().pixels()) {
+                    *out = weigh(pixel.0, weights);
+                }
+            }
+            _ if image.color().bits_per_pixel() / u16::from(image.color().channel_count()) == 8 => {
+                for (out, pixel) in out.iter_mut().zip(image.to_rgb8().pixels()) {
+                    *out = weigh(pixel.0.map(|code| linear(u16::from(code))), weights);
+                }
+            }
+            _ => {
+                for (out, pixel) in out.iter_mut().zip(image.to_rgb16().pixels()) {
+                    *out = weigh(pixel.0.map(linear), weights);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn decode(&self, decoder: impl ImageDecoder) -> Result<DynamicImage> {
+        DynamicImage::from_decoder(decoder).map_err(|error| translate(&self.path, error))
+    }
+}
+
+/// The weighted sum of three channels.
+#[inline]
+fn weigh(channels: [f32; 3], weights: [f32; 3]) -> f32 {
+    channels[0] * weights[0] + channels[1] * weights[1] + channels[2] * weights[2]
+}

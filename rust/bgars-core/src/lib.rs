@@ -1,0 +1,23 @@
+//! Photometric stereo for shiny parts: one camera, several lights, one image a light.
+//!
+//! The data flows one way:
+//! [`ImageStack`] + [`Lights`] -> [`normals::estimate`] -> [`integrate::integrate`] -> [`mesh::triangulate`].
+//!
+//! Conventions: image arrays are row-major and indexed `[row, col]`; world axes are x right (+col), **y up (-row)**,
+//! z toward the camera; light directions point from the surface to the light; lengths are pixels unless a name says `_um`.
+
+pub mod error;
+pub mod integrate;
+pub mod io;
+pub mod lights;
+pub mod mesh;
+pub mod normals;
+pub mod pixel;
+pub mod radiometry;
+pub mod stack;
+
+pub use error::{Error, Result};
+pub use lights::Lights;
+pub use pixel::Pixel;
+pub use radiometry::Radiometry;
+pub use stack::ImageStack;

@@ -1,0 +1,46 @@
+//! Normals from a light stack: choose the lights of each pixel, then least squares on them.
+//!
+//! For the kept lights K of a pixel, `rho n = (L_K^T L_K)^-1 L_K^T I_K` (Woodham 1980). The methods differ in K only:
+//! all lights ([`Method::Lambertian`]), the sorted-gap filter ([`Method::SpecularFilter`]), or the one-sided consensus of
+//! [`Method::RobustFilter`].
+
+mod confidence;
+mod kernel;
+mod robust;
+mod solve;
+mod specular;
+
+pub use kernel::estimate;
+pub use robust::{RobustParams, robust_filter};
+pub use specular::specular_filter;
+
+/// Which lights of a pixel enter its least squares.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Method {
+    /// All of them.
+    Lambertian,
+    /// The published sorted-gap filter; see [`specular_filter`].
+    SpecularFilter {
+        /// Gap in grey levels of 255 over which the rest of the sorted values is dropped.
+        threshold: f32,
+    },
+    /// One-sided consensus; see [`robust_filter`].
+    RobustFilter(RobustParams),
+}
+
+/// What [`estimate`] found; every array is row-major over `height * width` pixels.
+#[derive(Clone, Debug, Default)]
+pub struct NormalMap {
+    /// Unit normals, 3 values a pixel, `n_z > 0`; NaN where `mask` is false.
+    pub normals: Vec<f32>,
+    /// Length of the least-squares solution over full scale; NaN where `mask` is false.
+    pub albedo: Vec<f32>,
+    /// True where the pixel was asked for and has a solution.
+    pub mask: Vec<bool>,
+    /// Trust in (0, 1]: `1 / (1 + (s / 5 deg)^2)` with `s` the standard error of the direction; 0 where `mask` is false.
+    pub confidence: Vec<f32>,
+    /// Number of lights kept; 0 for a pixel that was not asked for.
+    pub lights_kept: Vec<u16>,
+    /// The kept lights themselves, `lights` values a pixel; empty unless asked for.
+    pub kept_sets: Vec<bool>,
+}

@@ -1,0 +1,133 @@
+//! From grey levels to values proportional to light: response, dark frame, black level, light intensity.
+
+use crate::{Error, ImageStack, Pixel, Result};
+
+/// How a grey level becomes a radiance, applied pixel by pixel inside the kernels, so that no float copy of a stack is made.
+///
+/// value = (response(code) - response(dark code or black level)) / intensity
+#[derive(Clone, Debug)]
+pub struct Radiometry<'a, P> {
+    /// Inverse response by code (`P::CODES` entries, in grey levels); `None` for a linear camera.
+    pub response: Option<&'a [f32]>,
+    /// Dark frame, `height * width` grey levels, lights off.
+    pub dark: Option<&'a [P]>,
+    /// Grey level of no light (before the response is inverted), where there is no dark frame.
+    pub black_level: f32,
+    /// Grey level at and above which a pixel counts as clipped; infinity when nothing clips.
+    pub saturation: f32,
+    /// Grey level of full scale: thresholds given "of 255" scale with it, albedo 1 is this level.
+    pub full_scale: f32,
+    /// Relative intensity of each light; one entry a light.
+    pub intensities: Vec<f64>,
+}
+
+impl<P: Pixel> Radiometry<'_, P> {
+    /// A linear camera without offset and lights of equal intensity 1.
+    #[must_use]
+    pub fn linear(lights: usize, full_scale: f32) -> Self {
+        Self {
+            response: None,
+            dark: None,
+            black_level: 0.0,
+            saturation: full_scale,
+            full_scale,
+            intensities: vec![1.0; lights],
+        }
+    }
+
+    /// Checks every field against the stack it is to serve.
+    ///
+    /// # Errors
+    /// Names the field and the value that break a rule.
+    pub fn check(&self, stack: &ImageStack<'_, P>) -> Result<()> {
+        if let Some(response) = self.response {
+            let expected = P::CODES.unwrap_or(0);
+            if response.len() != expected {
+                return Err(Error::LengthMismatch { argument: "response", expected, actual: response.len() });
+            }
+        }
+        if let Some(dark) = self.dark
+            && dark.len() != stack.pixels()
+        {
+            return Err(Error::LengthMismatch { argument: "dark", expected: stack.pixels(), actual: dark.len() });
+        }
+        if self.intensities.len() != stack.lights() {
+            return Err(Error::LengthMismatch {
+                argument: "light_intensities",
+                expected: stack.lights(),
+                actual: self.intensities.len(),
+            });
+        }
+        for (index, &value) in self.intensities.iter().enumerate() {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(Error::BadIntensity { index, value });
+            }
+        }
+        if !(self.full_scale.is_finite() && self.full_scale > 0.0) {
+            return Err(Error::OutOfRange {
+                argument: "full_scale",
+                rule: "finite and above 0",
+                value: f64::from(self.full_scale),
+            });
+        }
+        if !(self.black_level.is_finite() && self.black_level >= 0.0 && self.black_level < self.full_scale) {
+            return Err(Error::OutOfRange {
+                argument: "black_level",
+                rule: "at least 0 and below full scale",
+                value: f64::from(self.black_level),
+            });
+        }
+        if self.saturation.is_nan() || self.saturation <= self.black_level {
+            return Err(Error::OutOfRange {
+                argument: "saturation",
+                rule: "above the black level",
+                value: f64::from(self.saturation),
+            });
+        }
+        Ok(())
+    }
+
+    /// Linear grey levels of one code, the offset still in.
+    #[inline]
+    pub(crate) fn linearise(&self, code: P) -> f32 {
+        match self.response {
+            Some(table) => table[code.code()],
+            None => code.to_f32(),
+        }
+    }
+
+    /// Linear grey levels that mean "no light" at a pixel.
+    #[inline]
+    pub(crate) fn offset(&self, pixel: usize) -> f32 {
+        match (self.dark, self.response) {
+            (Some(dark), _) => self.linearise(dark[pixel]),
+            (None, None) => self.black_level,
+            (None, Some(table)) => interpolate(table, self.black_level),
+        }
+    }
+}
+
+/// The response table at a grey level between two codes.
+fn interpolate(table: &[f32], level: f32) -> f32 {
+    let last = table.len() - 1;
+    let position = level.clamp(0.0, last as f32);
+    // Clamped to [0, last] just above, so the sign is never lost.
+    #[allow(clippy::cast_sign_loss)]
+    let below = (position as usize).min(last.saturating_sub(1));
+    let fraction = position - below as f32;
+    table[below] + fraction * (table[(below + 1).min(last)] - table[below])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn black_level_between_two_codes_is_interpolated() {
+        let table: Vec<f32> = (0..256).map(|code| (code * code) as f32).collect();
+        let mut radiometry = Radiometry::<u8>::linear(3, 255.0);
+        radiometry.response = Some(&table);
+        radiometry.black_level = 2.5;
+        approx::assert_relative_eq!(radiometry.offset(0), 6.5);
+    }
+}

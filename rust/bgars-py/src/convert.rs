@@ -1,0 +1,60 @@
+//! The only file that knows numpy: arrays to slices without a copy, vectors to arrays without a copy.
+
+use numpy::{
+    Element, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
+};
+use pyo3::prelude::*;
+
+use crate::errors::InputError;
+
+/// A light stack of one of the accepted dtypes, shape (L, H, W).
+#[derive(FromPyObject)]
+pub enum Stack<'py> {
+    #[pyo3(transparent)]
+    U8(PyReadonlyArray3<'py, u8>),
+    #[pyo3(transparent)]
+    U16(PyReadonlyArray3<'py, u16>),
+    #[pyo3(transparent)]
+    F32(PyReadonlyArray3<'py, f32>),
+}
+
+/// The elements of a C-contiguous array; the Python side has made it contiguous.
+pub fn slice2<'a, T: Element>(array: &'a PyReadonlyArray2<'_, T>, name: &str) -> PyResult<&'a [T]> {
+    array.as_slice().map_err(|_| InputError::new_err(format!("{name}: must be C-contiguous")))
+}
+
+/// The same for three dimensions.
+pub fn slice3<'a, T: Element>(array: &'a PyReadonlyArray3<'_, T>, name: &str) -> PyResult<&'a [T]> {
+    array.as_slice().map_err(|_| InputError::new_err(format!("{name}: must be C-contiguous")))
+}
+
+/// Rows of three, shape (N, 3).
+pub fn triples<'a, T: Element + bytemuck::Pod>(
+    array: &'a PyReadonlyArray2<'_, T>,
+    name: &str,
+) -> PyResult<&'a [[T; 3]]> {
+    if array.shape()[1] != 3 {
+        let shape = array.shape();
+        return Err(InputError::new_err(format!("{name}: must have shape (N, 3), got ({}, {})", shape[0], shape[1])));
+    }
+    Ok(bytemuck::cast_slice(slice2(array, name)?))
+}
+
+/// An array of shape (H, W).
+pub fn array2<T: Element>(py: Python<'_>, data: Vec<T>, shape: [usize; 2]) -> PyResult<Bound<'_, PyArray2<T>>> {
+    PyArray1::from_vec(py, data).reshape(shape)
+}
+
+/// An array of shape (A, B, C).
+pub fn array3<T: Element>(py: Python<'_>, data: Vec<T>, shape: [usize; 3]) -> PyResult<Bound<'_, PyArray3<T>>> {
+    PyArray1::from_vec(py, data).reshape(shape)
+}
+
+/// An array of shape (N, 3) from rows of three.
+pub fn array_of_triples<T: Element + bytemuck::Pod>(
+    py: Python<'_>,
+    data: Vec<[T; 3]>,
+) -> PyResult<Bound<'_, PyArray2<T>>> {
+    let rows = data.len();
+    array2(py, bytemuck::cast_vec(data.into_iter().flatten().collect()), [rows, 3])
+}

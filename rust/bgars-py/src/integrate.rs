@@ -1,0 +1,53 @@
+//! `integrate_normals`.
+
+use bgars_core::integrate::{Difference, Params, integrate};
+use numpy::{PyArray2, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+
+use crate::convert::{array2, slice2, slice3};
+use crate::errors::InputError;
+use crate::progress::Reporter;
+
+/// height, labels, components (pixels, first row, first column), iterations, residual.
+type Result5<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<i32>>, Vec<(usize, usize, usize)>, usize, f64);
+
+#[pyfunction]
+#[pyo3(signature = (normals, mask, weights, *, difference, relative_tolerance, absolute_tolerance, max_iters, progress))]
+#[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)]
+pub fn integrate_normals<'py>(
+    py: Python<'py>,
+    normals: PyReadonlyArray3<'py, f32>,
+    mask: PyReadonlyArray2<'py, bool>,
+    weights: Option<PyReadonlyArray2<'py, f32>>,
+    difference: &str,
+    relative_tolerance: f64,
+    absolute_tolerance: f64,
+    max_iters: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Result5<'py>> {
+    let difference = match difference {
+        "trapezoid" => Difference::Trapezoid,
+        "forward" => Difference::Forward,
+        _ => return Err(InputError::new_err(format!("difference: unknown scheme {difference:?}"))),
+    };
+    let params = Params { difference, relative_tolerance, absolute_tolerance, max_iters };
+    let shape = [mask.shape()[0], mask.shape()[1]];
+    let normals = slice3(&normals, "normals")?;
+    let mask = slice2(&mask, "mask")?;
+    let weights = weights.as_ref().map(|weights| slice2(weights, "weights")).transpose()?;
+    let mut reporter = Reporter::new(progress);
+    let outcome = py.detach(|| {
+        integrate(normals, mask, shape[1], weights, &params, &mut |state| {
+            reporter.tick((state.iteration, state.residual))
+        })
+    });
+    let surface = reporter.resolve(outcome)?;
+    let components = surface.components.iter().map(|part| (part.pixels, part.first_row, part.first_col)).collect();
+    Ok((
+        array2(py, surface.height_px, shape)?,
+        array2(py, surface.labels, shape)?,
+        components,
+        surface.iterations,
+        surface.residual,
+    ))
+}

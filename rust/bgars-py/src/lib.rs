@@ -1,0 +1,33 @@
+//! The compiled half of the Python package `bgars`: a list of functions. Every one of them releases the GIL once, around
+//! the whole of its work; `python/bgars/_bgars.pyi` documents them.
+
+mod convert;
+mod errors;
+mod files;
+mod integrate;
+mod mesh;
+mod normals;
+mod progress;
+
+#[pyo3::pymodule]
+mod _bgars {
+    #[pymodule_export]
+    use crate::files::decode_stack;
+    #[pymodule_export]
+    use crate::files::read_rgb16;
+    #[pymodule_export]
+    use crate::files::write_obj;
+    #[pymodule_export]
+    use crate::files::write_ply;
+    #[pymodule_export]
+    use crate::files::write_png16;
+    #[pymodule_export]
+    use crate::integrate::integrate_normals;
+    #[pymodule_export]
+    use crate::mesh::triangulate;
+    #[pymodule_export]
+    use crate::normals::estimate_normals;
+
+    #[pymodule_export]
+    const DEBUG_BUILD: bool = cfg!(debug_assertions);
+}

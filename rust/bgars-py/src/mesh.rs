@@ -1,0 +1,26 @@
+//! `triangulate`.
+
+use bgars_core::mesh;
+use numpy::{PyArray1, PyArray2, PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+
+use crate::convert::{array_of_triples, slice2};
+use crate::errors::to_python;
+
+/// vertices (N, 3), faces (M, 3), pixel of each vertex (N,).
+type Arrays<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u32>>, Bound<'py, PyArray1<u32>>);
+
+#[pyfunction]
+#[allow(clippy::needless_pass_by_value)]
+pub fn triangulate<'py>(
+    py: Python<'py>,
+    height_px: PyReadonlyArray2<'py, f32>,
+    mask: PyReadonlyArray2<'py, bool>,
+    pitch: f64,
+) -> PyResult<Arrays<'py>> {
+    let width = mask.shape()[1];
+    let height_px = slice2(&height_px, "height_px")?;
+    let mask = slice2(&mask, "mask")?;
+    let mesh = py.detach(|| mesh::triangulate(height_px, mask, width, pitch)).map_err(to_python)?;
+    Ok((array_of_triples(py, mesh.vertices)?, array_of_triples(py, mesh.faces)?, PyArray1::from_vec(py, mesh.pixels)))
+}

@@ -1,0 +1,286 @@
+//! Normal estimation against a slow plain twin: pseudo-inverse by SVD, selection spelled out.
+
+use std::ops::ControlFlow;
+
+use bgars_core::normals::{Method, NormalMap, RobustParams, estimate, robust_filter};
+use bgars_core::{Error, ImageStack, Lights, Pixel, Radiometry};
+use nalgebra::{DMatrix, DVector};
+use proptest::prelude::*;
+
+/// Unit vectors on a ring, tilted a little from light to light so that no two subsets are alike.
+fn ring(count: usize, elevation_deg: f64) -> Vec<[f64; 3]> {
+    (0..count)
+        .map(|light| {
+            let azimuth = 2.0 * std::f64::consts::PI * light as f64 / count as f64;
+            let elevation = (elevation_deg + 7.0 * ((light * light) % 3) as f64).to_radians();
+            [elevation.cos() * azimuth.cos(), elevation.cos() * azimuth.sin(), elevation.sin()]
+        })
+        .collect()
+}
+
+fn run<P: Pixel>(images: &[P], lights: &Lights, mask: Option<&[bool]>, method: Method, full_scale: f32) -> NormalMap {
+    let width = images.len() / lights.len();
+    let stack = ImageStack::new(images, lights.len(), 1, width).unwrap();
+    let radiometry = Radiometry::linear(lights.len(), full_scale);
+    estimate(&stack, lights, &radiometry, mask, method, true, &mut |_| ControlFlow::Continue(())).unwrap()
+}
+
+/// The published filter, word for word: sort, walk up from the third value, cut at the first gap over the threshold.
+fn slow_specular_filter(values: &[f32], gap: f32) -> Vec<bool> {
+    let mut ranked: Vec<(f32, usize)> = values.iter().copied().zip(0..).collect();
+    ranked.sort_by(|a, b| a.0.partial_cmp(&b.0).unwrap().then(a.1.cmp(&b.1)));
+    let mut count = ranked.len();
+    for rank in 3..ranked.len() {
+        if ranked[rank].0 - ranked[rank - 1].0 > gap {
+            count = rank;
+            break;
+        }
+    }
+    let mut kept = vec![false; values.len()];
+    for &(_, light) in &ranked[..count] {
+        kept[light] = true;
+    }
+    kept
+}
+
+/// Least squares by SVD; `None` where the kept lights do not fix a normal, or it faces away.
+fn slow_solve(values: &[f32], directions: &[[f64; 3]], kept: &[bool]) -> Option<(DVector<f64>, f64)> {
+    let rows: Vec<usize> = (0..values.len()).filter(|&light| kept[light]).collect();
+    let lights = DMatrix::from_fn(rows.len(), 3, |row, col| directions[rows[row]][col]);
+    let right = DVector::from_fn(rows.len(), |row, _| f64::from(values[rows[row]]));
+    let svd = lights.svd(true, true);
+    if rows.len() < 3 || svd.singular_values[2] < 1e-2 * svd.singular_values[0] {
+        return None;
+    }
+    let solution = svd.solve(&right, 1e-12).unwrap();
+    let albedo = solution.norm();
+    if albedo > 0.0 && solution[2] > 0.0 { Some((solution / albedo, albedo)) } else { None }
+}
+
+fn slow_kept(method: Method, values: &[f32], directions: &[[f64; 3]], full_scale: f32) -> Vec<bool> {
+    match method {
+        Method::Lambertian => vec![true; values.len()],
+        Method::SpecularFilter { threshold } => slow_specular_filter(values, threshold * full_scale / 255.0),
+        Method::RobustFilter(params) => {
+            let clipped: Vec<bool> = values.iter().map(|&value| value >= full_scale).collect();
+            robust_filter(values, &clipped, directions, full_scale, params)
+        }
+    }
+}
+
+fn compare<P: Pixel>(images: &[P], directions: &[[f64; 3]], mask: &[bool], method: Method, full_scale: f32) {
+    let lights = Lights::directional(directions).unwrap();
+    let map = run(images, &lights, Some(mask), method, full_scale);
+    let pixels = mask.len();
+    for pixel in 0..pixels {
+        if !mask[pixel] {
+            assert!(!map.mask[pixel] && map.normals[pixel * 3].is_nan() && map.lights_kept[pixel] == 0);
+            continue;
+        }
+        let values: Vec<f32> = (0..lights.len()).map(|light| images[light * pixels + pixel].to_f32()).collect();
+        let kept = slow_kept(method, &values, directions, full_scale);
+        assert_eq!(&map.kept_sets[pixel * lights.len()..(pixel + 1) * lights.len()], kept, "kept set of {values:?}");
+        assert_eq!(usize::from(map.lights_kept[pixel]), kept.iter().filter(|&&kept| kept).count());
+        match slow_solve(&values, directions, &kept) {
+            Some((normal, albedo)) => {
+                let fast = DVector::from_fn(3, |axis, _| f64::from(map.normals[pixel * 3 + axis]));
+                if !map.mask[pixel] {
+                    // A normal seen exactly edge-on may fall to either side in rounding.
+                    assert!(normal[2] < 1e-6, "no normal, expected {normal}");
+                    continue;
+                }
+                let angle_deg = (&fast - &normal).norm().to_degrees();
+                assert!(angle_deg < 1e-3, "{angle_deg} deg between {fast} and {normal}");
+                let expected = (albedo / f64::from(full_scale)) as f32;
+                approx::assert_relative_eq!(map.albedo[pixel], expected, max_relative = 1e-4);
+                assert!(map.confidence[pixel] > 0.0 && map.confidence[pixel] <= 1.0);
+            }
+            None => assert!(!map.mask[pixel] || map.normals[pixel * 3 + 2] < 1e-6),
+        }
+    }
+}
+
+const METHODS: [Method; 3] =
+    [Method::Lambertian, Method::SpecularFilter { threshold: 50.0 }, Method::RobustFilter(RobustParams::DEFAULT)];
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+
+    #[test]
+    fn u8_stacks_equal_the_twin(
+        (count, values, mask) in (3usize..=16).prop_flat_map(|count| (
+            Just(count), prop::collection::vec(any::<u8>(), count * 6), prop::collection::vec(any::<bool>(), 6),
+        )),
+        elevation_deg in 20.0..60.0,
+    ) {
+        prop_assume!(mask.contains(&true));
+        for method in METHODS {
+            compare(&values, &ring(count, elevation_deg), &mask, method, 255.0);
+        }
+    }
+
+    #[test]
+    fn u16_stacks_equal_the_twin(
+        (count, values) in (3usize..=16).prop_flat_map(|count| (
+            Just(count), prop::collection::vec(any::<u16>(), count * 6),
+        )),
+        elevation_deg in 20.0..60.0,
+    ) {
+        for method in METHODS {
+            compare(&values, &ring(count, elevation_deg), &[true; 6], method, 65535.0);
+        }
+    }
+
+    #[test]
+    fn f32_stacks_equal_the_twin(
+        (count, values) in (3usize..=16).prop_flat_map(|count| (
+            Just(count), prop::collection::vec(0.0f32..1.0, count * 6),
+        )),
+        elevation_deg in 20.0..60.0,
+    ) {
+        for method in METHODS {
+            compare(&values, &ring(count, elevation_deg), &[true; 6], method, 1.0);
+        }
+    }
+
+    #[test]
+    fn a_lambertian_pixel_gives_its_normal_back_by_every_method(
+        count in 4usize..=16, x in -0.4f64..0.4, y in -0.4f64..0.4, albedo in 0.2f64..0.9,
+    ) {
+        let normal = nalgebra::Vector3::new(x, y, 1.0).normalize();
+        let directions = ring(count, 45.0);
+        let values: Vec<f32> =
+            directions.iter().map(|&light| (albedo * nalgebra::Vector3::from(light).dot(&normal)) as f32).collect();
+        prop_assume!(values.iter().all(|&value| value > 0.05));
+        let lights = Lights::directional(&directions).unwrap();
+        for method in [Method::Lambertian, Method::RobustFilter(RobustParams::DEFAULT)] {
+            let map = run(&values, &lights, None, method, 1.0);
+            let found = nalgebra::Vector3::new(map.normals[0], map.normals[1], map.normals[2]).cast::<f64>();
+            prop_assert!((found - normal).norm().to_degrees() < 1e-3, "{method:?}: {found} is not {normal}");
+        }
+    }
+}
+
+#[test]
+fn the_bits_are_the_same_for_one_and_two_threads() {
+    let (count, height, width) = (8, 61, 97);
+    let images: Vec<u8> = (0..count * height * width).map(|index| (index * 2_654_435_761 >> 13) as u8).collect();
+    let lights = Lights::directional(&ring(count, 40.0)).unwrap();
+    let stack = ImageStack::new(&images, count, height, width).unwrap();
+    let on_threads = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let radiometry = Radiometry::linear(count, 255.0);
+        let method = Method::RobustFilter(RobustParams::DEFAULT);
+        let map = pool.install(|| {
+            estimate(&stack, &lights, &radiometry, None, method, true, &mut |_| ControlFlow::Continue(())).unwrap()
+        });
+        let bits: Vec<u32> = map.normals.iter().chain(&map.confidence).map(|value| value.to_bits()).collect();
+        (bits, map.kept_sets)
+    };
+    assert_eq!(on_threads(1), on_threads(2));
+}
+
+#[test]
+fn near_lights_give_back_the_normal_of_a_board_point_off_the_centre() {
+    let positions: Vec<[f64; 3]> = ring(8, 45.0).iter().map(|direction| direction.map(|v| v * 300.0)).collect();
+    let reference: Vec<f64> = vec![300.0; 8];
+    let lights = Lights::near(&positions, &reference).unwrap();
+    let (height, width) = (40, 60);
+    let normal = nalgebra::Vector3::new(0.1, -0.2, 1.0).normalize();
+    let mut images = vec![0f32; 8 * height * width];
+    for light in 0..8 {
+        for row in 0..height {
+            for col in 0..width {
+                let x = col as f64 + 0.5 - width as f64 / 2.0;
+                let y = height as f64 / 2.0 - row as f64 - 0.5;
+                let to_light = nalgebra::Vector3::from(positions[light]) - nalgebra::Vector3::new(x, y, 0.0);
+                let irradiance = (300.0 / to_light.norm()).powi(2) * to_light.normalize().dot(&normal);
+                images[light * height * width + row * width + col] = irradiance as f32;
+            }
+        }
+    }
+    let stack = ImageStack::new(&images, 8, height, width).unwrap();
+    for method in [Method::Lambertian, Method::RobustFilter(RobustParams::DEFAULT)] {
+        let radiometry = Radiometry { saturation: f32::INFINITY, ..Radiometry::linear(8, 1.0) };
+        let map =
+            estimate(&stack, &lights, &radiometry, None, method, false, &mut |_| ControlFlow::Continue(())).unwrap();
+        for pixel in map.normals.chunks(3) {
+            let found = nalgebra::Vector3::new(pixel[0], pixel[1], pixel[2]).cast::<f64>();
+            assert!((found - normal).norm().to_degrees() < 1e-3, "{found}");
+        }
+    }
+}
+
+#[test]
+fn dark_frame_response_and_intensities_are_undone() {
+    let directions = ring(6, 45.0);
+    let lights = Lights::directional(&directions).unwrap();
+    let normal = nalgebra::Vector3::new(0.2, 0.1, 1.0).normalize();
+    let intensities = vec![1.0, 0.8, 1.2, 0.9, 1.1, 0.7];
+    // The camera squares nothing: it takes the root, so the table squares the code again.
+    let response: Vec<f32> = (0..65536u32).map(|code| (f64::from(code).powi(2) / 65535.0) as f32).collect();
+    let encode = |linear: f64| (linear * 65535.0).sqrt().round() as u16;
+    let dark_level = 900.0;
+    let images: Vec<u16> = directions
+        .iter()
+        .zip(&intensities)
+        .map(|(&light, e)| encode(dark_level + 30_000.0 * e * nalgebra::Vector3::from(light).dot(&normal)))
+        .collect();
+    let dark = [encode(dark_level)];
+    let stack = ImageStack::new(&images, 6, 1, 1).unwrap();
+    let radiometry =
+        Radiometry { response: Some(&response), dark: Some(&dark), intensities, ..Radiometry::linear(6, 65535.0) };
+    let map =
+        estimate(&stack, &lights, &radiometry, None, Method::Lambertian, false, &mut |_| ControlFlow::Continue(()))
+            .unwrap();
+    let found = nalgebra::Vector3::new(map.normals[0], map.normals[1], map.normals[2]).cast::<f64>();
+    assert!((found - normal).norm().to_degrees() < 0.01, "{found}");
+    approx::assert_relative_eq!(map.albedo[0], 30_000.0 / 65535.0, max_relative = 1e-3);
+}
+
+#[test]
+fn a_black_pixel_and_a_coplanar_kept_set_have_no_normal() {
+    let s = 0.5f64.sqrt();
+    // Lights 0, 1, 2 are coplanar; the filter keeps just these when 3 and 4 are highlights.
+    let lights = Lights::directional(&[[s, 0.0, s], [0.0, 0.0, 1.0], [-s, 0.0, s], [0.0, s, s], [0.0, -s, s]]).unwrap();
+    let images: [u8; 10] = [0, 10, 0, 12, 0, 11, 0, 200, 0, 201];
+    let map = run(&images, &lights, None, Method::SpecularFilter { threshold: 50.0 }, 255.0);
+    assert_eq!(map.mask, [false, false]);
+    assert!(map.normals.iter().all(|value| value.is_nan()));
+    assert_eq!(map.lights_kept, [5, 3]);
+}
+
+#[test]
+fn bad_input_is_named() {
+    let lights = Lights::directional(&ring(4, 45.0)).unwrap();
+    let proceed = &mut |_| ControlFlow::Continue(());
+    let images = [0f32; 8];
+    let radiometry = Radiometry::linear(4, 1.0);
+    let stack = ImageStack::new(&images, 4, 1, 2).unwrap();
+    let method = Method::Lambertian;
+
+    let three = ImageStack::new(&images[..6], 3, 1, 2).unwrap();
+    let error = estimate(&three, &lights, &radiometry, None, method, false, proceed).unwrap_err();
+    assert!(matches!(error, Error::LightCountMismatch { images: 3, lights: 4 }), "{error}");
+
+    let error = estimate(&stack, &lights, &radiometry, Some(&[false; 2]), method, false, proceed).unwrap_err();
+    assert!(matches!(error, Error::EmptyMask), "{error}");
+
+    let error = estimate(&stack, &lights, &radiometry, Some(&[true; 3]), method, false, proceed).unwrap_err();
+    assert!(matches!(error, Error::LengthMismatch { argument: "mask", expected: 2, actual: 3 }), "{error}");
+
+    let mut with_nan = images;
+    with_nan[5] = f32::NAN;
+    let bad = ImageStack::new(&with_nan, 4, 1, 2).unwrap();
+    let error = estimate(&bad, &lights, &radiometry, None, method, false, proceed).unwrap_err();
+    assert!(matches!(error, Error::NonFinitePixel { image: 2, row: 0, col: 1, count: 1 }), "{error}");
+    let masked = estimate(&bad, &lights, &radiometry, Some(&[true, false]), method, false, proceed);
+    assert!(masked.is_ok(), "NaN outside the mask does no harm");
+
+    let error =
+        estimate(&stack, &lights, &radiometry, None, Method::SpecularFilter { threshold: -1.0 }, false, proceed);
+    assert!(matches!(error.unwrap_err(), Error::OutOfRange { argument: "threshold", .. }));
+
+    let stopped = estimate(&stack, &lights, &radiometry, None, method, false, &mut |_| ControlFlow::Break(()));
+    assert!(matches!(stopped.unwrap_err(), Error::Cancelled));
+}

@@ -1,0 +1,157 @@
+"""The command line: results, words, exit codes."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tifffile
+import trimesh
+
+import bgars
+
+
+def bgars_command(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "bgars", *map(str, arguments)], capture_output=True, text=True, check=False, cwd=cwd
+    )
+
+
+def test_demo_writes_everything_and_says_what_to_open(tmp_path: Path) -> None:
+    run = bgars_command("demo", cwd=tmp_path)
+    assert run.returncode == 0, run.stderr
+    assert run.stderr == "", "quiet in pipes"
+    for name in ("overview.png", "mesh.ply", "normals.png", "height.tif", "height.npy", "summary.json"):
+        assert (tmp_path / "bgars-demo" / name).stat().st_size > 0
+        assert f"bgars-demo/{name}" in run.stdout
+    assert [path.name for path in tmp_path.iterdir()] == ["bgars-demo"], "no temporary folder is left"
+
+
+@pytest.mark.parametrize("mesh_format", ["ply", "obj", "stl", "glb"])
+def test_reconstruct(tmp_path: Path, mesh_format: str) -> None:
+    out = tmp_path / "out"
+    run = bgars_command("reconstruct", bgars.sample_capture(), "-o", out, "--mesh-format", mesh_format, "--json")
+    assert run.returncode == 0, run.stderr
+    summary = json.loads(run.stdout)
+    assert summary == json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert summary["height"]["unit"] == "um"
+    assert set(summary["files"]) == {path.name for path in out.iterdir()}
+    assert len(trimesh.load_mesh(out / f"mesh.{mesh_format}").faces) == summary["mesh"]["faces"]
+    np.testing.assert_array_equal(np.load(out / "height.npy"), tifffile.imread(out / "height.tif"))
+
+
+def test_reconstruct_keeps_foreign_files_of_the_output_folder(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
+    assert bgars_command("reconstruct", bgars.sample_capture(), "-o", tmp_path).returncode == 0
+    assert (tmp_path / "notes.txt").read_text(encoding="utf-8") == "mine"
+
+
+def test_normals_then_mesh(tmp_path: Path) -> None:
+    run = bgars_command("normals", bgars.sample_capture(), "-o", tmp_path / "n", "--json")
+    assert run.returncode == 0, run.stderr
+    assert json.loads(run.stdout)["method"] == "robust-filter"
+    mesh = tmp_path / "part.ply"
+    run = bgars_command("mesh", tmp_path / "n" / "normals.png", "-o", mesh, "--pixel-pitch-um", 3.4, "--json")
+    assert run.returncode == 0, run.stderr
+    facts = json.loads(run.stdout)
+    assert facts["unit"] == "um"
+    assert len(trimesh.load_mesh(mesh).vertices) == facts["vertices"]
+
+
+def test_height_map_to_mesh_keeps_its_scale(tmp_path: Path) -> None:
+    height = bgars.integrate_normals(np.tile(np.float32([-0.6, 0, 0.8]), (5, 9, 1)), pixel_pitch_um=10.0)
+    bgars.write_height(height, tmp_path / "h.tif")
+    run = bgars_command("mesh", tmp_path / "h.tif", "-o", tmp_path / "h.obj")
+    assert run.returncode == 0, run.stderr
+    size = np.ptp(trimesh.load_mesh(tmp_path / "h.obj").vertices, axis=0)
+    np.testing.assert_allclose(size, [80.0, 40.0, 60.0], rtol=1e-4)
+
+
+def test_info(tmp_path: Path) -> None:
+    run = bgars_command("info", bgars.sample_capture())
+    assert run.returncode == 0, run.stderr
+    for words in ("8 of 256 x 240 pixels, uint8", "3.4 um a pixel", "light_07.png", "45.0"):
+        assert words in run.stdout
+    facts = json.loads(bgars_command("info", bgars.sample_capture(), "--json").stdout)
+    assert facts["lights"][2]["azimuth_deg"] == pytest.approx(90.0)
+    assert 0 < facts["lights"][0]["clipped_fraction"] < 0.2
+    assert bgars_command("info", tmp_path).returncode == 2
+
+
+def test_evaluate_on_the_sample() -> None:
+    run = bgars_command("evaluate", bgars.sample_capture(), "--json")
+    assert run.returncode == 0, run.stderr
+    results = {result["method"]: result for result in json.loads(run.stdout)["results"]}
+    assert results["lambertian"]["normals"]["mean_deg"] == pytest.approx(9.34, abs=0.05)
+    assert results["specular-filter"]["normals"]["mean_deg"] == pytest.approx(6.76, abs=0.05)
+    assert results["robust-filter"]["normals"]["mean_deg"] <= 1.35
+    assert results["robust-filter"]["ball_height_rmse_um"] < results["lambertian"]["ball_height_rmse_um"]
+
+
+@pytest.mark.parametrize("command", ["", "demo", "reconstruct", "normals", "mesh", "info", "evaluate"])
+def test_every_command_has_help(command: str) -> None:
+    run = bgars_command(*command.split(), "--help")
+    assert run.returncode == 0
+    assert "Usage" in run.stdout
+    assert len(run.stdout) > 300
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["reconstruct"], "FOLDER"),
+        (["reconstruct", "nowhere", "-o", "out"], "nowhere: no such folder"),
+        (["reconstruct", "nowhere", "-o", "out", "--method", "magic"], "magic"),
+        (["mesh", "nowhere.tif", "-o", "out.ply"], "nowhere.tif"),
+        (["evaluate", "nowhere"], "nowhere"),
+        (["nonsense"], "nonsense"),
+    ],
+)
+def test_wrong_use_is_exit_code_2(tmp_path: Path, arguments: list[str], words: str) -> None:
+    run = bgars_command(*arguments, cwd=tmp_path)
+    assert run.returncode == 2, run.stdout
+    assert words in run.stderr
+    assert "Traceback" not in run.stderr
+    assert list(tmp_path.iterdir()) == [], "nothing is left behind"
+
+
+def test_an_output_that_cannot_be_written_fails_before_the_work(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("mine", encoding="utf-8")
+    run = bgars_command("reconstruct", bgars.sample_capture(), "-o", tmp_path / "file")
+    assert run.returncode == 2
+    assert "is a file, not a folder" in run.stderr
+    assert (tmp_path / "file").read_text(encoding="utf-8") == "mine"
+
+
+def test_without_truth_evaluate_says_what_it_expected(capture_folder: Path) -> None:
+    run = bgars_command("evaluate", capture_folder)
+    assert run.returncode == 2
+    assert "gt.npz" in run.stderr
+
+
+SOLVE_FOR_LONG = """
+import numpy as np, bgars
+normals = np.random.default_rng(0).normal([0, 0, 2], 0.5, (2000, 2000, 3)).astype(np.float32)
+normals[..., 2] = np.abs(normals[..., 2])
+print("ready", flush=True)
+bgars.integrate_normals(normals, relative_tolerance=1e-15, max_iters=1_000_000)
+"""
+
+
+def test_ctrl_c_stops_a_long_solve() -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", SOLVE_FOR_LONG], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    time.sleep(2.0)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=20)
+    assert process.returncode != 0
+    assert "KeyboardInterrupt" in errors

@@ -1,0 +1,104 @@
+"""Normal maps, height maps and meshes survive a round trip."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tifffile
+import trimesh
+
+import bgars
+
+
+@pytest.fixture
+def field() -> bgars.NormalField:
+    rig = bgars.LightRig.ring(6)
+    row, col = np.mgrid[:8, :9]
+    normals = np.stack([(col - 4) / 12, (4 - row) / 12, np.ones_like(row)], axis=2).astype(np.float64)
+    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    images = np.rint(60_000 * np.einsum("ld,hwd->lhw", rig.directions, normals)).astype(np.uint16)
+    mask = np.ones((8, 9), bool)
+    mask[2, 3] = False
+    return bgars.estimate_normals(images, rig.directions, mask=mask)
+
+
+@pytest.mark.parametrize("directx", [False, True])
+def test_normal_map(field: bgars.NormalField, tmp_path: Path, directx: bool) -> None:
+    path = tmp_path / "normals.png"
+    bgars.write_normal_map(field, path, directx=directx)
+    back = bgars.read_normal_map(path, directx=directx)
+    np.testing.assert_array_equal(np.isfinite(back).all(axis=2), field.mask)
+    assert bgars.angular_error_deg(back[field.mask], field.normals[field.mask]).max() < 0.003
+    other = bgars.read_normal_map(path, directx=not directx)
+    np.testing.assert_allclose(other[..., 1], -back[..., 1])
+
+
+@pytest.mark.parametrize("suffix", [".tif", ".npy"])
+def test_height_map(field: bgars.NormalField, tmp_path: Path, suffix: str) -> None:
+    height = bgars.integrate_normals(field, pixel_pitch_um=5.0)
+    path = tmp_path / f"height{suffix}"
+    bgars.write_height(height, path)
+    values, pitch_um = bgars.read_height(path)
+    np.testing.assert_array_equal(values, height.height_um)
+    assert pitch_um == (5.0 if suffix == ".tif" else None)
+    again = bgars.HeightMap.from_array(values, pixel_pitch_um=5.0)
+    np.testing.assert_allclose(again.height_px, height.height_px, rtol=1e-6)
+
+
+def test_a_height_file_that_is_none(tmp_path: Path) -> None:
+    for name in ("a.tif", "a.npy"):
+        path = tmp_path / name
+        with pytest.raises(bgars.FileFormatError, match=name):
+            bgars.read_height(path)
+        path.write_bytes(b"nonsense")
+        with pytest.raises(bgars.FileFormatError, match=name):
+            bgars.read_height(path)
+    tifffile.imwrite(tmp_path / "rgb.tif", np.zeros((4, 4, 3), np.uint8))
+    with pytest.raises(bgars.FileFormatError, match=r"rgb\.tif.*\(4, 4, 3\)"):
+        bgars.read_height(tmp_path / "rgb.tif")
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".obj", ".stl", ".glb"])
+@pytest.mark.parametrize("with_field", [True, False])
+def test_mesh(field: bgars.NormalField, tmp_path: Path, suffix: str, with_field: bool) -> None:
+    height = bgars.integrate_normals(field, pixel_pitch_um=10.0)
+    mesh = bgars.mesh_from_height(height, field if with_field else None)
+    assert mesh.metadata["unit"] == "um"
+    path = tmp_path / f"part{suffix}"
+    bgars.write_mesh(mesh, path)
+    back = trimesh.load_mesh(path, process=False)
+    assert len(back.faces) == len(mesh.faces) == 2 * 7 * 8 - 8 + 4
+    np.testing.assert_allclose(back.bounds, mesh.bounds, rtol=1e-5, atol=1e-4)
+    assert np.ptp(back.vertices[:, 0]) == pytest.approx(80.0), "x in um"
+    assert (back.face_normals[:, 2] > 0).all(), "faces look at the camera"
+    if suffix in {".ply", ".obj"}:
+        np.testing.assert_allclose(back.vertices, mesh.vertices, rtol=1e-6, atol=1e-5)
+        np.testing.assert_allclose(stored_normals(path), mesh.vertex_normals, atol=1e-5)
+        assert b"unit um" in path.read_bytes()[:200]
+        if with_field:
+            np.testing.assert_allclose(back.visual.vertex_colors[:, :3], mesh.visual.vertex_colors[:, :3], atol=1)
+
+
+def stored_normals(path: Path) -> np.ndarray:
+    """Vertex normals as the file holds them: trimesh computes its own when it loads."""
+    if path.suffix == ".obj":
+        lines = path.read_text(encoding="utf-8").splitlines()
+        return np.array([line.split()[1:] for line in lines if line.startswith("vn ")], dtype=np.float64)
+    vertices = trimesh.load_mesh(path, process=False).metadata["_ply_raw"]["vertex"]["data"]
+    return np.column_stack([vertices[name] for name in ("nx", "ny", "nz")])
+
+
+def test_mesh_vertices_sit_where_the_conventions_say() -> None:
+    height = bgars.HeightMap.from_array(np.zeros((2, 4), np.float32))
+    vertices = bgars.mesh_from_height(height).vertices
+    np.testing.assert_array_equal(vertices[0], [-1.5, 0.5, 0.0])
+    np.testing.assert_array_equal(vertices[-1], [1.5, -0.5, 0.0])
+
+
+def test_a_height_map_without_a_face_is_refused() -> None:
+    values = np.full((3, 3), np.nan, np.float32)
+    values[0, 0] = values[2, 2] = 1.0
+    with pytest.raises(bgars.InputError, match="no three neighbouring pixels"):
+        bgars.mesh_from_height(bgars.HeightMap.from_array(values))

@@ -1,0 +1,39 @@
+"""The data flows one way: no module imports one of its own or a later stage."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import bgars
+
+PACKAGE = Path(bgars.__file__).parent
+BASE = {"errors": 0, "light_files": 1, "rig": 2, "records": 3}
+STAGES = {name: 4 for name in ("io", "calibrate", "normals", "integrate", "mesh", "balls", "inspection")}
+LATER = {"pipeline": 5, "evaluate": 5, "batch": 6, "report": 6, "samples": 0, "cli": 7}
+LEVEL = {**BASE, **STAGES, **LATER, "simulate": 4}
+
+
+def stage(module: str) -> str:
+    return module.split(".")[1] if "." in module else ""
+
+
+def imports(path: Path) -> set[str]:
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("bgars."):
+            found.add(stage(str(node.module)))
+    return found
+
+
+@pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_imports_point_backward(path: Path) -> None:
+    own = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+    if own in {"__init__", "__main__"}:
+        return
+    for other in imports(path) - {own}:
+        assert LEVEL[other] < LEVEL[own], f"{own} must not import {other}"
+        if own == "simulate":
+            assert other in {"errors", "records", "rig"}, "the truth stays independent of the estimators"
