@@ -5,11 +5,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import bgars
 import imageio.v3 as iio
 import numpy as np
 import pytest
-
-import bgars
 
 
 @pytest.fixture(scope="session")
@@ -29,7 +28,7 @@ def capture_folder(tmp_path: Path) -> Path:
     for index, direction in enumerate(bgars.LightRig.ring(4).directions):
         level = int(np.rint(200 * direction @ normal))
         iio.imwrite(folder / f"img{index}.png", np.full((5, 6), level, np.uint8))
-    write_recipe(folder, 'pixel_pitch_um = 10.0\n[lights]\nring = { count = 4, elevation_deg = 45.0 }\n')
+    write_recipe(folder, "pixel_pitch_um = 10.0\n[lights]\nring = { count = 4, elevation_deg = 45.0 }\n")
     return folder
 
 

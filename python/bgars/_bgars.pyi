@@ -7,6 +7,18 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "DEBUG_BUILD",
+    "decode_stack",
+    "estimate_normals",
+    "integrate_normals",
+    "read_rgb16",
+    "triangulate",
+    "write_obj",
+    "write_ply",
+    "write_png16",
+]
+
 DEBUG_BUILD: Final[bool]
 
 def decode_stack(

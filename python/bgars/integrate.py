@@ -41,9 +41,9 @@ def integrate_normals(
     """Integrate normals to heights by weighted least squares.
 
     Minimises the sum over neighbouring pixels of ``(n_z dz + n_x)^2`` along x and ``(n_z dz + n_y)^2`` along y (up), by
-    conjugate gradient on the normal equations. **What this cannot give**: heights across an occluding contour. Between a
-    ball and its board the surface jumps where no pixel sees it, so the stand-off height is not in the normals, and parts that
-    do not touch (components) each float freely.
+    conjugate gradient on the normal equations. **What this cannot give**: heights across an occluding contour.
+    Between a ball and its board the surface jumps where no pixel sees it, so the stand-off height is not in the
+    normals, and parts that do not touch (components) each float freely.
 
     Parameters
     ----------
@@ -54,8 +54,8 @@ def integrate_normals(
     method : {"least-squares"}
         Integrator.
     difference : {"trapezoid", "forward"}
-        Slope between two pixels: mean of their normals, or the first pixel's alone as the paper prints it (this shifts the
-        surface by half a pixel).
+        Slope between two pixels: mean of their normals, or the first pixel's alone as the paper prints it (this
+        shifts the surface by half a pixel).
     weights : "confidence" or (H, W) array_like, optional
         Trust in each pixel, at least 0; an edge takes the geometric mean of its two. n_z^2 is always a weight.
     relative_tolerance, absolute_tolerance : float

@@ -8,7 +8,7 @@ import numpy as np
 
 from bgars import _bgars
 from bgars.errors import InputError
-from bgars.records import Capture, NormalField
+from bgars.records import Capture, NormalField, integer_full_scale
 from bgars.rig import LightRig
 
 if TYPE_CHECKING:
@@ -47,14 +47,14 @@ def estimate_normals(
     Parameters
     ----------
     images : Capture or (L, H, W) array_like of uint8, uint16 or float32
-        A capture, or one image a light. Arrays are used as they are; they are copied only when they are not C-contiguous
-        or when they are float64.
+        A capture, or one image a light. Arrays are used as they are; they are copied only when they are not
+        C-contiguous or when they are float64.
     light_directions : (L, 3) array_like
         Unit vectors from the surface to the light; only with plain arrays.
     method : {"lambertian", "specular-filter", "robust-filter"}
-        ``lambertian`` keeps every light. ``specular-filter`` is the published filter: sort the values, cut at the first gap
-        over `threshold` with at least 3 values kept. ``robust-filter`` keeps the largest consistent set of lights, shadows
-        and highlights left out.
+        ``lambertian`` keeps every light. ``specular-filter`` is the published filter: sort the values, cut at the
+        first gap over `threshold` with at least 3 values kept. ``robust-filter`` keeps the largest consistent set of
+        lights, shadows and highlights left out.
     mask : (H, W) array_like of bool, optional
         True = use; combined with the capture's own mask.
     light_intensities : (L,) array_like, optional
@@ -72,8 +72,8 @@ def estimate_normals(
     Returns
     -------
     NormalField
-        A pixel whose kept lights are coplanar, whose solution is zero or faces away from the camera is invalid: NaN, mask
-        False.
+        A pixel whose kept lights are coplanar, whose solution is zero or faces away from the camera is invalid: NaN,
+        mask False.
 
     Raises
     ------
@@ -149,8 +149,8 @@ def _capture_from_arrays(
     if len(rig) != len(stack):
         msg = f"images and light_directions: {len(stack)} images but {len(rig)} lights; they must be equal in number"
         raise InputError(msg)
-    if stack.dtype.kind == "u":
-        full_scale = float(np.iinfo(stack.dtype).max)
+    full_scale = integer_full_scale(stack)
+    if full_scale is not None:
         clip = full_scale if saturation is None else saturation
     else:
         finite = stack[np.isfinite(stack)]

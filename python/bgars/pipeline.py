@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from bgars.records import Capture, HeightMap, NormalField
 
-__all__ = ["Reconstruction", "reconstruct", "summarise_field"]
+__all__ = ["Reconstruction", "reconstruct", "solver_fraction", "summarise_field"]
 
 Stage = Literal["normals", "height", "mesh"]
 
@@ -113,7 +113,7 @@ def reconstruct(
         field,
         difference=difference,
         weights=weights,
-        progress=lambda _, residual: report("height", _solver_fraction(residual)),
+        progress=lambda _, residual: report("height", solver_fraction(residual)),
     )
     report("height", 1.0)
     mesh = mesh_from_height(height, field)
@@ -121,6 +121,6 @@ def reconstruct(
     return Reconstruction(capture, field, height, mesh)
 
 
-def _solver_fraction(residual: float, tolerance: float = 1e-8) -> float:
+def solver_fraction(residual: float, tolerance: float = 1e-8) -> float:
     """How far a residual has come on its way from 1 to the tolerance, on a log scale."""
     return float(np.clip(np.log(max(residual, tolerance)) / np.log(tolerance), 0.0, 1.0))

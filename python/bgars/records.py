@@ -17,11 +17,25 @@ if TYPE_CHECKING:
 
     from bgars.rig import LightRig
 
-__all__ = ["BoolArray", "Capture", "Component", "FloatArray", "HeightMap", "NormalField", "PixelArray"]
+__all__ = [
+    "BoolArray",
+    "Capture",
+    "Component",
+    "FloatArray",
+    "HeightMap",
+    "NormalField",
+    "PixelArray",
+    "integer_full_scale",
+]
 
 PixelArray = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32]
 FloatArray = NDArray[np.float32]
 BoolArray = NDArray[np.bool_]
+
+
+def integer_full_scale(pixels: PixelArray) -> float | None:
+    """Return the largest grey level of an integer dtype (255 or 65535), None for floats."""
+    return float((1 << 8 * pixels.dtype.itemsize) - 1) if pixels.dtype.kind == "u" else None
 
 
 @dataclass(frozen=True, eq=False)

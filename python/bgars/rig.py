@@ -199,7 +199,6 @@ class LightRig:
         directions, files = read_lp(path)
         return cls.from_directions(directions, intensities=intensities, files=files)
 
-
     def take(self, indices: NDArray[np.intp]) -> LightRig:
         """Return the lights at `indices`, in that order."""
         return LightRig(

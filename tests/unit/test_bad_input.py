@@ -7,11 +7,10 @@ import struct
 import zlib
 from pathlib import Path
 
+import bgars
 import imageio.v3 as iio
 import numpy as np
 import pytest
-
-import bgars
 
 RING = "[lights]\nring = { count = 4, elevation_deg = 45.0 }\n"
 
@@ -50,7 +49,10 @@ def refused(folder: Path, error: type[Exception], *words: str) -> None:
         ("[lights]\ndirections = [[0, 0, 1], [0, 0, 1]]\n", ["at least 3 lights", "2"]),
         ("[lights]\ndirections = [[0, 0, 2], [1, 0, 0], [0, 1, 0], [0, 0, 1]]\n", ["[0]", "unit vector", "2"]),
         ("[lights]\nangles_deg = [[0, 45], [90, 45], [180, -5], [270, 45]]\n", ["light 2", "(0, 90]", "-5"]),
-        ("[lights]\npositions_mm = [[1, 0, 9], [0, 1, 9], [0, 0, -9], [1, 1, 9]]\n", ["[2]", "above the board", "-9000"]),
+        (
+            "[lights]\npositions_mm = [[1, 0, 9], [0, 1, 9], [0, 0, -9], [1, 1, 9]]\n",
+            ["[2]", "above the board", "-9000"],
+        ),
         ("[lights]\npositions_mm = [[1, 0, 9], [0, 1, 9], [0, 0, 9], [1, 1, 9]]\n", ["pixel_pitch_um", "needed"]),
         ("[lights]\nring = { count = 4 }\nintensity_distance_mm = 5\n", ["intensity_distance_mm", "positions_mm"]),
         ("not toml at all", ["is not valid TOML"]),

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import bgars
 import imageio.v3 as iio
 import numpy as np
 import pytest
-
-import bgars
 
 RING = "[lights]\nring = { count = 4, elevation_deg = 45.0 }\n"
 

@@ -9,12 +9,11 @@ import sys
 import time
 from pathlib import Path
 
+import bgars
 import numpy as np
 import pytest
 import tifffile
 import trimesh
-
-import bgars
 
 
 def bgars_command(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:

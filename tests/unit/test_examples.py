@@ -9,9 +9,8 @@ import re
 import runpy
 from pathlib import Path
 
-import pytest
-
 import bgars
+import pytest
 
 ROOT = Path(__file__).parents[2]
 MODULES = [name for _, name, _ in pkgutil.walk_packages(bgars.__path__, "bgars.") if not name.endswith("__main__")]

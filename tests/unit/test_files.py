@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import bgars
 import numpy as np
 import pytest
 import tifffile
 import trimesh
-
-import bgars
 
 
 @pytest.fixture

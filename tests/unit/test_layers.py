@@ -5,13 +5,12 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
-import pytest
-
 import bgars
+import pytest
 
 PACKAGE = Path(bgars.__file__).parent
 BASE = {"errors": 0, "light_files": 1, "rig": 2, "records": 3}
-STAGES = {name: 4 for name in ("io", "calibrate", "normals", "integrate", "mesh", "balls", "inspection")}
+STAGES = dict.fromkeys(("io", "calibrate", "normals", "integrate", "mesh", "balls", "inspection"), 4)
 LATER = {"pipeline": 5, "evaluate": 5, "batch": 6, "report": 6, "samples": 0, "cli": 7}
 LEVEL = {**BASE, **STAGES, **LATER, "simulate": 4}
 

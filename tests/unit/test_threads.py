@@ -8,9 +8,8 @@ import subprocess
 import sys
 import threading
 
-import numpy as np
-
 import bgars
+import numpy as np
 
 DIGEST = """
 import hashlib, bgars

@@ -31,6 +31,10 @@ def test_the_wheel_installs_and_runs_the_demo(tmp_path: Path) -> None:
     output = run(tmp_path / "clean" / "bin" / "bgars", "demo", "-o", "demo", cwd=tmp_path)
     assert "overview.png" in output
     assert (tmp_path / "demo" / "mesh.ply").stat().st_size > 100_000
-    typed = run(python, "-c", "import bgars, pathlib; print((pathlib.Path(bgars.__file__).parent / 'py.typed').exists())",
-                cwd=tmp_path)
+    typed = run(
+        python,
+        "-c",
+        "import bgars, pathlib; print((pathlib.Path(bgars.__file__).parent / 'py.typed').exists())",
+        cwd=tmp_path,
+    )
     assert typed.strip() == "True"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -10,10 +12,13 @@ import typer
 
 import bgars
 from bgars.cli.console import EXIT_BAD_INPUT, fail, print_json, say, stage_progress
+from bgars.cli.describe import describe, describe_in_words
 from bgars.cli.outputs import write_normals, write_reconstruction
 from bgars.errors import BgarsError
 from bgars.io.mesh_files import MESH_SUFFIXES
-from bgars.normals import DEFAULT_METHOD
+from bgars.light_files import read_filenames
+from bgars.normals import DEFAULT_METHOD, METHODS
+from bgars.pipeline import solver_fraction
 
 __all__ = ["main"]
 
@@ -40,7 +45,8 @@ FolderArgument = Annotated[
     ),
 ]
 OutOption = Annotated[
-    Path, typer.Option("--output", "-o", metavar="OUT", help="Folder for the results; made if missing.", show_default=False)
+    Path,
+    typer.Option("--output", "-o", metavar="OUT", help="Folder for the results; made if missing.", show_default=False),
 ]
 MethodOption = Annotated[
     MethodName,
@@ -74,9 +80,9 @@ def top(
 
 @app.command()
 def demo(
-    output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="OUT", help="Folder for the results.")
-    ] = Path("bgars-demo"),
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT", help="Folder for the results.")] = Path(
+        "bgars-demo"
+    ),
     as_json: JsonOption = False,
 ) -> None:
     """Reconstruct a solder ball that ships with bgars, and say what to open."""
@@ -110,16 +116,15 @@ def reconstruct(
     method: MethodOption = DEFAULT_METHOD,
     threshold: ThresholdOption = 50.0,
     channel: ChannelChoice = None,
-    mesh_format: Annotated[
-        Literal["ply", "obj", "stl", "glb"], typer.Option(help="Format of the mesh file.")
-    ] = "ply",
+    mesh_format: Annotated[Literal["ply", "obj", "stl", "glb"], typer.Option(help="Format of the mesh file.")] = "ply",
     directx: DirectxOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """The main job: a folder of photographs becomes normals, a height map, a mesh and an overview picture.
 
     Writes overview.png, normals.png (16 bit), height.tif and height.npy (float32, um when the pixel pitch is known),
-    mesh.ply and summary.json. Heights between parts that do not touch, such as a ball above its board, are not measured.
+    mesh.ply and summary.json. Heights between parts that do not touch, such as a ball above its board, are not
+    measured.
     """
     summary, files = _reconstruct_to(folder, output, method, threshold, channel, mesh_format, directx)
     if as_json:
@@ -128,7 +133,8 @@ def reconstruct(
     height = summary["height"]
     low, high = height[f"height_range_{height['unit']}"]
     say(
-        f"{summary['capture']}: {summary['normals']['valid_pixels']} normals ({method}), height {low:.1f} to {high:.1f} "
+        f"{summary['capture']}: {summary['normals']['valid_pixels']} normals ({method}), height {low:.1f} to "
+        f"{high:.1f} "
         f"{height['unit']} in {height['components']} connected part(s), {height['iterations']} solver iterations."
     )
     _list_files(output, files)
@@ -165,15 +171,21 @@ def normals(
 def mesh(
     source: Annotated[
         Path,
-        typer.Argument(metavar="FILE", help="normals.png, or a height map (.tif, .npy; NaN = invalid).", show_default=False),
+        typer.Argument(
+            metavar="FILE", help="normals.png, or a height map (.tif, .npy; NaN = invalid).", show_default=False
+        ),
     ],
     output: Annotated[
         Path,
-        typer.Option("--output", "-o", metavar="MESH", help=f"Mesh file: {', '.join(MESH_SUFFIXES)}.", show_default=False),
+        typer.Option(
+            "--output", "-o", metavar="MESH", help=f"Mesh file: {', '.join(MESH_SUFFIXES)}.", show_default=False
+        ),
     ],
     pixel_pitch_um: Annotated[
         float | None,
-        typer.Option(help="Pixel pitch; a height map is then taken as um. A .tif of bgars brings its own.", show_default=False),
+        typer.Option(
+            help="Pixel pitch; a height map is then taken as um. A .tif of bgars brings its own.", show_default=False
+        ),
     ] = None,
     directx: Annotated[bool, typer.Option("--directx", help="The normal map has green = y down.")] = False,
     as_json: JsonOption = False,
@@ -193,8 +205,6 @@ def mesh(
 @app.command()
 def info(folder: FolderArgument, channel: ChannelChoice = None, as_json: JsonOption = False) -> None:
     """Read a capture and say what is in it: images, lights, scale, clipped pixels."""
-    from bgars.cli.describe import describe, describe_in_words  # noqa: PLC0415 - keeps this file to options
-
     capture = bgars.read_capture(folder, channel=channel)
     facts = describe(capture)
     if as_json:
@@ -212,27 +222,25 @@ def evaluate(
     ] = None,
     images: Annotated[
         Path | None,
-        typer.Option(help="Text file of image names, one a line: use only these (such as ring8.txt).", show_default=False),
+        typer.Option(
+            help="Text file of image names, one a line: use only these (such as ring8.txt).", show_default=False
+        ),
     ] = None,
     channel: ChannelChoice = None,
     as_json: JsonOption = False,
 ) -> None:
     """Compare with truth (gt.npz of a rendered scene, Normal_gt.npy of a photograph).
 
-    Scenes are judged over ball pixels with true n_z > 0.3, photographs over their mask. A pixel without a solution counts
-    as (0, 0, 1).
+    Scenes are judged over ball pixels with true n_z > 0.3, photographs over their mask. A pixel without a solution
+    counts as (0, 0, 1).
     """
-    from bgars.light_files import read_filenames  # noqa: PLC0415 - only here
-    from bgars.normals import METHODS  # noqa: PLC0415 - only here
-
     names = None if images is None else read_filenames(images)
     capture = bgars.read_capture(folder, channel=channel, images=names)
     truth = bgars.read_truth(folder)
     with stage_progress() as report:
-        results = [
-            bgars.evaluate(capture, method=name, truth=truth, progress=lambda fraction, name=name: report(name, fraction))
-            for name in (METHODS if method is None else (method,))
-        ]
+        results = []
+        for name in METHODS if method is None else (method,):
+            results.append(bgars.evaluate(capture, method=name, truth=truth, progress=partial(report, name)))
     if as_json:
         print_json({"capture": capture.name, "lights": len(capture.rig), "results": [r.to_dict() for r in results]})
         return
@@ -276,12 +284,14 @@ def _reconstruct_to(
         )
 
 
-def _height_from(source: Path, pixel_pitch_um: float | None, directx: bool, report: Any) -> bgars.HeightMap:
+def _height_from(
+    source: Path, pixel_pitch_um: float | None, directx: bool, report: Callable[[str, float], None]
+) -> bgars.HeightMap:
     if source.suffix.lower() == ".png":
         return bgars.integrate_normals(
             bgars.read_normal_map(source, directx=directx),
             pixel_pitch_um=pixel_pitch_um,
-            progress=lambda _, residual: report("height", min(1.0, max(0.0, -residual))),
+            progress=lambda _, residual: report("height", solver_fraction(residual)),
         )
     values, stored_pitch_um = bgars.read_height(source)
     return bgars.HeightMap.from_array(values, pixel_pitch_um=pixel_pitch_um or stored_pitch_um)

@@ -50,7 +50,9 @@ def describe_in_words(facts: dict[str, Any]) -> Iterator[str]:
     """Yield the lines that a person reads."""
     width, height = facts["image_size_px"]
     pitch = facts["pixel_pitch_um"]
-    scale = f"{pitch:g} um a pixel ({width * pitch / 1000:.2f} x {height * pitch / 1000:.2f} mm)" if pitch else "unknown"
+    scale = (
+        f"{pitch:g} um a pixel ({width * pitch / 1000:.2f} x {height * pitch / 1000:.2f} mm)" if pitch else "unknown"
+    )
     yield f"capture     {facts['capture']}"
     yield f"images      {len(facts['lights'])} of {width} x {height} pixels, {facts['dtype']}"
     yield f"scale       {scale}"
@@ -60,10 +62,13 @@ def describe_in_words(facts: dict[str, Any]) -> Iterator[str]:
     yield f"radiometry  {facts['response']} response, {dark}, clipped at {clip}"
     yield f"rig         {len(facts['lights'])} {facts['rig']}"
     yield ""
-    yield f"{'image':<24} {'azimuth':>9} {'elevation':>10} {'intensity':>10} {'median':>9} {'maximum':>9} {'clipped':>9}"
+    yield (
+        f"{'image':<24} {'azimuth':>9} {'elevation':>10} {'intensity':>10} {'median':>9} {'maximum':>9} {'clipped':>9}"
+    )
     yield f"{'':<24} {'deg':>9} {'deg':>10} {'':>10} {'grey':>9} {'grey':>9} {'':>9}"
     for light in facts["lights"]:
         yield (
-            f"{light['image']:<24} {light['azimuth_deg']:>9.1f} {light['elevation_deg']:>10.1f} {light['intensity']:>10.3f}"
+            f"{light['image']:<24} {light['azimuth_deg']:>9.1f} {light['elevation_deg']:>10.1f} "
+            f"{light['intensity']:>10.3f}"
             f" {light['median_grey']:>9.4g} {light['maximum_grey']:>9.4g} {light['clipped_fraction']:>9.2%}"
         )

@@ -36,7 +36,7 @@ def write_reconstruction(
         files = {
             "overview.png": "the picture to look at first",
             f"mesh.{mesh_format}": f"the surface in 3-D, in {unit} (MeshLab, Blender, CloudCompare)",
-            "normals.png": f"normals, 16 bit, {'DirectX' if directx else 'OpenGL'} (green = y {'down' if directx else 'up'})",
+            "normals.png": _normals_meaning(directx),
             "height.tif": f"heights, float32, in {unit}",
             "height.npy": "the same for numpy",
             "summary.json": "the numbers of this run",
@@ -51,10 +51,14 @@ def write_reconstruction(
     return summary, files
 
 
+def _normals_meaning(directx: bool) -> str:
+    return "normals, 16 bit, DirectX (green = y down)" if directx else "normals, 16 bit, OpenGL (green = y up)"
+
+
 def write_normals(field: NormalField, output: Path, *, directx: bool) -> tuple[dict[str, Any], dict[str, str]]:
     """Write a normal field as pictures; return its summary and what each file is."""
     files = {
-        "normals.png": f"normals, 16 bit, {'DirectX' if directx else 'OpenGL'} (green = y {'down' if directx else 'up'})",
+        "normals.png": _normals_meaning(directx),
         "albedo.tif": "diffuse reflectance times light, float32, 1 = full scale",
         "confidence.tif": "trust in each normal, float32, 0 to 1",
         "lights_kept.png": "number of lights in each fit",

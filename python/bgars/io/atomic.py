@@ -54,7 +54,9 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 @contextmanager
 def atomic_folder(folder: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary folder; when the block succeeds, move its files into `folder`, replacing files of the same name.
+    """Yield a temporary folder; when the block succeeds, move its files into `folder`.
+
+    Files of the same name are replaced.
 
     Other files of an existing `folder` stay. The folder is tried before the block runs, so that long work is not lost.
 

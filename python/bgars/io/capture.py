@@ -40,9 +40,9 @@ def read_capture(
     """Read a folder of photographs, one light at a time, with the description of its lights.
 
     With a ``capture.toml`` in the folder, that recipe says everything. Without one, the lights come from
-    ``light_directions.txt`` (and ``light_intensities.txt``, ``filenames.txt``: the DiLiGenT layout) or from the only ``.lp``
-    file, and ``mask.png`` is the mask if it exists. Image order: recipe, else ``filenames.txt``, else the ``.lp`` file, else
-    the image files in natural order (files that start with "mask" or "dark" left out).
+    ``light_directions.txt`` (and ``light_intensities.txt``, ``filenames.txt``: the DiLiGenT layout) or from the only
+    ``.lp`` file, and ``mask.png`` is the mask if it exists. Image order: recipe, else ``filenames.txt``, else the
+    ``.lp`` file, else the image files in natural order (files that start with "mask" or "dark" left out).
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def _load(
         np.ones(len(paths)) if in_values else _one_intensity(lights.intensities, channel), files=tuple(names)
     )
     if rig.is_near and recipe.pixel_pitch_um is None:
-        msg = f"{folder / RECIPE_NAME}: pixel_pitch_um: needed with lights.positions_mm, to place pixels and lights together"
+        msg = f"{folder / RECIPE_NAME}: pixel_pitch_um: needed with lights.positions_mm, to place pixels under lights"
         raise InputError(msg)
     return Capture(
         images=images,
@@ -155,9 +155,7 @@ def _curve(folder: Path, recipe: CaptureRecipe, full_scale: float) -> Curve | No
     return None
 
 
-def _response_table(
-    folder: Path, recipe: CaptureRecipe, first: Path, max_megapixels: float
-) -> FloatArray | None:
+def _response_table(folder: Path, recipe: CaptureRecipe, first: Path, max_megapixels: float) -> FloatArray | None:
     """Linear grey level by code for integer images; the first image tells how many codes there are."""
     if recipe.response == "linear":
         return None
@@ -180,7 +178,8 @@ def _one_intensity(intensities: NDArray[np.float64], channel: ChannelName) -> ND
     if intensities.shape[1] != RGB:
         return intensities[:, 0]
     weights = np.array(WEIGHTS[channel])
-    return intensities @ weights / weights.sum()
+    combined: NDArray[np.float64] = intensities @ weights / weights.sum()
+    return combined
 
 
 def _levels(folder: Path, recipe: CaptureRecipe, images: PixelArray, code_scale: float | None) -> _Radiometry:
@@ -194,8 +193,8 @@ def _levels(folder: Path, recipe: CaptureRecipe, images: PixelArray, code_scale:
         full_scale, saturation = max(float(np.nanmax(images)), TINY), float("inf")
     if not recipe.black_level < min(full_scale, saturation):
         msg = (
-            f"{folder / RECIPE_NAME}: black_level: must be below the saturation level ({min(full_scale, saturation):g}), "
-            f"got {recipe.black_level:g}"
+            f"{folder / RECIPE_NAME}: black_level: must be below the saturation level "
+            f"({min(full_scale, saturation):g}), got {recipe.black_level:g}"
         )
         raise InputError(msg)
     return _Radiometry(full_scale, saturation, recipe.black_level)
@@ -246,8 +245,8 @@ def _subtract_offset(
 ) -> None:
     """Subtract what no light reads, in place: with gains of their own, each image has an offset of its own."""
     if dark_path is not None:
-        for image, gain in zip(images, gains, strict=True):
-            image -= decode_stack([dark_path], channel=channel, response=table, gains=gain[None]).images[0]
+        for index, gain in enumerate(gains):
+            images[index] -= decode_stack([dark_path], channel=channel, response=table, gains=gain[None]).images[0]
     else:
         level = black_level if table is None else np.interp(black_level, np.arange(len(table)), table)
         images -= (level * (gains @ np.array(WEIGHTS[channel], dtype=np.float32)))[:, None, None]

@@ -48,7 +48,10 @@ def default_recipe(folder: Path) -> CaptureRecipe:
     elif len(lp_files) == 1:
         lights["lp"] = lp_files[0].name
     elif lp_files:
-        msg = f"{folder}: holds {len(lp_files)} .lp files ({', '.join(p.name for p in lp_files)}); name one in {RECIPE_NAME}"
+        msg = (
+            f"{folder}: holds {len(lp_files)} .lp files ({', '.join(p.name for p in lp_files)}); name one in "
+            f"{RECIPE_NAME}"
+        )
         raise InputError(msg)
     else:
         msg = (
@@ -63,9 +66,13 @@ def default_recipe(folder: Path) -> CaptureRecipe:
 
 
 def read_lights(folder: Path, recipe: CaptureRecipe) -> Lights:
+    """Return the lights that a recipe describes, from whichever source it names."""
     lights = recipe.lights
     if lights is None:
-        msg = f"{folder / RECIPE_NAME}: lights: missing; add a [lights] table with directions, angles_deg, positions_mm, lp or ring"
+        msg = (
+            f"{folder / RECIPE_NAME}: lights: missing; add a [lights] table with directions, angles_deg, "
+            f"positions_mm, lp or ring"
+        )
         raise InputError(msg)
 
     def numbers(value: str | Sequence[object], columns: int, meaning: str) -> NDArray[np.float64]:
@@ -103,9 +110,7 @@ def read_lights(folder: Path, recipe: CaptureRecipe) -> Lights:
     return Lights(rig, intensities, source)
 
 
-def _intensity_rows(
-    folder: Path, value: str | Sequence[object] | None, count: int, source: str
-) -> NDArray[np.float64]:
+def _intensity_rows(folder: Path, value: str | Sequence[object] | None, count: int, source: str) -> NDArray[np.float64]:
     """Return (L, 1) or (L, 3) intensities, 1 where none are given."""
     if value is None:
         return np.ones((count, 1))
@@ -127,6 +132,7 @@ def _intensity_rows(
 
 
 def image_names(folder: Path, recipe: CaptureRecipe, lights: Lights) -> list[str]:
+    """Return the image files, in the order of the recipe, filenames.txt, the .lp file, or their natural order."""
     if recipe.images is not None:
         return recipe.images
     if (folder / "filenames.txt").exists():
@@ -147,9 +153,7 @@ def _natural_key(name: str) -> list[tuple[int, int | str]]:
     return [(0, int(part)) if part.isdigit() else (1, part.lower()) for part in re.split(r"(\d+)", name) if part]
 
 
-def match(
-    folder: Path, lights: Lights, names: list[str], wanted: Sequence[str] | None
-) -> tuple[Lights, list[str]]:
+def match(folder: Path, lights: Lights, names: list[str], wanted: Sequence[str] | None) -> tuple[Lights, list[str]]:
     """Pair lights and images: by name where the ``.lp`` file names them all, else by order."""
     if lights.rig.files and names != list(lights.rig.files):
         place = {Path(name).name: index for index, name in enumerate(lights.rig.files)}
@@ -157,7 +161,10 @@ def match(
             lights = lights.take([place[Path(name).name] for name in names])
     if len(names) != len(lights.rig):
         shown = ", ".join(names[:4]) + (", ..." if len(names) > 4 else "")  # noqa: PLR2004 - enough to recognise them
-        msg = f"{folder}: {len(names)} images ({shown or 'none found'}), but {lights.source} gives {len(lights.rig)} lights"
+        msg = (
+            f"{folder}: {len(names)} images ({shown or 'none found'}), but {lights.source} gives "
+            f"{len(lights.rig)} lights"
+        )
         raise InputError(msg)
     if wanted is None:
         return lights, names

@@ -9,6 +9,7 @@ import numpy as np
 
 from bgars import _bgars
 from bgars.errors import FileFormatError, InputError, UnsupportedImageError
+from bgars.records import integer_full_scale
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -102,11 +103,10 @@ def read_mask(path: Path, shape: tuple[int, int]) -> BoolArray:
     mask = decode_stack([path], channel="mean").images[0]
     if mask.shape != shape:
         msg = (
-            f"{path}: the mask is {mask.shape[1]} x {mask.shape[0]} pixels, "
-            f"but the images are {shape[1]} x {shape[0]}"
+            f"{path}: the mask is {mask.shape[1]} x {mask.shape[0]} pixels, but the images are {shape[1]} x {shape[0]}"
         )
         raise InputError(msg)
-    white = np.iinfo(mask.dtype).max if mask.dtype.kind == "u" else max(float(mask.max()), 1.0)
+    white = integer_full_scale(mask) or max(float(mask.max()), 1.0)
     use: BoolArray = mask > white / 2
     if not use.any():
         msg = f"{path}: the mask is empty: no pixel is brighter than half of white ({white:g})"
@@ -130,10 +130,11 @@ def _decode_with_imageio(
         described = (*image.shape[:2], image.dtype.name, image.ndim)
         if stack is None:
             first_shape = described
-            full_scale = float(np.iinfo(image.dtype).max) if image.dtype.kind == "u" else None
+            full_scale = integer_full_scale(image)
         elif described != first_shape:
             msg = (
-                f"{path}: is {described[1]} x {described[0]} pixels of {described[2]}, but the first image of the stack "
+                f"{path}: is {described[1]} x {described[0]} pixels of {described[2]}, but the first image of "
+                f"the stack "
                 f"({paths[0]}) is {first_shape[1]} x {first_shape[0]} of {first_shape[2]}; all must be alike"
             )
             raise FileFormatError(msg)
@@ -196,6 +197,7 @@ def _combine(
     rgb = image[..., :3]
     values = rgb.astype(np.float32) if response is None or rgb.dtype.kind != "u" else response[rgb]
     combined: FloatArray = values @ weights
-    if response is None and gains is None and image.dtype.kind == "u":
-        return np.rint(combined).astype(image.dtype)
-    return combined
+    if response is not None or gains is not None or image.dtype.kind == "f":
+        return combined
+    rounded = np.rint(combined)
+    return rounded.astype(np.uint8) if image.dtype == np.uint8 else rounded.astype(np.uint16)

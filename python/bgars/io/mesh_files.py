@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from trimesh.visual import ColorVisuals
 
 from bgars import _bgars
 from bgars.errors import InputError
@@ -24,9 +25,9 @@ MESH_SUFFIXES = (".ply", ".obj", ".stl", ".glb")
 def write_mesh(mesh: trimesh.Trimesh, path: str | PathLike[str]) -> None:
     """Write a mesh; the suffix chooses the format.
 
-    ``.ply`` (binary) and ``.obj`` carry vertex normals and, where the mesh has them, vertex colours; ``.stl`` carries faces
-    only; ``.glb`` is for viewers. Numbers stay in the mesh's unit (``metadata["unit"]``), which PLY and OBJ name in a
-    comment. The file appears whole or not at all.
+    ``.ply`` (binary) and ``.obj`` carry vertex normals and, where the mesh has them, vertex colours; ``.stl`` carries
+    faces only; ``.glb`` is for viewers. Numbers stay in the mesh's unit (``metadata["unit"]``), which PLY and OBJ
+    name in a comment. The file appears whole or not at all.
 
     Parameters
     ----------
@@ -59,14 +60,16 @@ def write_mesh(mesh: trimesh.Trimesh, path: str | PathLike[str]) -> None:
                 np.ascontiguousarray(mesh.faces, dtype=np.uint32),
                 normals=np.ascontiguousarray(mesh.vertex_normals, dtype=np.float32),
                 colors=_colors(mesh),
-                comments=[f"bgars mesh, unit {mesh.metadata.get('unit', 'unknown')}, x right, y up, z toward the camera"],
+                comments=[
+                    f"bgars mesh, unit {mesh.metadata.get('unit', 'unknown')}, x right, y up, z toward the camera"
+                ],
             )
         else:
-            temporary.write_bytes(mesh.export(file_type=suffix[1:]))
+            mesh.export(temporary, file_type=suffix[1:])
 
 
 def _colors(mesh: trimesh.Trimesh) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]] | None:
     """(N, 3) red, green, blue, or None where the mesh has no vertex colours of its own."""
-    if mesh.visual.kind != "vertex":
+    if not isinstance(mesh.visual, ColorVisuals) or mesh.visual.kind != "vertex":
         return None
     return np.ascontiguousarray(mesh.visual.vertex_colors[:, :3], dtype=np.uint8)

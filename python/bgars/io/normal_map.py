@@ -23,9 +23,7 @@ FULL = 65535.0
 NORMALS_NDIM = 3
 
 
-def write_normal_map(
-    normals: NormalField | FloatArray, path: str | PathLike[str], *, directx: bool = False
-) -> None:
+def write_normal_map(normals: NormalField | FloatArray, path: str | PathLike[str], *, directx: bool = False) -> None:
     """Write normals as a 16-bit RGB PNG: ``round((n + 1) / 2 * 65535)``, R = x, G = y up (OpenGL), B = z.
 
     Invalid pixels (NaN) are black, which no unit normal encodes to.

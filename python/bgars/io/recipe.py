@@ -16,7 +16,15 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-__all__ = ["RECIPE_NAME", "CaptureRecipe", "ChannelName", "GammaResponse", "LightsRecipe", "TableResponse", "read_recipe"]
+__all__ = [
+    "RECIPE_NAME",
+    "CaptureRecipe",
+    "ChannelName",
+    "GammaResponse",
+    "LightsRecipe",
+    "TableResponse",
+    "read_recipe",
+]
 
 RECIPE_NAME = "capture.toml"
 

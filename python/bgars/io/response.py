@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bgars.records import FloatArray
+    from bgars.records import FloatArray, PixelArray
 
 __all__ = ["gamma_curve", "linearise", "read_response_table", "tabulate"]
 
@@ -77,8 +77,11 @@ def tabulate(curve: Curve, codes: int) -> FloatArray:
     return linearise(np.arange(codes, dtype=np.float64), curve, codes - 1.0)
 
 
-def linearise(values: NDArray[np.floating], curve: Curve, full_scale: float) -> FloatArray:
+def linearise(values: PixelArray | NDArray[np.float64], curve: Curve, full_scale: float) -> FloatArray:
     """Return linear values of an array of grey levels, any shape, float32; full scale stays full scale."""
     levels, radiances = curve
     zero, full = np.interp([0.0, full_scale], levels, radiances)
-    return ((np.interp(values, levels, radiances) - zero) * (full_scale / (full - zero))).astype(np.float32)
+    linear: FloatArray = ((np.interp(values, levels, radiances) - zero) * (full_scale / (full - zero))).astype(
+        np.float32
+    )
+    return linear

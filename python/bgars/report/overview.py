@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.colors import LightSource
+from matplotlib import colormaps
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
@@ -15,17 +15,20 @@ if TYPE_CHECKING:
     from os import PathLike
 
     from matplotlib.axes import Axes
+    from matplotlib.image import AxesImage
     from mpl_toolkits.mplot3d import Axes3D
+    from numpy.typing import NDArray
 
     from bgars.pipeline import Reconstruction
-    from bgars.records import FloatArray, HeightMap
+    from bgars.records import HeightMap
 
 __all__ = ["write_overview"]
 
 MAX_SURFACE_POINTS = 240
 MAX_PICTURE_PX = 1600
 DPI = 140
-SURFACE_COLOR = (0.80, 0.82, 0.86)
+AMBIENT = 0.25
+PICTURE_LIGHT = (-0.48, 0.48, 0.735)
 LINE_COLOR = "#1f4e79"
 MARK_COLOR = "#d1495b"
 
@@ -68,7 +71,8 @@ def _title(result: Reconstruction) -> str:
     scale = "pixel pitch unknown" if capture.pixel_pitch_um is None else f"{capture.pixel_pitch_um:g} µm per pixel"
     parts = len(height.components)
     return (
-        f"{capture.name}: {len(capture.rig)} lights, {capture.images.shape[2]} x {capture.images.shape[1]} px, {scale}; "
+        f"{capture.name}: {len(capture.rig)} lights, {capture.images.shape[2]} x {capture.images.shape[1]} px, "
+        f"{scale}; "
         f"method {result.field.method}; {parts} connected part{'s' if parts != 1 else ''}"
     )
 
@@ -84,9 +88,24 @@ def _extent(height: HeightMap) -> tuple[float, float, float, float]:
     return (-cols / 2 * pitch, cols / 2 * pitch, -rows / 2 * pitch, rows / 2 * pitch)
 
 
-def _picture(axes: Axes, values: Any, height: HeightMap, title: str, **kwargs: Any) -> Any:
+def _picture(
+    axes: Axes,
+    values: NDArray[np.generic],
+    height: HeightMap,
+    title: str,
+    *,
+    cmap: str | None = None,
+    span: tuple[float, float] = (0.0, 1.0),
+) -> AxesImage:
     step = max(1, int(np.ceil(max(height.mask.shape) / MAX_PICTURE_PX)))
-    picture = axes.imshow(values[::step, ::step], extent=_extent(height), interpolation="nearest", **kwargs)
+    picture = axes.imshow(
+        values[::step, ::step],
+        extent=_extent(height),
+        interpolation="nearest",
+        cmap=cmap,
+        vmin=span[0],
+        vmax=max(span[1], span[0] + 1e-9),
+    )
     axes.set_title(title, fontsize=11)
     axes.set_xlabel(f"x ({_unit(height)})")
     axes.set_ylabel(f"y ({_unit(height)})")
@@ -101,7 +120,7 @@ def _show_input(figure: Figure, axes: Axes, result: Reconstruction) -> None:
     top = float(np.percentile(image[capture.mask], 99.8))
     rig = capture.rig
     title = f"Input: light 1 of {len(rig)} (azimuth {rig.azimuths_deg[0]:.0f}°, elevation {rig.elevations_deg[0]:.0f}°)"
-    picture = _picture(axes, image, result.height, title, cmap="gray", vmin=0.0, vmax=max(top, 1e-12))
+    picture = _picture(axes, image, result.height, title, cmap="gray", span=(0.0, top))
     figure.colorbar(picture, ax=axes, label="grey level", shrink=0.85)
 
 
@@ -112,21 +131,18 @@ def _show_normals(axes: Axes, result: Reconstruction) -> None:
 
 
 def _show_kept_lights(figure: Figure, axes: Axes, result: Reconstruction) -> None:
-    lights = len(result.capture.rig)
-    kept = np.where(result.field.mask, result.field.lights_kept, 0).astype(np.float32)
-    kept[~result.field.mask] = np.nan
-    picture = _picture(
-        axes, kept, result.height, "Lights kept in the fit (white: no normal)", cmap="viridis", vmin=3, vmax=max(lights, 4)
-    )
+    most = float(len(result.capture.rig))
+    kept = np.where(result.field.mask, result.field.lights_kept, np.nan)
+    title = "Lights kept in the fit (white: no normal)"
+    picture = _picture(axes, kept, result.height, title, cmap="viridis", span=(min(3.0, most - 1.0), most))
     figure.colorbar(picture, ax=axes, label="lights", shrink=0.85, ticks=MaxNLocator(6, integer=True))
 
 
 def _show_height(figure: Figure, axes: Axes, height: HeightMap, row: int) -> None:
     values = height.height
-    low, high = np.nanpercentile(values, [0.5, 99.5])
-    picture = _picture(
-        axes, values, height, "Height (each connected part has mean 0)", cmap="cividis", vmin=low, vmax=max(high, low + 1e-9)
-    )
+    low, high = (float(level) for level in np.nanpercentile(values, [0.5, 99.5]))
+    title = "Height" if len(height.components) == 1 else "Height (each connected part has mean 0)"
+    picture = _picture(axes, values, height, title, cmap="cividis", span=(low, high))
     figure.colorbar(picture, ax=axes, label=f"height ({_unit(height)})", shrink=0.85)
     y = (height.mask.shape[0] / 2 - row - 0.5) * (height.pixel_pitch_um or 1.0)
     axes.axhline(y, color=MARK_COLOR, linewidth=1.2, linestyle="--")
@@ -146,31 +162,41 @@ def _show_surface(axes: Axes3D, height: HeightMap) -> None:
     x = (np.arange(cols[0], cols[-1] + 1)[::step] + 0.5 - shape[1] / 2) * pitch
     y = (shape[0] / 2 - np.arange(rows[0], rows[-1] + 1)[::step] - 0.5) * pitch
     grid_x, grid_y = np.meshgrid(x, y)
-    filled = np.where(np.isfinite(z), z, np.nanmin(z))
-    # Row 0 is the top of the image, so dy is negative; the light stands where the camera of the picture can see its effect.
-    light = LightSource(azdeg=300, altdeg=50)
-    base = np.broadcast_to(np.array(SURFACE_COLOR), (*z.shape, 3))
-    spacing = pitch * step
-    shaded = light.shade_rgb(base, filled, vert_exag=1.0, dx=spacing, dy=-spacing, blend_mode="soft", fraction=1.0)
-    faces = np.concatenate([shaded, np.isfinite(z)[..., None].astype(np.float64)], axis=2)
-    axes.plot_surface(grid_x, grid_y, z, facecolors=faces, rstride=1, cstride=1, linewidth=0, antialiased=False, shade=False)
-    span = [np.ptp(x) or 1.0, np.ptp(y) or 1.0, max(float(np.nanmax(z) - np.nanmin(z)), 0.05 * max(np.ptp(x), np.ptp(y)))]
-    axes.set_box_aspect(span, zoom=1.15)
+    colors = _shaded_colors(z, pitch * step)
+    axes.plot_surface(
+        grid_x, grid_y, z, facecolors=colors, rstride=1, cstride=1, linewidth=0, antialiased=False, shade=False
+    )
+    width, depth, rise = float(np.ptp(x)) or 1.0, float(np.ptp(y)) or 1.0, float(np.nanmax(z) - np.nanmin(z))
+    axes.set_box_aspect((width, depth, max(rise, 0.05 * max(width, depth))), zoom=1.1)
     axes.view_init(elev=38, azim=-62)
     axes.set_title("Surface, true to scale" + (" (largest part)" if len(height.components) > 1 else ""), fontsize=11)
     axes.set_xlabel(f"x ({_unit(height)})", labelpad=8)
     axes.set_ylabel(f"y ({_unit(height)})", labelpad=8)
-    axes.set_zlabel(f"z ({_unit(height)})", labelpad=2)
+    axes.set_zlabel(f"z ({_unit(height)})", labelpad=4)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(4))
     axes.zaxis.set_major_locator(MaxNLocator(3))
     axes.tick_params(labelsize=8)
 
 
+def _shaded_colors(z: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
+    """RGBA of a relief: colour by height, brightness by a light from the upper left; transparent where z is NaN."""
+    filled = np.where(np.isfinite(z), z, np.nanmin(z))
+    slope_down, slope_right = np.gradient(filled, spacing) if min(z.shape) > 1 else (np.zeros_like(z),) * 2
+    normals = np.stack([-slope_right, slope_down, np.ones_like(z)], axis=2)
+    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    brightness = AMBIENT + (1.0 - AMBIENT) * np.clip(normals @ np.array(PICTURE_LIGHT), 0.0, 1.0)
+    low, high = np.nanpercentile(z, [0.5, 99.5])
+    colors: NDArray[np.float64] = colormaps["cividis"](np.clip((filled - low) / max(high - low, 1e-9), 0.0, 1.0))
+    colors[..., :3] = np.clip(colors[..., :3] * brightness[..., None] * 1.25, 0.0, 1.0)
+    colors[..., 3] = np.isfinite(z)
+    return colors
+
+
 def _profile_row(height: HeightMap) -> int:
-    """The row through the highest point of the smoothed height: it crosses a ball, if there is one."""
-    values: FloatArray = np.where(height.mask, height.height_px, -np.inf).astype(np.float32)
-    return int(np.unravel_index(int(np.argmax(values)), values.shape)[0])
+    """The row through the highest point: it crosses a ball, if there is one."""
+    highest = int(np.argmax(np.where(height.mask, height.height_px, -np.inf)))
+    return highest // int(height.mask.shape[1])
 
 
 def _show_profile(axes: Axes, height: HeightMap, row: int) -> None:
@@ -178,7 +204,8 @@ def _show_profile(axes: Axes, height: HeightMap, row: int) -> None:
     cols = height.mask.shape[1]
     x = (np.arange(cols) + 0.5 - cols / 2) * pitch
     axes.plot(x, height.height[row], color=LINE_COLOR, linewidth=1.6)
-    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_aspect("equal", adjustable="box")
+    axes.margins(x=0.0, y=0.12)
     axes.set_title(f"Profile along row {row} (dashed line), true to scale", fontsize=11)
     axes.set_xlabel(f"x ({_unit(height)})")
     axes.set_ylabel(f"height ({_unit(height)})")

@@ -10,8 +10,8 @@ __all__ = ["sample_capture"]
 def sample_capture() -> Path:
     """Return the folder of the sample capture.
 
-    One solder ball of 600 um diameter on its board, strong highlights, 8 lights at 45 degrees, 3.4 um a pixel; rendered by a
-    physically based renderer, with its truth in ``gt.npz``.
+    One solder ball of 600 um diameter on its board, strong highlights, 8 lights at 45 degrees, 3.4 um a pixel;
+    rendered by a physically based renderer, with its truth in ``gt.npz``.
 
     Examples
     --------
