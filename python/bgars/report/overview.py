@@ -28,7 +28,7 @@ MAX_SURFACE_POINTS = 240
 MAX_PICTURE_PX = 1600
 DPI = 140
 AMBIENT = 0.25
-PICTURE_LIGHT = (-0.48, 0.48, 0.735)
+PICTURE_LIGHT = (-0.55, -0.4, 0.73)
 LINE_COLOR = "#1f4e79"
 MARK_COLOR = "#d1495b"
 
@@ -169,10 +169,10 @@ def _show_surface(axes: Axes3D, height: HeightMap) -> None:
     width, depth, rise = float(np.ptp(x)) or 1.0, float(np.ptp(y)) or 1.0, float(np.nanmax(z) - np.nanmin(z))
     axes.set_box_aspect((width, depth, max(rise, 0.05 * max(width, depth))), zoom=1.1)
     axes.view_init(elev=38, azim=-62)
-    axes.set_title("Surface, true to scale" + (" (largest part)" if len(height.components) > 1 else ""), fontsize=11)
+    part = ", largest part" if len(height.components) > 1 else ""
+    axes.set_title(f"Surface, true to scale{part} (z in {_unit(height)})", fontsize=11)
     axes.set_xlabel(f"x ({_unit(height)})", labelpad=8)
     axes.set_ylabel(f"y ({_unit(height)})", labelpad=8)
-    axes.set_zlabel(f"z ({_unit(height)})", labelpad=4)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(4))
     axes.zaxis.set_major_locator(MaxNLocator(3))
@@ -180,7 +180,7 @@ def _show_surface(axes: Axes3D, height: HeightMap) -> None:
 
 
 def _shaded_colors(z: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
-    """RGBA of a relief: colour by height, brightness by a light from the upper left; transparent where z is NaN."""
+    """RGBA of a relief: colour by height, brightness by a light from the lower left; transparent where z is NaN."""
     filled = np.where(np.isfinite(z), z, np.nanmin(z))
     slope_down, slope_right = np.gradient(filled, spacing) if min(z.shape) > 1 else (np.zeros_like(z),) * 2
     normals = np.stack([-slope_right, slope_down, np.ones_like(z)], axis=2)
