@@ -1,4 +1,5 @@
 //! Reading stacks and writing meshes.
+#![allow(clippy::unwrap_used, clippy::float_cmp, missing_docs)]
 
 use std::path::{Path, PathBuf};
 
@@ -51,7 +52,9 @@ fn colour_is_combined_linearly_as_asked() {
     RgbImage::from_pixel(2, 2, Rgb([100, 50, 200])).save(&path).unwrap();
     let value = |channel| {
         let color = Color { channel, ..plain() };
-        let StackData::U8(data) = decode_stack(&[path.clone()], &color, LIMIT).unwrap().data else { panic!() };
+        let StackData::U8(data) = decode_stack(std::slice::from_ref(&path), &color, LIMIT).unwrap().data else {
+            panic!()
+        };
         data[0]
     };
     // 0.2126 * 100 + 0.7152 * 50 + 0.0722 * 200 = 71.46

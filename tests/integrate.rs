@@ -1,4 +1,5 @@
 //! Integration against surfaces known in closed form.
+#![allow(clippy::unwrap_used, clippy::float_cmp, missing_docs)]
 
 use std::ops::ControlFlow;
 
@@ -182,7 +183,7 @@ fn too_few_iterations_raise_with_their_number_and_residual() {
     let outcome = integrate(&sample.normals, &sample.mask, 60, None, &params, &mut |_| ControlFlow::Continue(()));
     match outcome.unwrap_err() {
         Error::NoConvergence { iterations: 5, residual, .. } => {
-            assert!(residual > 1e-8 && residual < 10.0, "{residual}")
+            assert!(residual > 1e-8 && residual < 10.0, "{residual}");
         }
         other => panic!("{other}"),
     }

@@ -119,7 +119,8 @@ def _load(
     dark = None
     if in_values and gains is not None:
         _subtract_offset(images, dark_path, levels.black_level, channel, table, gains)
-        levels = levels._replace(saturation=float("inf"), black_level=0.0)
+        full_scale = levels.full_scale * float(np.mean(gains @ np.array(WEIGHTS[channel])))
+        levels = _Radiometry(full_scale, saturation=float("inf"), black_level=0.0)
     else:
         if dark_path is not None:
             dark = _read_dark(dark_path, images, channel, table)

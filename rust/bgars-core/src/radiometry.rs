@@ -111,8 +111,6 @@ impl<P: Pixel> Radiometry<'_, P> {
 fn interpolate(table: &[f32], level: f32) -> f32 {
     let last = table.len() - 1;
     let position = level.clamp(0.0, last as f32);
-    // Clamped to [0, last] just above, so the sign is never lost.
-    #[allow(clippy::cast_sign_loss)]
     let below = (position as usize).min(last.saturating_sub(1));
     let fraction = position - below as f32;
     table[below] + fraction * (table[(below + 1).min(last)] - table[below])

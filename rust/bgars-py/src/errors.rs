@@ -13,6 +13,7 @@ mod classes {
 pub use classes::InputError;
 
 /// One exception class for each kind of mistake; the message is the core's.
+#[allow(clippy::needless_pass_by_value)] // the shape that map_err wants
 pub fn to_python(error: Error) -> PyErr {
     let message = error.to_string();
     match error {

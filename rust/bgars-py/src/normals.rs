@@ -127,7 +127,7 @@ fn run<P: Pixel + numpy::Element>(
     dark: Option<&Bound<'_, PyAny>>,
     reporter: &mut Reporter,
 ) -> PyResult<bgars_core::Result<NormalMap>> {
-    let dark: Option<PyReadonlyArray2<'_, P>> = dark.map(|dark| dark.extract()).transpose()?;
+    let dark: Option<PyReadonlyArray2<'_, P>> = dark.map(PyAnyMethods::extract).transpose()?;
     let dark = dark.as_ref().map(|dark| slice2(dark, "dark")).transpose()?;
     let images = slice3(images, "images")?;
     Ok(py.detach(|| request.run(images, dark, reporter)))

@@ -24,7 +24,6 @@ pub(super) fn label(mask: &[bool], width: usize) -> (Vec<i32>, Vec<Component>) {
             continue;
         }
         // At most one component a pixel, and images of 2^31 pixels are refused where they are read.
-        #[allow(clippy::cast_possible_wrap)]
         let index = components.len() as i32;
         let mut pixels = 0;
         labels[first] = index;

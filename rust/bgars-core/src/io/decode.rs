@@ -186,8 +186,6 @@ pub(super) fn open(path: &Path, max_megapixels: f64) -> Result<impl ImageDecoder
     }
     let mut limits = Limits::default();
     // 16 bytes a pixel (RGBA f32) is the most a decoder of this crate asks for; the claim itself is checked in `read_header`.
-    // A limit is a positive count of bytes far below 2^63.
-    #[allow(clippy::cast_sign_loss)]
     let bytes = (max_megapixels * 16e6) as u64;
     limits.max_alloc = Some(bytes);
     reader.limits(limits);

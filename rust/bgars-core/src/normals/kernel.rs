@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::confidence::confidence;
-use super::robust::RobustFilter;
+use super::robust::{self, RobustFilter, RobustScratch};
 use super::solve::SubsetSolver;
 use super::specular::specular_filter;
 use super::{Method, NormalMap};
@@ -74,10 +74,10 @@ pub fn estimate<P: Pixel>(
         let rows = first_row..(first_row + band_rows).min(height);
         let band = rows.start * width..rows.end * width;
         let row_results: Vec<RowOut<'_>> = RowOut::split(&mut map, band, width, set_width);
-        row_results
-            .into_par_iter()
-            .enumerate()
-            .for_each_init(|| Scratch::new(lights), |scratch, (row, out)| kernel.row(first_row + row, out, scratch));
+        row_results.into_par_iter().enumerate().for_each_init(
+            || Scratch::new(lights),
+            |scratch, (row, mut out)| kernel.row(first_row + row, &mut out, scratch),
+        );
         if progress(rows.end as f64 / height as f64).is_break() {
             return Err(Error::Cancelled);
         }
@@ -147,7 +147,10 @@ struct Kernel<'a, P> {
     method: Method,
     robust: Option<RobustFilter>,
     solver: SubsetSolver,
+    /// 1 / intensity of each light.
     scales: Vec<f32>,
+    /// Full scale in the unit of the scaled values: its mean over the lights.
+    full_scale: f64,
 }
 
 /// What a row writes.
@@ -188,6 +191,7 @@ struct Scratch {
     kept: Vec<bool>,
     directions: Vec<Vector3<f64>>,
     order: Vec<usize>,
+    robust: RobustScratch,
 }
 
 impl Scratch {
@@ -199,6 +203,7 @@ impl Scratch {
             kept: vec![false; count],
             directions: (0..count).map(|light| lights.at(light, 0.0, 0.0).0).collect(),
             order: Vec::with_capacity(count),
+            robust: RobustScratch::default(),
         }
     }
 }
@@ -211,19 +216,21 @@ impl<'a, P: Pixel> Kernel<'a, P> {
         mask: Option<&'a [bool]>,
         method: Method,
     ) -> Self {
-        let (solver, fixed) = match lights {
-            Lights::Directional(directions) => (SubsetSolver::with_table(directions), Some(directions.as_slice())),
-            Lights::Near { .. } => (SubsetSolver::without_table(), None),
+        let solver = match lights {
+            Lights::Directional(directions) => SubsetSolver::with_table(directions),
+            Lights::Near { .. } => SubsetSolver::without_table(),
         };
         let robust = match method {
-            Method::RobustFilter(params) => Some(RobustFilter::new(params, lights.len(), fixed)),
+            Method::RobustFilter(params) => Some(RobustFilter::new(params, lights.len())),
             _ => None,
         };
-        let scales = radiometry.intensities.iter().map(|intensity| (1.0 / intensity) as f32).collect();
-        Self { stack, lights, radiometry, mask, method, robust, solver, scales }
+        let scales: Vec<f32> = radiometry.intensities.iter().map(|intensity| (1.0 / intensity) as f32).collect();
+        let mean_scale = scales.iter().map(|&scale| f64::from(scale)).sum::<f64>() / scales.len() as f64;
+        let full_scale = f64::from(radiometry.full_scale) * mean_scale;
+        Self { stack, lights, radiometry, mask, method, robust, solver, scales, full_scale }
     }
 
-    fn row(&self, row: usize, out: RowOut<'_>, scratch: &mut Scratch) {
+    fn row(&self, row: usize, out: &mut RowOut<'_>, scratch: &mut Scratch) {
         let width = self.stack.width();
         let lights = self.stack.lights();
         for col in 0..width {
@@ -285,14 +292,13 @@ impl<'a, P: Pixel> Kernel<'a, P> {
                 specular_filter(&scratch.values, gap, &mut scratch.order, &mut scratch.kept);
             }
             (Method::RobustFilter(_), Some(filter)) => {
-                filter.choose(
-                    &scratch.values,
-                    &scratch.clipped,
-                    &scratch.directions,
-                    self.radiometry.full_scale,
-                    &mut scratch.order,
-                    &mut scratch.kept,
-                );
+                let pixel = robust::Pixel {
+                    values: &scratch.values,
+                    clipped: &scratch.clipped,
+                    directions: &scratch.directions,
+                    full_scale: self.full_scale,
+                };
+                filter.choose(&pixel, &self.solver, &mut scratch.robust, &mut scratch.kept);
             }
             _ => scratch.kept.fill(true),
         }

@@ -1,30 +1,286 @@
-//! placeholder
-use crate::Result;
-use nalgebra::Vector3;
-/// Settings
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct RobustParams {}
+//! The robust filter: the window of sorted values that a Lambertian facet explains best.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::{Error, Result};
+
+use super::solve::{Gram, SubsetSolver};
+use super::specular::sort_lights;
+
+/// Most steps that the sorted values are cut into: up to 8 lights every window is tried, beyond that every eighth part.
+const MAX_STEPS: usize = 8;
+
+/// Fewest lights that fix a normal.
+const MIN_KEPT: usize = 3;
+
+/// A window must hold at least one light in this many.
+const MIN_SHARE: usize = 3;
+
+/// Smallest `det(L^T L)` of a window: three neighbours of a ring of eight at 65 degrees just pass.
+const MIN_DETERMINANT: f64 = 3e-3;
+
+/// Cost of a dropped light that the fit cannot explain, relative to a kept light's.
+const DROPPED_WEIGHT: f64 = 0.1;
+
+/// Fits that the noise level is worth: keeps a fit of three lights, which has no residual, from looking perfect.
+const PRIOR_FITS: f64 = 0.7;
+
+/// Power of (all lights / kept lights): what dropping a light costs.
+const DROPPING_POWER: i32 = 4;
+
+/// Settings of the robust filter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RobustParams {
+    /// Standard deviation of a value, in grey levels of 255.
+    pub noise_level: f32,
+}
+
 impl RobustParams {
-    pub(super) fn check(&self) -> Result<()> {
-        Ok(())
+    /// One grey level of 255.
+    pub const DEFAULT: Self = Self { noise_level: 1.0 };
+
+    pub(super) fn check(self) -> Result<()> {
+        if self.noise_level.is_finite() && self.noise_level > 0.0 {
+            return Ok(());
+        }
+        let value = f64::from(self.noise_level);
+        Err(Error::OutOfRange { argument: "noise_level", rule: "finite and above 0 (grey levels of 255)", value })
     }
 }
-/// x
-pub fn robust_filter() {}
-pub(super) struct RobustFilter {}
-impl RobustFilter {
-    pub fn new(_p: RobustParams, _lights: usize, _fixed: Option<&[Vector3<f64>]>) -> Self {
-        Self {}
+
+impl Default for RobustParams {
+    fn default() -> Self {
+        Self::DEFAULT
     }
-    pub fn choose(
-        &self,
-        _values: &[f32],
-        _clipped: &[bool],
-        _dirs: &[Vector3<f64>],
-        _full: f32,
-        _order: &mut Vec<usize>,
-        kept: &mut [bool],
-    ) {
-        kept.fill(true);
+}
+
+/// Marks the lights that the robust filter keeps at one pixel.
+///
+/// # Inputs
+/// `values` linear, one a light, divided by the light's intensity; `clipped` true for values at the saturation level;
+/// `directions` unit vectors; `full_scale` the saturation level in the unit of `values`.
+///
+/// # Method
+/// Shadows are among the darkest values and highlights among the brightest, so the diffuse values are a *window* of the
+/// sorted ones. Each window of at least 3 lights and a third of them all is fitted by least squares, `g = rho n`, and judged
+/// by what a Lambertian facet with that `g` would show under *every* light:
+///
+/// 1. A kept light costs its squared residual.
+/// 2. A dropped light that is *darker* than predicted costs a tenth of its squared difference: highlights add light, so a
+///    dropped bright light is no evidence against the fit, but a missing one is. A light dropped as dark must be black
+///    (2 noise levels), whatever was predicted: a cast shadow has no light, while inter-reflection does.
+/// 3. The mean cost a degree of freedom, with 0.7 of the squared noise as prior, times (lights / kept)^4, over sqrt(rho):
+///    a bigger window and a brighter facet are preferred when they explain the values as well.
+/// 4. At most half the lights are highlights: a facet darker than the median of the values is taken only where no other
+///    window exists; one brighter than full scale pays (rho / full scale)^2.
+///
+/// The window of the least cost wins, the larger first. Where none fixes a normal, every light is kept.
+///
+/// # Examples
+/// ```
+/// use bgars_core::normals::{RobustParams, robust_filter};
+/// let s = 0.5f64.sqrt();
+/// let ring = [[s, 0.0, s], [0.5, 0.5, s], [0.0, s, s], [-0.5, 0.5, s], [-s, 0.0, s], [-0.5, -0.5, s]];
+/// // A facet toward the camera of 100 grey levels; light 1 makes a highlight, light 3 is in a cast shadow.
+/// let values = [70.7, 180.0, 70.7, 0.0, 70.7, 70.7];
+/// let kept = robust_filter(&values, &[false; 6], &ring, 255.0, RobustParams::DEFAULT);
+/// assert_eq!(kept, [true, false, true, false, true, true]);
+/// ```
+///
+/// # Cost
+/// At most 21 windows of O(L) each, after a sort.
+#[must_use]
+pub fn robust_filter(
+    values: &[f32],
+    clipped: &[bool],
+    directions: &[[f64; 3]],
+    full_scale: f32,
+    params: RobustParams,
+) -> Vec<bool> {
+    let directions: Vec<Vector3<f64>> = directions.iter().map(|&direction| Vector3::from(direction)).collect();
+    let pixel = Pixel { values, clipped, directions: &directions, full_scale: f64::from(full_scale) };
+    let mut kept = vec![true; values.len()];
+    let solver = SubsetSolver::without_table();
+    RobustFilter::new(params, values.len()).choose(&pixel, &solver, &mut RobustScratch::default(), &mut kept);
+    kept
+}
+
+/// One pixel, as the filter sees it.
+pub(super) struct Pixel<'a> {
+    /// Linear values at unit light intensity.
+    pub values: &'a [f32],
+    /// True for values at the saturation level.
+    pub clipped: &'a [bool],
+    /// Unit vectors to the lights.
+    pub directions: &'a [Vector3<f64>],
+    /// Saturation level in the unit of the values.
+    pub full_scale: f64,
+}
+
+/// Memory of one thread, reused from pixel to pixel: everything in the order of the sorted values.
+#[derive(Debug, Default)]
+pub(super) struct RobustScratch {
+    order: Vec<usize>,
+    ranked: Vec<Ranked>,
+    /// `L^T L` and `L^T I` of all ranks below each.
+    sums: Vec<(Matrix3<f64>, Vector3<f64>)>,
+}
+
+/// A light in its rank.
+#[derive(Clone, Copy, Debug)]
+struct Ranked {
+    direction: Vector3<f64>,
+    value: f64,
+    clipped: bool,
+}
+
+/// What does not change from pixel to pixel.
+#[derive(Debug)]
+pub(super) struct RobustFilter {
+    /// First and one-past-last rank of each window, the larger windows first.
+    windows: Vec<(usize, usize)>,
+    noise_level: f64,
+}
+
+impl RobustFilter {
+    /// A filter for `lights` lights.
+    pub fn new(params: RobustParams, lights: usize) -> Self {
+        Self { windows: windows(lights), noise_level: f64::from(params.noise_level) / 255.0 }
+    }
+
+    /// Writes the kept lights of a pixel to `kept`; see [`robust_filter`].
+    pub fn choose(&self, pixel: &Pixel<'_>, solver: &SubsetSolver, scratch: &mut RobustScratch, kept: &mut [bool]) {
+        sort_lights(pixel.values, &mut scratch.order);
+        let median = median(pixel.values, &scratch.order);
+        put_clipped_last(pixel.clipped, &mut scratch.order);
+        rank(pixel, scratch);
+        let noise = self.noise_level * pixel.full_scale;
+        let mut best: Option<(bool, f64, (usize, usize))> = None;
+        for &window in &self.windows {
+            let Some(facet) = fit(window, solver, scratch) else { continue };
+            let brightness = facet.norm();
+            if !(brightness > 0.0 && brightness.is_finite()) {
+                continue;
+            }
+            let cost = cost(window, &facet, &scratch.ranked, noise) / brightness.sqrt()
+                * (brightness / pixel.full_scale).powi(2).max(1.0);
+            let too_dark = brightness < median;
+            if best.is_none_or(|(dark, least, _)| (too_dark, cost) < (dark, least)) {
+                best = Some((too_dark, cost, window));
+            }
+        }
+        let (first, end) = best.map_or((0, kept.len()), |(_, _, window)| window);
+        for (rank, &light) in scratch.order.iter().enumerate() {
+            kept[light] = (first..end).contains(&rank);
+        }
+    }
+}
+
+/// `rho n` of a window by least squares; `None` where its lights do not fix a normal.
+fn fit((first, end): (usize, usize), solver: &SubsetSolver, scratch: &RobustScratch) -> Option<Vector3<f64>> {
+    let (below, through) = (&scratch.sums[first], &scratch.sums[end]);
+    let subset = || scratch.order[first..end].iter().fold(0, |subset, light| subset | 1 << light);
+    let gram = solver.tabulated(subset).unwrap_or_else(|| Gram::new(&(through.0 - below.0)));
+    if gram.determinant > MIN_DETERMINANT { Some(gram.inverse? * (through.1 - below.1)) } else { None }
+}
+
+/// The windows of a filter: starts and ends on at most 8 steps, larger first, of equal size the darker first.
+fn windows(lights: usize) -> Vec<(usize, usize)> {
+    let steps = lights.min(MAX_STEPS);
+    // Rounded to the nearest rank; every rank when there are at most 8.
+    let edge = |step: usize| (2 * step * lights + steps) / (2 * steps);
+    (1..=steps)
+        .rev()
+        .flat_map(|size| (0..=steps - size).map(move |start| (edge(start), edge(start + size))))
+        .filter(|&(first, end)| end - first >= MIN_KEPT && MIN_SHARE * (end - first) >= lights)
+        .collect()
+}
+
+/// Moves clipped lights behind all others (divided by different intensities, they need not be the brightest).
+fn put_clipped_last(clipped: &[bool], order: &mut [usize]) {
+    if clipped.contains(&true) {
+        order.sort_by_key(|&light| clipped[light]);
+    }
+}
+
+/// The median of the sorted values; the mean of the two middle ones for an even number.
+fn median(values: &[f32], order: &[usize]) -> f64 {
+    let middle = values.len() / 2;
+    let upper = f64::from(values[order[middle]]);
+    if values.len() % 2 == 1 { upper } else { f64::midpoint(f64::from(values[order[middle - 1]]), upper) }
+}
+
+/// Fills the scratch with the lights in their ranks and the running sums of their normal equations.
+fn rank(pixel: &Pixel<'_>, scratch: &mut RobustScratch) {
+    let RobustScratch { order, ranked, sums } = scratch;
+    ranked.clear();
+    ranked.extend(order.iter().map(|&light| Ranked {
+        direction: pixel.directions[light],
+        value: f64::from(pixel.values[light]),
+        clipped: pixel.clipped[light],
+    }));
+    sums.clear();
+    let mut sum = (Matrix3::zeros(), Vector3::zeros());
+    sums.push(sum);
+    for light in &*ranked {
+        sum.0 += light.direction * light.direction.transpose();
+        sum.1 += light.direction * light.value;
+        sums.push(sum);
+    }
+}
+
+/// Cost of a window a degree of freedom, times (lights / kept)^4; see [`robust_filter`].
+fn cost((first, end): (usize, usize), facet: &Vector3<f64>, ranked: &[Ranked], noise: f64) -> f64 {
+    let mut residuals = 0.0;
+    let mut unexplained = 0.0;
+    for (rank, light) in ranked.iter().enumerate() {
+        let predicted = light.direction.dot(facet);
+        if (first..end).contains(&rank) {
+            residuals += (light.value - predicted).powi(2);
+            continue;
+        }
+        let black = light.value <= 2.0 * noise;
+        let difference = light.value - predicted.max(0.0);
+        let missing = difference < 0.0 && !light.clipped;
+        let left_bright = rank < first && !(light.clipped && difference < 0.0);
+        if !black && (missing || left_bright) {
+            unexplained += difference * difference;
+        }
+    }
+    let kept = (end - first) as f64;
+    let freedom = kept - MIN_KEPT as f64 + PRIOR_FITS;
+    let mean = (residuals + DROPPED_WEIGHT * unexplained + PRIOR_FITS * noise * noise) / freedom;
+    mean * (ranked.len() as f64 / kept).powi(DROPPING_POWER)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_of_four_lights_are_all_the_darkest_and_the_brightest_three() {
+        assert_eq!(windows(4), [(0, 4), (0, 3), (1, 4)]);
+    }
+
+    #[test]
+    fn windows_of_eight_lights_are_all_of_three_and_more() {
+        let windows = windows(8);
+        assert_eq!(windows.len(), 21);
+        assert!(windows.iter().all(|&(first, end)| end - first >= 3 && end <= 8));
+    }
+
+    #[test]
+    fn windows_of_many_lights_stay_few_and_hold_a_third() {
+        let windows = windows(96);
+        assert!(windows.len() <= 21);
+        assert!(windows.iter().all(|&(first, end)| 3 * (end - first) >= 96));
+        assert_eq!(windows[0], (0, 96));
+    }
+
+    #[test]
+    fn clipped_lights_rank_last() {
+        let mut order = [1, 3, 2, 0];
+        put_clipped_last(&[false, true, false, false], &mut order);
+        assert_eq!(order, [3, 2, 0, 1]);
     }
 }

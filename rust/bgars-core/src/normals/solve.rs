@@ -4,17 +4,34 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::lights::{MIN_CONDITIONING, conditioning};
 
-/// Most lights for which every subset's inverse is computed beforehand (4,096 matrices, 300 KB).
+/// Most lights for which every subset's inverse is computed beforehand (4,096 matrices, 350 KB).
 const MAX_TABLE_LIGHTS: usize = 12;
 
-/// `(L^T L)^-1` of a subset of lights, or `None` where it is rank-deficient.
-type Inverse = Option<Matrix3<f64>>;
+/// The Gram matrix `L^T L` of a subset of lights, as a solver wants it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gram {
+    /// `(L^T L)^-1`; `None` where the lights are fewer than three or (nearly) coplanar.
+    pub inverse: Option<Matrix3<f64>>,
+    /// `det(L^T L)`.
+    pub determinant: f64,
+}
+
+impl Gram {
+    pub fn new(gram: &Matrix3<f64>) -> Self {
+        let inverse = if conditioning(gram) < MIN_CONDITIONING { None } else { gram.try_inverse() };
+        Self { inverse, determinant: gram.determinant() }
+    }
+
+    fn of_lights<'a>(directions: impl Iterator<Item = &'a Vector3<f64>>) -> Self {
+        Self::new(&directions.fold(Matrix3::zeros(), |gram, direction| gram + direction * direction.transpose()))
+    }
+}
 
 /// Solves for `rho n` on kept lights: from a table of all subsets where the lights are the same for every pixel and few,
 /// else from the normal equations of the pixel.
 #[derive(Debug)]
 pub(super) struct SubsetSolver {
-    table: Vec<Inverse>,
+    table: Vec<Gram>,
 }
 
 /// `rho n` and the inverse of the Gram matrix it came from.
@@ -29,13 +46,11 @@ impl SubsetSolver {
         if directions.len() > MAX_TABLE_LIGHTS {
             return Self::without_table();
         }
-        let table = (0..1usize << directions.len())
-            .map(|subset| {
-                let lights = directions.iter().enumerate();
-                inverse_gram(lights.filter(|(light, _)| subset >> light & 1 == 1).map(|(_, direction)| direction))
-            })
-            .collect();
-        Self { table }
+        let of_subset = |subset: usize| {
+            let lights = directions.iter().enumerate();
+            Gram::of_lights(lights.filter(|(light, _)| subset >> light & 1 == 1).map(|(_, direction)| direction))
+        };
+        Self { table: (0..1usize << directions.len()).map(of_subset).collect() }
     }
 
     /// A solver for lights that change from pixel to pixel.
@@ -43,15 +58,20 @@ impl SubsetSolver {
         Self { table: Vec::new() }
     }
 
+    /// The entry of a subset (bit k: light k), if there is a table.
+    #[inline]
+    pub fn tabulated(&self, subset: impl FnOnce() -> usize) -> Option<Gram> {
+        if self.table.is_empty() { None } else { Some(self.table[subset()]) }
+    }
+
     /// `(L^T L)^-1 L^T I` over the lights marked in `kept`; `None` when these do not fix a normal.
     #[inline]
     pub fn solve(&self, values: &[f32], directions: &[Vector3<f64>], kept: &[bool]) -> Option<Solution> {
-        let inverse = if self.table.is_empty() {
-            inverse_gram(directions.iter().zip(kept).filter(|(_, kept)| **kept).map(|(direction, _)| direction))?
-        } else {
-            let subset = kept.iter().rev().fold(0, |bits, &kept| bits << 1 | usize::from(kept));
-            self.table[subset]?
-        };
+        let subset = || kept.iter().rev().fold(0, |bits, &kept| bits << 1 | usize::from(kept));
+        let gram = self.tabulated(subset).unwrap_or_else(|| {
+            Gram::of_lights(directions.iter().zip(kept).filter(|(_, kept)| **kept).map(|(direction, _)| direction))
+        });
+        let inverse = gram.inverse?;
         let mut right = Vector3::zeros();
         for ((&value, direction), &kept) in values.iter().zip(directions).zip(kept) {
             if kept {
@@ -60,10 +80,4 @@ impl SubsetSolver {
         }
         Some(Solution { scaled_normal: inverse * right, inverse })
     }
-}
-
-/// `(L^T L)^-1` of some unit vectors, `None` where they are fewer than three or (nearly) coplanar.
-fn inverse_gram<'a>(directions: impl Iterator<Item = &'a Vector3<f64>>) -> Inverse {
-    let gram = directions.fold(Matrix3::zeros(), |gram, direction| gram + direction * direction.transpose());
-    if conditioning(&gram) < MIN_CONDITIONING { None } else { gram.try_inverse() }
 }
