@@ -52,7 +52,7 @@ def cases(data: Path) -> tuple[list[Case], list[Case]]:
 
 
 def table(chosen: list[Case]) -> list[str]:
-    """Rows of a Markdown table: mean / median / 95th percentile of each method, pixels without a solution in brackets."""
+    """Rows of a Markdown table: mean / median / 95th percentile of each method, unsolved pixels in brackets."""
     photographs = "real" in chosen[0].shown
     heights = "" if photographs else " ball height RMSE (um), the same methods |"
     lines = [
@@ -82,7 +82,9 @@ def main() -> None:
     page = PAGE.read_text(encoding="utf-8")
     head, rest = page.split(START)
     tail = rest.split(END)[1]
-    body = "\n".join(["", "### Rendered scenes", "", *table(scenes), "", "### Photographs", "", *table(photographs), ""])
+    body = "\n".join(
+        ["", "### Rendered scenes", "", *table(scenes), "", "### Photographs", "", *table(photographs), ""]
+    )
     PAGE.write_text(f"{head}{START}\n{body}\n{END}{tail}", encoding="utf-8")
 
 

@@ -50,7 +50,8 @@ fn slow_solve(values: &[f32], directions: &[[f64; 3]], kept: &[bool]) -> Option<
     let lights = DMatrix::from_fn(rows.len(), 3, |row, col| directions[rows[row]][col]);
     let right = DVector::from_fn(rows.len(), |row, _| f64::from(values[rows[row]]));
     let svd = lights.svd(true, true);
-    if rows.len() < 3 || svd.singular_values[2] < 1e-2 * svd.singular_values[0] {
+    let squares = svd.singular_values.map(|value| value * value);
+    if rows.len() < 3 || 27.0 * squares.product() < 1e-6 * squares.sum().powi(3) {
         return None;
     }
     let solution = svd.solve(&right, 1e-12).unwrap();
@@ -90,7 +91,7 @@ fn slow_robust_filter(
             }
             let facet = rows.svd(true, true).solve(&right, 0.0).unwrap();
             let rho = facet.norm();
-            if rho == 0.0 {
+            if facet[2] <= 0.0 {
                 continue;
             }
             let mut total = 0.7 * noise * noise;

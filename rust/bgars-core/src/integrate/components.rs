@@ -74,9 +74,9 @@ mod tests {
 
     #[test]
     fn diagonal_neighbours_are_apart() {
-        let mask = [true, false, false, true, true, false];
+        let mask = [true, false, false, true, false, true];
         let (labels, components) = label(&mask, 2);
-        assert_eq!(labels, [0, -1, -1, 1, 1, -1]);
+        assert_eq!(labels, [0, -1, -1, 1, -1, 1]);
         let sizes: Vec<usize> = components.iter().map(|component| component.pixels).collect();
         assert_eq!(sizes, [1, 2]);
         assert_eq!((components[1].first_row, components[1].first_col), (1, 1));

@@ -74,7 +74,8 @@ impl Default for RobustParams {
 /// 4. At most half the lights are highlights: a facet darker than the median of the values is taken only where no other
 ///    window exists; one brighter than full scale pays (rho / full scale)^2.
 ///
-/// The window of the least cost wins, the larger first. Where none fixes a normal, every light is kept.
+/// The window of the least cost wins, the larger first; a facet that faces away from the camera is none. Where no window
+/// fixes a normal, every light is kept.
 ///
 /// # Examples
 /// ```
@@ -159,7 +160,7 @@ impl RobustFilter {
         for &window in &self.windows {
             let Some(facet) = fit(window, solver, scratch) else { continue };
             let brightness = facet.norm();
-            if !(brightness > 0.0 && brightness.is_finite()) {
+            if !(facet.z > 0.0 && brightness.is_finite()) {
                 continue;
             }
             let cost = cost(window, &facet, &scratch.ranked, noise) / brightness.sqrt()

@@ -1,0 +1,52 @@
+"""The compiled estimator against numpy, over random stacks, dtypes, masks and light counts."""
+
+from __future__ import annotations
+
+import bgars
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+
+def slow_filter(values: NDArray[np.float64], gap: float) -> NDArray[np.bool_]:
+    order = np.argsort(values, kind="stable")
+    gaps = np.flatnonzero(np.diff(values[order])[2:] > gap)
+    kept = np.ones(len(values), bool)
+    if gaps.size:
+        kept[order[gaps[0] + 3 :]] = False
+    return kept
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    lights=st.integers(3, 16),
+    dtype=st.sampled_from([np.uint8, np.uint16, np.float32]),
+    elevation_deg=st.floats(25, 65),
+    method=st.sampled_from(["lambertian", "specular-filter"]),
+)
+def test_fast_equals_slow(seed: int, lights: int, dtype: type, elevation_deg: float, method: str) -> None:
+    rng = np.random.default_rng(seed)
+    full = 1.0 if dtype is np.float32 else float(np.iinfo(dtype).max)
+    images = (rng.random((lights, 3, 4)) * full).astype(dtype)
+    images[0, 0, 0] = full  # float stacks: the largest value is full scale
+    mask = rng.random((3, 4)) > 0.3
+    mask[0, 0] = True
+    directions = bgars.LightRig.ring(lights, elevation_deg=elevation_deg).directions
+    field = bgars.estimate_normals(images, directions, mask=mask, method=method, keep_sets=True)  # type: ignore[arg-type]
+    assert field.kept_sets is not None
+    for row, col in np.argwhere(mask):
+        values = images[:, row, col].astype(np.float64)
+        kept = np.ones(lights, bool) if method == "lambertian" else slow_filter(values, 50.0 * full / 255.0)
+        np.testing.assert_array_equal(field.kept_sets[row, col], kept)
+        solution = np.linalg.lstsq(directions[kept], values[kept], rcond=None)[0]
+        if not field.mask[row, col]:
+            squares = np.linalg.svd(directions[kept], compute_uv=False) ** 2
+            assert solution[2] <= 1e-9 * full or 27 * squares.prod() < 1.001e-6 * squares.sum() ** 3
+            continue
+        normal = solution / np.linalg.norm(solution)
+        assert np.degrees(np.linalg.norm(field.normals[row, col] - normal)) < 1e-3
+        assert field.albedo[row, col] == pytest.approx(np.linalg.norm(solution) / full, rel=1e-4)
+    assert not field.mask[~mask].any()
