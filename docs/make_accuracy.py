@@ -1,4 +1,4 @@
-"""Measure every open scene and photograph with truth, and rewrite the tables of docs/accuracy.md."""
+"""Measure every open scene and photograph with truth; rewrite the tables of docs/accuracy.md and README.md."""
 
 from __future__ import annotations
 
@@ -12,6 +12,16 @@ from bgars.light_files import read_filenames
 from bgars.normals import METHODS
 
 PAGE = Path(__file__).parent / "accuracy.md"
+README = Path(__file__).parents[1] / "README.md"
+IN_README = {
+    "scenes/A_one_ball_diffuse": "one ball, weak highlights (A)",
+    "scenes/B_one_ball_paper_id050": "one ball, strong highlights (B id050)",
+    "scenes/C_grid_4x4_paper": "4 x 4 balls (C)",
+    "scenes/C2_grid_4x4_gamma": "4 x 4 balls, gamma and noise (C2)",
+    "scenes/E_grid_5x5_metal": "bare metal (E): no method here helps",
+    "real/dil_cat": "photograph, cat, 24 lights",
+    "real/dil_bear": "photograph, bear, 24 lights",
+}
 START, END = "<!-- tables: make accuracy -->", "<!-- end of tables -->"
 
 
@@ -51,6 +61,24 @@ def cases(data: Path) -> tuple[list[Case], list[Case]]:
     return scenes, photographs
 
 
+def readme_rows(chosen: list[Case]) -> list[str]:
+    """Rows of the short table: mean errors only."""
+    rows = []
+    for case in chosen:
+        if case.shown in IN_README and case.images is None:
+            cells = " | ".join(f"{result.normals.mean_deg:.2f}" for result in case.evaluate())
+            rows.append(f"| {IN_README[case.shown]} | {cells} |")
+    return rows
+
+
+def rewrite(page: Path, lines: list[str]) -> None:
+    """Put lines between the marks of a page."""
+    head, rest = page.read_text(encoding="utf-8").split(START)
+    tail = rest.split(END)[1]
+    body = "\n".join(lines)
+    page.write_text(f"{head}{START}\n\n{body}\n\n{END}{tail}", encoding="utf-8")
+
+
 def table(chosen: list[Case]) -> list[str]:
     """Rows of a Markdown table: mean / median / 95th percentile of each method, unsolved pixels in brackets."""
     photographs = "real" in chosen[0].shown
@@ -77,15 +105,11 @@ def table(chosen: list[Case]) -> list[str]:
 
 
 def main() -> None:
-    """Rewrite the part of the page between the marks."""
+    """Rewrite the parts of both pages between the marks."""
     scenes, photographs = cases(Path(os.environ["BGARS_DATA"]))
-    page = PAGE.read_text(encoding="utf-8")
-    head, rest = page.split(START)
-    tail = rest.split(END)[1]
-    body = "\n".join(
-        ["", "### Rendered scenes", "", *table(scenes), "", "### Photographs", "", *table(photographs), ""]
-    )
-    PAGE.write_text(f"{head}{START}\n{body}\n{END}{tail}", encoding="utf-8")
+    header = [f"| capture | {' | '.join(METHODS)} |", f"| --- |{' ---: |' * len(METHODS)}"]
+    rewrite(README, [*header, *readme_rows(scenes + photographs)])
+    rewrite(PAGE, ["### Rendered scenes", "", *table(scenes), "", "### Photographs", "", *table(photographs)])
 
 
 if __name__ == "__main__":
