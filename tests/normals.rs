@@ -71,7 +71,7 @@ fn slow_robust_filter(
     let noise = noise_level / 255.0 * full_scale;
     let mut sorted: Vec<f64> = values.iter().map(|&value| f64::from(value)).collect();
     sorted.sort_by(f64::total_cmp);
-    let median = (sorted[(lights - 1) / 2] + sorted[lights / 2]) / 2.0;
+    let median = f64::midpoint(sorted[(lights - 1) / 2], sorted[lights / 2]);
     let mut order: Vec<usize> = (0..lights).collect();
     order.sort_by(|&a, &b| clipped[a].cmp(&clipped[b]).then(values[a].total_cmp(&values[b])).then(a.cmp(&b)));
     let steps = lights.min(8);
