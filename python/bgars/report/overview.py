@@ -27,6 +27,7 @@ __all__ = ["write_overview"]
 MAX_SURFACE_POINTS = 240
 MAX_PICTURE_PX = 1600
 DPI = 140
+FLAT_PROFILE = 0.2
 AMBIENT = 0.25
 PICTURE_LIGHT = (-0.55, -0.4, 0.73)
 LINE_COLOR = "#1f4e79"
@@ -204,9 +205,15 @@ def _show_profile(axes: Axes, height: HeightMap, row: int) -> None:
     cols = height.mask.shape[1]
     x = (np.arange(cols) + 0.5 - cols / 2) * pitch
     axes.plot(x, height.height[row], color=LINE_COLOR, linewidth=1.6)
-    axes.set_aspect("equal", adjustable="box")
+    rise = float(np.ptp(height.height[row][height.mask[row]]))
+    flat = rise < FLAT_PROFILE * cols * pitch
+    if flat:
+        axes.set_box_aspect(0.6)
+    else:
+        axes.set_aspect("equal", adjustable="box")
     axes.margins(x=0.0, y=0.12)
-    axes.set_title(f"Profile along row {row} (dashed line), true to scale", fontsize=11)
+    scale = "height stretched" if flat else "true to scale"
+    axes.set_title(f"Profile along row {row} (dashed line), {scale}", fontsize=11)
     axes.set_xlabel(f"x ({_unit(height)})")
     axes.set_ylabel(f"height ({_unit(height)})")
     axes.grid(visible=True, color="0.88", linewidth=0.8)
