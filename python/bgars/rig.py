@@ -168,6 +168,12 @@ class LightRig:
         ------
         InputError
             Fewer than 3 lights, or a light that is not above the board.
+
+        Examples
+        --------
+        >>> leds_um = [[40_000, 0, 40_000], [-40_000, 0, 40_000], [0, 40_000, 40_000]]
+        >>> LightRig.from_positions(leds_um).elevations_deg.round(1).tolist()
+        [45.0, 45.0, 45.0]
         """
         positions = _vectors(positions_um, "light_positions")
         below = np.flatnonzero(positions[:, 2] <= 0)

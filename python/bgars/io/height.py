@@ -62,6 +62,16 @@ def read_height(path: str | PathLike[str]) -> tuple[FloatArray, float | None]:
         An unknown suffix.
     FileFormatError
         The file is missing, truncated, or not a single grey float image.
+
+    Examples
+    --------
+    >>> import bgars, numpy as np, pathlib, tempfile
+    >>> height = bgars.HeightMap.from_array(np.ones((1, 2), np.float32), pixel_pitch_um=5.0)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     bgars.write_height(height, pathlib.Path(folder) / "h.tif")
+    ...     values, pitch_um = bgars.read_height(pathlib.Path(folder) / "h.tif")
+    >>> values.tolist(), pitch_um
+    ([[1.0, 1.0]], 5.0)
     """
     path = Path(path)
     _check_suffix(path)

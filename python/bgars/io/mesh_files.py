@@ -42,6 +42,15 @@ def write_mesh(mesh: trimesh.Trimesh, path: str | PathLike[str]) -> None:
         An unknown suffix or a mesh without faces.
     FileFormatError
         The file cannot be written.
+
+    Examples
+    --------
+    >>> import bgars, numpy as np, pathlib, tempfile
+    >>> mesh = bgars.mesh_from_height(bgars.HeightMap.from_array(np.zeros((2, 2), np.float32)))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     bgars.write_mesh(mesh, pathlib.Path(folder) / "flat.ply")
+    ...     [path.name for path in pathlib.Path(folder).iterdir()]
+    ['flat.ply']
     """
     path = Path(path)
     suffix = path.suffix.lower()

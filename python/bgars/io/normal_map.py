@@ -78,6 +78,16 @@ def read_normal_map(path: str | PathLike[str], *, directx: bool = False) -> Floa
     ------
     FileFormatError
         The file is not an RGB image.
+
+    Examples
+    --------
+    >>> import bgars, numpy as np, pathlib, tempfile
+    >>> normals = np.float32([[[0.6, 0.0, 0.8], [np.nan, np.nan, np.nan]]])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     bgars.write_normal_map(normals, pathlib.Path(folder) / "n.png")
+    ...     back = bgars.read_normal_map(pathlib.Path(folder) / "n.png")
+    >>> back.round(3).tolist()
+    [[[0.6000000238418579, 0.0, 0.800000011920929], [nan, nan, nan]]]
     """
     rgb = _bgars.read_rgb16(Path(path), MAX_MEGAPIXELS)
     vectors = rgb.astype(np.float32) / np.float32(FULL) * 2.0 - 1.0

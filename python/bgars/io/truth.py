@@ -55,6 +55,12 @@ def read_truth(folder: str | PathLike[str]) -> Truth:
     ------
     FileFormatError
         There is no truth, or it cannot be read.
+
+    Examples
+    --------
+    >>> import bgars
+    >>> bgars.read_truth(bgars.sample_capture()).normals.shape
+    (240, 256, 3)
     """
     folder = Path(folder)
     for place in (folder, folder.resolve().parent):
