@@ -53,8 +53,8 @@ def estimate_normals(
         Unit vectors from the surface to the light; only with plain arrays.
     method : {"lambertian", "specular-filter", "robust-filter"}
         ``lambertian`` keeps every light. ``specular-filter`` is the published filter: sort the values, cut at the
-        first gap over `threshold` with at least 3 values kept. ``robust-filter`` keeps the largest consistent set of
-        lights, shadows and highlights left out.
+        first gap over `threshold` with at least 3 values kept. ``robust-filter`` keeps the window of sorted values
+        that a Lambertian facet explains best, shadows and highlights left out (docs/method.md).
     mask : (H, W) array_like of bool, optional
         True = use; combined with the capture's own mask.
     light_intensities : (L,) array_like, optional

@@ -54,7 +54,7 @@ MethodOption = Annotated[
         "--method",
         "-m",
         help="lambertian: all lights. specular-filter: the published sorted-gap filter. "
-        "robust-filter: the largest consistent set of lights, shadows and highlights left out.",
+        "robust-filter: the window of sorted values that a matt facet explains best, shadows and highlights left out.",
     ),
 ]
 ThresholdOption = Annotated[

@@ -1,8 +1,8 @@
 //! Normals from a light stack: choose the lights of each pixel, then least squares on them.
 //!
 //! For the kept lights K of a pixel, `rho n = (L_K^T L_K)^-1 L_K^T I_K` (Woodham 1980). The methods differ in K only:
-//! all lights ([`Method::Lambertian`]), the sorted-gap filter ([`Method::SpecularFilter`]), or the one-sided consensus of
-//! [`Method::RobustFilter`].
+//! all lights ([`Method::Lambertian`]), the sorted-gap filter ([`Method::SpecularFilter`]), or the best window of sorted
+//! values ([`Method::RobustFilter`]).
 
 mod confidence;
 mod kernel;
@@ -24,7 +24,7 @@ pub enum Method {
         /// Gap in grey levels of 255 over which the rest of the sorted values is dropped.
         threshold: f32,
     },
-    /// One-sided consensus; see [`robust_filter`].
+    /// The best window of sorted values; see [`robust_filter`].
     RobustFilter(RobustParams),
 }
 
