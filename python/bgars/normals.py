@@ -8,7 +8,7 @@ import numpy as np
 
 from bgars import _bgars
 from bgars.errors import InputError
-from bgars.records import Capture, NormalField, integer_full_scale
+from bgars.records import Capture, NormalField, float_full_scale, integer_full_scale
 from bgars.rig import LightRig
 
 if TYPE_CHECKING:
@@ -153,8 +153,7 @@ def _capture_from_arrays(
     if full_scale is not None:
         clip = full_scale if saturation is None else saturation
     else:
-        finite = stack[np.isfinite(stack)]
-        full_scale = saturation or max(float(finite.max(initial=0.0)), 1e-30)
+        full_scale = saturation or float_full_scale(stack)
         clip = float("inf") if saturation is None else saturation
     return Capture(
         images=stack,

@@ -25,17 +25,24 @@ __all__ = [
     "HeightMap",
     "NormalField",
     "PixelArray",
+    "float_full_scale",
     "integer_full_scale",
 ]
 
 PixelArray = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32]
 FloatArray = NDArray[np.float32]
+TINY = 1e-30
 BoolArray = NDArray[np.bool_]
 
 
 def integer_full_scale(pixels: PixelArray) -> float | None:
     """Return the largest grey level of an integer dtype (255 or 65535), None for floats."""
     return float((1 << 8 * pixels.dtype.itemsize) - 1) if pixels.dtype.kind == "u" else None
+
+
+def float_full_scale(pixels: PixelArray) -> float:
+    """Return the largest finite value of float pixels: their full scale, where no saturation level is known."""
+    return max(float(np.max(pixels, initial=0.0, where=np.isfinite(pixels))), TINY)
 
 
 @dataclass(frozen=True, eq=False)

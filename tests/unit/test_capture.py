@@ -186,6 +186,8 @@ def test_float_pixels_go_through_the_response_too(capture_folder: Path) -> None:
     assert capture.images[0, 0, 0] == pytest.approx(0.25, abs=1e-4)
     assert capture.black_level == pytest.approx(0.0625, abs=1e-4)
     assert capture.saturation == pytest.approx(1.0, abs=1e-4)
+    recipe(capture_folder, "response = { gamma = 2.0 }\n" + RING)
+    assert bgars.read_capture(capture_folder).saturation == np.inf, "nothing was said to clip"
 
 
 def test_the_recipe_of_a_subfolder_may_point_upward(capture_folder: Path) -> None:

@@ -134,8 +134,8 @@ def reconstruct(
     low, high = height[f"height_range_{height['unit']}"]
     say(
         f"{summary['capture']}: {summary['normals']['valid_pixels']} normals ({method}), height {low:.1f} to "
-        f"{high:.1f} "
-        f"{height['unit']} in {height['components']} connected part(s), {height['iterations']} solver iterations."
+        f"{high:.1f} {height['unit']} in {height['components']} connected part(s), "
+        f"{height['iterations']} solver iterations."
     )
     _list_files(output, files)
 

@@ -12,7 +12,7 @@ from bgars.io.capture_lights import default_recipe, image_names, match, read_lig
 from bgars.io.images import MAX_MEGAPIXELS, WEIGHTS, decode_stack, read_mask
 from bgars.io.recipe import RECIPE_NAME, CaptureRecipe, GammaResponse, TableResponse, read_recipe
 from bgars.io.response import Curve, gamma_curve, linearise, read_response_table, tabulate
-from bgars.records import Capture
+from bgars.records import Capture, float_full_scale
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 __all__ = ["read_capture"]
 
 RGB = 3
-TINY = 1e-30
 
 
 def read_capture(
@@ -191,7 +190,7 @@ def _levels(folder: Path, recipe: CaptureRecipe, images: PixelArray, code_scale:
     elif recipe.saturation is not None:
         full_scale = saturation = recipe.saturation
     else:
-        full_scale, saturation = max(float(np.nanmax(images)), TINY), float("inf")
+        full_scale, saturation = float_full_scale(images), float("inf")
     if not recipe.black_level < min(full_scale, saturation):
         msg = (
             f"{folder / RECIPE_NAME}: black_level: must be below the saturation level "
@@ -233,6 +232,8 @@ def _linearise_floats(
         images = linearise(images, curve, full_scale)
         dark = None if dark is None else linearise(dark, curve, full_scale)
     black_level, saturation = linearise(np.array([levels.black_level, levels.saturation]), curve, full_scale)
+    if np.isinf(levels.saturation):
+        saturation = np.float32(np.inf)  # the curve ends at full scale, but nothing was said to clip there
     return images, dark, levels._replace(black_level=float(black_level), saturation=float(saturation))
 
 
