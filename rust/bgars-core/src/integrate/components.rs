@@ -1,5 +1,7 @@
 //! Connected parts of a mask: each keeps its own unknown constant.
 
+use rayon::prelude::*;
+
 /// One connected component of the mask (4-neighbourhood).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Component {
@@ -11,61 +13,135 @@ pub struct Component {
     pub first_col: usize,
 }
 
-/// Labels the components of `mask`: an index a pixel (-1 outside), and the components in the order of their first pixels.
-///
-/// # Cost
-/// Linear in the number of pixels; the stack of a flood fill holds at most the pixels of one component.
-pub(super) fn label(mask: &[bool], width: usize) -> (Vec<i32>, Vec<Component>) {
-    let mut labels = vec![-1i32; mask.len()];
-    let mut components = Vec::new();
-    let mut pending = Vec::new();
-    for first in 0..mask.len() {
-        if !mask[first] || labels[first] >= 0 {
-            continue;
+/// Pixels of the mask that follow each other in a row.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Run {
+    pub row: usize,
+    pub start: usize,
+    pub end: usize,
+    pub component: usize,
+}
+
+/// A mask as runs in reading order, and the components that they form.
+#[derive(Debug)]
+pub(super) struct Runs {
+    width: usize,
+    runs: Vec<Run>,
+    /// First run of each row, and the end.
+    row_starts: Vec<usize>,
+    pub components: Vec<Component>,
+}
+
+impl Runs {
+    /// # Cost
+    /// Linear in the number of pixels, in parallel, and nearly linear in the number of runs (union-find).
+    pub fn new(mask: &[bool], width: usize) -> Self {
+        let height = mask.len() / width;
+        let mut runs: Vec<Run> =
+            mask.par_chunks(width).enumerate().flat_map_iter(|(row, mask)| RowRuns { row, mask, col: 0 }).collect();
+        let mut row_starts = vec![0; height + 1];
+        for run in &runs {
+            row_starts[run.row + 1] += 1;
         }
-        // At most one component a pixel, and images of 2^31 pixels are refused where they are read.
-        let index = components.len() as i32;
-        let mut pixels = 0;
-        labels[first] = index;
-        pending.push(first);
-        while let Some(pixel) = pending.pop() {
-            pixels += 1;
-            let col = pixel % width;
-            let neighbours = [
-                (col > 0).then(|| pixel - 1),
-                (col + 1 < width).then(|| pixel + 1),
-                pixel.checked_sub(width),
-                Some(pixel + width).filter(|&below| below < mask.len()),
-            ];
-            for neighbour in neighbours.into_iter().flatten() {
-                if mask[neighbour] && labels[neighbour] < 0 {
-                    labels[neighbour] = index;
-                    pending.push(neighbour);
+        for row in 0..height {
+            row_starts[row + 1] += row_starts[row];
+        }
+        let mut parents: Vec<usize> = (0..runs.len()).collect();
+        for row in 1..height {
+            let (mut above, end_above) = (row_starts[row - 1], row_starts[row]);
+            for run in row_starts[row]..row_starts[row + 1] {
+                while above < end_above && runs[above].end <= runs[run].start {
+                    above += 1;
+                }
+                // The last run above may reach over the next one here, too.
+                let mut touching = above;
+                while touching < end_above && runs[touching].start < runs[run].end {
+                    unite(&mut parents, run, touching);
+                    touching += 1;
                 }
             }
         }
-        components.push(Component { pixels, first_row: first / width, first_col: first % width });
+        let mut components = Vec::new();
+        for index in 0..runs.len() {
+            let root = find(&mut parents, index);
+            let Run { row, start, end, .. } = runs[index];
+            // The root is the first run of its component: it has its number already.
+            let component = if root == index {
+                components.push(Component { pixels: 0, first_row: row, first_col: start });
+                components.len() - 1
+            } else {
+                runs[root].component
+            };
+            runs[index].component = component;
+            components[component].pixels += end - start;
+        }
+        Self { width, runs, row_starts, components }
     }
-    (labels, components)
+
+    /// The runs of a row.
+    pub fn row(&self, row: usize) -> &[Run] {
+        &self.runs[self.row_starts[row]..self.row_starts[row + 1]]
+    }
+
+    /// Index of each pixel's component, row-major; -1 outside the mask.
+    pub fn labels(&self) -> Vec<i32> {
+        let mut labels = vec![0i32; (self.row_starts.len() - 1) * self.width];
+        labels.par_chunks_mut(self.width).enumerate().for_each(|(row, labels)| {
+            labels.fill(-1);
+            for run in self.row(row) {
+                // At most one component a pixel, and images of 2^31 pixels are refused where they are read.
+                labels[run.start..run.end].fill(run.component as i32);
+            }
+        });
+        labels
+    }
+
+    /// Mean of `value(row, col)` over each component; summed in an order that does not depend on the threads.
+    pub fn means(&self, value: impl Fn(usize, usize) -> f64 + Sync) -> Vec<f64> {
+        let run_sum = |run: &Run| (run.start..run.end).map(|col| value(run.row, col)).sum::<f64>();
+        let run_sums: Vec<f64> = self.runs.par_iter().map(run_sum).collect();
+        let mut means = vec![0.0; self.components.len()];
+        for (run, sum) in self.runs.iter().zip(run_sums) {
+            means[run.component] += sum;
+        }
+        for (mean, component) in means.iter_mut().zip(&self.components) {
+            *mean /= component.pixels as f64;
+        }
+        means
+    }
 }
 
-/// Subtracts from `field` its mean over each component, so that the free constants are gone.
-pub(super) fn remove_means(field: &mut [f64], labels: &[i32], components: &[Component]) {
-    let mut sums = vec![0.0; components.len()];
-    let index = |label: i32| usize::try_from(label).ok();
-    for (&value, &label) in field.iter().zip(labels) {
-        if let Some(component) = index(label) {
-            sums[component] += value;
-        }
+/// The runs of one row of a mask.
+struct RowRuns<'a> {
+    row: usize,
+    mask: &'a [bool],
+    col: usize,
+}
+
+impl Iterator for RowRuns<'_> {
+    type Item = Run;
+
+    fn next(&mut self) -> Option<Run> {
+        let start = self.col + self.mask[self.col..].iter().position(|&used| used)?;
+        let rest = &self.mask[start..];
+        let end = start + rest.iter().position(|&used| !used).unwrap_or(rest.len());
+        self.col = end;
+        Some(Run { row: self.row, start, end, component: 0 })
     }
-    for (sum, component) in sums.iter_mut().zip(components) {
-        *sum /= component.pixels as f64;
+}
+
+/// The first run of the component of `run`.
+fn find(parents: &mut [usize], mut run: usize) -> usize {
+    while parents[run] != run {
+        parents[run] = parents[parents[run]];
+        run = parents[run];
     }
-    for (value, &label) in field.iter_mut().zip(labels) {
-        if let Some(component) = index(label) {
-            *value -= sums[component];
-        }
-    }
+    run
+}
+
+fn unite(parents: &mut [usize], a: usize, b: usize) {
+    let (a, b) = (find(parents, a), find(parents, b));
+    parents[a.max(b)] = a.min(b);
 }
 
 #[cfg(test)]
@@ -75,16 +151,33 @@ mod tests {
     #[test]
     fn diagonal_neighbours_are_apart() {
         let mask = [true, false, false, true, false, true];
-        let (labels, components) = label(&mask, 2);
-        assert_eq!(labels, [0, -1, -1, 1, -1, 1]);
-        let sizes: Vec<usize> = components.iter().map(|component| component.pixels).collect();
+        let runs = Runs::new(&mask, 2);
+        assert_eq!(runs.labels(), [0, -1, -1, 1, -1, 1]);
+        let sizes: Vec<usize> = runs.components.iter().map(|component| component.pixels).collect();
         assert_eq!(sizes, [1, 2]);
-        assert_eq!((components[1].first_row, components[1].first_col), (1, 1));
+        assert_eq!((runs.components[1].first_row, runs.components[1].first_col), (1, 1));
     }
 
     #[test]
     fn rows_do_not_wrap_around() {
-        let (_, components) = label(&[false, true, true, false], 2);
-        assert_eq!(components.len(), 2);
+        assert_eq!(Runs::new(&[false, true, true, false], 2).components.len(), 2);
+    }
+
+    #[test]
+    fn arms_that_meet_further_down_are_one_component() {
+        // A comb: three teeth on one beam, and a pixel of its own.
+        let rows = ["#.#.#", "#.#.#", "#####", ".....", "..#.."];
+        let mask: Vec<bool> = rows.concat().chars().map(|mark| mark == '#').collect();
+        let runs = Runs::new(&mask, 5);
+        let sizes: Vec<usize> = runs.components.iter().map(|component| component.pixels).collect();
+        assert_eq!(sizes, [11, 1]);
+    }
+
+    #[test]
+    fn means_are_taken_a_component() {
+        let mask = [true, true, false, true, false, false];
+        let means = Runs::new(&mask, 3).means(|row, col| (10 * row + col) as f64);
+        // Row 0: columns 0 and 1; row 1: column 0, below column 0.
+        assert_eq!(means, [(0.0 + 1.0 + 10.0) / 3.0]);
     }
 }

@@ -4,10 +4,15 @@
 //! equations are a weighted graph Laplacian; it is never stored as a matrix but applied as a 5-point stencil inside faer's
 //! conjugate gradient.
 
+mod checkerboard;
+mod coarsen;
+mod coarsest;
 mod components;
-mod jacobi;
+mod multigrid;
 mod operator;
+mod reduction;
 mod solve;
+mod transfer;
 
 pub use components::Component;
 pub use solve::integrate;

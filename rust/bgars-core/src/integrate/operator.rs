@@ -1,4 +1,4 @@
-//! The normal equations as a stencil: a weighted graph Laplacian on the pixels of the mask.
+//! The normal equations: a weighted graph Laplacian on the pixels of the mask, its blacks eliminated.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -8,23 +8,11 @@ use faer::{MatMut, MatRef, Par};
 use rayon::prelude::*;
 
 use super::Difference;
+use super::checkerboard::{BAND_ROWS, Grid, Weights, split_row};
+use super::reduction::multiply;
 
 /// Smallest n_z of an edge: a normal seen edge-on has no finite slope.
 const MIN_N_Z: f64 = 1e-3;
-
-/// `M^T M` on a full grid; pixels outside the mask have no edges, so their rows are zero.
-#[derive(Debug)]
-pub(super) struct Laplacian<'a> {
-    width: usize,
-    /// Weight of the edge from each pixel to its right neighbour; 0 where there is none.
-    right: Vec<f64>,
-    /// Weight of the edge from each pixel to the one below; 0 where there is none.
-    below: Vec<f64>,
-    /// Sum of the weights of a pixel's edges.
-    pub diagonal: Vec<f64>,
-    /// Set to make the solver stop; see [`LinOp::apply`] below.
-    cancelled: &'a AtomicBool,
-}
 
 /// The pixels to integrate over, their normals and how much each is trusted.
 #[derive(Clone, Copy)]
@@ -35,80 +23,175 @@ pub(super) struct Field<'a> {
     pub width: usize,
 }
 
-impl Field<'_> {
-    /// Weight of the edge `a -> b` and the height step `z_b - z_a` it asks for times that weight.
-    ///
-    /// `step` is the component of the normal along the edge with the sign of `b - a`; `n_z^2` is the weight that the paper's
-    /// rows `n_z dz = -n_x` imply.
-    #[inline]
-    fn edge(&self, a: usize, b: usize, axis: usize, sign: f64, difference: Difference, lead: usize) -> (f64, f64) {
-        let component = |pixel: usize, axis: usize| f64::from(self.normals[pixel * 3 + axis]);
-        let (along, n_z) = match difference {
-            Difference::Trapezoid => {
-                (f64::midpoint(component(a, axis), component(b, axis)), f64::midpoint(component(a, 2), component(b, 2)))
+/// A right side, or a solution, by colour.
+#[derive(Debug)]
+pub(super) struct Colours {
+    pub reds: Vec<f64>,
+    pub blacks: Vec<f64>,
+}
+
+/// One row of the field with its components apart; pixels outside the mask face the camera and are not trusted.
+#[derive(Debug, Default, Clone)]
+struct FieldRow {
+    along: [Vec<f32>; 2],
+    n_z: Vec<f32>,
+    /// Square root of the pixel's weight, 0 outside the mask.
+    trust: Vec<f64>,
+}
+
+/// Weights of the edges from a row's pixels to the next ones, and the height steps these ask for times the weights.
+#[derive(Debug, Default, Clone)]
+struct EdgeRow {
+    weight: Vec<f32>,
+    push: Vec<f64>,
+}
+
+impl FieldRow {
+    fn load(&mut self, field: Field<'_>, row: usize) {
+        let span = row * field.width..(row + 1) * field.width;
+        let mask = &field.mask[span.clone()];
+        self.trust.clear();
+        match field.weights {
+            Some(weights) => {
+                let roots = weights[span.clone()].iter().map(|&weight| f64::from(weight).sqrt());
+                self.trust.extend(roots.zip(mask).map(|(root, &used)| if used { root } else { 0.0 }));
             }
-            Difference::Forward => (component(lead, axis), component(lead, 2)),
+            None => self.trust.extend(mask.iter().map(|&used| f64::from(u8::from(used)))),
+        }
+        let normals = &field.normals[span.start * 3..span.end * 3];
+        let component = |axis: usize, outside: f32| {
+            normals
+                .chunks_exact(3)
+                .zip(mask)
+                .map(move |(normal, &used)| if used { normal[axis] } else { outside })
         };
-        let n_z = n_z.max(MIN_N_Z);
-        let trust = self.weights.map_or(1.0, |weights| (f64::from(weights[a]) * f64::from(weights[b])).sqrt());
-        (trust * n_z * n_z, -trust * n_z * along * sign)
+        for (axis, along) in self.along.iter_mut().enumerate() {
+            along.clear();
+            along.extend(component(axis, 0.0));
+        }
+        self.n_z.clear();
+        self.n_z.extend(component(2, 1.0));
     }
 }
 
-impl<'a> Laplacian<'a> {
-    /// The operator and its right side `M^T v` (zero outside the mask).
-    pub fn new(field: Field<'_>, difference: Difference, cancelled: &'a AtomicBool) -> (Self, Vec<f64>) {
-        let Field { mask, width, .. } = field;
-        let pixels = mask.len();
-        let mut right = vec![0.0; pixels];
-        let mut below = vec![0.0; pixels];
-        let mut diagonal = vec![0.0; pixels];
-        let mut divergence = vec![0.0; pixels];
-        for pixel in (0..pixels).filter(|&pixel| mask[pixel]) {
-            let mut add = |a: usize, b: usize, (weight, push): (f64, f64)| {
-                diagonal[a] += weight;
-                diagonal[b] += weight;
-                divergence[a] -= push;
-                divergence[b] += push;
-                weight
-            };
-            let neighbour = pixel + 1;
-            if neighbour % width != 0 && mask[neighbour] {
-                right[pixel] = add(pixel, neighbour, field.edge(pixel, neighbour, 0, 1.0, difference, pixel));
-            }
-            let neighbour = pixel + width;
-            if neighbour < pixels && mask[neighbour] {
-                // y grows upward: the forward difference starts at the lower pixel.
-                below[pixel] = add(pixel, neighbour, field.edge(pixel, neighbour, 1, -1.0, difference, neighbour));
-            }
+impl EdgeRow {
+    /// Edges from pixel k of `a` to pixel k of `b`; `sign` is +1 where the axis grows from `a` to `b`; `lead_is_a` says whose
+    /// normal the forward difference takes.
+    ///
+    /// `n_z^2` is the weight that the paper's rows `n_z dz = -n_x` imply.
+    #[allow(clippy::too_many_arguments)]
+    fn join(
+        &mut self,
+        a: (&[f32], &[f32], &[f64]),
+        b: (&[f32], &[f32], &[f64]),
+        sign: f64,
+        difference: Difference,
+        lead_is_a: bool,
+    ) {
+        let edges = a.2.len().min(b.2.len());
+        self.weight.clear();
+        self.weight.resize(a.2.len(), 0.0);
+        self.push.clear();
+        self.push.resize(a.2.len(), 0.0);
+        let (share_a, share_b) = match (difference, lead_is_a) {
+            (Difference::Trapezoid, _) => (0.5, 0.5),
+            (Difference::Forward, true) => (1.0, 0.0),
+            (Difference::Forward, false) => (0.0, 1.0),
+        };
+        for k in 0..edges {
+            let along = share_a * f64::from(a.0[k]) + share_b * f64::from(b.0[k]);
+            let n_z = (share_a * f64::from(a.1[k]) + share_b * f64::from(b.1[k])).max(MIN_N_Z);
+            let trust = a.2[k] * b.2[k];
+            self.weight[k] = (trust * n_z * n_z) as f32;
+            self.push[k] = -sign * trust * n_z * along;
         }
-        (Self { width, right, below, diagonal, cancelled }, divergence)
     }
 
-    /// `out = A x`, one row of pixels a task.
-    pub fn multiply(&self, out: &mut [f64], x: &[f64]) {
-        let width = self.width;
-        out.par_chunks_mut(width).enumerate().for_each(|(row, out)| {
-            let start = row * width;
-            for (col, out) in out.iter_mut().enumerate() {
-                let pixel = start + col;
-                let mut sum = self.diagonal[pixel] * x[pixel];
-                if col > 0 {
-                    sum -= self.right[pixel - 1] * x[pixel - 1];
-                }
-                if col + 1 < width {
-                    sum -= self.right[pixel] * x[pixel + 1];
-                }
-                if row > 0 {
-                    sum -= self.below[pixel - width] * x[pixel - width];
-                }
-                if pixel + width < x.len() {
-                    sum -= self.below[pixel] * x[pixel + width];
-                }
-                *out = sum;
-            }
-        });
+    fn clear(&mut self, width: usize) {
+        self.weight.clear();
+        self.weight.resize(width, 0.0);
+        self.push.clear();
+        self.push.resize(width, 0.0);
     }
+}
+
+/// Weights and right side `M^T v` of a field; both zero outside the mask.
+pub(super) fn assemble(field: Field<'_>, difference: Difference) -> (Weights, Colours) {
+    let width = field.width;
+    let grid = Grid { height: field.mask.len() / width, width };
+    let half = grid.half();
+    let mut weights = Weights::zeros(grid);
+    let mut right = Colours { reds: vec![0.0; grid.half_pixels()], blacks: vec![0.0; grid.half_pixels()] };
+    let bands = weights
+        .bands_mut()
+        .zip(right.reds.par_chunks_mut(BAND_ROWS * half))
+        .zip(right.blacks.par_chunks_mut(BAND_ROWS * half))
+        .enumerate();
+    bands.for_each(|(band, ((mut sides, reds), blacks))| {
+        let first = band * BAND_ROWS;
+        let rows = reds.len() / half;
+        let [mut here, mut next] = [FieldRow::default(), FieldRow::default()];
+        let [mut above, mut along, mut below] = [EdgeRow::default(), EdgeRow::default(), EdgeRow::default()];
+        let join_rows = |upper: &FieldRow, lower: &FieldRow, edges: &mut EdgeRow| {
+            // y grows upward: the forward difference starts at the lower pixel.
+            edges.join(
+                (&upper.along[1], &upper.n_z, &upper.trust),
+                (&lower.along[1], &lower.n_z, &lower.trust),
+                -1.0,
+                difference,
+                false,
+            );
+        };
+        here.load(field, first);
+        above.clear(width);
+        if first > 0 {
+            next.load(field, first - 1);
+            join_rows(&next, &here, &mut above);
+        }
+        let mut left = vec![0.0f32; width];
+        let mut unused = vec![0.0f32; half];
+        let mut divergence = vec![0.0f64; width];
+        for offset in 0..rows {
+            let row = first + offset;
+            along.join(
+                (&here.along[0], &here.n_z, &here.trust),
+                (&here.along[0][1..], &here.n_z[1..], &here.trust[1..]),
+                1.0,
+                difference,
+                true,
+            );
+            if row + 1 < grid.height {
+                next.load(field, row + 1);
+                join_rows(&here, &next, &mut below);
+            } else {
+                below.clear(width);
+            }
+            left[1..].copy_from_slice(&along.weight[..width - 1]);
+            let pixels = [&left, &along.weight, &above.weight, &below.weight];
+            for (side, pixels) in sides.iter_mut().zip(pixels) {
+                split_row(row, pixels, &mut side[offset * (half + 1)..][..half], &mut unused);
+            }
+            for k in 0..width {
+                divergence[k] = (above.push[k] - below.push[k]) - along.push[k];
+            }
+            for k in 1..width {
+                divergence[k] += along.push[k - 1];
+            }
+            let span = offset * half..(offset + 1) * half;
+            split_row(row, &divergence, &mut reds[span.clone()], &mut blacks[span]);
+            std::mem::swap(&mut above, &mut below);
+            std::mem::swap(&mut here, &mut next);
+        }
+    });
+    (weights, right)
+}
+
+/// The reduced system as faer wants it.
+#[derive(Debug)]
+pub(super) struct Reduced<'a> {
+    pub weights: &'a Weights,
+    /// Set to make the solver stop; see [`LinOp::apply`] below.
+    pub cancelled: &'a AtomicBool,
 }
 
 /// The only column of a vector handed over by faer, as a slice.
@@ -121,17 +204,17 @@ pub(super) fn column_mut(x: MatMut<'_, f64>) -> &mut [f64] {
     x.col_mut(0).try_as_col_major_mut().expect("faer hands over contiguous vectors").as_slice_mut()
 }
 
-impl LinOp<f64> for Laplacian<'_> {
+impl LinOp<f64> for Reduced<'_> {
     fn apply_scratch(&self, _rhs_ncols: usize, _par: Par) -> StackReq {
         StackReq::EMPTY
     }
 
     fn nrows(&self) -> usize {
-        self.diagonal.len()
+        self.weights.grid.half_pixels()
     }
 
     fn ncols(&self) -> usize {
-        self.diagonal.len()
+        self.weights.grid.half_pixels()
     }
 
     fn apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, _par: Par, _stack: &mut MemStack) {
@@ -142,7 +225,7 @@ impl LinOp<f64> for Laplacian<'_> {
                 *out = -rhs;
             }
         } else {
-            self.multiply(out, rhs);
+            multiply(self.weights, rhs, out);
         }
     }
 

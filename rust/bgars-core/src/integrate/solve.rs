@@ -6,12 +6,18 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::matrix_free::InitialGuessStatus;
 use faer::matrix_free::conjugate_gradient::{CgError, CgParams, conjugate_gradient, conjugate_gradient_scratch};
 use faer::{ColMut, ColRef, Par};
+use rayon::prelude::*;
 
-use super::components::{label, remove_means};
-use super::jacobi::Jacobi;
-use super::operator::{Field, Laplacian};
+use super::checkerboard::Weights;
+use super::components::Runs;
+use super::multigrid::Multigrid;
+use super::operator::{Field, Reduced, assemble};
+use super::reduction::{eliminate_blacks, fill_blacks, multiply};
 use super::{OnProgress, Params, Progress, Surface};
 use crate::{Error, Result};
+
+/// Values summed one after the other before blocks are.
+const SUM_BLOCK: usize = 1 << 12;
 
 /// Integrates `normals` over `mask` to a height map in pixels.
 ///
@@ -53,16 +59,30 @@ pub fn integrate(
 ) -> Result<Surface> {
     let field = Field { normals, mask, weights, width };
     check(field, params)?;
-    let (labels, components) = label(mask, width);
-    let cancelled = AtomicBool::new(false);
-    let (operator, mut right) = Laplacian::new(field, params.difference, &cancelled);
-    remove_means(&mut right, &labels, &components);
-    let mut height = vec![0.0; mask.len()];
-    let iterations = conjugate_gradients(&operator, &right, &mut height, params, &cancelled, on_progress)?;
-    remove_means(&mut height, &labels, &components);
-    let residual = relative_residual(&operator, &height, &right);
-    let height_px = height.iter().zip(mask).map(|(&z, &used)| if used { z as f32 } else { f32::NAN }).collect();
-    Ok(Surface { height_px, labels, components, iterations, residual })
+    let runs = Runs::new(mask, width);
+    let (weights, mut right) = assemble(field, params.difference);
+    let scale = (square_sum(&right.reds) + square_sum(&right.blacks)).sqrt();
+    eliminate_blacks(&weights, &mut right.reds, &right.blacks);
+    let mut reds = vec![0.0; right.reds.len()];
+    let iterations = conjugate_gradients(&weights, &right.reds, scale, &mut reds, params, on_progress)?;
+    let residual = relative_residual(&weights, &reds, &right.reds, scale);
+    fill_blacks(&weights, &reds, &mut right.blacks);
+    let half = weights.grid.half();
+    let value = |row: usize, col: usize| {
+        let colour = if (row + col).is_multiple_of(2) { &reds } else { &right.blacks };
+        colour[row * half + col / 2]
+    };
+    let means = runs.means(value);
+    let mut height_px = vec![0.0; mask.len()];
+    height_px.par_chunks_mut(width).enumerate().for_each(|(row, height_px)| {
+        height_px.fill(f32::NAN);
+        for run in runs.row(row) {
+            for col in run.start..run.end {
+                height_px[col] = (value(row, col) - means[run.component]) as f32;
+            }
+        }
+    });
+    Ok(Surface { height_px, labels: runs.labels(), components: runs.components, iterations, residual })
 }
 
 /// Refuses what the solver cannot work on.
@@ -104,38 +124,40 @@ fn check(field: Field<'_>, params: &Params) -> Result<()> {
     Ok(())
 }
 
-/// Runs faer's solver from zero; returns the number of iterations.
+/// Runs faer's solver on the reduced system from zero; returns the number of iterations.
 fn conjugate_gradients(
-    operator: &Laplacian<'_>,
+    weights: &Weights,
     right: &[f64],
-    height: &mut [f64],
+    scale: f64,
+    reds: &mut [f64],
     params: &Params,
-    cancelled: &AtomicBool,
     on_progress: OnProgress<'_>,
 ) -> Result<usize> {
-    let right_norm = norm(right);
-    let preconditioner = Jacobi::new(&operator.diagonal);
+    let cancelled = AtomicBool::new(false);
+    let operator = Reduced { weights, cancelled: &cancelled };
+    let preconditioner = Multigrid::new(weights);
     // faer's own vector work stays on one thread: its sums must not depend on the number of threads.
     let par = Par::Seq;
     let cg_params = CgParams {
         // Not `Zero`: faer 0.24 then leaves its residual uninitialised.
         initial_guess: InitialGuessStatus::MaybeNonZero,
-        abs_tolerance: params.absolute_tolerance * (right.len() as f64).sqrt(),
-        rel_tolerance: params.relative_tolerance,
+        // The residual is that of the whole system (its blacks have none), so it is judged by the whole right side.
+        abs_tolerance: (params.relative_tolerance * scale).max(params.absolute_tolerance * (2.0 * right.len() as f64).sqrt()),
+        rel_tolerance: 0.0,
         max_iters: params.max_iters,
         ..Default::default()
     };
-    let mut buffer = MemBuffer::new(conjugate_gradient_scratch(&preconditioner, operator, 1, par));
+    let mut buffer = MemBuffer::new(conjugate_gradient_scratch(&preconditioner, &operator, 1, par));
     let mut iteration = 0;
     let outcome = conjugate_gradient(
-        ColMut::from_slice_mut(height).as_mat_mut(),
+        ColMut::from_slice_mut(reds).as_mat_mut(),
         &preconditioner,
-        operator,
+        &operator,
         ColRef::from_slice(right).as_mat(),
         cg_params,
         |_| {
             iteration += 1;
-            let residual = preconditioner.residual_norm() / right_norm;
+            let residual = preconditioner.residual_norm() / scale;
             if on_progress(Progress { iteration, residual }).is_break() {
                 cancelled.store(true, Ordering::Relaxed);
             }
@@ -146,41 +168,32 @@ fn conjugate_gradients(
     if cancelled.load(Ordering::Relaxed) {
         return Err(Error::Cancelled);
     }
+    let no_convergence = |iterations| Error::NoConvergence {
+        iterations,
+        residual: relative_residual(weights, reds, right, scale),
+        tolerance: params.relative_tolerance,
+    };
     match outcome {
         Ok(info) => Ok(info.iter_count),
         // The operator is semi-definite by construction: only a direction lost in rounding ends up here.
         Err(CgError::NonPositiveDefiniteOperator | CgError::NonPositiveDefinitePreconditioner) => {
-            Err(no_convergence(operator, height, right, iteration, params))
+            Err(no_convergence(iteration))
         }
-        Err(CgError::NoConvergence { .. }) => Err(no_convergence(operator, height, right, params.max_iters, params)),
+        Err(CgError::NoConvergence { .. }) => Err(no_convergence(params.max_iters)),
     }
 }
 
-fn no_convergence(
-    operator: &Laplacian<'_>,
-    height: &[f64],
-    right: &[f64],
-    iterations: usize,
-    params: &Params,
-) -> Error {
-    Error::NoConvergence {
-        iterations,
-        residual: relative_residual(operator, height, right),
-        tolerance: params.relative_tolerance,
-    }
-}
-
-/// `|b - A x| / |b|`; 0 for a zero right side.
-fn relative_residual(operator: &Laplacian<'_>, x: &[f64], right: &[f64]) -> f64 {
+/// `|b - S x| / scale`; 0 for a zero right side.
+fn relative_residual(weights: &Weights, x: &[f64], right: &[f64], scale: f64) -> f64 {
     let mut residual = vec![0.0; right.len()];
-    operator.multiply(&mut residual, x);
-    for (residual, right) in residual.iter_mut().zip(right) {
-        *residual = right - *residual;
-    }
-    let scale = norm(right);
-    if scale > 0.0 { norm(&residual) / scale } else { 0.0 }
+    multiply(weights, x, &mut residual);
+    residual.par_iter_mut().zip(right).for_each(|(residual, right)| *residual = right - *residual);
+    if scale > 0.0 { square_sum(&residual).sqrt() / scale } else { 0.0 }
 }
 
-fn norm(vector: &[f64]) -> f64 {
-    vector.iter().map(|value| value * value).sum::<f64>().sqrt()
+/// Sum of squares, by blocks in parallel and then in order: the same bits for any number of threads.
+fn square_sum(vector: &[f64]) -> f64 {
+    let blocks: Vec<f64> =
+        vector.par_chunks(SUM_BLOCK).map(|block| block.iter().map(|value| value * value).sum()).collect();
+    blocks.iter().sum()
 }

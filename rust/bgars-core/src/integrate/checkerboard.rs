@@ -1,0 +1,264 @@
+//! The pixel grid as a checkerboard: every edge joins a red and a black pixel.
+//!
+//! Pixel (row, col) is red where row + col is even. A row of `width` pixels is kept as `half = ceil(width / 2)` reds and as
+//! many blacks: red k of an even row is column 2k and black k column 2k + 1; in odd rows it is the other way round (a missing
+//! last pixel is one without edges). Then the neighbours of red k above and below are black k, and left and right are two
+//! blacks that follow each other, so every stencil runs over contiguous memory.
+
+use std::ops::{Add, Mul};
+
+use rayon::prelude::*;
+
+/// Rows of pixels that one task works on; even, so that tasks own whole rows of the next coarser grid.
+pub(super) const BAND_ROWS: usize = 32;
+
+/// Size of a grid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Grid {
+    pub height: usize,
+    pub width: usize,
+}
+
+impl Grid {
+    /// Pixels of one colour in a row.
+    pub fn half(self) -> usize {
+        self.width.div_ceil(2)
+    }
+
+    /// Pixels of one colour.
+    pub fn half_pixels(self) -> usize {
+        self.height * self.half()
+    }
+
+    /// The grid of the corners: the reds of even rows.
+    pub fn coarser(self) -> Self {
+        Self { height: self.height.div_ceil(2), width: self.half() }
+    }
+
+    /// True for a row of the grid.
+    pub fn contains(self, row: isize) -> bool {
+        (0..self.height as isize).contains(&row)
+    }
+}
+
+/// A floating-point number of a kernel: `f32` in the preconditioner, `f64` in the operator.
+pub(super) trait Real: Copy + Default + PartialOrd + Send + Sync + From<f32> + Add<Output = Self> + Mul<Output = Self> {
+    /// `1 / self`, or 0 for a pixel without edges.
+    fn inverse(self) -> Self;
+
+    /// Rounded to `f32`.
+    fn to_f32(self) -> f32;
+}
+
+macro_rules! real {
+    ($type:ty) => {
+        impl Real for $type {
+            #[inline(always)]
+            fn inverse(self) -> Self {
+                if self > 0.0 { 1.0 / self } else { 0.0 }
+            }
+
+            #[inline(always)]
+            #[allow(clippy::unnecessary_cast)]
+            fn to_f32(self) -> f32 {
+                self as f32
+            }
+        }
+    };
+}
+real!(f32);
+real!(f64);
+
+/// The weights of all edges, kept at their red pixels: 8 bytes a pixel.
+#[derive(Debug)]
+pub(super) struct Weights {
+    pub grid: Grid,
+    /// To the left, right, upper and lower neighbour. A zero pads each row, a row of zeros each end.
+    sides: [Vec<f32>; 4],
+}
+
+/// A row of one side's weights with a zero on either end: red k is at `k + 1`.
+pub(super) type PaddedRow<'a, T> = &'a [T];
+
+const LEFT: usize = 0;
+const RIGHT: usize = 1;
+const UP: usize = 2;
+const DOWN: usize = 3;
+
+impl Weights {
+    /// No edges.
+    pub fn zeros(grid: Grid) -> Self {
+        let length = 1 + (grid.height + 2) * (grid.half() + 1);
+        Self { grid, sides: std::array::from_fn(|_| vec![0.0; length]) }
+    }
+
+    fn side(&self, side: usize, row: isize) -> PaddedRow<'_, f32> {
+        let half = self.grid.half();
+        let start = (row + 1) as usize * (half + 1);
+        &self.sides[side][start..start + half + 2]
+    }
+
+    /// Weights from the reds of `row` (-1 to `height`) to their left neighbours.
+    pub fn left(&self, row: isize) -> PaddedRow<'_, f32> {
+        self.side(LEFT, row)
+    }
+
+    /// The same to the right.
+    pub fn right(&self, row: isize) -> PaddedRow<'_, f32> {
+        self.side(RIGHT, row)
+    }
+
+    /// The same upward.
+    pub fn up(&self, row: isize) -> PaddedRow<'_, f32> {
+        self.side(UP, row)
+    }
+
+    /// The same downward.
+    pub fn down(&self, row: isize) -> PaddedRow<'_, f32> {
+        self.side(DOWN, row)
+    }
+
+    /// The weights of each band of rows, to write: rows of `half` weights and a zero each, left, right, up, down.
+    pub fn bands_mut(&mut self) -> impl IndexedParallelIterator<Item = [&mut [f32]; 4]> {
+        let stride = self.grid.half() + 1;
+        let inner = 1 + stride..1 + stride * (self.grid.height + 1);
+        let chunk = BAND_ROWS * stride;
+        let [left, right, up, down] = self.sides.each_mut().map(|side| side[inner.clone()].par_chunks_mut(chunk));
+        (left, right, up, down).into_par_iter().map(|(left, right, up, down)| [left, right, up, down])
+    }
+
+    /// `out_k` = sum of the weights of red k of `row`.
+    #[inline(always)]
+    pub fn red_diagonal<T: Real>(&self, row: isize, out: &mut [T]) {
+        let n = self.grid.half();
+        let (left, right) = (&self.left(row)[1..=n], &self.right(row)[1..=n]);
+        let (up, down) = (&self.up(row)[1..=n], &self.down(row)[1..=n]);
+        let out = &mut out[..n];
+        for k in 0..n {
+            out[k] = (T::from(left[k]) + T::from(right[k])) + (T::from(up[k]) + T::from(down[k]));
+        }
+    }
+
+    /// The weights of the edges of the blacks of `row`, at their four reds: left, right, up, down.
+    #[inline(always)]
+    fn black_sides(&self, row: isize) -> [&[f32]; 4] {
+        let n = self.grid.half();
+        let odd = row.rem_euclid(2) as usize;
+        // Left and right red of black k: k and k + 1 in even rows, k - 1 and k in odd ones.
+        [
+            &self.right(row)[1 - odd..][..n],
+            &self.left(row)[2 - odd..][..n],
+            &self.down(row - 1)[1..=n],
+            &self.up(row + 1)[1..=n],
+        ]
+    }
+
+    /// `out_k` = sum of the weights of black k of `row`.
+    #[inline(always)]
+    pub fn black_diagonal<T: Real>(&self, row: isize, out: &mut [T]) {
+        let n = self.grid.half();
+        let [left, right, up, down] = self.black_sides(row);
+        let out = &mut out[..n];
+        for k in 0..n {
+            out[k] = (T::from(left[k]) + T::from(right[k])) + (T::from(up[k]) + T::from(down[k]));
+        }
+    }
+
+    /// Sum over the edges of black k of weight times red neighbour; `[above, here, below]` are padded rows of reds.
+    #[inline(always)]
+    pub fn gather_black<T: Real>(&self, row: isize, reds: [PaddedRow<'_, T>; 3], out: &mut [T]) {
+        let n = self.grid.half();
+        let odd = row.rem_euclid(2) as usize;
+        let [left, right, up, down] = self.black_sides(row);
+        let [above, here, below] = reds;
+        let (above, below) = (&above[1..=n], &below[1..=n]);
+        let (here_left, here_right) = (&here[1 - odd..][..n], &here[2 - odd..][..n]);
+        let out = &mut out[..n];
+        for k in 0..n {
+            out[k] = (T::from(left[k]) * here_left[k] + T::from(right[k]) * here_right[k])
+                + (T::from(up[k]) * above[k] + T::from(down[k]) * below[k]);
+        }
+    }
+
+    /// Sum over the edges of red k of weight times black neighbour; `[above, here, below]` are padded rows of blacks.
+    #[inline(always)]
+    pub fn gather_red<T: Real>(&self, row: isize, blacks: [PaddedRow<'_, T>; 3], out: &mut [T]) {
+        let n = self.grid.half();
+        let odd = row.rem_euclid(2) as usize;
+        let (left, right) = (&self.left(row)[1..=n], &self.right(row)[1..=n]);
+        let (up, down) = (&self.up(row)[1..=n], &self.down(row)[1..=n]);
+        let [above, here, below] = blacks;
+        let (above, below) = (&above[1..=n], &below[1..=n]);
+        let (here_left, here_right) = (&here[odd..][..n], &here[1 + odd..][..n]);
+        let out = &mut out[..n];
+        for k in 0..n {
+            out[k] = (T::from(left[k]) * here_left[k] + T::from(right[k]) * here_right[k])
+                + (T::from(up[k]) * above[k] + T::from(down[k]) * below[k]);
+        }
+    }
+}
+
+/// The last four padded rows of a quantity that is computed row after row.
+pub(super) struct Ring<T> {
+    rows: [Vec<T>; 4],
+}
+
+impl<T: Real> Ring<T> {
+    pub fn new(half: usize) -> Self {
+        Self { rows: std::array::from_fn(|_| vec![T::default(); half + 2]) }
+    }
+
+    #[inline(always)]
+    pub fn row(&self, row: isize) -> PaddedRow<'_, T> {
+        &self.rows[row.rem_euclid(4) as usize]
+    }
+
+    /// The rows above, at and below `row`.
+    #[inline(always)]
+    pub fn around(&self, row: isize) -> [PaddedRow<'_, T>; 3] {
+        [self.row(row - 1), self.row(row), self.row(row + 1)]
+    }
+
+    /// The `half` values of a row, to write.
+    #[inline(always)]
+    pub fn row_mut(&mut self, row: isize) -> &mut [T] {
+        let row = &mut self.rows[row.rem_euclid(4) as usize];
+        let end = row.len() - 1;
+        &mut row[1..end]
+    }
+}
+
+/// Multiplies row by row: `values_k *= 1 / diagonal_k` (0 where the diagonal is).
+#[inline(always)]
+pub(super) fn divide<T: Real>(values: &mut [T], diagonal: &[T]) {
+    for (value, &diagonal) in values.iter_mut().zip(diagonal) {
+        *value = *value * diagonal.inverse();
+    }
+}
+
+/// Splits a row of pixels into its reds and blacks.
+#[inline(always)]
+pub(super) fn split_row<T: Copy>(row: usize, pixels: &[T], reds: &mut [T], blacks: &mut [T]) {
+    let (first, second) = if row.is_multiple_of(2) { (reds, blacks) } else { (blacks, reds) };
+    for (pair, (first, second)) in pixels.chunks_exact(2).zip(first.iter_mut().zip(second.iter_mut())) {
+        *first = pair[0];
+        *second = pair[1];
+    }
+    if pixels.len() % 2 == 1 {
+        first[pixels.len() / 2] = pixels[pixels.len() - 1];
+    }
+}
+
+/// Joins reds and blacks to a row of pixels.
+#[inline(always)]
+pub(super) fn join_row<T: Copy>(row: usize, reds: &[T], blacks: &[T], pixels: &mut [T]) {
+    let (first, second) = if row.is_multiple_of(2) { (reds, blacks) } else { (blacks, reds) };
+    let width = pixels.len();
+    for (pair, (&first, &second)) in pixels.chunks_exact_mut(2).zip(first.iter().zip(second)) {
+        pair[0] = first;
+        pair[1] = second;
+    }
+    if width % 2 == 1 {
+        pixels[width - 1] = first[width / 2];
+    }
+}

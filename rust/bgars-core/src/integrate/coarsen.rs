@@ -1,0 +1,90 @@
+//! The next coarser grid: its pixels are the corners, its edges what the finer edges conduct between them.
+
+use rayon::prelude::*;
+
+use super::checkerboard::{BAND_ROWS, Weights, split_row};
+
+/// Halves both sides of a grid.
+///
+/// Weights are conductances. Between two corners lies one edge pixel: two edges in series, `a b / (a + b)`. The paths beside,
+/// through the centres, count for each of the corners they run between as far as the blacks at both their ends hang on it.
+pub(super) fn coarsen(weights: &Weights) -> Weights {
+    let grid = weights.grid;
+    let n = grid.half();
+    let coarse = grid.coarser();
+    let mut rightward = vec![0.0f32; coarse.height * coarse.width];
+    let mut downward = vec![0.0f32; coarse.height * coarse.width];
+    rightward.par_chunks_mut(n).zip(downward.par_chunks_mut(n)).enumerate().for_each(
+        |(coarse_row, (rightward, downward))| {
+            let row = 2 * coarse_row as isize;
+            // Along the row of the corners: red k, black k, red k + 1.
+            let (right, left) = (&weights.right(row)[1..=n], &weights.left(row)[2..n + 2]);
+            for k in 0..n {
+                rightward[k] = series(right[k], left[k]);
+            }
+            // Beside it: black k, centre k, black k + 1 of the rows above and below.
+            for beside in [row - 1, row + 1] {
+                if !grid.contains(beside) {
+                    continue;
+                }
+                let (left, right) = (&weights.left(beside)[1..=n], &weights.right(beside)[1..=n]);
+                let (down, up) = (&weights.down(beside - 1)[1..n + 2], &weights.up(beside + 1)[1..n + 2]);
+                let (own, other) = if beside < row { (up, down) } else { (down, up) };
+                for k in 0..n {
+                    rightward[k] += series(left[k], right[k]) * share(own, other, k).min(share(own, other, k + 1));
+                }
+            }
+            // Down the column of the corners: red k, black k of the row between, red k.
+            if !grid.contains(row + 2) {
+                return;
+            }
+            let (down, up) = (&weights.down(row)[1..=n], &weights.up(row + 2)[1..=n]);
+            for k in 0..n {
+                downward[k] = series(down[k], up[k]);
+            }
+            // Beside it: black k, centre k, black k of the row of the lower corners. It lies between the corners k and k + 1.
+            let (up, down) = (&weights.up(row + 1)[1..=n], &weights.down(row + 1)[1..=n]);
+            let (top_own, top_next) = (&weights.right(row)[1..=n], &weights.left(row)[2..n + 2]);
+            let (low_own, low_next) = (&weights.right(row + 2)[1..=n], &weights.left(row + 2)[2..n + 2]);
+            for k in 0..n {
+                let path = series(up[k], down[k]);
+                downward[k] += path * share(top_own, top_next, k).min(share(low_own, low_next, k));
+                if k + 1 < n {
+                    downward[k + 1] += path * share(top_next, top_own, k).min(share(low_next, low_own, k));
+                }
+            }
+        },
+    );
+    let mut out = Weights::zeros(coarse);
+    let half = coarse.half();
+    out.bands_mut().enumerate().for_each(|(band, mut sides)| {
+        let mut unused = vec![0.0; half];
+        let mut leftward = vec![0.0; coarse.width];
+        let none = vec![0.0; coarse.width];
+        for offset in 0..sides[0].len() / (half + 1) {
+            let row = band * BAND_ROWS + offset;
+            let here = &rightward[row * coarse.width..][..coarse.width];
+            leftward[1..].copy_from_slice(&here[..coarse.width - 1]);
+            let upward = if row > 0 { &downward[(row - 1) * coarse.width..][..coarse.width] } else { &none };
+            let below = &downward[row * coarse.width..][..coarse.width];
+            for (side, pixels) in sides.iter_mut().zip([&leftward, here, upward, below]) {
+                split_row(row, pixels, &mut side[offset * (half + 1)..][..half], &mut unused);
+            }
+        }
+    });
+    out
+}
+
+/// Two conductances one after the other.
+#[inline(always)]
+fn series(a: f32, b: f32) -> f32 {
+    let sum = a + b;
+    if sum > 0.0 { a * b / sum } else { 0.0 }
+}
+
+/// How much of a black between two corners hangs on the first.
+#[inline(always)]
+fn share(own: &[f32], other: &[f32], k: usize) -> f32 {
+    let sum = own[k] + other[k];
+    if sum > 0.0 { own[k] / sum } else { 0.0 }
+}
