@@ -70,6 +70,9 @@ real!(f32);
 real!(f64);
 
 /// The weights of all edges, kept at their red pixels: 8 bytes a pixel.
+///
+/// A negative weight belongs to a *virtual* edge (see [`super::fill`]): it carries values between grids, but it is no part of
+/// the system.
 #[derive(Debug)]
 pub(super) struct Weights {
     pub grid: Grid,
@@ -127,6 +130,14 @@ impl Weights {
         (left, right, up, down).into_par_iter().map(|(left, right, up, down)| [left, right, up, down])
     }
 
+    /// Sets the weights of red `k` of `row`: left, right, up, down.
+    pub fn set_red(&mut self, row: usize, k: usize, weights: [f32; 4]) {
+        let index = 1 + (row + 1) * (self.grid.half() + 1) + k;
+        for (side, weight) in self.sides.iter_mut().zip(weights) {
+            side[index] = weight;
+        }
+    }
+
     /// `out_k` = sum of the weights of red k of `row`.
     #[inline(always)]
     pub fn red_diagonal<T: Real>(&self, row: isize, out: &mut [T]) {
@@ -135,7 +146,7 @@ impl Weights {
         let (up, down) = (&self.up(row)[1..=n], &self.down(row)[1..=n]);
         let out = &mut out[..n];
         for k in 0..n {
-            out[k] = (T::from(left[k]) + T::from(right[k])) + (T::from(up[k]) + T::from(down[k]));
+            out[k] = (real::<T>(left[k]) + real::<T>(right[k])) + (real::<T>(up[k]) + real::<T>(down[k]));
         }
     }
 
@@ -160,7 +171,7 @@ impl Weights {
         let [left, right, up, down] = self.black_sides(row);
         let out = &mut out[..n];
         for k in 0..n {
-            out[k] = (T::from(left[k]) + T::from(right[k])) + (T::from(up[k]) + T::from(down[k]));
+            out[k] = (real::<T>(left[k]) + real::<T>(right[k])) + (real::<T>(up[k]) + real::<T>(down[k]));
         }
     }
 
@@ -175,8 +186,8 @@ impl Weights {
         let (here_left, here_right) = (&here[1 - odd..][..n], &here[2 - odd..][..n]);
         let out = &mut out[..n];
         for k in 0..n {
-            out[k] = (T::from(left[k]) * here_left[k] + T::from(right[k]) * here_right[k])
-                + (T::from(up[k]) * above[k] + T::from(down[k]) * below[k]);
+            out[k] = (real::<T>(left[k]) * here_left[k] + real::<T>(right[k]) * here_right[k])
+                + (real::<T>(up[k]) * above[k] + real::<T>(down[k]) * below[k]);
         }
     }
 
@@ -192,10 +203,16 @@ impl Weights {
         let (here_left, here_right) = (&here[odd..][..n], &here[1 + odd..][..n]);
         let out = &mut out[..n];
         for k in 0..n {
-            out[k] = (T::from(left[k]) * here_left[k] + T::from(right[k]) * here_right[k])
-                + (T::from(up[k]) * above[k] + T::from(down[k]) * below[k]);
+            out[k] = (real::<T>(left[k]) * here_left[k] + real::<T>(right[k]) * here_right[k])
+                + (real::<T>(up[k]) * above[k] + real::<T>(down[k]) * below[k]);
         }
     }
+}
+
+/// The weight of an edge of the system; 0 for a virtual edge.
+#[inline(always)]
+fn real<T: Real>(weight: f32) -> T {
+    T::from(weight.max(0.0))
 }
 
 /// The last four padded rows of a quantity that is computed row after row.

@@ -77,7 +77,8 @@ pub(super) fn coarsen(weights: &Weights) -> Weights {
 
 /// Two conductances one after the other.
 #[inline(always)]
-fn series(a: f32, b: f32) -> f32 {
+pub(super) fn series(a: f32, b: f32) -> f32 {
+    let (a, b) = (a.abs(), b.abs());
     let sum = a + b;
     if sum > 0.0 { a * b / sum } else { 0.0 }
 }
@@ -85,6 +86,7 @@ fn series(a: f32, b: f32) -> f32 {
 /// How much of a black between two corners hangs on the first.
 #[inline(always)]
 fn share(own: &[f32], other: &[f32], k: usize) -> f32 {
-    let sum = own[k] + other[k];
-    if sum > 0.0 { own[k] / sum } else { 0.0 }
+    let (own, other) = (own[k].abs(), other[k].abs());
+    let sum = own + other;
+    if sum > 0.0 { own / sum } else { 0.0 }
 }

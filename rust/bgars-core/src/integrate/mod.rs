@@ -8,6 +8,7 @@ mod checkerboard;
 mod coarsen;
 mod coarsest;
 mod components;
+mod fill;
 mod multigrid;
 mod operator;
 mod reduction;

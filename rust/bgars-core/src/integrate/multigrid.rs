@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use super::checkerboard::{Real, Weights, join_row};
 use super::coarsen::coarsen;
 use super::coarsest::Coarsest;
+use super::fill::fill_corners;
 use super::operator::{column, column_mut};
 use super::reduction::{eliminate_blacks, fill_blacks};
 use super::transfer::{prolong, restrict};
@@ -66,8 +67,10 @@ impl<'a> Multigrid<'a> {
     pub fn new(finest: &'a Weights) -> Self {
         let mut levels = Vec::new();
         let mut weights = coarsen(finest);
+        fill_corners(&mut weights);
         while weights.grid.height * weights.grid.width > DIRECT_PIXELS {
-            let coarser = coarsen(&weights);
+            let mut coarser = coarsen(&weights);
+            fill_corners(&mut coarser);
             levels.push(std::mem::replace(&mut weights, coarser));
         }
         let vectors = levels.iter().chain([&weights]).map(LevelVectors::new).collect();

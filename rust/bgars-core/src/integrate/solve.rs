@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::checkerboard::Weights;
 use super::components::Runs;
+use super::fill::fill_corners;
 use super::multigrid::Multigrid;
 use super::operator::{Field, Reduced, assemble};
 use super::reduction::{eliminate_blacks, fill_blacks, multiply};
@@ -60,7 +61,8 @@ pub fn integrate(
     let field = Field { normals, mask, weights, width };
     check(field, params)?;
     let runs = Runs::new(mask, width);
-    let (weights, mut right) = assemble(field, params.difference);
+    let (mut weights, mut right) = assemble(field, params.difference);
+    fill_corners(&mut weights);
     let scale = (square_sum(&right.reds) + square_sum(&right.blacks)).sqrt();
     eliminate_blacks(&weights, &mut right.reds, &right.blacks);
     let mut reds = vec![0.0; right.reds.len()];

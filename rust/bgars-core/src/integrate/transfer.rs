@@ -42,7 +42,7 @@ fn black_ties(weights: &Weights, row: isize, out: &mut [f32]) {
         (&weights.down(row - 1)[1..=n], &weights.up(row + 1)[1..=n])
     };
     for k in 0..n {
-        out[k] = first[k] + second[k];
+        out[k] = first[k].abs() + second[k].abs();
     }
 }
 
@@ -148,10 +148,12 @@ fn restrict_band<T: Real>(weights: &Weights, b: &[T], band: usize, coarse_reds: 
             let horizontal = &horizontal[..n];
             let coarse = &mut coarse[..n];
             for k in 0..n {
-                coarse[k] = corner[k] + right[k] * horizontal[k] + (up[k] * above[k] + down[k] * below[k]);
+                coarse[k] = corner[k]
+                    + right[k].abs() * horizontal[k]
+                    + (up[k].abs() * above[k] + down[k].abs() * below[k]);
             }
             for k in 1..n {
-                coarse[k] += left[k] * horizontal[k - 1];
+                coarse[k] += left[k].abs() * horizontal[k - 1];
             }
         }
         diagonal = horizontal;
@@ -202,14 +204,14 @@ fn prolong_band<T: Real>(weights: &Weights, b: &[T], coarse: &[f32], band: usize
             let (here, next) = (&corners_left[..n], &corners_left[1..=n]);
             let (right, left) = (&weights.right(row)[1..=n], &weights.left(row)[2..n + 2]);
             for k in 0..n {
-                out[k] = (right[k] * here[k] + left[k] * next[k]) * tie[k].inverse();
+                out[k] = (right[k].abs() * here[k] + left[k].abs() * next[k]) * tie[k].inverse();
             }
         } else {
             let above = corner_row(row - 1);
             let below = if grid.contains(row + 1) { corner_row(row + 1) } else { above };
             let (down, up) = (&weights.down(row - 1)[1..=n], &weights.up(row + 1)[1..=n]);
             for k in 0..n {
-                out[k] = (down[k] * above[k] + up[k] * below[k]) * tie[k].inverse();
+                out[k] = (down[k].abs() * above[k] + up[k].abs() * below[k]) * tie[k].inverse();
             }
         }
     };
