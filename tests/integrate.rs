@@ -139,7 +139,7 @@ fn the_residual_is_the_true_one_and_the_iterations_are_bounded() {
     let sample = sample(100, 100, |x, y| hemisphere(45.0, x, y));
     let surface = solve(&sample, &Params::default());
     assert!(surface.residual <= 1e-8, "{}", surface.residual);
-    assert!(surface.iterations <= 300, "{}", surface.iterations);
+    assert!(surface.iterations <= 10, "{}", surface.iterations);
 }
 
 #[test]
@@ -195,12 +195,12 @@ fn the_callback_sees_the_residual_fall_and_can_stop_the_solver() {
     let mut seen = Vec::new();
     let mut record = |progress: Progress| {
         seen.push(progress);
-        if progress.iteration == 20 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if progress.iteration == 3 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let outcome = integrate(&sample.normals, &sample.mask, 60, None, &Params::default(), &mut record);
     assert!(matches!(outcome.unwrap_err(), Error::Cancelled));
-    assert_eq!(seen.len(), 20, "nothing runs on after the stop");
-    assert!(seen[19].residual < seen[0].residual);
+    assert_eq!(seen.len(), 3, "nothing runs on after the stop");
+    assert!(seen[2].residual < seen[0].residual);
 }
 
 #[test]

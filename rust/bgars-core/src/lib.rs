@@ -10,6 +10,7 @@ pub mod error;
 pub mod integrate;
 pub mod io;
 pub mod lights;
+mod memory;
 pub mod mesh;
 pub mod normals;
 pub mod pixel;

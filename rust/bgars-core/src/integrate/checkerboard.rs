@@ -9,6 +9,8 @@ use std::ops::{Add, Mul};
 
 use rayon::prelude::*;
 
+use crate::memory::zeros;
+
 /// Rows of pixels that one task works on; even, so that tasks own whole rows of the next coarser grid.
 pub(super) const BAND_ROWS: usize = 32;
 
@@ -48,6 +50,9 @@ pub(super) trait Real: Copy + Default + PartialOrd + Send + Sync + From<f32> + A
 
     /// Rounded to `f32`.
     fn to_f32(self) -> f32;
+
+    /// Exactly as `f64`.
+    fn to_f64(self) -> f64;
 }
 
 macro_rules! real {
@@ -62,6 +67,11 @@ macro_rules! real {
             #[allow(clippy::unnecessary_cast)]
             fn to_f32(self) -> f32 {
                 self as f32
+            }
+
+            #[inline(always)]
+            fn to_f64(self) -> f64 {
+                f64::from(self)
             }
         }
     };
@@ -92,7 +102,7 @@ impl Weights {
     /// No edges.
     pub fn zeros(grid: Grid) -> Self {
         let length = 1 + (grid.height + 2) * (grid.half() + 1);
-        Self { grid, sides: std::array::from_fn(|_| vec![0.0; length]) }
+        Self { grid, sides: std::array::from_fn(|_| zeros(length)) }
     }
 
     fn side(&self, side: usize, row: isize) -> PaddedRow<'_, f32> {
@@ -138,23 +148,18 @@ impl Weights {
         }
     }
 
-    /// `out_k` = sum of the weights of red k of `row`.
+    /// The weights of the edges of the reds of `row`: left, right, up, down.
     #[inline(always)]
-    pub fn red_diagonal<T: Real>(&self, row: isize, out: &mut [T]) {
+    fn red_sides(&self, row: isize) -> [&[f32]; 4] {
         let n = self.grid.half();
-        let (left, right) = (&self.left(row)[1..=n], &self.right(row)[1..=n]);
-        let (up, down) = (&self.up(row)[1..=n], &self.down(row)[1..=n]);
-        let out = &mut out[..n];
-        for k in 0..n {
-            out[k] = (real::<T>(left[k]) + real::<T>(right[k])) + (real::<T>(up[k]) + real::<T>(down[k]));
-        }
+        [LEFT, RIGHT, UP, DOWN].map(|side| &self.side(side, row)[1..=n])
     }
 
-    /// The weights of the edges of the blacks of `row`, at their four reds: left, right, up, down.
+    /// The weights of the edges of the blacks of `row`, kept at their four reds: left, right, up, down.
     #[inline(always)]
     fn black_sides(&self, row: isize) -> [&[f32]; 4] {
         let n = self.grid.half();
-        let odd = row.rem_euclid(2) as usize;
+        let odd = is_odd(row);
         // Left and right red of black k: k and k + 1 in even rows, k - 1 and k in odd ones.
         [
             &self.right(row)[1 - odd..][..n],
@@ -164,48 +169,66 @@ impl Weights {
         ]
     }
 
-    /// `out_k` = sum of the weights of black k of `row`.
+    /// Calls `visit(k, sum of weights, sum of weights times neighbours)` for the reds of `row`; `blacks` are the padded rows
+    /// above, at and below it.
     #[inline(always)]
-    pub fn black_diagonal<T: Real>(&self, row: isize, out: &mut [T]) {
-        let n = self.grid.half();
-        let [left, right, up, down] = self.black_sides(row);
-        let out = &mut out[..n];
-        for k in 0..n {
-            out[k] = (real::<T>(left[k]) + real::<T>(right[k])) + (real::<T>(up[k]) + real::<T>(down[k]));
-        }
+    pub fn each_red<T: Real>(&self, row: isize, blacks: [PaddedRow<'_, T>; 3], visit: impl FnMut(usize, T, T)) {
+        let odd = is_odd(row);
+        each(self.grid.half(), self.red_sides(row), blacks, odd, visit);
     }
 
-    /// Sum over the edges of black k of weight times red neighbour; `[above, here, below]` are padded rows of reds.
+    /// The same for the blacks of `row`.
     #[inline(always)]
-    pub fn gather_black<T: Real>(&self, row: isize, reds: [PaddedRow<'_, T>; 3], out: &mut [T]) {
-        let n = self.grid.half();
-        let odd = row.rem_euclid(2) as usize;
-        let [left, right, up, down] = self.black_sides(row);
-        let [above, here, below] = reds;
-        let (above, below) = (&above[1..=n], &below[1..=n]);
-        let (here_left, here_right) = (&here[1 - odd..][..n], &here[2 - odd..][..n]);
-        let out = &mut out[..n];
-        for k in 0..n {
-            out[k] = (real::<T>(left[k]) * here_left[k] + real::<T>(right[k]) * here_right[k])
-                + (real::<T>(up[k]) * above[k] + real::<T>(down[k]) * below[k]);
-        }
+    pub fn each_black<T: Real>(&self, row: isize, reds: [PaddedRow<'_, T>; 3], visit: impl FnMut(usize, T, T)) {
+        let odd = is_odd(row);
+        each(self.grid.half(), self.black_sides(row), reds, 1 - odd, visit);
     }
 
-    /// Sum over the edges of red k of weight times black neighbour; `[above, here, below]` are padded rows of blacks.
+    /// `out_k = b_k / diagonal_k` for the reds of `row`; 0 where there are no edges.
     #[inline(always)]
-    pub fn gather_red<T: Real>(&self, row: isize, blacks: [PaddedRow<'_, T>; 3], out: &mut [T]) {
-        let n = self.grid.half();
-        let odd = row.rem_euclid(2) as usize;
-        let (left, right) = (&self.left(row)[1..=n], &self.right(row)[1..=n]);
-        let (up, down) = (&self.up(row)[1..=n], &self.down(row)[1..=n]);
-        let [above, here, below] = blacks;
-        let (above, below) = (&above[1..=n], &below[1..=n]);
-        let (here_left, here_right) = (&here[odd..][..n], &here[1 + odd..][..n]);
-        let out = &mut out[..n];
-        for k in 0..n {
-            out[k] = (real::<T>(left[k]) * here_left[k] + real::<T>(right[k]) * here_right[k])
-                + (real::<T>(up[k]) * above[k] + real::<T>(down[k]) * below[k]);
-        }
+    pub fn scale_reds<T: Real>(&self, row: isize, b: impl Fn(usize) -> T, out: &mut [T]) {
+        scale(self.grid.half(), self.red_sides(row), b, out);
+    }
+
+    /// The same for the blacks of `row`.
+    #[inline(always)]
+    pub fn scale_blacks<T: Real>(&self, row: isize, b: impl Fn(usize) -> T, out: &mut [T]) {
+        scale(self.grid.half(), self.black_sides(row), b, out);
+    }
+}
+
+/// 1 for an odd row, also for the row above the first.
+#[inline(always)]
+fn is_odd(row: isize) -> usize {
+    row.rem_euclid(2) as usize
+}
+
+/// `shift` is 0 where the left neighbour of pixel k is pixel k - 1 of the other colour, 1 where it is pixel k.
+#[inline(always)]
+fn each<T: Real>(
+    n: usize,
+    [left, right, up, down]: [&[f32]; 4],
+    [above, here, below]: [PaddedRow<'_, T>; 3],
+    shift: usize,
+    mut visit: impl FnMut(usize, T, T),
+) {
+    let (above, below) = (&above[1..=n], &below[1..=n]);
+    let (here_left, here_right) = (&here[shift..][..n], &here[1 + shift..][..n]);
+    let (left, right, up, down) = (&left[..n], &right[..n], &up[..n], &down[..n]);
+    for k in 0..n {
+        let [left, right, up, down] = [left[k], right[k], up[k], down[k]].map(real::<T>);
+        let sum = (left * here_left[k] + right * here_right[k]) + (up * above[k] + down * below[k]);
+        visit(k, (left + right) + (up + down), sum);
+    }
+}
+
+#[inline(always)]
+fn scale<T: Real>(n: usize, [left, right, up, down]: [&[f32]; 4], b: impl Fn(usize) -> T, out: &mut [T]) {
+    let (left, right, up, down) = (&left[..n], &right[..n], &up[..n], &down[..n]);
+    let out = &mut out[..n];
+    for k in 0..n {
+        let [left, right, up, down] = [left[k], right[k], up[k], down[k]].map(real::<T>);
+        out[k] = b(k) * ((left + right) + (up + down)).inverse();
     }
 }
 
@@ -242,14 +265,6 @@ impl<T: Real> Ring<T> {
         let row = &mut self.rows[row.rem_euclid(4) as usize];
         let end = row.len() - 1;
         &mut row[1..end]
-    }
-}
-
-/// Multiplies row by row: `values_k *= 1 / diagonal_k` (0 where the diagonal is).
-#[inline(always)]
-pub(super) fn divide<T: Real>(values: &mut [T], diagonal: &[T]) {
-    for (value, &diagonal) in values.iter_mut().zip(diagonal) {
-        *value = *value * diagonal.inverse();
     }
 }
 

@@ -2,6 +2,8 @@
 
 use rayon::prelude::*;
 
+use crate::memory::zeros;
+
 /// One connected component of the mask (4-neighbourhood).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Component {
@@ -85,7 +87,7 @@ impl Runs {
 
     /// Index of each pixel's component, row-major; -1 outside the mask.
     pub fn labels(&self) -> Vec<i32> {
-        let mut labels = vec![0i32; (self.row_starts.len() - 1) * self.width];
+        let mut labels = zeros((self.row_starts.len() - 1) * self.width);
         labels.par_chunks_mut(self.width).enumerate().for_each(|(row, labels)| {
             labels.fill(-1);
             for run in self.row(row) {

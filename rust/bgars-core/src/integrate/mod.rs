@@ -8,6 +8,7 @@ mod checkerboard;
 mod coarsen;
 mod coarsest;
 mod components;
+mod conjugate_gradient;
 mod fill;
 mod multigrid;
 mod operator;

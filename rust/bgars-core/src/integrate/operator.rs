@@ -1,15 +1,10 @@
 //! The normal equations: a weighted graph Laplacian on the pixels of the mask, its blacks eliminated.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-
-use faer::dyn_stack::{MemStack, StackReq};
-use faer::matrix_free::LinOp;
-use faer::{MatMut, MatRef, Par};
 use rayon::prelude::*;
 
 use super::Difference;
 use super::checkerboard::{BAND_ROWS, Grid, Weights, split_row};
-use super::reduction::multiply;
+use crate::memory::zeros;
 
 /// Smallest n_z of an edge: a normal seen edge-on has no finite slope.
 const MIN_N_Z: f64 = 1e-3;
@@ -121,7 +116,7 @@ pub(super) fn assemble(field: Field<'_>, difference: Difference) -> (Weights, Co
     let grid = Grid { height: field.mask.len() / width, width };
     let half = grid.half();
     let mut weights = Weights::zeros(grid);
-    let mut right = Colours { reds: vec![0.0; grid.half_pixels()], blacks: vec![0.0; grid.half_pixels()] };
+    let mut right = Colours { reds: zeros(grid.half_pixels()), blacks: zeros(grid.half_pixels()) };
     let bands = weights
         .bands_mut()
         .zip(right.reds.par_chunks_mut(BAND_ROWS * half))
@@ -184,52 +179,4 @@ pub(super) fn assemble(field: Field<'_>, difference: Difference) -> (Weights, Co
         }
     });
     (weights, right)
-}
-
-/// The reduced system as faer wants it.
-#[derive(Debug)]
-pub(super) struct Reduced<'a> {
-    pub weights: &'a Weights,
-    /// Set to make the solver stop; see [`LinOp::apply`] below.
-    pub cancelled: &'a AtomicBool,
-}
-
-/// The only column of a vector handed over by faer, as a slice.
-pub(super) fn column(x: MatRef<'_, f64>) -> &[f64] {
-    x.col(0).try_as_col_major().expect("faer hands over contiguous vectors").as_slice()
-}
-
-/// The same, to write.
-pub(super) fn column_mut(x: MatMut<'_, f64>) -> &mut [f64] {
-    x.col_mut(0).try_as_col_major_mut().expect("faer hands over contiguous vectors").as_slice_mut()
-}
-
-impl LinOp<f64> for Reduced<'_> {
-    fn apply_scratch(&self, _rhs_ncols: usize, _par: Par) -> StackReq {
-        StackReq::EMPTY
-    }
-
-    fn nrows(&self) -> usize {
-        self.weights.grid.half_pixels()
-    }
-
-    fn ncols(&self) -> usize {
-        self.weights.grid.half_pixels()
-    }
-
-    fn apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, _par: Par, _stack: &mut MemStack) {
-        let (out, rhs) = (column_mut(out), column(rhs));
-        if self.cancelled.load(Ordering::Relaxed) {
-            // faer's solver has no way to stop early, but it gives up on an operator that is not positive definite.
-            for (out, rhs) in out.iter_mut().zip(rhs) {
-                *out = -rhs;
-            }
-        } else {
-            multiply(self.weights, rhs, out);
-        }
-    }
-
-    fn conj_apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, par: Par, stack: &mut MemStack) {
-        self.apply(out, rhs, par, stack);
-    }
 }

@@ -3,12 +3,14 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::checkerboard::{BAND_ROWS, Real, Ring, Weights, divide};
+use super::checkerboard::{BAND_ROWS, Real, Ring, Weights};
 
-/// `out = S x`.
-pub(super) fn multiply<T: Real + std::ops::Sub<Output = T>>(weights: &Weights, x: &[T], out: &mut [T]) {
+/// `out = S x`; returns `<x, S x>`, summed in an order that does not depend on the threads.
+pub(super) fn multiply(weights: &Weights, x: &[f64], out: &mut [f64]) -> f64 {
     let chunk = BAND_ROWS * weights.grid.half();
-    out.par_chunks_mut(chunk).enumerate().for_each(|(band, out)| multiply_band(weights, x, band, out));
+    let bands = out.par_chunks_mut(chunk).enumerate();
+    let products: Vec<f64> = bands.map(|(band, out)| multiply_band(weights, x, band, out)).collect();
+    products.iter().sum()
 }
 
 /// `reds += W D_black^-1 blacks`: the right side of the reduced system.
@@ -23,6 +25,17 @@ pub(super) fn fill_blacks<T: Real>(weights: &Weights, reds: &[T], blacks: &mut [
     blacks.par_chunks_mut(chunk).enumerate().for_each(|(band, blacks)| fill_band(weights, reds, band, blacks));
 }
 
+/// `D_black^-1 W^T reds` of a row; zeros outside the grid.
+#[inline(always)]
+pub(super) fn solve_blacks<T: Real>(weights: &Weights, row: isize, reds: &Ring<T>, blacks: &mut Ring<T>) {
+    let out = blacks.row_mut(row);
+    if weights.grid.contains(row) {
+        weights.each_black(row, reds.around(row), |k, diagonal, sum| out[k] = sum * diagonal.inverse());
+    } else {
+        out.fill(T::default());
+    }
+}
+
 /// Copies a row of `values` into a padded row; zeros outside the grid.
 #[inline(always)]
 fn load<T: Real>(weights: &Weights, values: &[T], row: isize, out: &mut [T]) {
@@ -35,38 +48,44 @@ fn load<T: Real>(weights: &Weights, values: &[T], row: isize, out: &mut [T]) {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn multiply_band<T: Real + std::ops::Sub<Output = T>>(weights: &Weights, x: &[T], band: usize, out: &mut [T]) {
+fn multiply_band(weights: &Weights, x: &[f64], band: usize, out: &mut [f64]) -> f64 {
     let n = weights.grid.half();
     let first = (band * BAND_ROWS) as isize;
     let end = first + (out.len() / n) as isize;
-    let mut diagonal = vec![T::default(); n];
-    let mut gathered = vec![T::default(); n];
-    let [mut reds, mut blacks] = std::array::from_fn(|_| Ring::<T>::new(n));
+    let [mut reds, mut blacks] = std::array::from_fn(|_| Ring::<f64>::new(n));
+    let mut product = 0.0;
     for row in first - 2..=end + 1 {
         load(weights, x, row, reds.row_mut(row));
         let row = row - 1;
         if row < first - 1 {
             continue;
         }
-        if weights.grid.contains(row) {
-            weights.gather_black(row, reds.around(row), blacks.row_mut(row));
-            weights.black_diagonal(row, &mut diagonal);
-            divide(blacks.row_mut(row), &diagonal);
-        } else {
-            blacks.row_mut(row).fill(T::default());
-        }
+        solve_blacks(weights, row, &reds, &mut blacks);
         let row = row - 1;
         if row < first {
             continue;
         }
-        weights.gather_red(row, blacks.around(row), &mut gathered);
-        weights.red_diagonal(row, &mut diagonal);
+        let here = &reds.row(row)[1..=n];
         let out = &mut out[(row - first) as usize * n..][..n];
-        let (gathered, diagonal, here) = (&gathered[..n], &diagonal[..n], &reds.row(row)[1..=n]);
-        for k in 0..n {
-            out[k] = diagonal[k] * here[k] - gathered[k];
+        weights.each_red(row, blacks.around(row), |k, diagonal, sum| out[k] = diagonal * here[k] - sum);
+        product += dot(here, out);
+    }
+    product
+}
+
+/// Sum of products in eight lanes, so that it vectorises and has one order.
+#[inline(always)]
+pub(super) fn dot<A: Real, B: Real>(a: &[A], b: &[B]) -> f64 {
+    const LANES: usize = 8;
+    let mut lanes = [0.0; LANES];
+    let (a_blocks, b_blocks) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let rest: f64 = a_blocks.remainder().iter().zip(b_blocks.remainder()).map(|(a, b)| a.to_f64() * b.to_f64()).sum();
+    for (a, b) in a_blocks.zip(b_blocks) {
+        for lane in 0..LANES {
+            lanes[lane] += a[lane].to_f64() * b[lane].to_f64();
         }
     }
+    lanes.iter().sum::<f64>() + rest
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
@@ -74,22 +93,20 @@ fn eliminate_band<T: Real>(weights: &Weights, blacks: &[T], band: usize, reds: &
     let n = weights.grid.half();
     let first = (band * BAND_ROWS) as isize;
     let end = first + (reds.len() / n) as isize;
-    let mut scratch = vec![T::default(); n];
     let mut scaled = Ring::<T>::new(n);
     for row in first - 1..=end {
-        load(weights, blacks, row, scaled.row_mut(row));
         if weights.grid.contains(row) {
-            weights.black_diagonal(row, &mut scratch);
-            divide(scaled.row_mut(row), &scratch);
+            let blacks = &blacks[row as usize * n..][..n];
+            weights.scale_blacks(row, |k| blacks[k], scaled.row_mut(row));
+        } else {
+            scaled.row_mut(row).fill(T::default());
         }
         let row = row - 1;
         if row < first {
             continue;
         }
-        weights.gather_red(row, scaled.around(row), &mut scratch);
-        for (red, &gathered) in reds[(row - first) as usize * n..][..n].iter_mut().zip(&scratch) {
-            *red = *red + gathered;
-        }
+        let reds = &mut reds[(row - first) as usize * n..][..n];
+        weights.each_red(row, scaled.around(row), |k, _, sum| reds[k] = reds[k] + sum);
     }
 }
 
@@ -98,7 +115,6 @@ fn fill_band<T: Real>(weights: &Weights, reds: &[T], band: usize, blacks: &mut [
     let n = weights.grid.half();
     let first = (band * BAND_ROWS) as isize;
     let end = first + (blacks.len() / n) as isize;
-    let [mut gathered, mut diagonal] = std::array::from_fn(|_| vec![T::default(); n]);
     let mut here = Ring::<T>::new(n);
     for row in first - 1..=end {
         load(weights, reds, row, here.row_mut(row));
@@ -106,11 +122,9 @@ fn fill_band<T: Real>(weights: &Weights, reds: &[T], band: usize, blacks: &mut [
         if row < first {
             continue;
         }
-        weights.gather_black(row, here.around(row), &mut gathered);
-        weights.black_diagonal(row, &mut diagonal);
         let blacks = &mut blacks[(row - first) as usize * n..][..n];
-        for ((black, &gathered), &diagonal) in blacks.iter_mut().zip(&gathered).zip(&diagonal) {
-            *black = (*black + gathered) * diagonal.inverse();
-        }
+        weights.each_black(row, here.around(row), |k, diagonal, sum| {
+            blacks[k] = (blacks[k] + sum) * diagonal.inverse();
+        });
     }
 }

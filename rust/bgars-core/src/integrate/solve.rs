@@ -1,24 +1,15 @@
 //! The least-squares integrator: checks, faer's conjugate gradient, constants.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::matrix_free::InitialGuessStatus;
-use faer::matrix_free::conjugate_gradient::{CgError, CgParams, conjugate_gradient, conjugate_gradient_scratch};
-use faer::{ColMut, ColRef, Par};
 use rayon::prelude::*;
 
-use super::checkerboard::Weights;
 use super::components::Runs;
 use super::fill::fill_corners;
-use super::multigrid::Multigrid;
-use super::operator::{Field, Reduced, assemble};
-use super::reduction::{eliminate_blacks, fill_blacks, multiply};
-use super::{OnProgress, Params, Progress, Surface};
+use super::conjugate_gradient::{Solution, conjugate_gradients, square_sum};
+use super::operator::{Field, assemble};
+use super::reduction::{eliminate_blacks, fill_blacks};
+use super::{OnProgress, Params, Surface};
+use crate::memory::zeros;
 use crate::{Error, Result};
-
-/// Values summed one after the other before blocks are.
-const SUM_BLOCK: usize = 1 << 12;
 
 /// Integrates `normals` over `mask` to a height map in pixels.
 ///
@@ -65,9 +56,7 @@ pub fn integrate(
     fill_corners(&mut weights);
     let scale = (square_sum(&right.reds) + square_sum(&right.blacks)).sqrt();
     eliminate_blacks(&weights, &mut right.reds, &right.blacks);
-    let mut reds = vec![0.0; right.reds.len()];
-    let iterations = conjugate_gradients(&weights, &right.reds, scale, &mut reds, params, on_progress)?;
-    let residual = relative_residual(&weights, &reds, &right.reds, scale);
+    let Solution { x: reds, iterations, residual } = conjugate_gradients(&weights, &right.reds, scale, params, on_progress)?;
     fill_blacks(&weights, &reds, &mut right.blacks);
     let half = weights.grid.half();
     let value = |row: usize, col: usize| {
@@ -75,7 +64,7 @@ pub fn integrate(
         colour[row * half + col / 2]
     };
     let means = runs.means(value);
-    let mut height_px = vec![0.0; mask.len()];
+    let mut height_px = zeros(mask.len());
     height_px.par_chunks_mut(width).enumerate().for_each(|(row, height_px)| {
         height_px.fill(f32::NAN);
         for run in runs.row(row) {
@@ -124,78 +113,4 @@ fn check(field: Field<'_>, params: &Params) -> Result<()> {
         return Err(Error::OutOfRange { argument: "max_iters", rule: "at least 1", value: 0.0 });
     }
     Ok(())
-}
-
-/// Runs faer's solver on the reduced system from zero; returns the number of iterations.
-fn conjugate_gradients(
-    weights: &Weights,
-    right: &[f64],
-    scale: f64,
-    reds: &mut [f64],
-    params: &Params,
-    on_progress: OnProgress<'_>,
-) -> Result<usize> {
-    let cancelled = AtomicBool::new(false);
-    let operator = Reduced { weights, cancelled: &cancelled };
-    let preconditioner = Multigrid::new(weights);
-    // faer's own vector work stays on one thread: its sums must not depend on the number of threads.
-    let par = Par::Seq;
-    let cg_params = CgParams {
-        // Not `Zero`: faer 0.24 then leaves its residual uninitialised.
-        initial_guess: InitialGuessStatus::MaybeNonZero,
-        // The residual is that of the whole system (its blacks have none), so it is judged by the whole right side.
-        abs_tolerance: (params.relative_tolerance * scale).max(params.absolute_tolerance * (2.0 * right.len() as f64).sqrt()),
-        rel_tolerance: 0.0,
-        max_iters: params.max_iters,
-        ..Default::default()
-    };
-    let mut buffer = MemBuffer::new(conjugate_gradient_scratch(&preconditioner, &operator, 1, par));
-    let mut iteration = 0;
-    let outcome = conjugate_gradient(
-        ColMut::from_slice_mut(reds).as_mat_mut(),
-        &preconditioner,
-        &operator,
-        ColRef::from_slice(right).as_mat(),
-        cg_params,
-        |_| {
-            iteration += 1;
-            let residual = preconditioner.residual_norm() / scale;
-            if on_progress(Progress { iteration, residual }).is_break() {
-                cancelled.store(true, Ordering::Relaxed);
-            }
-        },
-        par,
-        MemStack::new(&mut buffer),
-    );
-    if cancelled.load(Ordering::Relaxed) {
-        return Err(Error::Cancelled);
-    }
-    let no_convergence = |iterations| Error::NoConvergence {
-        iterations,
-        residual: relative_residual(weights, reds, right, scale),
-        tolerance: params.relative_tolerance,
-    };
-    match outcome {
-        Ok(info) => Ok(info.iter_count),
-        // The operator is semi-definite by construction: only a direction lost in rounding ends up here.
-        Err(CgError::NonPositiveDefiniteOperator | CgError::NonPositiveDefinitePreconditioner) => {
-            Err(no_convergence(iteration))
-        }
-        Err(CgError::NoConvergence { .. }) => Err(no_convergence(params.max_iters)),
-    }
-}
-
-/// `|b - S x| / scale`; 0 for a zero right side.
-fn relative_residual(weights: &Weights, x: &[f64], right: &[f64], scale: f64) -> f64 {
-    let mut residual = vec![0.0; right.len()];
-    multiply(weights, x, &mut residual);
-    residual.par_iter_mut().zip(right).for_each(|(residual, right)| *residual = right - *residual);
-    if scale > 0.0 { square_sum(&residual).sqrt() / scale } else { 0.0 }
-}
-
-/// Sum of squares, by blocks in parallel and then in order: the same bits for any number of threads.
-fn square_sum(vector: &[f64]) -> f64 {
-    let blocks: Vec<f64> =
-        vector.par_chunks(SUM_BLOCK).map(|block| block.iter().map(|value| value * value).sum()).collect();
-    blocks.iter().sum()
 }

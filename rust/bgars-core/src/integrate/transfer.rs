@@ -12,7 +12,8 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::checkerboard::{BAND_ROWS, Real, Ring, Weights, divide, split_row};
+use super::checkerboard::{BAND_ROWS, Real, Ring, Weights, split_row};
+use super::reduction::{dot, solve_blacks};
 
 /// `coarse = P^T (b - S D^-1 b)`: smooths `b` from zero and restricts what is left to the coarser grid, as reds and blacks.
 pub(super) fn restrict<T: Real>(weights: &Weights, b: &[T], coarse_reds: &mut [f32], coarse_blacks: &mut [f32]) {
@@ -26,14 +27,23 @@ pub(super) fn restrict<T: Real>(weights: &Weights, b: &[T], coarse_reds: &mut [f
 }
 
 /// `x = D^-1 (b + N (D^-1 b + P coarse))`, `N = W D_black^-1 W^T`: the correction of the coarser grid (row-major), smoothed.
-pub(super) fn prolong<T: Real>(weights: &Weights, b: &[T], coarse: &[f32], x: &mut [T]) {
+///
+/// Returns `<b, x>`, summed in an order that does not depend on the threads.
+pub(super) fn prolong<T: Real>(weights: &Weights, b: &[T], coarse: &[f32], x: &mut [f32]) -> f64 {
     let chunk = BAND_ROWS * weights.grid.half();
-    x.par_chunks_mut(chunk).enumerate().for_each(|(band, x)| prolong_band(weights, b, coarse, band, x));
+    let bands = x.par_chunks_mut(chunk).enumerate();
+    let products: Vec<f64> = bands.map(|(band, x)| prolong_band(weights, b, coarse, band, x)).collect();
+    products.iter().sum()
 }
 
-/// Sums of the weights that tie a row's blacks to corners: left and right in even rows, up and down in odd ones.
+/// Sums of the weights that tie a row's blacks to corners: left and right in even rows, up and down in odd ones; zeros
+/// outside the grid.
 #[inline(always)]
 fn black_ties(weights: &Weights, row: isize, out: &mut [f32]) {
+    if !weights.grid.contains(row) {
+        out.fill(0.0);
+        return;
+    }
     let n = weights.grid.half();
     let out = &mut out[..n];
     let (first, second) = if row.rem_euclid(2) == 0 {
@@ -71,36 +81,29 @@ fn restrict_band<T: Real>(weights: &Weights, b: &[T], band: usize, coarse_reds: 
     let first = (band * BAND_ROWS) as isize;
     let coarse_rows = coarse_reds.len() / coarse_half;
     let end = first + 2 * coarse_rows as isize;
-    let mut diagonal = vec![0.0; n];
-    let mut coarse = vec![0.0; n];
+    let [mut horizontal, mut coarse] = std::array::from_fn(|_| vec![0.0f32; n]);
     let [mut smooth, mut blacks, mut residual, mut centres] = std::array::from_fn(|_| Ring::<f32>::new(n));
     let [mut vertical, mut ties] = std::array::from_fn(|_| Ring::<f32>::new(n));
     for row in first - 3..=end + 1 {
-        smoothed_row(weights, b, row, &mut diagonal, smooth.row_mut(row));
+        smoothed_row(weights, b, row, smooth.row_mut(row));
 
         let row = row - 1;
         if row < first - 2 {
             continue;
         }
-        if grid.contains(row) {
-            weights.gather_black(row, smooth.around(row), blacks.row_mut(row));
-            weights.black_diagonal(row, &mut diagonal);
-            divide(blacks.row_mut(row), &diagonal);
-            black_ties(weights, row, ties.row_mut(row));
-        } else {
-            blacks.row_mut(row).fill(0.0);
-            ties.row_mut(row).fill(0.0);
-        }
+        solve_blacks(weights, row, &smooth, &mut blacks);
+        black_ties(weights, row, ties.row_mut(row));
 
         // The residual: D - N applied to D^-1 b leaves N D^-1 b.
         let row = row - 1;
         if row < first - 1 {
             continue;
         }
+        let out = residual.row_mut(row);
         if grid.contains(row) {
-            weights.gather_red(row, blacks.around(row), residual.row_mut(row));
+            weights.each_red(row, blacks.around(row), |k, _, sum| out[k] = sum);
         } else {
-            residual.row_mut(row).fill(0.0);
+            out.fill(0.0);
         }
         if row.rem_euclid(2) == 0 {
             continue;
@@ -130,7 +133,6 @@ fn restrict_band<T: Real>(weights: &Weights, b: &[T], band: usize, coarse_reds: 
         }
         // Even row above it: blacks to their corners.
         let row = row - 1;
-        let mut horizontal = std::mem::take(&mut diagonal);
         {
             let (down, up) = (&weights.down(row - 1)[1..=n], &weights.up(row + 1)[1..=n]);
             let (above, below) = (&centres.row(row - 1)[1..=n], &centres.row(row + 1)[1..=n]);
@@ -156,7 +158,6 @@ fn restrict_band<T: Real>(weights: &Weights, b: &[T], band: usize, coarse_reds: 
                 coarse[k] += left[k].abs() * horizontal[k - 1];
             }
         }
-        diagonal = horizontal;
         let coarse_row = (row - first) as usize / 2;
         let span = coarse_row * coarse_half..(coarse_row + 1) * coarse_half;
         split_row((row / 2) as usize, &coarse, &mut coarse_reds[span.clone()], &mut coarse_blacks[span]);
@@ -165,38 +166,33 @@ fn restrict_band<T: Real>(weights: &Weights, b: &[T], band: usize, coarse_reds: 
 
 /// `D^-1 b` of a row; zeros outside the grid.
 #[inline(always)]
-fn smoothed_row<T: Real>(weights: &Weights, b: &[T], row: isize, diagonal: &mut [f32], out: &mut [f32]) {
-    if !weights.grid.contains(row) {
+fn smoothed_row<T: Real>(weights: &Weights, b: &[T], row: isize, out: &mut [f32]) {
+    if weights.grid.contains(row) {
+        let b = &b[row as usize * weights.grid.half()..][..weights.grid.half()];
+        weights.scale_reds(row, |k| b[k].to_f32(), out);
+    } else {
         out.fill(0.0);
-        return;
-    }
-    let n = weights.grid.half();
-    weights.red_diagonal(row, diagonal);
-    let b = &b[row as usize * n..][..n];
-    for ((out, &b), &diagonal) in out.iter_mut().zip(b).zip(&*diagonal) {
-        *out = b.to_f32() * diagonal.inverse();
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn prolong_band<T: Real>(weights: &Weights, b: &[T], coarse: &[f32], band: usize, x: &mut [T]) {
+fn prolong_band<T: Real>(weights: &Weights, b: &[T], coarse: &[f32], band: usize, x: &mut [f32]) -> f64 {
     let grid = weights.grid;
     let n = grid.half();
     let first = (band * BAND_ROWS) as isize;
     let end = first + (x.len() / n) as isize;
-    let mut diagonal = vec![0.0; n];
-    let mut gathered = vec![0.0; n];
+    let mut product = 0.0;
+    let mut centres = vec![0.0; n];
     let mut corners_left = vec![0.0; n + 1];
     let [mut smooth, mut blacks, mut ties, mut on_edges] = std::array::from_fn(|_| Ring::<f32>::new(n));
     let corner_row = |row: isize| &coarse[(row / 2) as usize * n..][..n];
     // Blacks between corners, one row ahead: the centres of an odd row need those of the row below.
     let mut interpolate_blacks = |row: isize, ties: &mut Ring<f32>, on_edges: &mut Ring<f32>| {
+        black_ties(weights, row, ties.row_mut(row));
         if !grid.contains(row) {
-            ties.row_mut(row).fill(0.0);
             on_edges.row_mut(row).fill(0.0);
             return;
         }
-        black_ties(weights, row, ties.row_mut(row));
         let tie = &ties.row(row)[1..=n];
         let out = &mut on_edges.row_mut(row)[..n];
         if row % 2 == 0 {
@@ -222,7 +218,7 @@ fn prolong_band<T: Real>(weights: &Weights, b: &[T], coarse: &[f32], band: usize
         if row < first - 2 {
             continue;
         }
-        smoothed_row(weights, b, row, &mut diagonal, smooth.row_mut(row));
+        smoothed_row(weights, b, row, smooth.row_mut(row));
         if grid.contains(row) {
             let out = smooth.row_mut(row);
             if row % 2 == 0 {
@@ -230,9 +226,9 @@ fn prolong_band<T: Real>(weights: &Weights, b: &[T], coarse: &[f32], band: usize
                     *out += corner;
                 }
             } else {
-                weights.gather_red(row, on_edges.around(row), &mut diagonal);
-                divide_by_centre_ties(weights, row, &ties, &mut diagonal);
-                for (out, &centre) in out.iter_mut().zip(&diagonal) {
+                weights.each_red(row, on_edges.around(row), |k, _, sum| centres[k] = sum);
+                divide_by_centre_ties(weights, row, &ties, &mut centres);
+                for (out, &centre) in out.iter_mut().zip(&centres) {
                     *out += centre;
                 }
             }
@@ -242,13 +238,7 @@ fn prolong_band<T: Real>(weights: &Weights, b: &[T], coarse: &[f32], band: usize
         if row < first - 1 {
             continue;
         }
-        if grid.contains(row) {
-            weights.gather_black(row, smooth.around(row), blacks.row_mut(row));
-            weights.black_diagonal(row, &mut diagonal);
-            divide(blacks.row_mut(row), &diagonal);
-        } else {
-            blacks.row_mut(row).fill(0.0);
-        }
+        solve_blacks(weights, row, &smooth, &mut blacks);
 
         let row = row - 1;
         if row < first {
@@ -256,11 +246,10 @@ fn prolong_band<T: Real>(weights: &Weights, b: &[T], coarse: &[f32], band: usize
         }
         let values = &mut x[(row - first) as usize * n..][..n];
         let b = &b[row as usize * n..][..n];
-        weights.gather_red(row, blacks.around(row), &mut gathered);
-        weights.red_diagonal(row, &mut diagonal);
-        let (gathered, diagonal) = (&gathered[..n], &diagonal[..n]);
-        for k in 0..n {
-            values[k] = T::from((b[k].to_f32() + gathered[k]) * diagonal[k].inverse());
-        }
+        weights.each_red(row, blacks.around(row), |k, diagonal, sum| {
+            values[k] = (b[k].to_f32() + sum) * diagonal.inverse();
+        });
+        product += dot(b, values);
     }
+    product
 }

@@ -1,0 +1,114 @@
+//! Conjugate gradient on the reduced system (Hestenes and Stiefel 1952), preconditioned by multigrid.
+//!
+//! Written out here for its memory traffic: the sums ride along with the passes that make their vectors, and every pass runs on
+//! all threads. faer's solver, with which the tests compare it, does its vector work on one thread and in passes of its own.
+
+use rayon::prelude::*;
+
+use super::checkerboard::Weights;
+use super::multigrid::Multigrid;
+use super::reduction::{dot, multiply};
+use super::{OnProgress, Params, Progress};
+use crate::memory::zeros;
+use crate::{Error, Result};
+
+/// Elements of a vector that one task updates.
+const BLOCK: usize = 1 << 14;
+
+/// What [`conjugate_gradients`] found.
+pub(super) struct Solution {
+    pub x: Vec<f64>,
+    pub iterations: usize,
+    /// Norm of the true residual, relative to `scale`.
+    pub residual: f64,
+}
+
+/// Solves `S x = b` from zero, until the norm of `b - S x` is at most the tolerance times `scale`.
+///
+/// The residual that the iteration carries along drifts from the true one by rounding: when it says done, the true one is
+/// computed, and if it does not agree the iteration starts again from there.
+pub(super) fn conjugate_gradients(
+    weights: &Weights,
+    b: &[f64],
+    scale: f64,
+    params: &Params,
+    on_progress: OnProgress<'_>,
+) -> Result<Solution> {
+    let size = b.len();
+    let mut solution = Solution { x: zeros(size), iterations: 0, residual: 0.0 };
+    if scale == 0.0 {
+        return Ok(solution);
+    }
+    let target = (params.relative_tolerance * scale).max(params.absolute_tolerance * (2.0 * size as f64).sqrt());
+    let preconditioner = Multigrid::new(weights);
+    let Solution { x, iterations, residual } = &mut solution;
+    let (mut p, mut q): (Vec<f64>, Vec<f64>) = (zeros(size), zeros(size));
+    let mut z: Vec<f32> = zeros(size);
+    let mut r: Vec<f64> = zeros(size);
+    r.par_chunks_mut(BLOCK).zip(b.par_chunks(BLOCK)).for_each(|(r, b)| r.copy_from_slice(b));
+    loop {
+        let mut norm = square_sum(&r).sqrt();
+        *residual = norm / scale;
+        if norm <= target {
+            return Ok(solution);
+        }
+        let mut r_z_before = f64::INFINITY;
+        p.par_chunks_mut(BLOCK).for_each(|p| p.fill(0.0));
+        while norm > target {
+            let stuck = |iterations, norm: f64| {
+                let tolerance = params.relative_tolerance;
+                Error::NoConvergence { iterations, residual: norm / scale, tolerance }
+            };
+            if *iterations == params.max_iters {
+                return Err(stuck(*iterations, norm));
+            }
+            let r_z = preconditioner.cycle(&r, &mut z);
+            let beta = r_z / r_z_before;
+            r_z_before = r_z;
+            p.par_chunks_mut(BLOCK).zip(z.par_chunks(BLOCK)).for_each(|(p, z)| {
+                for (p, &z) in p.iter_mut().zip(z) {
+                    *p = f64::from(z) + beta * *p;
+                }
+            });
+            let p_q = multiply(weights, &p, &mut q);
+            // Both are positive but for rounding; what is lost in it cannot be found again.
+            if !(r_z > 0.0 && p_q > 0.0) {
+                return Err(stuck(*iterations, norm));
+            }
+            norm = step(x, &mut r, &p, &q, r_z / p_q).sqrt();
+            *iterations += 1;
+            if on_progress(Progress { iteration: *iterations, residual: norm / scale }).is_break() {
+                return Err(Error::Cancelled);
+            }
+        }
+        multiply(weights, x, &mut q);
+        r.par_chunks_mut(BLOCK).zip(b.par_chunks(BLOCK)).zip(q.par_chunks(BLOCK)).for_each(|((r, b), q)| {
+            for ((r, b), q) in r.iter_mut().zip(b).zip(q) {
+                *r = b - q;
+            }
+        });
+    }
+}
+
+/// `x += alpha p`, `r -= alpha q`; returns `<r, r>`.
+fn step(x: &mut [f64], r: &mut [f64], p: &[f64], q: &[f64], alpha: f64) -> f64 {
+    let squares: Vec<f64> = (x.par_chunks_mut(BLOCK), r.par_chunks_mut(BLOCK), p.par_chunks(BLOCK), q.par_chunks(BLOCK))
+        .into_par_iter()
+        .map(|(x, r, p, q)| {
+            for (x, p) in x.iter_mut().zip(p) {
+                *x += alpha * p;
+            }
+            for (r, q) in r.iter_mut().zip(q) {
+                *r -= alpha * q;
+            }
+            dot(r, r)
+        })
+        .collect();
+    squares.iter().sum()
+}
+
+/// Sum of squares, by blocks in parallel and then in order: the same bits for any number of threads.
+pub(super) fn square_sum(vector: &[f64]) -> f64 {
+    let blocks: Vec<f64> = vector.par_chunks(BLOCK).map(|block| dot(block, block)).collect();
+    blocks.iter().sum()
+}
