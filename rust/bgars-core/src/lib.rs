@@ -9,6 +9,7 @@
 pub mod error;
 pub mod integrate;
 pub mod io;
+mod key;
 pub mod lights;
 mod memory;
 pub mod mesh;

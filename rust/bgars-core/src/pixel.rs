@@ -1,7 +1,7 @@
 //! The pixel types that the kernels take as they come from the camera.
 
 /// A grey level: `u8`, `u16` or `f32`.
-pub trait Pixel: Copy + Send + Sync + std::fmt::Debug + 'static {
+pub trait Pixel: crate::key::Key + Send + Sync + std::fmt::Debug + 'static {
     /// Number of different codes of an integer type (the size of a response table); `None` for floats.
     const CODES: Option<usize>;
 
@@ -15,12 +15,12 @@ pub trait Pixel: Copy + Send + Sync + std::fmt::Debug + 'static {
 impl Pixel for u8 {
     const CODES: Option<usize> = Some(1 << 8);
 
-    #[inline]
+    #[inline(always)]
     fn to_f32(self) -> f32 {
         f32::from(self)
     }
 
-    #[inline]
+    #[inline(always)]
     fn code(self) -> usize {
         usize::from(self)
     }
@@ -29,12 +29,12 @@ impl Pixel for u8 {
 impl Pixel for u16 {
     const CODES: Option<usize> = Some(1 << 16);
 
-    #[inline]
+    #[inline(always)]
     fn to_f32(self) -> f32 {
         f32::from(self)
     }
 
-    #[inline]
+    #[inline(always)]
     fn code(self) -> usize {
         usize::from(self)
     }
@@ -43,12 +43,12 @@ impl Pixel for u16 {
 impl Pixel for f32 {
     const CODES: Option<usize> = None;
 
-    #[inline]
+    #[inline(always)]
     fn to_f32(self) -> f32 {
         self
     }
 
-    #[inline]
+    #[inline(always)]
     fn code(self) -> usize {
         0
     }

@@ -3,10 +3,10 @@
 use nalgebra::{Matrix3, Vector3};
 
 /// Standard error of the direction at which the confidence is one half, degrees.
-const HALF_DEG: f64 = 5.0;
+pub(super) const HALF_DEG: f64 = 5.0;
 
 /// Residual a Lambertian fit is assumed to have at least, relative to the albedo: what a fit without redundancy is worth.
-const PRIOR_RESIDUAL: f64 = 0.02;
+pub(super) const PRIOR_RESIDUAL: f64 = 0.02;
 
 /// `1 / (1 + (s / 5 deg)^2)` with `s` the standard error of the direction of `solution = rho n`.
 ///

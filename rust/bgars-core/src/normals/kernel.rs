@@ -1,19 +1,27 @@
 //! The loop over pixels: radiometry, choice of lights, least squares.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::confidence::confidence;
+use super::lanes::{Choice, LaneKernel};
 use super::robust::{self, RobustFilter, RobustScratch};
-use super::solve::SubsetSolver;
+use super::solve::{Solution, SubsetSolver};
 use super::specular::specular_filter;
 use super::{Method, NormalMap};
+use crate::memory::{prefer_large_pages, zeros};
 use crate::{Error, ImageStack, Lights, Pixel, Radiometry, Result};
 
 /// Pixels between two calls of the progress callback.
 const BAND_PIXELS: usize = 1 << 19;
+
+/// The same for the fast kernel.
+const LANE_BAND_PIXELS: usize = 1 << 22;
+
+/// Pixels of one task.
+const TASK_PIXELS: usize = 1 << 13;
 
 /// Estimates the normal of every pixel that `mask` allows.
 ///
@@ -57,32 +65,38 @@ pub fn estimate<P: Pixel>(
 ) -> Result<NormalMap> {
     check(stack, lights, radiometry, mask, method)?;
     let kernel = Kernel::new(stack, lights, radiometry, mask, method);
-    let (height, width) = (stack.height(), stack.width());
     let pixels = stack.pixels();
     let mut map = NormalMap {
-        normals: vec![f32::NAN; pixels * 3],
-        albedo: vec![f32::NAN; pixels],
+        normals: zeros(pixels * 3),
+        albedo: zeros(pixels),
         mask: vec![false; pixels],
-        confidence: vec![0.0; pixels],
-        lights_kept: vec![0; pixels],
+        confidence: zeros(pixels),
+        lights_kept: zeros(pixels),
         kept_sets: vec![false; if keep_sets { pixels * stack.lights() } else { 0 }],
     };
-    // An empty vector has no rows to hand out: one unused row then serves as many empty slices.
-    let set_width = if keep_sets { width * stack.lights() } else { 0 };
-    let band_rows = (BAND_PIXELS / width.max(1)).max(1);
-    for first_row in (0..height).step_by(band_rows) {
-        let rows = first_row..(first_row + band_rows).min(height);
-        let band = rows.start * width..rows.end * width;
-        let row_results: Vec<RowOut<'_>> = RowOut::split(&mut map, band, width, set_width);
-        row_results.into_par_iter().enumerate().for_each_init(
+    prefer_large_pages(&mut map.mask);
+    prefer_large_pages(&mut map.kept_sets);
+    let band_pixels = if kernel.lanes.is_some() { LANE_BAND_PIXELS } else { BAND_PIXELS };
+    for start in (0..pixels).step_by(band_pixels) {
+        let band = start..(start + band_pixels).min(pixels);
+        let tasks = Out::split(&mut map, &band, if keep_sets { stack.lights() } else { 0 });
+        tasks.into_par_iter().enumerate().for_each_init(
             || Scratch::new(lights),
-            |scratch, (row, mut out)| kernel.row(first_row + row, &mut out, scratch),
+            |scratch, (task, mut out)| {
+                let first = start + task * TASK_PIXELS;
+                kernel.task(first..first + out.albedo.len(), &mut out, scratch);
+            },
         );
-        if progress(rows.end as f64 / height as f64).is_break() {
+        if progress(band.end as f64 / pixels as f64).is_break() {
             return Err(Error::Cancelled);
         }
     }
     Ok(map)
+}
+
+/// A gap in the grey levels of the images from one in grey levels of 255.
+fn gap(threshold: f32, full_scale: f32) -> f32 {
+    threshold * full_scale / 255.0
 }
 
 /// Refuses what the kernel cannot work on.
@@ -147,40 +161,60 @@ struct Kernel<'a, P> {
     method: Method,
     robust: Option<RobustFilter>,
     solver: SubsetSolver,
+    /// The fast kernel, where it can serve.
+    lanes: Option<LaneKernel>,
+    /// The images.
+    planes: Vec<&'a [P]>,
     /// 1 / intensity of each light.
     scales: Vec<f32>,
     /// Full scale in the unit of the scaled values: its mean over the lights.
     full_scale: f64,
 }
 
-/// What a row writes.
-struct RowOut<'a> {
-    normals: &'a mut [f32],
-    albedo: &'a mut [f32],
-    mask: &'a mut [bool],
-    confidence: &'a mut [f32],
-    lights_kept: &'a mut [u16],
-    kept_sets: &'a mut [bool],
+/// What a task writes: the pixels from its first one on.
+pub(super) struct Out<'a> {
+    pub normals: &'a mut [f32],
+    pub albedo: &'a mut [f32],
+    pub mask: &'a mut [bool],
+    pub confidence: &'a mut [f32],
+    pub lights_kept: &'a mut [u16],
+    /// Empty unless asked for.
+    pub kept_sets: &'a mut [bool],
 }
 
-impl<'a> RowOut<'a> {
-    /// The rows of a band of pixels.
-    fn split(map: &'a mut NormalMap, band: std::ops::Range<usize>, width: usize, set_width: usize) -> Vec<Self> {
-        let lights = set_width / width;
-        let mut kept_sets = &mut map.kept_sets[band.start * lights..band.end * lights];
-        let mut rows = Vec::with_capacity(band.len() / width);
+impl<'a> Out<'a> {
+    /// The tasks of a band of pixels; `set_lights` is the number of lights of the kept sets, 0 without these.
+    fn split(map: &'a mut NormalMap, band: &Range<usize>, set_lights: usize) -> Vec<Self> {
+        let mut kept_sets = &mut map.kept_sets[band.start * set_lights..band.end * set_lights];
+        let mut tasks = Vec::with_capacity(band.len().div_ceil(TASK_PIXELS));
         let scalars = map.normals[band.start * 3..band.end * 3]
-            .chunks_mut(width * 3)
-            .zip(map.albedo[band.clone()].chunks_mut(width))
-            .zip(map.mask[band.clone()].chunks_mut(width))
-            .zip(map.confidence[band.clone()].chunks_mut(width))
-            .zip(map.lights_kept[band].chunks_mut(width));
+            .chunks_mut(TASK_PIXELS * 3)
+            .zip(map.albedo[band.clone()].chunks_mut(TASK_PIXELS))
+            .zip(map.mask[band.clone()].chunks_mut(TASK_PIXELS))
+            .zip(map.confidence[band.clone()].chunks_mut(TASK_PIXELS))
+            .zip(map.lights_kept[band.clone()].chunks_mut(TASK_PIXELS));
         for ((((normals, albedo), mask), confidence), lights_kept) in scalars {
-            let (row_sets, rest) = std::mem::take(&mut kept_sets).split_at_mut(set_width);
+            let (task_sets, rest) = std::mem::take(&mut kept_sets).split_at_mut(albedo.len() * set_lights);
             kept_sets = rest;
-            rows.push(Self { normals, albedo, mask, confidence, lights_kept, kept_sets: row_sets });
+            tasks.push(Self { normals, albedo, mask, confidence, lights_kept, kept_sets: task_sets });
         }
-        rows
+        tasks
+    }
+
+    /// Marks pixels as not asked for.
+    pub fn clear(&mut self, span: Range<usize>) {
+        self.lights_kept[span.clone()].fill(0);
+        let lights = self.kept_sets.len() / self.albedo.len();
+        self.kept_sets[span.start * lights..span.end * lights].fill(false);
+        self.reject(span);
+    }
+
+    /// Marks pixels as without solution.
+    fn reject(&mut self, span: Range<usize>) {
+        self.normals[span.start * 3..span.end * 3].fill(f32::NAN);
+        self.albedo[span.clone()].fill(f32::NAN);
+        self.confidence[span.clone()].fill(0.0);
+        self.mask[span].fill(false);
     }
 }
 
@@ -227,54 +261,75 @@ impl<'a, P: Pixel> Kernel<'a, P> {
         let scales: Vec<f32> = radiometry.intensities.iter().map(|intensity| (1.0 / intensity) as f32).collect();
         let mean_scale = scales.iter().map(|&scale| f64::from(scale)).sum::<f64>() / scales.len() as f64;
         let full_scale = f64::from(radiometry.full_scale) * mean_scale;
-        Self { stack, lights, radiometry, mask, method, robust, solver, scales, full_scale }
+        let choice = match method {
+            Method::Lambertian => Some(Choice::All),
+            Method::SpecularFilter { threshold } => Some(Choice::UpToGap(gap(threshold, radiometry.full_scale))),
+            Method::RobustFilter(_) => None,
+        };
+        let lanes = choice.and_then(|choice| LaneKernel::new(lights, choice, radiometry.full_scale));
+        let planes = (0..stack.lights()).map(|light| stack.plane(light)).collect();
+        Self { stack, lights, radiometry, mask, method, robust, solver, lanes, planes, scales, full_scale }
     }
 
-    fn row(&self, row: usize, out: &mut RowOut<'_>, scratch: &mut Scratch) {
-        let width = self.stack.width();
-        let lights = self.stack.lights();
-        for col in 0..width {
-            let pixel = row * width + col;
-            if self.mask.is_some_and(|mask| !mask[pixel]) {
-                continue;
+    /// Works on a range of pixels.
+    fn task(&self, pixels: Range<usize>, out: &mut Out<'_>, scratch: &mut Scratch) {
+        let first = pixels.start;
+        let careful = &mut |pixel: usize, out: &mut Out<'_>| self.pixel(pixel, pixel - first, out, scratch);
+        if let Some(lanes) = &self.lanes {
+            lanes.run(&self.planes, self.radiometry, &self.scales, self.mask, pixels, out, careful);
+            return;
+        }
+        for pixel in pixels {
+            if self.mask.is_none_or(|mask| mask[pixel]) {
+                careful(pixel, out);
+            } else {
+                out.clear(pixel - first..pixel - first + 1);
             }
-            self.load(row, col, scratch);
-            self.choose(scratch);
-            out.lights_kept[col] = scratch.kept.iter().filter(|&&kept| kept).count() as u16;
-            if !out.kept_sets.is_empty() {
-                out.kept_sets[col * lights..(col + 1) * lights].copy_from_slice(&scratch.kept);
-            }
-            let Some(solution) = self.solver.solve(&scratch.values, &scratch.directions, &scratch.kept) else {
-                continue;
-            };
-            let scaled = solution.scaled_normal;
-            let albedo = scaled.norm();
-            if !(albedo.is_finite() && albedo > 0.0 && scaled.z > 0.0) {
-                continue;
-            }
-            let squared_residuals: f64 = (0..lights)
-                .filter(|&light| scratch.kept[light])
-                .map(|light| (f64::from(scratch.values[light]) - scratch.directions[light].dot(&scaled)).powi(2))
-                .sum();
-            let normal = scaled / albedo;
-            out.normals[col * 3..col * 3 + 3].copy_from_slice(&[normal.x as f32, normal.y as f32, normal.z as f32]);
-            out.albedo[col] = (albedo / f64::from(self.radiometry.full_scale)) as f32;
-            out.confidence[col] =
-                confidence(&scaled, &solution.inverse, squared_residuals, usize::from(out.lights_kept[col]));
-            out.mask[col] = true;
         }
     }
 
+    /// The careful kernel: one pixel in `f64`, written to place `at`.
+    fn pixel(&self, pixel: usize, at: usize, out: &mut Out<'_>, scratch: &mut Scratch) {
+        let lights = self.stack.lights();
+        self.load(pixel, scratch);
+        self.choose(scratch);
+        out.lights_kept[at] = scratch.kept.iter().filter(|&&kept| kept).count() as u16;
+        if !out.kept_sets.is_empty() {
+            out.kept_sets[at * lights..(at + 1) * lights].copy_from_slice(&scratch.kept);
+        }
+        let facing = |solution: &Solution| {
+            let albedo = solution.scaled_normal.norm();
+            albedo.is_finite() && albedo > 0.0 && solution.scaled_normal.z > 0.0
+        };
+        let solution = self.solver.solve(&scratch.values, &scratch.directions, &scratch.kept).filter(facing);
+        let Some(solution) = solution else {
+            out.reject(at..at + 1);
+            return;
+        };
+        let scaled = solution.scaled_normal;
+        let albedo = scaled.norm();
+        let squared_residuals: f64 = (0..lights)
+            .filter(|&light| scratch.kept[light])
+            .map(|light| (f64::from(scratch.values[light]) - scratch.directions[light].dot(&scaled)).powi(2))
+            .sum();
+        let normal = scaled / albedo;
+        out.normals[at * 3..at * 3 + 3].copy_from_slice(&[normal.x as f32, normal.y as f32, normal.z as f32]);
+        out.albedo[at] = (albedo / f64::from(self.radiometry.full_scale)) as f32;
+        out.confidence[at] =
+            confidence(&scaled, &solution.inverse, squared_residuals, usize::from(out.lights_kept[at]));
+        out.mask[at] = true;
+    }
+
     /// The pixel's values in linear grey levels at unit light intensity, its clipped lights, and near lights' directions.
-    fn load(&self, row: usize, col: usize, scratch: &mut Scratch) {
-        let pixel = row * self.stack.width() + col;
+    fn load(&self, pixel: usize, scratch: &mut Scratch) {
         let offset = self.radiometry.offset(pixel);
         for light in 0..self.stack.lights() {
-            let code = self.stack.plane(light)[pixel];
+            let code = self.planes[light][pixel];
             scratch.clipped[light] = code.to_f32() >= self.radiometry.saturation;
             scratch.values[light] = (self.radiometry.linearise(code) - offset) * self.scales[light];
         }
         if let Lights::Near { .. } = self.lights {
+            let (row, col) = (pixel / self.stack.width(), pixel % self.stack.width());
             let x_px = col as f64 + 0.5 - self.stack.width() as f64 / 2.0;
             let y_px = self.stack.height() as f64 / 2.0 - row as f64 - 0.5;
             for light in 0..self.stack.lights() {
@@ -288,7 +343,7 @@ impl<'a, P: Pixel> Kernel<'a, P> {
     fn choose(&self, scratch: &mut Scratch) {
         match (self.method, &self.robust) {
             (Method::SpecularFilter { threshold }, _) => {
-                let gap = threshold * self.radiometry.full_scale / 255.0;
+                let gap = gap(threshold, self.radiometry.full_scale);
                 specular_filter(&scratch.values, gap, &mut scratch.order, &mut scratch.kept);
             }
             (Method::RobustFilter(_), Some(filter)) => {

@@ -5,7 +5,9 @@
 //! values ([`Method::RobustFilter`]).
 
 mod confidence;
+mod cutoff;
 mod kernel;
+mod lanes;
 mod robust;
 mod solve;
 mod specular;

@@ -1,0 +1,74 @@
+//! Comparisons of pixels that vectorise; a private supertrait, so that [`crate::Pixel`] stays with its three types.
+
+/// What is sorted: grey levels as they come, or linear values.
+pub trait Key: Copy {
+    /// Smaller than every other.
+    const LEAST: Self;
+    /// Larger than every other.
+    const LARGEST: Self;
+
+    /// The smaller of both.
+    fn least(self, other: Self) -> Self;
+    /// The larger of both.
+    fn largest(self, other: Self) -> Self;
+    /// True when `self` is over `below` by more than `gap`; `below` is at most `self`, or the answer is no.
+    fn is_over(self, below: Self, gap: Self) -> bool;
+    /// The largest key step that is not over `gap` in values.
+    fn gap(gap: f32) -> Self;
+}
+
+macro_rules! integer_key {
+    ($type:ty) => {
+        impl Key for $type {
+            const LEAST: Self = 0;
+            const LARGEST: Self = Self::MAX;
+
+            #[inline(always)]
+            fn least(self, other: Self) -> Self {
+                self.min(other)
+            }
+
+            #[inline(always)]
+            fn largest(self, other: Self) -> Self {
+                self.max(other)
+            }
+
+            #[inline(always)]
+            fn is_over(self, below: Self, gap: Self) -> bool {
+                self.saturating_sub(below) > gap
+            }
+
+            fn gap(gap: f32) -> Self {
+                // Steps are whole; a float too large saturates, and then nothing is over it.
+                gap as Self
+            }
+        }
+    };
+}
+integer_key!(u8);
+integer_key!(u16);
+
+impl Key for f32 {
+    const LEAST: Self = Self::NEG_INFINITY;
+    const LARGEST: Self = Self::INFINITY;
+
+    // Not f32::min and f32::max: these take care of NaN, which costs three instructions instead of one.
+    #[inline(always)]
+    fn least(self, other: Self) -> Self {
+        if self < other { self } else { other }
+    }
+
+    #[inline(always)]
+    fn largest(self, other: Self) -> Self {
+        if self > other { self } else { other }
+    }
+
+    #[inline(always)]
+    fn is_over(self, below: Self, gap: Self) -> bool {
+        self - below > gap
+    }
+
+    fn gap(gap: f32) -> Self {
+        gap
+    }
+}

@@ -1,0 +1,119 @@
+//! The published specular filter on many pixels at once: one cutoff a pixel instead of a sorted list.
+//!
+//! Values up to the cutoff are kept. Ties need no care: a gap over the threshold lies between different values.
+
+use crate::key::Key;
+
+/// Pixels worked on at once.
+pub(super) const LANES: usize = 32;
+
+/// One quantity of a block of pixels.
+pub(super) type Lanes<T> = [T; LANES];
+
+/// The largest kept key of each pixel: from the darkest up, the one below the first step over `gap` that leaves at least 3.
+///
+/// `keys` has one entry a light, at least 3.
+#[inline(always)]
+pub(super) fn cutoffs<K: Key>(keys: &[Lanes<K>], gap: K) -> Lanes<K> {
+    match keys.try_into() {
+        Ok(keys) => sorted_cutoffs(keys, gap),
+        Err(_) => grown_cutoffs(keys, gap),
+    }
+}
+
+/// Eight lights: a sorting network of 19 exchanges (Knuth, The Art of Computer Programming 3, section 5.3.4), then the steps.
+#[inline(always)]
+fn sorted_cutoffs<K: Key>(keys: &[Lanes<K>; 8], gap: K) -> Lanes<K> {
+    let mut cutoffs = [K::LEAST; LANES];
+    for lane in 0..LANES {
+        let mut s: [K; 8] = std::array::from_fn(|light| keys[light][lane]);
+        macro_rules! exchange {
+            ($($a:literal $b:literal),*) => {$(
+                (s[$a], s[$b]) = (s[$a].least(s[$b]), s[$a].largest(s[$b]));
+            )*};
+        }
+        exchange!(0 1, 2 3, 4 5, 6 7, 0 2, 1 3, 4 6, 5 7, 1 2, 5 6, 0 4, 1 5, 2 6, 3 7, 2 4, 3 5, 1 2, 3 4, 5 6);
+        let mut cutoff = s[7];
+        for kept in (3..8).rev() {
+            cutoff = if s[kept].is_over(s[kept - 1], gap) { s[kept - 1] } else { cutoff };
+        }
+        cutoffs[lane] = cutoff;
+    }
+    cutoffs
+}
+
+/// Any number of lights without sorting: start at the third darkest, and take in what is within the gap until nothing is.
+#[inline(always)]
+fn grown_cutoffs<K: Key>(keys: &[Lanes<K>], gap: K) -> Lanes<K> {
+    let [mut first, mut second, mut cutoffs] = [[K::LARGEST; LANES]; 3];
+    for key in keys {
+        for lane in 0..LANES {
+            let mut rest = first[lane].largest(key[lane]);
+            first[lane] = first[lane].least(key[lane]);
+            (second[lane], rest) = (second[lane].least(rest), second[lane].largest(rest));
+            cutoffs[lane] = cutoffs[lane].least(rest);
+        }
+    }
+    // Each round reaches further in at least one pixel, or is the last.
+    for _ in 3..=keys.len() {
+        let mut next = cutoffs;
+        for key in keys {
+            for lane in 0..LANES {
+                let reached = if key[lane].is_over(cutoffs[lane], gap) { K::LEAST } else { key[lane] };
+                next[lane] = next[lane].largest(reached);
+            }
+        }
+        let mut grown = false;
+        for lane in 0..LANES {
+            // `>` and not `!=`: NaN outside the mask must not go round for ever.
+            grown |= next[lane].is_over(cutoffs[lane], K::gap(0.0));
+        }
+        cutoffs = next;
+        if !grown {
+            break;
+        }
+    }
+    cutoffs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Word for word: sort, walk up, stop at the first gap.
+    fn slow_cutoff(values: &[u8], gap: u8) -> u8 {
+        let mut sorted = values.to_vec();
+        sorted.sort_unstable();
+        let kept = (3..sorted.len()).find(|&kept| sorted[kept] - sorted[kept - 1] > gap).unwrap_or(sorted.len());
+        sorted[kept - 1]
+    }
+
+    fn random_keys(lights: usize, seed: u32) -> Vec<Lanes<u8>> {
+        let mut state = seed;
+        let mut next = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let level = (state >> 24) as u8;
+            // Half of the values in a dark cluster, so that gaps occur.
+            if state & 1 == 0 { level / 5 } else { level }
+        };
+        (0..lights).map(|_| std::array::from_fn(|_| next())).collect()
+    }
+
+    #[test]
+    fn cutoffs_are_those_of_a_sorted_list() {
+        for (lights, gap) in [(3, 0), (4, 20), (5, 50), (8, 0), (8, 50), (8, 255), (9, 30), (24, 10), (96, 3)] {
+            for seed in 0..50 {
+                let keys = random_keys(lights, seed);
+                let found = cutoffs(&keys, gap);
+                let wide: Vec<Lanes<u16>> = keys.iter().map(|key| key.map(u16::from)).collect();
+                let float: Vec<Lanes<f32>> = keys.iter().map(|key| key.map(f32::from)).collect();
+                assert_eq!(cutoffs(&wide, u16::from(gap)), found.map(u16::from));
+                assert_eq!(cutoffs(&float, f32::from(gap)), found.map(f32::from));
+                for lane in 0..LANES {
+                    let values: Vec<u8> = keys.iter().map(|key| key[lane]).collect();
+                    assert_eq!(found[lane], slow_cutoff(&values, gap), "{values:?}, gap {gap}");
+                }
+            }
+        }
+    }
+}

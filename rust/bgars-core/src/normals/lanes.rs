@@ -1,0 +1,449 @@
+//! The fast kernel: least squares on 32 pixels at once, in `f32`, for distant lights.
+//!
+//! Plain loops over the lanes of a block, which the compiler turns into the vector instructions of the processor it runs on.
+//! A subset of lights whose equations are too badly conditioned for `f32` is left to the careful kernel, pixel by pixel.
+
+use std::ops::Range;
+
+use multiversion::multiversion;
+use nalgebra::{Matrix3, Vector3};
+
+use super::confidence::{HALF_DEG, PRIOR_RESIDUAL};
+use super::cutoff::{LANES, Lanes, cutoffs};
+use super::kernel::Out;
+use super::solve::MAX_TABLE_LIGHTS;
+use crate::lights::conditioning;
+use crate::{Lights, Pixel, Radiometry};
+
+/// Subsets of lights below this [`conditioning`] are solved in `f64`: one refinement in `f32` no longer makes up for rounding.
+const MIN_LANE_CONDITIONING: f64 = 1e-3;
+
+/// What a block of pixels leaves undone: bit k is set where pixel k wants the careful kernel.
+pub(super) type Careful = u32;
+
+/// Which lights a block keeps.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Choice {
+    /// All of them.
+    All,
+    /// Up to the first gap of the sorted values, in linear grey levels.
+    UpToGap(f32),
+}
+
+/// The six entries of a symmetric inverse, then its trace, then 1 where it may be used.
+type Inverse = [f32; 8];
+
+/// What does not change from pixel to pixel.
+#[derive(Debug)]
+pub(super) struct LaneKernel {
+    choice: Choice,
+    /// Unit vectors to the lights.
+    directions: Vec<[f32; 3]>,
+    /// `(L^T L)^-1 L^T`, a column a light.
+    pseudo_inverse: Vec<[f32; 3]>,
+    all: Inverse,
+    /// `L^T L` of all lights: xx, xy, xz, yy, yz, zz.
+    gram: [f32; 6],
+    /// The inverse for every subset (bit k: light k); empty for more than 12 lights.
+    table: Vec<Inverse>,
+    full_scale: f32,
+}
+
+impl LaneKernel {
+    /// `None` where the lanes cannot serve: near lights, or lights that are badly conditioned even together.
+    pub fn new(lights: &Lights, choice: Choice, full_scale: f32) -> Option<Self> {
+        let Lights::Directional(directions) = lights else { return None };
+        let gram = directions.iter().fold(Matrix3::zeros(), |gram, light| gram + light * light.transpose());
+        let all = inverse(&gram);
+        if all[7] == 0.0 {
+            return None;
+        }
+        let exact = gram.try_inverse()?;
+        let of_subset = |subset: usize| {
+            let lights = directions.iter().enumerate().filter(|(light, _)| subset >> light & 1 == 1);
+            inverse(&lights.fold(Matrix3::zeros(), |gram, (_, light)| gram + light * light.transpose()))
+        };
+        let tabulated = directions.len() <= MAX_TABLE_LIGHTS && matches!(choice, Choice::UpToGap(_));
+        Some(Self {
+            choice,
+            directions: directions.iter().map(single).collect(),
+            pseudo_inverse: directions.iter().map(|light| single(&(exact * light))).collect(),
+            all,
+            gram: upper(&gram),
+            table: if tabulated { (0..1 << directions.len()).map(of_subset).collect() } else { Vec::new() },
+            full_scale,
+        })
+    }
+
+    /// Works on `pixels` (of the whole image) and writes to `out` (of these pixels alone). `careful(pixel)` is called for
+    /// every pixel that is left over; it must write all of that pixel.
+    pub fn run<P: Pixel>(
+        &self,
+        planes: &[&[P]],
+        radiometry: &Radiometry<'_, P>,
+        scales: &[f32],
+        mask: Option<&[bool]>,
+        pixels: Range<usize>,
+        out: &mut Out<'_>,
+        careful: &mut dyn FnMut(usize, &mut Out<'_>),
+    ) {
+        let plain = radiometry.response.is_none() && scales.iter().all(|&scale| scale == 1.0);
+        let offsets = radiometry.dark.is_some() || radiometry.black_level != 0.0;
+        if plain {
+            let mut keys = vec![[P::LEAST; LANES]; planes.len()];
+            let mut load = |block: &Range<usize>, keys: &mut [Lanes<P>], offset: &mut Lanes<f32>| {
+                for (key, plane) in keys.iter_mut().zip(planes) {
+                    key[..block.len()].copy_from_slice(&plane[block.clone()]);
+                }
+                if offsets {
+                    for (offset, pixel) in offset.iter_mut().zip(block.clone()) {
+                        *offset = radiometry.offset(pixel);
+                    }
+                }
+            };
+            run_blocks(self, &mut load, &mut keys, offsets, mask, pixels, out, careful);
+        } else {
+            let mut keys = vec![[0.0f32; LANES]; planes.len()];
+            let mut load = |block: &Range<usize>, keys: &mut [Lanes<f32>], _: &mut Lanes<f32>| {
+                let mut offset = [0.0; LANES];
+                for (offset, pixel) in offset.iter_mut().zip(block.clone()) {
+                    *offset = radiometry.offset(pixel);
+                }
+                for ((key, plane), &scale) in keys.iter_mut().zip(planes).zip(scales) {
+                    for ((key, &code), &offset) in key.iter_mut().zip(&plane[block.clone()]).zip(&offset) {
+                        *key = (radiometry.linearise(code) - offset) * scale;
+                    }
+                }
+            };
+            run_blocks(self, &mut load, &mut keys, false, mask, pixels, out, careful);
+        }
+    }
+}
+
+/// The least squares of a block.
+struct Solutions {
+    /// `rho n`, by component.
+    scaled: [Lanes<f32>; 3],
+    squared_residuals: Lanes<f32>,
+    /// `tr C - n^T C n`, `C` the inverse in use.
+    turning: Lanes<f32>,
+    kept: Lanes<u16>,
+    careful: Careful,
+}
+
+/// The hot loop, compiled for several instruction sets; one call a task.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl+avx512dq", "x86_64+avx2+fma"))]
+fn run_blocks<K: Pixel>(
+    kernel: &LaneKernel,
+    load: &mut dyn FnMut(&Range<usize>, &mut [Lanes<K>], &mut Lanes<f32>),
+    keys: &mut [Lanes<K>],
+    offsets: bool,
+    mask: Option<&[bool]>,
+    pixels: Range<usize>,
+    out: &mut Out<'_>,
+    careful: &mut dyn FnMut(usize, &mut Out<'_>),
+) {
+    let mut offset = [0.0; LANES];
+    for first in pixels.clone().step_by(LANES) {
+        let block = first..(first + LANES).min(pixels.end);
+        let at = first - pixels.start;
+        let used = mask.map(|mask| &mask[block.clone()]);
+        if used.is_some_and(|used| !used.contains(&true)) {
+            out.clear(at..at + block.len());
+            continue;
+        }
+        load(&block, keys, &mut offset);
+        let offset = offsets.then_some(&offset);
+        // The usual number of lights is unrolled.
+        let solutions = match <&[Lanes<K>; 8]>::try_from(&*keys) {
+            Ok(keys) => solve(kernel, keys, offset),
+            Err(_) => solve(kernel, keys, offset),
+        };
+        write(kernel, &solutions, used, at..at + block.len(), out);
+        if !out.kept_sets.is_empty() {
+            write_sets(kernel, keys, used, at..at + block.len(), out);
+        }
+        if solutions.careful != 0 {
+            for lane in (0..block.len()).filter(|lane| solutions.careful >> lane & 1 == 1) {
+                if used.is_none_or(|used| used[lane]) {
+                    careful(first + lane, out);
+                }
+            }
+        }
+    }
+}
+
+/// Chooses and solves; `keys` of a length known to the compiler are unrolled.
+#[inline(always)]
+fn solve<K: Pixel>(kernel: &LaneKernel, keys: &[Lanes<K>], offset: Option<&Lanes<f32>>) -> Solutions {
+    match kernel.choice {
+        Choice::All => solve_all(kernel, keys, offset),
+        Choice::UpToGap(gap) => {
+            let cutoffs = cutoffs(keys, K::gap(gap));
+            let mut any_dropped = false;
+            for key in keys {
+                for lane in 0..LANES {
+                    any_dropped |= key[lane].is_over(cutoffs[lane], K::gap(0.0));
+                }
+            }
+            if any_dropped { solve_kept(kernel, keys, &cutoffs, offset) } else { solve_all(kernel, keys, offset) }
+        }
+    }
+}
+
+/// The linear value of a light in one lane.
+#[inline(always)]
+fn value<K: Pixel>(key: K, offset: Option<&Lanes<f32>>, lane: usize) -> f32 {
+    offset.map_or(key.to_f32(), |offset| key.to_f32() - offset[lane])
+}
+
+/// Every light of every lane is kept: one matrix for all.
+#[inline(always)]
+fn solve_all<K: Pixel>(kernel: &LaneKernel, keys: &[Lanes<K>], offset: Option<&Lanes<f32>>) -> Solutions {
+    let mut scaled = [[0.0f32; LANES]; 3];
+    let mut squares = [0.0f32; LANES];
+    let columns = &kernel.pseudo_inverse[..keys.len()];
+    for lane in 0..LANES {
+        let [mut x, mut y, mut z, mut square] = [0.0f32; 4];
+        for light in 0..keys.len() {
+            let value = value(keys[light][lane], offset, lane);
+            let [a, b, c] = columns[light];
+            x += a * value;
+            y += b * value;
+            z += c * value;
+            square += value * value;
+        }
+        [scaled[0][lane], scaled[1][lane], scaled[2][lane]] = [x, y, z];
+        squares[lane] = square;
+    }
+    let [xx, xy, xz, yy, yz, zz] = kernel.gram;
+    let mut turning = [0.0f32; LANES];
+    let mut residuals = [0.0f32; LANES];
+    for lane in 0..LANES {
+        let [x, y, z] = [scaled[0][lane], scaled[1][lane], scaled[2][lane]];
+        // |I|^2 - |L g|^2; what rounding leaves is far below the prior of 2 %.
+        let explained = x * (xx * x + 2.0 * (xy * y + xz * z)) + y * (yy * y + 2.0 * yz * z) + z * (zz * z);
+        residuals[lane] = if squares[lane] > explained { squares[lane] - explained } else { 0.0 };
+        turning[lane] = turning_of(&kernel.all, [x, y, z]);
+    }
+    let kept = [keys.len() as u16; LANES];
+    Solutions { scaled, squared_residuals: residuals, turning, kept, careful: 0 }
+}
+
+/// Lights over the cutoff are dropped: normal equations of each lane, refined once.
+#[inline(always)]
+fn solve_kept<K: Pixel>(
+    kernel: &LaneKernel,
+    keys: &[Lanes<K>],
+    cutoffs: &Lanes<K>,
+    offset: Option<&Lanes<f32>>,
+) -> Solutions {
+    let directions = &kernel.directions[..keys.len()];
+    let zero = K::gap(0.0);
+    let mut kept = [0u16; LANES];
+    let mut sums = [[0.0f32; LANES]; 3];
+    for light in 0..keys.len() {
+        let [a, b, c] = directions[light];
+        for lane in 0..LANES {
+            let dropped = keys[light][lane].is_over(cutoffs[lane], zero);
+            let value = if dropped { 0.0 } else { value(keys[light][lane], offset, lane) };
+            kept[lane] += u16::from(!dropped);
+            sums[0][lane] += a * value;
+            sums[1][lane] += b * value;
+            sums[2][lane] += c * value;
+        }
+    }
+    let inverses = if kernel.table.is_empty() {
+        summed_inverses(directions, keys, cutoffs)
+    } else {
+        tabulated_inverses(&kernel.table, keys, cutoffs)
+    };
+    let mut scaled = product(&inverses, &sums);
+    // One step of iterative refinement: the residual of each light, and what it corrects.
+    let mut corrections = [[0.0f32; LANES]; 3];
+    let mut residuals = [0.0f32; LANES];
+    for light in 0..keys.len() {
+        let [a, b, c] = directions[light];
+        for lane in 0..LANES {
+            let predicted = a * scaled[0][lane] + b * scaled[1][lane] + c * scaled[2][lane];
+            let dropped = keys[light][lane].is_over(cutoffs[lane], zero);
+            let residual = if dropped { 0.0 } else { value(keys[light][lane], offset, lane) - predicted };
+            residuals[lane] += residual * residual;
+            corrections[0][lane] += a * residual;
+            corrections[1][lane] += b * residual;
+            corrections[2][lane] += c * residual;
+        }
+    }
+    let correction = product(&inverses, &corrections);
+    let mut turning = [0.0f32; LANES];
+    let mut careful = 0;
+    for lane in 0..LANES {
+        for axis in 0..3 {
+            scaled[axis][lane] += correction[axis][lane];
+        }
+        let inverse = std::array::from_fn(|entry| inverses[entry][lane]);
+        turning[lane] = turning_of(&inverse, [scaled[0][lane], scaled[1][lane], scaled[2][lane]]);
+        careful |= u32::from(inverses[7][lane] == 0.0) << lane;
+    }
+    Solutions { scaled, squared_residuals: residuals, turning, kept, careful }
+}
+
+/// `tr C - n^T C n` of `g = rho n`.
+#[inline(always)]
+fn turning_of(inverse: &Inverse, [x, y, z]: [f32; 3]) -> f32 {
+    let [xx, xy, xz, yy, yz, zz, trace, _] = *inverse;
+    let along = x * (xx * x + 2.0 * (xy * y + xz * z)) + y * (yy * y + 2.0 * yz * z) + z * (zz * z);
+    trace - along / (x * x + y * y + z * z)
+}
+
+#[inline(always)]
+fn product(inverses: &[Lanes<f32>; 8], vectors: &[Lanes<f32>; 3]) -> [Lanes<f32>; 3] {
+    let [xx, xy, xz, yy, yz, zz, ..] = inverses;
+    let mut out = [[0.0f32; LANES]; 3];
+    for lane in 0..LANES {
+        let [x, y, z] = [vectors[0][lane], vectors[1][lane], vectors[2][lane]];
+        out[0][lane] = xx[lane] * x + xy[lane] * y + xz[lane] * z;
+        out[1][lane] = xy[lane] * x + yy[lane] * y + yz[lane] * z;
+        out[2][lane] = xz[lane] * x + yz[lane] * y + zz[lane] * z;
+    }
+    out
+}
+
+/// The inverse of each lane's kept lights from the table.
+#[inline(always)]
+fn tabulated_inverses<K: Pixel>(table: &[Inverse], keys: &[Lanes<K>], cutoffs: &Lanes<K>) -> [Lanes<f32>; 8] {
+    let mut subsets = [0u16; LANES];
+    let zero = K::gap(0.0);
+    for (light, key) in keys.iter().enumerate() {
+        for lane in 0..LANES {
+            subsets[lane] |= if key[lane].is_over(cutoffs[lane], zero) { 0 } else { 1 << light };
+        }
+    }
+    let mut inverses = [[0.0f32; LANES]; 8];
+    for lane in 0..LANES {
+        let entry = &table[usize::from(subsets[lane])];
+        for (inverse, &entry) in inverses.iter_mut().zip(entry) {
+            inverse[lane] = entry;
+        }
+    }
+    inverses
+}
+
+/// The inverse of each lane's kept lights from their Gram matrix, for more lights than a table can hold.
+#[inline(always)]
+fn summed_inverses<K: Pixel>(directions: &[[f32; 3]], keys: &[Lanes<K>], cutoffs: &Lanes<K>) -> [Lanes<f32>; 8] {
+    let zero = K::gap(0.0);
+    let mut gram = [[0.0f32; LANES]; 6];
+    for (&[a, b, c], key) in directions.iter().zip(keys) {
+        let products = [a * a, a * b, a * c, b * b, b * c, c * c];
+        for lane in 0..LANES {
+            let weight = if key[lane].is_over(cutoffs[lane], zero) { 0.0 } else { 1.0 };
+            for (gram, product) in gram.iter_mut().zip(products) {
+                gram[lane] += weight * product;
+            }
+        }
+    }
+    let mut inverses = [[0.0f32; LANES]; 8];
+    for lane in 0..LANES {
+        let [xx, xy, xz, yy, yz, zz] = std::array::from_fn(|entry| gram[entry][lane]);
+        let cofactors = [yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy];
+        let determinant = xx * cofactors[0] + xy * cofactors[1] + xz * cofactors[2];
+        let third = (xx + yy + zz) / 3.0;
+        let usable = determinant > MIN_LANE_CONDITIONING as f32 * (third * third * third);
+        let scale = 1.0 / determinant;
+        let entries = [
+            cofactors[0] * scale,
+            cofactors[1] * scale,
+            cofactors[2] * scale,
+            (xx * zz - xz * xz) * scale,
+            (xy * xz - xx * yz) * scale,
+            (xx * yy - xy * xy) * scale,
+        ];
+        for (inverse, entry) in inverses.iter_mut().zip(entries) {
+            inverse[lane] = entry;
+        }
+        inverses[6][lane] = entries[0] + entries[3] + entries[5];
+        inverses[7][lane] = if usable { 1.0 } else { 0.0 };
+    }
+    inverses
+}
+
+/// Normals, albedo, mask, confidence and counts of a block.
+#[inline(always)]
+fn write(kernel: &LaneKernel, solutions: &Solutions, used: Option<&[bool]>, span: Range<usize>, out: &mut Out<'_>) {
+    const DEG2: f32 = ((180.0 / std::f64::consts::PI) * (180.0 / std::f64::consts::PI) / (HALF_DEG * HALF_DEG)) as f32;
+    const PRIOR2: f32 = (PRIOR_RESIDUAL * PRIOR_RESIDUAL) as f32;
+    let mut normals = [0.0f32; 3 * LANES];
+    let [mut albedo, mut confidence] = [[0.0f32; LANES]; 2];
+    let mut valid = [false; LANES];
+    let per_full_scale = 1.0 / kernel.full_scale;
+    for lane in 0..LANES {
+        let [x, y, z] = [solutions.scaled[0][lane], solutions.scaled[1][lane], solutions.scaled[2][lane]];
+        let square = x * x + y * y + z * z;
+        let length = square.sqrt();
+        valid[lane] = z > 0.0 && square < f32::INFINITY;
+        let scale = if valid[lane] { 1.0 / length } else { f32::NAN };
+        albedo[lane] = if valid[lane] { length * per_full_scale } else { f32::NAN };
+        // See `confidence`: the squared standard error over the squared half-way point.
+        let variance =
+            (solutions.squared_residuals[lane] + PRIOR2 * square) / (f32::from(solutions.kept[lane]) - 2.0);
+        let turning = if solutions.turning[lane] > 0.0 { solutions.turning[lane] } else { 0.0 };
+        let ratio2 = variance * turning * DEG2 / square;
+        confidence[lane] = if valid[lane] { 1.0 / (1.0 + ratio2) } else { 0.0 };
+        normals[3 * lane] = x * scale;
+        normals[3 * lane + 1] = y * scale;
+        normals[3 * lane + 2] = z * scale;
+    }
+    let count = span.len();
+    out.normals[3 * span.start..3 * span.end].copy_from_slice(&normals[..3 * count]);
+    out.albedo[span.clone()].copy_from_slice(&albedo[..count]);
+    out.confidence[span.clone()].copy_from_slice(&confidence[..count]);
+    out.lights_kept[span.clone()].copy_from_slice(&solutions.kept[..count]);
+    out.mask[span.clone()].copy_from_slice(&valid[..count]);
+    if let Some(used) = used {
+        for (lane, _) in used.iter().enumerate().filter(|(_, used)| !**used) {
+            out.clear(span.start + lane..span.start + lane + 1);
+        }
+    }
+}
+
+/// The kept lights themselves; asked for seldom, so they are found once more.
+#[inline(never)]
+fn write_sets<K: Pixel>(
+    kernel: &LaneKernel,
+    keys: &[Lanes<K>],
+    used: Option<&[bool]>,
+    span: Range<usize>,
+    out: &mut Out<'_>,
+) {
+    let cutoffs = match kernel.choice {
+        Choice::All => [K::LARGEST; LANES],
+        Choice::UpToGap(gap) => cutoffs(keys, K::gap(gap)),
+    };
+    for (lane, pixel) in span.enumerate() {
+        let sets = &mut out.kept_sets[pixel * keys.len()..(pixel + 1) * keys.len()];
+        let here = used.is_none_or(|used| used[lane]);
+        for (kept, key) in sets.iter_mut().zip(keys) {
+            *kept = here && !key[lane].is_over(cutoffs[lane], K::gap(0.0));
+        }
+    }
+}
+
+/// The entries of the upper triangle: xx, xy, xz, yy, yz, zz.
+fn upper(matrix: &Matrix3<f64>) -> [f32; 6] {
+    [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|entry| matrix[entry] as f32)
+}
+
+fn inverse(gram: &Matrix3<f64>) -> Inverse {
+    match gram.try_inverse() {
+        Some(inverse) if conditioning(gram) >= MIN_LANE_CONDITIONING => {
+            let [xx, xy, xz, yy, yz, zz] = upper(&inverse);
+            [xx, xy, xz, yy, yz, zz, inverse.trace() as f32, 1.0]
+        }
+        _ => [0.0; 8],
+    }
+}
+
+fn single(vector: &Vector3<f64>) -> [f32; 3] {
+    [vector.x as f32, vector.y as f32, vector.z as f32]
+}
