@@ -17,6 +17,7 @@ pub mod normals;
 pub mod pixel;
 pub mod radiometry;
 pub mod stack;
+mod stream;
 
 pub use error::{Error, Result};
 pub use lights::Lights;

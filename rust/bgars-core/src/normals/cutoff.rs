@@ -5,7 +5,7 @@
 use crate::key::Key;
 
 /// Pixels worked on at once.
-pub(super) const LANES: usize = 32;
+pub(super) const LANES: usize = 64;
 
 /// One quantity of a block of pixels.
 pub(super) type Lanes<T> = [T; LANES];

@@ -11,14 +11,17 @@ use super::robust::{self, RobustFilter, RobustScratch};
 use super::solve::{Solution, SubsetSolver};
 use super::specular::specular_filter;
 use super::{Method, NormalMap};
-use crate::memory::{prefer_large_pages, zeros};
-use crate::{Error, ImageStack, Lights, Pixel, Radiometry, Result};
+use crate::memory::zeros;
+use crate::{Error, ImageStack, Lights, Pixel, Radiometry, Result, stream};
 
 /// Pixels between two calls of the progress callback.
 const BAND_PIXELS: usize = 1 << 19;
 
 /// The same for the fast kernel.
 const LANE_BAND_PIXELS: usize = 1 << 22;
+
+/// Pixels that are looked through for NaN at a time.
+const FINITE_BLOCK: usize = 1 << 14;
 
 /// Pixels of one task.
 const TASK_PIXELS: usize = 1 << 13;
@@ -63,23 +66,40 @@ pub fn estimate<P: Pixel>(
     keep_sets: bool,
     progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<NormalMap> {
+    let mut map = NormalMap::default();
+    estimate_into(stack, lights, radiometry, mask, method, keep_sets, progress, &mut map)?;
+    Ok(map)
+}
+
+/// [`estimate`] into a map that is there already: its memory is used again, which on a line that measures one part after the
+/// other saves the operating system's handing out of fresh pages. After an error the map's content means nothing.
+///
+/// # Errors
+/// Those of [`estimate`].
+#[allow(clippy::too_many_arguments)]
+pub fn estimate_into<P: Pixel>(
+    stack: &ImageStack<'_, P>,
+    lights: &Lights,
+    radiometry: &Radiometry<'_, P>,
+    mask: Option<&[bool]>,
+    method: Method,
+    keep_sets: bool,
+    progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    map: &mut NormalMap,
+) -> Result<()> {
     check(stack, lights, radiometry, mask, method)?;
     let kernel = Kernel::new(stack, lights, radiometry, mask, method);
     let pixels = stack.pixels();
-    let mut map = NormalMap {
-        normals: zeros(pixels * 3),
-        albedo: zeros(pixels),
-        mask: vec![false; pixels],
-        confidence: zeros(pixels),
-        lights_kept: zeros(pixels),
-        kept_sets: vec![false; if keep_sets { pixels * stack.lights() } else { 0 }],
-    };
-    prefer_large_pages(&mut map.mask);
-    prefer_large_pages(&mut map.kept_sets);
+    fit(&mut map.normals, pixels * 3);
+    fit(&mut map.albedo, pixels);
+    fit(&mut map.mask, pixels);
+    fit(&mut map.confidence, pixels);
+    fit(&mut map.lights_kept, pixels);
+    fit(&mut map.kept_sets, if keep_sets { pixels * stack.lights() } else { 0 });
     let band_pixels = if kernel.lanes.is_some() { LANE_BAND_PIXELS } else { BAND_PIXELS };
     for start in (0..pixels).step_by(band_pixels) {
         let band = start..(start + band_pixels).min(pixels);
-        let tasks = Out::split(&mut map, &band, if keep_sets { stack.lights() } else { 0 });
+        let tasks = Out::split(map, &band, if keep_sets { stack.lights() } else { 0 });
         tasks.into_par_iter().enumerate().for_each_init(
             || Scratch::new(lights),
             |scratch, (task, mut out)| {
@@ -91,7 +111,14 @@ pub fn estimate<P: Pixel>(
             return Err(Error::Cancelled);
         }
     }
-    Ok(map)
+    Ok(())
+}
+
+/// Gives `array` a length; what is in it afterwards means nothing.
+fn fit<T: bytemuck::Zeroable + Clone>(array: &mut Vec<T>, len: usize) {
+    if array.len() != len {
+        *array = zeros(len);
+    }
 }
 
 /// A gap in the grey levels of the images from one in grey levels of 255.
@@ -142,6 +169,11 @@ fn check<P: Pixel>(
 fn check_finite<P: Pixel>(stack: &ImageStack<'_, P>, mask: Option<&[bool]>) -> Result<()> {
     for image in 0..stack.lights() {
         let plane = stack.plane(image);
+        // Nearly always all is well, and that shows quickly.
+        let all_finite = |block: &[P]| block.iter().fold(true, |finite, pixel| finite & pixel.to_f32().is_finite());
+        if plane.par_chunks(FINITE_BLOCK).all(all_finite) {
+            continue;
+        }
         let bad = |&pixel: &usize| !plane[pixel].to_f32().is_finite() && mask.is_none_or(|mask| mask[pixel]);
         let count = (0..plane.len()).into_par_iter().filter(bad).count();
         if let Some(first) = if count > 0 { (0..plane.len()).find(bad) } else { None } {
@@ -180,11 +212,14 @@ pub(super) struct Out<'a> {
     pub lights_kept: &'a mut [u16],
     /// Empty unless asked for.
     pub kept_sets: &'a mut [bool],
+    /// Write past the caches.
+    pub streamed: bool,
 }
 
 impl<'a> Out<'a> {
     /// The tasks of a band of pixels; `set_lights` is the number of lights of the kept sets, 0 without these.
     fn split(map: &'a mut NormalMap, band: &Range<usize>, set_lights: usize) -> Vec<Self> {
+        let streamed = map.albedo.len() >= stream::MIN_PIXELS;
         let mut kept_sets = &mut map.kept_sets[band.start * set_lights..band.end * set_lights];
         let mut tasks = Vec::with_capacity(band.len().div_ceil(TASK_PIXELS));
         let scalars = map.normals[band.start * 3..band.end * 3]
@@ -196,7 +231,7 @@ impl<'a> Out<'a> {
         for ((((normals, albedo), mask), confidence), lights_kept) in scalars {
             let (task_sets, rest) = std::mem::take(&mut kept_sets).split_at_mut(albedo.len() * set_lights);
             kept_sets = rest;
-            tasks.push(Self { normals, albedo, mask, confidence, lights_kept, kept_sets: task_sets });
+            tasks.push(Self { normals, albedo, mask, confidence, lights_kept, kept_sets: task_sets, streamed });
         }
         tasks
     }

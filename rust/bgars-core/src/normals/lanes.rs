@@ -1,10 +1,11 @@
-//! The fast kernel: least squares on 32 pixels at once, in `f32`, for distant lights.
+//! The fast kernel: least squares on 64 pixels at once, in `f32`, for distant lights.
 //!
 //! Plain loops over the lanes of a block, which the compiler turns into the vector instructions of the processor it runs on.
 //! A subset of lights whose equations are too badly conditioned for `f32` is left to the careful kernel, pixel by pixel.
 
 use std::ops::Range;
 
+use bytemuck::NoUninit;
 use multiversion::multiversion;
 use nalgebra::{Matrix3, Vector3};
 
@@ -13,13 +14,13 @@ use super::cutoff::{LANES, Lanes, cutoffs};
 use super::kernel::Out;
 use super::solve::MAX_TABLE_LIGHTS;
 use crate::lights::conditioning;
-use crate::{Lights, Pixel, Radiometry};
+use crate::{Lights, Pixel, Radiometry, stream};
 
 /// Subsets of lights below this [`conditioning`] are solved in `f64`: one refinement in `f32` no longer makes up for rounding.
 const MIN_LANE_CONDITIONING: f64 = 1e-3;
 
 /// What a block of pixels leaves undone: bit k is set where pixel k wants the careful kernel.
-pub(super) type Careful = u32;
+pub(super) type Careful = u64;
 
 /// Which lights a block keeps.
 #[derive(Clone, Copy, Debug)]
@@ -30,7 +31,7 @@ pub(super) enum Choice {
     UpToGap(f32),
 }
 
-/// The six entries of a symmetric inverse, then its trace, then 1 where it may be used.
+/// The six entries of a symmetric inverse, padded to a power of two; all zero where it is not to be used.
 type Inverse = [f32; 8];
 
 /// What does not change from pixel to pixel.
@@ -41,7 +42,7 @@ pub(super) struct LaneKernel {
     directions: Vec<[f32; 3]>,
     /// `(L^T L)^-1 L^T`, a column a light.
     pseudo_inverse: Vec<[f32; 3]>,
-    all: Inverse,
+    all: [f32; 6],
     /// `L^T L` of all lights: xx, xy, xz, yy, yz, zz.
     gram: [f32; 6],
     /// The inverse for every subset (bit k: light k); empty for more than 12 lights.
@@ -54,11 +55,7 @@ impl LaneKernel {
     pub fn new(lights: &Lights, choice: Choice, full_scale: f32) -> Option<Self> {
         let Lights::Directional(directions) = lights else { return None };
         let gram = directions.iter().fold(Matrix3::zeros(), |gram, light| gram + light * light.transpose());
-        let all = inverse(&gram);
-        if all[7] == 0.0 {
-            return None;
-        }
-        let exact = gram.try_inverse()?;
+        let exact = gram.try_inverse().filter(|_| conditioning(&gram) >= MIN_LANE_CONDITIONING)?;
         let of_subset = |subset: usize| {
             let lights = directions.iter().enumerate().filter(|(light, _)| subset >> light & 1 == 1);
             inverse(&lights.fold(Matrix3::zeros(), |gram, (_, light)| gram + light * light.transpose()))
@@ -68,7 +65,7 @@ impl LaneKernel {
             choice,
             directions: directions.iter().map(single).collect(),
             pseudo_inverse: directions.iter().map(|light| single(&(exact * light))).collect(),
-            all,
+            all: upper(&exact),
             gram: upper(&gram),
             table: if tabulated { (0..1 << directions.len()).map(of_subset).collect() } else { Vec::new() },
             full_scale,
@@ -93,7 +90,10 @@ impl LaneKernel {
             let mut keys = vec![[P::LEAST; LANES]; planes.len()];
             let mut load = |block: &Range<usize>, keys: &mut [Lanes<P>], offset: &mut Lanes<f32>| {
                 for (key, plane) in keys.iter_mut().zip(planes) {
-                    key[..block.len()].copy_from_slice(&plane[block.clone()]);
+                    match <&Lanes<P>>::try_from(&plane[block.clone()]) {
+                        Ok(full) => *key = *full,
+                        Err(_) => key[..block.len()].copy_from_slice(&plane[block.clone()]),
+                    }
                 }
                 if offsets {
                     for (offset, pixel) in offset.iter_mut().zip(block.clone()) {
@@ -171,6 +171,9 @@ fn run_blocks<K: Pixel>(
             }
         }
     }
+    if out.streamed {
+        stream::finish();
+    }
 }
 
 /// Chooses and solves; `keys` of a length known to the compiler are unrolled.
@@ -183,7 +186,7 @@ fn solve<K: Pixel>(kernel: &LaneKernel, keys: &[Lanes<K>], offset: Option<&Lanes
             let mut any_dropped = false;
             for key in keys {
                 for lane in 0..LANES {
-                    any_dropped |= key[lane].is_over(cutoffs[lane], K::gap(0.0));
+                    any_dropped |= !is_kept(key[lane], cutoffs[lane]);
                 }
             }
             if any_dropped { solve_kept(kernel, keys, &cutoffs, offset) } else { solve_all(kernel, keys, offset) }
@@ -197,25 +200,34 @@ fn value<K: Pixel>(key: K, offset: Option<&Lanes<f32>>, lane: usize) -> f32 {
     offset.map_or(key.to_f32(), |offset| key.to_f32() - offset[lane])
 }
 
+/// Calls `$body` for the lights by eights, then fours, then one by one: `$keys`, `$vectors` are arrays of that size, over
+/// which the compiler unrolls, and `$first` is the first light.
+macro_rules! by_chunks {
+    ($all_keys:expr, $all_vectors:expr, |$keys:ident, $vectors:ident, $first:ident| $body:expr) => {{
+        let (mut keys_left, mut vectors_left) = ($all_keys, $all_vectors);
+        let mut $first = 0;
+        by_chunks!(@size 8, keys_left, vectors_left, $keys, $vectors, $first, $body);
+        by_chunks!(@size 4, keys_left, vectors_left, $keys, $vectors, $first, $body);
+        by_chunks!(@size 1, keys_left, vectors_left, $keys, $vectors, $first, $body);
+        let _ = ($first, keys_left, vectors_left);
+    }};
+    (@size $size:literal, $keys_left:ident, $vectors_left:ident, $keys:ident, $vectors:ident, $first:ident, $body:expr) => {
+        while let (Some(($keys, keys_rest)), Some(($vectors, vectors_rest))) =
+            ($keys_left.split_first_chunk::<$size>(), $vectors_left.split_first_chunk::<$size>())
+        {
+            $body;
+            ($keys_left, $vectors_left) = (keys_rest, vectors_rest);
+            $first += $size;
+        }
+    };
+}
+
 /// Every light of every lane is kept: one matrix for all.
 #[inline(always)]
 fn solve_all<K: Pixel>(kernel: &LaneKernel, keys: &[Lanes<K>], offset: Option<&Lanes<f32>>) -> Solutions {
-    let mut scaled = [[0.0f32; LANES]; 3];
-    let mut squares = [0.0f32; LANES];
-    let columns = &kernel.pseudo_inverse[..keys.len()];
-    for lane in 0..LANES {
-        let [mut x, mut y, mut z, mut square] = [0.0f32; 4];
-        for light in 0..keys.len() {
-            let value = value(keys[light][lane], offset, lane);
-            let [a, b, c] = columns[light];
-            x += a * value;
-            y += b * value;
-            z += c * value;
-            square += value * value;
-        }
-        [scaled[0][lane], scaled[1][lane], scaled[2][lane]] = [x, y, z];
-        squares[lane] = square;
-    }
+    let mut sums = [[0.0f32; LANES]; 4];
+    by_chunks!(keys, kernel.pseudo_inverse.as_slice(), |keys, columns, _first| add_columns(keys, columns, offset, &mut sums));
+    let [scaled @ .., squares] = sums;
     let [xx, xy, xz, yy, yz, zz] = kernel.gram;
     let mut turning = [0.0f32; LANES];
     let mut residuals = [0.0f32; LANES];
@@ -230,6 +242,28 @@ fn solve_all<K: Pixel>(kernel: &LaneKernel, keys: &[Lanes<K>], offset: Option<&L
     Solutions { scaled, squared_residuals: residuals, turning, kept, careful: 0 }
 }
 
+/// `sums += (column * value, value^2)` over the lights of a chunk.
+#[inline(always)]
+fn add_columns<K: Pixel, const C: usize>(
+    keys: &[Lanes<K>; C],
+    columns: &[[f32; 3]; C],
+    offset: Option<&Lanes<f32>>,
+    sums: &mut [Lanes<f32>; 4],
+) {
+    for lane in 0..LANES {
+        let [mut x, mut y, mut z, mut square] = std::array::from_fn(|sum| sums[sum][lane]);
+        for light in 0..C {
+            let value = value(keys[light][lane], offset, lane);
+            let [a, b, c] = columns[light];
+            x += a * value;
+            y += b * value;
+            z += c * value;
+            square += value * value;
+        }
+        [sums[0][lane], sums[1][lane], sums[2][lane], sums[3][lane]] = [x, y, z, square];
+    }
+}
+
 /// Lights over the cutoff are dropped: normal equations of each lane, refined once.
 #[inline(always)]
 fn solve_kept<K: Pixel>(
@@ -238,42 +272,26 @@ fn solve_kept<K: Pixel>(
     cutoffs: &Lanes<K>,
     offset: Option<&Lanes<f32>>,
 ) -> Solutions {
-    let directions = &kernel.directions[..keys.len()];
-    let zero = K::gap(0.0);
+    let directions = kernel.directions.as_slice();
     let mut kept = [0u16; LANES];
     let mut sums = [[0.0f32; LANES]; 3];
-    for light in 0..keys.len() {
-        let [a, b, c] = directions[light];
-        for lane in 0..LANES {
-            let dropped = keys[light][lane].is_over(cutoffs[lane], zero);
-            let value = if dropped { 0.0 } else { value(keys[light][lane], offset, lane) };
-            kept[lane] += u16::from(!dropped);
-            sums[0][lane] += a * value;
-            sums[1][lane] += b * value;
-            sums[2][lane] += c * value;
-        }
-    }
+    by_chunks!(keys, directions, |keys, directions, _first| add_kept(keys, directions, cutoffs, offset, &mut sums, &mut kept));
     let inverses = if kernel.table.is_empty() {
-        summed_inverses(directions, keys, cutoffs)
+        let mut gram = [[0.0f32; LANES]; 6];
+        by_chunks!(keys, directions, |keys, directions, _first| add_gram(keys, directions, cutoffs, &mut gram));
+        inverses_of(&gram)
     } else {
-        tabulated_inverses(&kernel.table, keys, cutoffs)
+        let mut subsets = [0u16; LANES];
+        by_chunks!(keys, directions, |keys, _directions, first| add_bits(keys, cutoffs, first, &mut subsets));
+        tabulated_inverses(&kernel.table, &subsets)
     };
     let mut scaled = product(&inverses, &sums);
     // One step of iterative refinement: the residual of each light, and what it corrects.
-    let mut corrections = [[0.0f32; LANES]; 3];
-    let mut residuals = [0.0f32; LANES];
-    for light in 0..keys.len() {
-        let [a, b, c] = directions[light];
-        for lane in 0..LANES {
-            let predicted = a * scaled[0][lane] + b * scaled[1][lane] + c * scaled[2][lane];
-            let dropped = keys[light][lane].is_over(cutoffs[lane], zero);
-            let residual = if dropped { 0.0 } else { value(keys[light][lane], offset, lane) - predicted };
-            residuals[lane] += residual * residual;
-            corrections[0][lane] += a * residual;
-            corrections[1][lane] += b * residual;
-            corrections[2][lane] += c * residual;
-        }
-    }
+    let mut corrections = [[0.0f32; LANES]; 4];
+    by_chunks!(keys, directions, |keys, directions, _first| {
+        add_residuals(keys, directions, cutoffs, offset, &scaled, &mut corrections);
+    });
+    let [corrections @ .., squared_residuals] = corrections;
     let correction = product(&inverses, &corrections);
     let mut turning = [0.0f32; LANES];
     let mut careful = 0;
@@ -283,22 +301,124 @@ fn solve_kept<K: Pixel>(
         }
         let inverse = std::array::from_fn(|entry| inverses[entry][lane]);
         turning[lane] = turning_of(&inverse, [scaled[0][lane], scaled[1][lane], scaled[2][lane]]);
-        careful |= u32::from(inverses[7][lane] == 0.0) << lane;
     }
-    Solutions { scaled, squared_residuals: residuals, turning, kept, careful }
+    for lane in 0..LANES {
+        careful |= u64::from(inverses[0][lane] == 0.0) << lane;
+    }
+    Solutions { scaled, squared_residuals, turning, kept, careful }
+}
+
+/// True for a light that is kept.
+#[inline(always)]
+fn is_kept<K: Pixel>(key: K, cutoff: K) -> bool {
+    !key.is_over(cutoff, K::gap(0.0))
+}
+
+/// `sums += direction * value`, `counts += 1` over the kept lights of a chunk.
+#[inline(always)]
+fn add_kept<K: Pixel, const C: usize>(
+    keys: &[Lanes<K>; C],
+    directions: &[[f32; 3]; C],
+    cutoffs: &Lanes<K>,
+    offset: Option<&Lanes<f32>>,
+    sums: &mut [Lanes<f32>; 3],
+    counts: &mut Lanes<u16>,
+) {
+    for lane in 0..LANES {
+        for key in keys {
+            counts[lane] += u16::from(is_kept(key[lane], cutoffs[lane]));
+        }
+    }
+    for lane in 0..LANES {
+        let [mut x, mut y, mut z] = std::array::from_fn(|sum| sums[sum][lane]);
+        for light in 0..C {
+            let kept = is_kept(keys[light][lane], cutoffs[lane]);
+            let value = if kept { value(keys[light][lane], offset, lane) } else { 0.0 };
+            let [a, b, c] = directions[light];
+            x += a * value;
+            y += b * value;
+            z += c * value;
+        }
+        [sums[0][lane], sums[1][lane], sums[2][lane]] = [x, y, z];
+    }
+}
+
+/// `sums += (direction * residual, residual^2)` over the kept lights of a chunk, `scaled` being the solution so far.
+#[inline(always)]
+fn add_residuals<K: Pixel, const C: usize>(
+    keys: &[Lanes<K>; C],
+    directions: &[[f32; 3]; C],
+    cutoffs: &Lanes<K>,
+    offset: Option<&Lanes<f32>>,
+    scaled: &[Lanes<f32>; 3],
+    sums: &mut [Lanes<f32>; 4],
+) {
+    for lane in 0..LANES {
+        let [mut x, mut y, mut z, mut square] = std::array::from_fn(|sum| sums[sum][lane]);
+        let [u, v, w] = std::array::from_fn(|axis| scaled[axis][lane]);
+        for light in 0..C {
+            let [a, b, c] = directions[light];
+            let difference = value(keys[light][lane], offset, lane) - (a * u + b * v + c * w);
+            let residual = if is_kept(keys[light][lane], cutoffs[lane]) { difference } else { 0.0 };
+            x += a * residual;
+            y += b * residual;
+            z += c * residual;
+            square += residual * residual;
+        }
+        [sums[0][lane], sums[1][lane], sums[2][lane], sums[3][lane]] = [x, y, z, square];
+    }
+}
+
+/// Sets the bit of each kept light of a chunk.
+#[inline(always)]
+fn add_bits<K: Pixel, const C: usize>(
+    keys: &[Lanes<K>; C],
+    cutoffs: &Lanes<K>,
+    first: usize,
+    subsets: &mut Lanes<u16>,
+) {
+    for lane in 0..LANES {
+        let mut bits = 0u16;
+        for (light, key) in keys.iter().enumerate() {
+            bits |= if is_kept(key[lane], cutoffs[lane]) { 1 << light } else { 0 };
+        }
+        subsets[lane] |= bits << first;
+    }
+}
+
+/// `gram += direction direction^T` over the kept lights of a chunk.
+#[inline(always)]
+fn add_gram<K: Pixel, const C: usize>(
+    keys: &[Lanes<K>; C],
+    directions: &[[f32; 3]; C],
+    cutoffs: &Lanes<K>,
+    gram: &mut [Lanes<f32>; 6],
+) {
+    for lane in 0..LANES {
+        let mut sums: [f32; 6] = std::array::from_fn(|entry| gram[entry][lane]);
+        for (&[a, b, c], key) in directions.iter().zip(keys) {
+            let weight = if is_kept(key[lane], cutoffs[lane]) { 1.0 } else { 0.0 };
+            for (sum, product) in sums.iter_mut().zip([a * a, a * b, a * c, b * b, b * c, c * c]) {
+                *sum += weight * product;
+            }
+        }
+        for (gram, sum) in gram.iter_mut().zip(sums) {
+            gram[lane] = sum;
+        }
+    }
 }
 
 /// `tr C - n^T C n` of `g = rho n`.
 #[inline(always)]
-fn turning_of(inverse: &Inverse, [x, y, z]: [f32; 3]) -> f32 {
-    let [xx, xy, xz, yy, yz, zz, trace, _] = *inverse;
+fn turning_of(inverse: &[f32; 6], [x, y, z]: [f32; 3]) -> f32 {
+    let [xx, xy, xz, yy, yz, zz] = *inverse;
     let along = x * (xx * x + 2.0 * (xy * y + xz * z)) + y * (yy * y + 2.0 * yz * z) + z * (zz * z);
-    trace - along / (x * x + y * y + z * z)
+    (xx + yy + zz) - along / (x * x + y * y + z * z)
 }
 
 #[inline(always)]
-fn product(inverses: &[Lanes<f32>; 8], vectors: &[Lanes<f32>; 3]) -> [Lanes<f32>; 3] {
-    let [xx, xy, xz, yy, yz, zz, ..] = inverses;
+fn product(inverses: &[Lanes<f32>; 6], vectors: &[Lanes<f32>; 3]) -> [Lanes<f32>; 3] {
+    let [xx, xy, xz, yy, yz, zz] = inverses;
     let mut out = [[0.0f32; LANES]; 3];
     for lane in 0..LANES {
         let [x, y, z] = [vectors[0][lane], vectors[1][lane], vectors[2][lane]];
@@ -309,17 +429,10 @@ fn product(inverses: &[Lanes<f32>; 8], vectors: &[Lanes<f32>; 3]) -> [Lanes<f32>
     out
 }
 
-/// The inverse of each lane's kept lights from the table.
+/// The inverse of each lane's subset of lights from the table.
 #[inline(always)]
-fn tabulated_inverses<K: Pixel>(table: &[Inverse], keys: &[Lanes<K>], cutoffs: &Lanes<K>) -> [Lanes<f32>; 8] {
-    let mut subsets = [0u16; LANES];
-    let zero = K::gap(0.0);
-    for (light, key) in keys.iter().enumerate() {
-        for lane in 0..LANES {
-            subsets[lane] |= if key[lane].is_over(cutoffs[lane], zero) { 0 } else { 1 << light };
-        }
-    }
-    let mut inverses = [[0.0f32; LANES]; 8];
+fn tabulated_inverses(table: &[Inverse], subsets: &Lanes<u16>) -> [Lanes<f32>; 6] {
+    let mut inverses = [[0.0f32; LANES]; 6];
     for lane in 0..LANES {
         let entry = &table[usize::from(subsets[lane])];
         for (inverse, &entry) in inverses.iter_mut().zip(entry) {
@@ -329,41 +442,28 @@ fn tabulated_inverses<K: Pixel>(table: &[Inverse], keys: &[Lanes<K>], cutoffs: &
     inverses
 }
 
-/// The inverse of each lane's kept lights from their Gram matrix, for more lights than a table can hold.
+/// The inverses of Gram matrices; zero where they are not to be used.
 #[inline(always)]
-fn summed_inverses<K: Pixel>(directions: &[[f32; 3]], keys: &[Lanes<K>], cutoffs: &Lanes<K>) -> [Lanes<f32>; 8] {
-    let zero = K::gap(0.0);
-    let mut gram = [[0.0f32; LANES]; 6];
-    for (&[a, b, c], key) in directions.iter().zip(keys) {
-        let products = [a * a, a * b, a * c, b * b, b * c, c * c];
-        for lane in 0..LANES {
-            let weight = if key[lane].is_over(cutoffs[lane], zero) { 0.0 } else { 1.0 };
-            for (gram, product) in gram.iter_mut().zip(products) {
-                gram[lane] += weight * product;
-            }
-        }
-    }
-    let mut inverses = [[0.0f32; LANES]; 8];
+fn inverses_of(gram: &[Lanes<f32>; 6]) -> [Lanes<f32>; 6] {
+    let mut inverses = [[0.0f32; LANES]; 6];
     for lane in 0..LANES {
         let [xx, xy, xz, yy, yz, zz] = std::array::from_fn(|entry| gram[entry][lane]);
         let cofactors = [yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy];
         let determinant = xx * cofactors[0] + xy * cofactors[1] + xz * cofactors[2];
         let third = (xx + yy + zz) / 3.0;
         let usable = determinant > MIN_LANE_CONDITIONING as f32 * (third * third * third);
-        let scale = 1.0 / determinant;
+        let scale = if usable { 1.0 / determinant } else { 0.0 };
         let entries = [
-            cofactors[0] * scale,
-            cofactors[1] * scale,
-            cofactors[2] * scale,
-            (xx * zz - xz * xz) * scale,
-            (xy * xz - xx * yz) * scale,
-            (xx * yy - xy * xy) * scale,
+            cofactors[0],
+            cofactors[1],
+            cofactors[2],
+            xx * zz - xz * xz,
+            xy * xz - xx * yz,
+            xx * yy - xy * xy,
         ];
         for (inverse, entry) in inverses.iter_mut().zip(entries) {
-            inverse[lane] = entry;
+            inverse[lane] = entry * scale;
         }
-        inverses[6][lane] = entries[0] + entries[3] + entries[5];
-        inverses[7][lane] = if usable { 1.0 } else { 0.0 };
     }
     inverses
 }
@@ -394,16 +494,25 @@ fn write(kernel: &LaneKernel, solutions: &Solutions, used: Option<&[bool]>, span
         normals[3 * lane + 1] = y * scale;
         normals[3 * lane + 2] = z * scale;
     }
-    let count = span.len();
-    out.normals[3 * span.start..3 * span.end].copy_from_slice(&normals[..3 * count]);
-    out.albedo[span.clone()].copy_from_slice(&albedo[..count]);
-    out.confidence[span.clone()].copy_from_slice(&confidence[..count]);
-    out.lights_kept[span.clone()].copy_from_slice(&solutions.kept[..count]);
-    out.mask[span.clone()].copy_from_slice(&valid[..count]);
+    store(&normals, &mut out.normals[3 * span.start..3 * span.end], out.streamed);
+    store(&albedo, &mut out.albedo[span.clone()], out.streamed);
+    store(&confidence, &mut out.confidence[span.clone()], out.streamed);
+    store(&solutions.kept, &mut out.lights_kept[span.clone()], out.streamed);
+    store(&valid, &mut out.mask[span.clone()], out.streamed);
     if let Some(used) = used {
         for (lane, _) in used.iter().enumerate().filter(|(_, used)| !**used) {
             out.clear(span.start + lane..span.start + lane + 1);
         }
+    }
+}
+
+/// Copies as much of `block` as there is room for; a full block in one go.
+#[inline(always)]
+fn store<T: NoUninit, const N: usize>(block: &[T; N], out: &mut [T], streamed: bool) {
+    match <&mut [T; N]>::try_from(&mut *out) {
+        Ok(full) if streamed => stream::copy(block, full),
+        Ok(full) => *full = *block,
+        Err(_) => out.copy_from_slice(&block[..out.len()]),
     }
 }
 
@@ -424,7 +533,7 @@ fn write_sets<K: Pixel>(
         let sets = &mut out.kept_sets[pixel * keys.len()..(pixel + 1) * keys.len()];
         let here = used.is_none_or(|used| used[lane]);
         for (kept, key) in sets.iter_mut().zip(keys) {
-            *kept = here && !key[lane].is_over(cutoffs[lane], K::gap(0.0));
+            *kept = here && is_kept(key[lane], cutoffs[lane]);
         }
     }
 }
@@ -438,7 +547,7 @@ fn inverse(gram: &Matrix3<f64>) -> Inverse {
     match gram.try_inverse() {
         Some(inverse) if conditioning(gram) >= MIN_LANE_CONDITIONING => {
             let [xx, xy, xz, yy, yz, zz] = upper(&inverse);
-            [xx, xy, xz, yy, yz, zz, inverse.trace() as f32, 1.0]
+            [xx, xy, xz, yy, yz, zz, 0.0, 0.0]
         }
         _ => [0.0; 8],
     }

@@ -12,7 +12,7 @@ mod robust;
 mod solve;
 mod specular;
 
-pub use kernel::estimate;
+pub use kernel::{estimate, estimate_into};
 pub use robust::{RobustParams, robust_filter};
 pub use specular::specular_filter;
 
