@@ -44,7 +44,9 @@ impl Grid {
 }
 
 /// A floating-point number of a kernel: `f32` in the preconditioner, `f64` in the operator.
-pub(super) trait Real: Copy + Default + PartialOrd + Send + Sync + From<f32> + Add<Output = Self> + Mul<Output = Self> {
+pub(super) trait Real:
+    Copy + Default + PartialOrd + Send + Sync + From<f32> + Add<Output = Self> + Mul<Output = Self>
+{
     /// `1 / self`, or 0 for a pixel without edges.
     fn inverse(self) -> Self;
 

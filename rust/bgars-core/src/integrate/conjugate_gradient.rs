@@ -92,18 +92,19 @@ pub(super) fn conjugate_gradients(
 
 /// `x += alpha p`, `r -= alpha q`; returns `<r, r>`.
 fn step(x: &mut [f64], r: &mut [f64], p: &[f64], q: &[f64], alpha: f64) -> f64 {
-    let squares: Vec<f64> = (x.par_chunks_mut(BLOCK), r.par_chunks_mut(BLOCK), p.par_chunks(BLOCK), q.par_chunks(BLOCK))
-        .into_par_iter()
-        .map(|(x, r, p, q)| {
-            for (x, p) in x.iter_mut().zip(p) {
-                *x += alpha * p;
-            }
-            for (r, q) in r.iter_mut().zip(q) {
-                *r -= alpha * q;
-            }
-            dot(r, r)
-        })
-        .collect();
+    let squares: Vec<f64> =
+        (x.par_chunks_mut(BLOCK), r.par_chunks_mut(BLOCK), p.par_chunks(BLOCK), q.par_chunks(BLOCK))
+            .into_par_iter()
+            .map(|(x, r, p, q)| {
+                for (x, p) in x.iter_mut().zip(p) {
+                    *x += alpha * p;
+                }
+                for (r, q) in r.iter_mut().zip(q) {
+                    *r -= alpha * q;
+                }
+                dot(r, r)
+            })
+            .collect();
     squares.iter().sum()
 }
 

@@ -38,7 +38,10 @@ fn virtual_ties(weights: &Weights, row: isize, k: usize) -> Option<[f32; 4]> {
     let left_up = series(weights.down(above)[k], weights.right(above)[k]);
     let up_right = series(weights.left(above)[red], weights.down(above)[red]);
     let (right_down, down_left) = if weights.grid.contains(below) {
-        (series(weights.up(below)[red], weights.left(below)[red]), series(weights.right(below)[k], weights.up(below)[k]))
+        (
+            series(weights.up(below)[red], weights.left(below)[red]),
+            series(weights.right(below)[k], weights.up(below)[k]),
+        )
     } else {
         (0.0, 0.0)
     };

@@ -1,8 +1,11 @@
 //! Height from normals: weighted least squares on the edges between neighbouring pixels of any mask.
 //!
 //! Each edge between two pixels of the mask asks `n_z dz = -n_x` (along x) or `n_z dz = -n_y` (along y, up). The normal
-//! equations are a weighted graph Laplacian; it is never stored as a matrix but applied as a 5-point stencil inside faer's
-//! conjugate gradient.
+//! equations are a weighted graph Laplacian, a 5-point stencil that is never stored as a matrix.
+//!
+//! The way through the files: [`operator`] makes weights and right side of the normals on a [`checkerboard`]; [`reduction`]
+//! eliminates every other pixel; [`conjugate_gradient`] solves for the rest, preconditioned by [`multigrid`], whose grids come
+//! from [`coarsen`] (after [`fill`] has closed the smallest holes) and talk to each other by [`transfer`].
 
 mod checkerboard;
 mod coarsen;
@@ -14,10 +17,12 @@ mod multigrid;
 mod operator;
 mod reduction;
 mod solve;
+mod system;
 mod transfer;
 
 pub use components::Component;
 pub use solve::integrate;
+pub use system::{Operator, System, VCycle};
 
 use std::ops::ControlFlow;
 

@@ -68,12 +68,7 @@ impl<'a> Multigrid<'a> {
             levels.push(std::mem::replace(&mut weights, coarser));
         }
         let vectors = levels.iter().chain([&weights]).map(LevelVectors::new).collect();
-        Self {
-            finest,
-            coarsest: Coarsest::new(&weights),
-            levels,
-            vectors: Mutex::new(vectors),
-        }
+        Self { finest, coarsest: Coarsest::new(&weights), levels, vectors: Mutex::new(vectors) }
     }
 
     /// `x = M b`; returns `<b, x>`.

@@ -55,10 +55,7 @@ impl FieldRow {
         }
         let normals = &field.normals[span.start * 3..span.end * 3];
         let component = |axis: usize, outside: f32| {
-            normals
-                .chunks_exact(3)
-                .zip(mask)
-                .map(move |(normal, &used)| if used { normal[axis] } else { outside })
+            normals.chunks_exact(3).zip(mask).map(move |(normal, &used)| if used { normal[axis] } else { outside })
         };
         for (axis, along) in self.along.iter_mut().enumerate() {
             along.clear();

@@ -1,15 +1,18 @@
-//! The least-squares integrator: checks, faer's conjugate gradient, constants.
+//! The least-squares integrator: checks, the solver, constants.
 
 use rayon::prelude::*;
 
 use super::components::Runs;
-use super::fill::fill_corners;
 use super::conjugate_gradient::{Solution, conjugate_gradients, square_sum};
+use super::fill::fill_corners;
 use super::operator::{Field, assemble};
 use super::reduction::{eliminate_blacks, fill_blacks};
 use super::{OnProgress, Params, Surface};
 use crate::memory::zeros;
 use crate::{Error, Result};
+
+/// Pixels that are checked at a time.
+const CHECK_PIXELS: usize = 1 << 14;
 
 /// Integrates `normals` over `mask` to a height map in pixels.
 ///
@@ -18,9 +21,9 @@ use crate::{Error, Result};
 /// `weights` one value a pixel (an edge takes the geometric mean of its two). The weight `n_z^2` is always in.
 ///
 /// # Method
-/// Minimises the sum over edges of `w (n_z dz + n_x)^2` (and the like in y) by conjugate gradient on the normal equations
-/// with a Jacobi preconditioner (Horn and Brooks 1986; Quéau, Durou, Aujol 2018, section 3). The constant of each
-/// component is projected out of right side and solution.
+/// Minimises the sum over edges of `w (n_z dz + n_x)^2` (and the like in y; Horn and Brooks 1986; Quéau, Durou, Aujol 2018,
+/// section 3) by conjugate gradient on the normal equations, preconditioned by a multigrid V-cycle (Brandt 1977; Trottenberg,
+/// Oosterlee, Schüller 2001). The constant of each component is free: its mean is set to zero at the end.
 ///
 /// # Errors
 /// Mismatched lengths, an empty mask, normals inside the mask that are not finite or look away, settings out of range,
@@ -56,7 +59,8 @@ pub fn integrate(
     fill_corners(&mut weights);
     let scale = (square_sum(&right.reds) + square_sum(&right.blacks)).sqrt();
     eliminate_blacks(&weights, &mut right.reds, &right.blacks);
-    let Solution { x: reds, iterations, residual } = conjugate_gradients(&weights, &right.reds, scale, params, on_progress)?;
+    let Solution { x: reds, iterations, residual } =
+        conjugate_gradients(&weights, &right.reds, scale, params, on_progress)?;
     fill_blacks(&weights, &reds, &mut right.blacks);
     let half = weights.grid.half();
     let value = |row: usize, col: usize| {
@@ -77,7 +81,7 @@ pub fn integrate(
 }
 
 /// Refuses what the solver cannot work on.
-fn check(field: Field<'_>, params: &Params) -> Result<()> {
+pub(super) fn check(field: Field<'_>, params: &Params) -> Result<()> {
     let Field { normals, mask, weights, width } = field;
     let length = |argument, expected, actual| {
         if expected == actual { Ok(()) } else { Err(Error::LengthMismatch { argument, expected, actual }) }
@@ -90,17 +94,12 @@ fn check(field: Field<'_>, params: &Params) -> Result<()> {
         return Err(Error::EmptyMask);
     }
     length("mask", mask.len().div_ceil(width) * width, mask.len())?;
-    for pixel in (0..mask.len()).filter(|&pixel| mask[pixel]) {
-        let (row, col) = (pixel / width, pixel % width);
-        let normal = &normals[pixel * 3..pixel * 3 + 3];
-        if !(normal.iter().all(|component| component.is_finite()) && normal[2] >= 0.0) {
-            return Err(Error::BadNormal { row, col, n_z: f64::from(normal[2]) });
-        }
-        if let Some(weights) = weights
-            && !(weights[pixel].is_finite() && weights[pixel] >= 0.0)
-        {
-            return Err(Error::BadWeight { row, col, value: f64::from(weights[pixel]) });
-        }
+    // Nearly always all is well, and that shows quickly; only otherwise the first offender is looked for.
+    if !mask.par_chunks(CHECK_PIXELS).enumerate().all(|(chunk, mask)| {
+        let first = chunk * CHECK_PIXELS;
+        (first..first + mask.len()).all(|pixel| check_pixel(field, pixel).is_ok())
+    }) {
+        (0..mask.len()).try_for_each(|pixel| check_pixel(field, pixel))?;
     }
     for (argument, value) in
         [("relative_tolerance", params.relative_tolerance), ("absolute_tolerance", params.absolute_tolerance)]
@@ -111,6 +110,25 @@ fn check(field: Field<'_>, params: &Params) -> Result<()> {
     }
     if params.max_iters == 0 {
         return Err(Error::OutOfRange { argument: "max_iters", rule: "at least 1", value: 0.0 });
+    }
+    Ok(())
+}
+
+/// Refuses a normal or a weight inside the mask that means nothing.
+fn check_pixel(field: Field<'_>, pixel: usize) -> Result<()> {
+    let Field { normals, mask, weights, width } = field;
+    if !mask[pixel] {
+        return Ok(());
+    }
+    let (row, col) = (pixel / width, pixel % width);
+    let normal = &normals[pixel * 3..pixel * 3 + 3];
+    if !(normal.iter().all(|component| component.is_finite()) && normal[2] >= 0.0) {
+        return Err(Error::BadNormal { row, col, n_z: f64::from(normal[2]) });
+    }
+    if let Some(weights) = weights
+        && !(weights[pixel].is_finite() && weights[pixel] >= 0.0)
+    {
+        return Err(Error::BadWeight { row, col, value: f64::from(weights[pixel]) });
     }
     Ok(())
 }

@@ -150,9 +150,8 @@ fn restrict_band<T: Real>(weights: &Weights, b: &[T], band: usize, coarse_reds: 
             let horizontal = &horizontal[..n];
             let coarse = &mut coarse[..n];
             for k in 0..n {
-                coarse[k] = corner[k]
-                    + right[k].abs() * horizontal[k]
-                    + (up[k].abs() * above[k] + down[k].abs() * below[k]);
+                coarse[k] =
+                    corner[k] + right[k].abs() * horizontal[k] + (up[k].abs() * above[k] + down[k].abs() * below[k]);
             }
             for k in 1..n {
                 coarse[k] += left[k].abs() * horizontal[k - 1];

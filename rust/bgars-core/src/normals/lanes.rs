@@ -226,7 +226,9 @@ macro_rules! by_chunks {
 #[inline(always)]
 fn solve_all<K: Pixel>(kernel: &LaneKernel, keys: &[Lanes<K>], offset: Option<&Lanes<f32>>) -> Solutions {
     let mut sums = [[0.0f32; LANES]; 4];
-    by_chunks!(keys, kernel.pseudo_inverse.as_slice(), |keys, columns, _first| add_columns(keys, columns, offset, &mut sums));
+    by_chunks!(keys, kernel.pseudo_inverse.as_slice(), |keys, columns, _first| add_columns(
+        keys, columns, offset, &mut sums
+    ));
     let [scaled @ .., squares] = sums;
     let [xx, xy, xz, yy, yz, zz] = kernel.gram;
     let mut turning = [0.0f32; LANES];
@@ -275,7 +277,9 @@ fn solve_kept<K: Pixel>(
     let directions = kernel.directions.as_slice();
     let mut kept = [0u16; LANES];
     let mut sums = [[0.0f32; LANES]; 3];
-    by_chunks!(keys, directions, |keys, directions, _first| add_kept(keys, directions, cutoffs, offset, &mut sums, &mut kept));
+    by_chunks!(keys, directions, |keys, directions, _first| add_kept(
+        keys, directions, cutoffs, offset, &mut sums, &mut kept
+    ));
     let inverses = if kernel.table.is_empty() {
         let mut gram = [[0.0f32; LANES]; 6];
         by_chunks!(keys, directions, |keys, directions, _first| add_gram(keys, directions, cutoffs, &mut gram));
@@ -453,14 +457,8 @@ fn inverses_of(gram: &[Lanes<f32>; 6]) -> [Lanes<f32>; 6] {
         let third = (xx + yy + zz) / 3.0;
         let usable = determinant > MIN_LANE_CONDITIONING as f32 * (third * third * third);
         let scale = if usable { 1.0 / determinant } else { 0.0 };
-        let entries = [
-            cofactors[0],
-            cofactors[1],
-            cofactors[2],
-            xx * zz - xz * xz,
-            xy * xz - xx * yz,
-            xx * yy - xy * xy,
-        ];
+        let entries =
+            [cofactors[0], cofactors[1], cofactors[2], xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy];
         for (inverse, entry) in inverses.iter_mut().zip(entries) {
             inverse[lane] = entry * scale;
         }
@@ -485,8 +483,7 @@ fn write(kernel: &LaneKernel, solutions: &Solutions, used: Option<&[bool]>, span
         let scale = if valid[lane] { 1.0 / length } else { f32::NAN };
         albedo[lane] = if valid[lane] { length * per_full_scale } else { f32::NAN };
         // See `confidence`: the squared standard error over the squared half-way point.
-        let variance =
-            (solutions.squared_residuals[lane] + PRIOR2 * square) / (f32::from(solutions.kept[lane]) - 2.0);
+        let variance = (solutions.squared_residuals[lane] + PRIOR2 * square) / (f32::from(solutions.kept[lane]) - 2.0);
         let turning = if solutions.turning[lane] > 0.0 { solutions.turning[lane] } else { 0.0 };
         let ratio2 = variance * turning * DEG2 / square;
         confidence[lane] = if valid[lane] { 1.0 / (1.0 + ratio2) } else { 0.0 };

@@ -1,0 +1,259 @@
+//! The integrator's linear algebra: the reduced operator against a plain matrix, the preconditioner against its promises.
+#![allow(clippy::unwrap_used, clippy::float_cmp, missing_docs)]
+
+use std::ops::ControlFlow;
+
+use bgars_core::integrate::{Difference, Params, Surface, System, integrate};
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::matrix_free::InitialGuessStatus;
+use faer::matrix_free::LinOp;
+use faer::matrix_free::conjugate_gradient::{CgParams, conjugate_gradient, conjugate_gradient_scratch};
+use faer::{Mat, Par};
+use nalgebra::{DMatrix, DVector};
+
+/// Numbers in -0.5 .. 0.5 from a linear congruence.
+fn noise(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as f64 / (1u64 << 31) as f64 - 0.5
+    }
+}
+
+/// Noisy normals of a wavy surface, so that every frequency has to be solved for.
+fn wavy_normals(height: usize, width: usize, seed: u64) -> Vec<f32> {
+    let mut noise = noise(seed);
+    let mut normals = Vec::with_capacity(height * width * 3);
+    for row in 0..height {
+        for col in 0..width {
+            let (u, v) = (col as f64 * 20.0 / width as f64, row as f64 * 20.0 / height as f64);
+            let (p, q) = (0.6 * u.sin() * v.cos() + 0.1 * noise(), 0.6 * (v + u).cos() + 0.1 * noise());
+            let length = (1.0 + p * p + q * q).sqrt();
+            normals.extend([-p / length, -q / length, 1.0 / length].map(|component| component as f32));
+        }
+    }
+    normals
+}
+
+/// `inside(x, y)` with the image centre as origin and half the height as unit.
+fn mask(height: usize, width: usize, inside: impl Fn(f64, f64) -> bool) -> Vec<bool> {
+    let unit = height as f64 / 2.0;
+    (0..height * width)
+        .map(|pixel| {
+            let (row, col) = (pixel / width, pixel % width);
+            inside((col as f64 + 0.5 - width as f64 / 2.0) / unit, (unit - row as f64 - 0.5) / unit)
+        })
+        .collect()
+}
+
+fn disc_with_holes(x: f64, y: f64) -> bool {
+    let from_hole = |coordinate: f64, shift: f64| (coordinate * 4.0 + shift).rem_euclid(1.0) - 0.5;
+    x.hypot(y) < 0.96 && from_hole(x, 0.3).hypot(from_hole(y, 0.1)) > 0.2
+}
+
+/// A disc with cuts of one pixel: straight, slanted, and a frame around an island.
+fn slits(size: usize) -> impl Fn(f64, f64) -> bool {
+    let pixel = 2.0 / size as f64;
+    move |x, y| {
+        let on = |distance: f64| distance.abs() < 0.51 * pixel;
+        let straight = on(x + 0.26) && y < 0.4 || on(y + 0.42) && x > -0.6;
+        let slanted = (y - 0.37 * x - 0.22).abs() < 0.7 * pixel && x.abs() < 0.6;
+        let (u, v) = (x - 0.45, y + 0.05);
+        let frame = on(u.abs().max(v.abs()) - 0.15);
+        x.hypot(y) < 0.96 && !straight && !slanted && !frame
+    }
+}
+
+fn solve(normals: &[f32], mask: &[bool], width: usize, relative_tolerance: f64) -> Surface {
+    let params = Params { relative_tolerance, ..Params::default() };
+    integrate(normals, mask, width, None, &params, &mut |_| ControlFlow::Continue(())).unwrap()
+}
+
+/// The graph Laplacian of the mask with weights `n_z^2`, edge by edge, and its right side.
+fn slow_system(normals: &[f32], mask: &[bool], width: usize) -> (DMatrix<f64>, DVector<f64>) {
+    let pixels = mask.len();
+    let mut matrix = DMatrix::zeros(pixels, pixels);
+    let mut right = DVector::zeros(pixels);
+    let mut edge = |a: usize, b: usize, axis: usize, sign: f64| {
+        if mask[a] && mask[b] {
+            let mean = |axis: usize| (f64::from(normals[3 * a + axis]) + f64::from(normals[3 * b + axis])) / 2.0;
+            let (weight, step) = (mean(2) * mean(2), -sign * mean(axis) / mean(2));
+            matrix[(a, a)] += weight;
+            matrix[(b, b)] += weight;
+            matrix[(a, b)] -= weight;
+            matrix[(b, a)] -= weight;
+            right[a] -= weight * step;
+            right[b] += weight * step;
+        }
+    };
+    for pixel in 0..pixels {
+        if pixel % width + 1 < width {
+            edge(pixel, pixel + 1, 0, 1.0);
+        }
+        if pixel + width < pixels {
+            edge(pixel, pixel + width, 1, -1.0);
+        }
+    }
+    (matrix, right)
+}
+
+#[test]
+fn heights_solve_the_plain_normal_equations() {
+    // Odd and even sizes, single rows and columns, masks with a fifth of the pixels missing.
+    for (height, width) in [(1, 1), (1, 9), (8, 1), (2, 2), (7, 9), (12, 10), (16, 17), (33, 35)] {
+        let mut noise = noise(height as u64 * 100 + width as u64);
+        let mut mask: Vec<bool> = (0..height * width).map(|_| noise() > -0.3).collect();
+        mask[0] = true;
+        let normals = wavy_normals(height, width, 5);
+        let surface = solve(&normals, &mask, width, 1e-10);
+        let (matrix, right) = slow_system(&normals, &mask, width);
+        let heights = DVector::from_iterator(
+            mask.len(),
+            surface.height_px.iter().map(|&z| if z.is_nan() { 0.0 } else { f64::from(z) }),
+        );
+        // Heights are returned in f32.
+        let error = (&matrix * heights - &right).amax();
+        assert!(error <= 2e-5, "{height} x {width}: {error}");
+    }
+}
+
+#[test]
+fn the_operator_is_the_schur_complement_of_the_plain_matrix() {
+    let (height, width) = (9, 12);
+    let mut noise = noise(3);
+    let mask: Vec<bool> = (0..height * width).map(|_| noise() > -0.35).collect();
+    let normals = wavy_normals(height, width, 7);
+    let system = System::new(&normals, &mask, width, None, Difference::Trapezoid).unwrap();
+    let (matrix, right) = slow_system(&normals, &mask, width);
+    let colour = |parity: usize| {
+        (0..height * width).filter(|pixel| (pixel / width + pixel % width) % 2 == parity).collect::<Vec<usize>>()
+    };
+    let (reds, blacks) = (colour(0), colour(1));
+    // A pixel without neighbours has an empty row: its inverse is taken as zero.
+    let inverse = blacks.iter().map(|&b| if matrix[(b, b)] > 0.0 { 1.0 / matrix[(b, b)] } else { 0.0 });
+    let inverse = DMatrix::from_diagonal(&DVector::from_iterator(blacks.len(), inverse));
+    let block = |rows: &[usize], cols: &[usize]| {
+        DMatrix::from_fn(rows.len(), cols.len(), |row, col| matrix[(rows[row], cols[col])])
+    };
+    let schur = block(&reds, &reds) - block(&reds, &blacks) * &inverse * block(&blacks, &reds);
+    let x = DVector::from_fn(reds.len(), |_, _| noise());
+    let expected = &schur * &x;
+    let mut out = Mat::<f64>::zeros(reds.len(), 1);
+    let vector = Mat::from_fn(reds.len(), 1, |row, _| x[row]);
+    system.operator().apply(out.as_mut(), vector.as_ref(), Par::Seq, MemStack::new(&mut []));
+    let pick = |pixels: &[usize]| DVector::from_iterator(pixels.len(), pixels.iter().map(|&pixel| right[pixel]));
+    let expected_right = pick(&reds) - block(&reds, &blacks) * inverse * pick(&blacks);
+    for row in 0..reds.len() {
+        assert!((out[(row, 0)] - expected[row]).abs() < 1e-6, "red {row}");
+        assert!((system.right_side()[row] - expected_right[row]).abs() < 1e-6, "red {row}");
+    }
+}
+
+#[test]
+fn the_preconditioner_is_symmetric_and_positive() {
+    for (name, size, inside) in [
+        ("rectangle", 96, Box::new(|_, _| true) as Box<dyn Fn(f64, f64) -> bool>),
+        ("disc with holes", 131, Box::new(disc_with_holes)),
+        ("slits", 160, Box::new(slits(160))),
+    ] {
+        let mask = mask(size, size, inside);
+        let system = System::new(&wavy_normals(size, size, 1), &mask, size, None, Difference::Trapezoid).unwrap();
+        let preconditioner = system.preconditioner();
+        let n = system.right_side().len();
+        let mut noise = noise(9);
+        let apply = |x: &Mat<f64>| {
+            let mut out = Mat::<f64>::zeros(n, 1);
+            preconditioner.apply(out.as_mut(), x.as_ref(), Par::Seq, MemStack::new(&mut []));
+            out
+        };
+        // In the range of the operator: residuals never have a part in a component's constant.
+        let mut residual = || {
+            let x = Mat::from_fn(n, 1, |_, _| noise());
+            let mut out = Mat::<f64>::zeros(n, 1);
+            system.operator().apply(out.as_mut(), x.as_ref(), Par::Seq, MemStack::new(&mut []));
+            out
+        };
+        let (x, y) = (residual(), residual());
+        let (m_x, m_y) = (apply(&x), apply(&y));
+        let dot = |a: &Mat<f64>, b: &Mat<f64>| (0..n).map(|row| a[(row, 0)] * b[(row, 0)]).sum::<f64>();
+        let scale = (dot(&m_x, &x) * dot(&m_y, &y)).sqrt();
+        assert!(dot(&m_x, &x) > 0.0 && dot(&m_y, &y) > 0.0, "{name}");
+        let asymmetry = (dot(&m_x, &y) - dot(&x, &m_y)).abs() / scale;
+        assert!(asymmetry < 1e-5, "{name}: {asymmetry}");
+    }
+}
+
+#[test]
+fn faer_with_our_preconditioner_agrees_with_our_solver() {
+    let size = 150;
+    let mask = mask(size, size, disc_with_holes);
+    let normals = wavy_normals(size, size, 2);
+    let system = System::new(&normals, &mask, size, None, Difference::Trapezoid).unwrap();
+    let (operator, preconditioner) = (system.operator(), system.preconditioner());
+    let right = Mat::from_fn(system.right_side().len(), 1, |row, _| system.right_side()[row]);
+    let mut x = Mat::<f64>::zeros(right.nrows(), 1);
+    // Not the default `Zero`: faer 0.24 then leaves its residual uninitialised.
+    let params = CgParams {
+        initial_guess: InitialGuessStatus::MaybeNonZero,
+        rel_tolerance: 1e-9,
+        max_iters: 50,
+        ..CgParams::default()
+    };
+    let mut buffer = MemBuffer::new(conjugate_gradient_scratch(&preconditioner, &operator, 1, Par::Seq));
+    let info = conjugate_gradient(
+        x.as_mut(),
+        &preconditioner,
+        &operator,
+        right.as_ref(),
+        params,
+        |_| {},
+        Par::Seq,
+        MemStack::new(&mut buffer),
+    )
+    .unwrap();
+    let surface = solve(&normals, &mask, size, 1e-9);
+    assert!(info.iter_count.abs_diff(surface.iterations) <= 1, "{} and {}", info.iter_count, surface.iterations);
+    // Equal up to the constant of the component.
+    let half = size / 2;
+    let red = |pixel: usize| (pixel / size + pixel % size).is_multiple_of(2) && surface.labels[pixel] == 0;
+    let differences: Vec<f64> = (0..size * size)
+        .filter(|&pixel| red(pixel))
+        .map(|pixel| x[(pixel / size * half + pixel % size / 2, 0)] - f64::from(surface.height_px[pixel]))
+        .collect();
+    let mean = differences.iter().sum::<f64>() / differences.len() as f64;
+    let worst = differences.iter().fold(0.0f64, |worst, difference| worst.max((difference - mean).abs()));
+    assert!(worst < 1e-4, "{worst} px");
+}
+
+#[test]
+fn a_millionth_takes_ten_iterations_at_any_size_and_fifteen_with_slits() {
+    for size in [64, 255, 512] {
+        let normals = wavy_normals(size, size, 4);
+        for (name, mask, limit) in [
+            ("rectangle", mask(size, size, |_, _| true), 10),
+            ("disc with holes", mask(size, size, disc_with_holes), 10),
+            ("slits", mask(size, size, slits(size)), 15),
+        ] {
+            let surface = solve(&normals, &mask, size, 1e-6);
+            assert!(surface.residual <= 1e-6);
+            assert!(surface.iterations <= limit, "{name} of {size}: {} iterations", surface.iterations);
+        }
+    }
+}
+
+#[test]
+fn the_two_sides_of_a_cut_do_not_feel_each_other() {
+    // Two rectangles, apart by one column of pixels: the left one must come out the same whatever the right one holds.
+    let (height, width, cut) = (70, 131, 66);
+    let mask: Vec<bool> = (0..height * width).map(|pixel| pixel % width != cut).collect();
+    let normals = wavy_normals(height, width, 6);
+    let mut steeper = normals.clone();
+    for pixel in (0..height * width).filter(|pixel| pixel % width > cut) {
+        steeper[3 * pixel..3 * pixel + 3].copy_from_slice(&[-0.6, 0.0, 0.8]);
+    }
+    let (plain, changed) = (solve(&normals, &mask, width, 1e-10), solve(&steeper, &mask, width, 1e-10));
+    for pixel in (0..height * width).filter(|pixel| pixel % width < cut) {
+        let difference = plain.height_px[pixel] - changed.height_px[pixel];
+        assert!(difference.abs() < 1e-5, "{difference} px at {pixel}");
+    }
+}
