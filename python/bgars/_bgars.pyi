@@ -45,6 +45,7 @@ def estimate_normals(
     method: str,
     threshold: float,
     keep_sets: bool,
+    threads: int | None,
     progress: Callable[[float], object] | None,
 ) -> tuple[
     NDArray[np.float32],
@@ -63,6 +64,7 @@ def integrate_normals(
     relative_tolerance: float,
     absolute_tolerance: float,
     max_iters: int,
+    threads: int | None,
     progress: Callable[[int, float], object] | None,
 ) -> tuple[NDArray[np.float32], NDArray[np.int32], list[tuple[int, int, int]], int, float]: ...
 def read_rgb16(path: str | PathLike[str], max_megapixels: float) -> NDArray[np.uint16]: ...

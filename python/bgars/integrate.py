@@ -34,21 +34,23 @@ def integrate_normals(
     weights: Literal["confidence"] | ArrayLike | None = None,
     relative_tolerance: float = 1e-8,
     absolute_tolerance: float = 1e-12,
-    max_iters: int = 20_000,
+    max_iters: int = 2_000,
     pixel_pitch_um: float | None = None,
+    threads: int | None = None,
     progress: Callable[[int, float], object] | None = None,
 ) -> HeightMap:
     """Integrate normals to heights by weighted least squares.
 
     Minimises the sum over neighbouring pixels of ``(n_z dz + n_x)^2`` along x and ``(n_z dz + n_y)^2`` along y (up), by
-    conjugate gradient on the normal equations. **What this cannot give**: heights across an occluding contour.
+    conjugate gradient on the normal equations, preconditioned by multigrid: about 8 iterations whatever the size. **What this cannot give**: heights across an occluding contour.
     Between a ball and its board the surface jumps where no pixel sees it, so the stand-off height is not in the
     normals, and parts that do not touch (components) each float freely.
 
     Parameters
     ----------
     normals : NormalField or (H, W, 3) array_like
-        Unit normals, x right, y up, z toward the camera.
+        Unit normals, x right, y up, z toward the camera. A C-contiguous float32 array is used where it lies; others are
+        copied once.
     mask : (H, W) array_like of bool, optional
         True = use; combined with the field's own mask. For plain arrays: by default every finite normal with n_z > 0.
     method : {"least-squares"}
@@ -61,9 +63,12 @@ def integrate_normals(
     relative_tolerance, absolute_tolerance : float
         Stop at a residual of this times the right side, or of this a pixel (root mean square, pixels).
     max_iters : int
-        Most iterations.
+        Most iterations. Masks of narrow winding corridors may need hundreds; all others, ten to twenty.
     pixel_pitch_um : float, optional
         Size of a pixel; a field brings its own.
+    threads : int, optional
+        Most threads to work on; by default what the environment variable ``RAYON_NUM_THREADS`` says, else one a core.
+        The result does not depend on it.
     progress : callable, optional
         Called with (iteration, relative residual), at most ten times a second.
 
@@ -114,6 +119,7 @@ def integrate_normals(
         relative_tolerance=relative_tolerance,
         absolute_tolerance=absolute_tolerance,
         max_iters=max_iters,
+        threads=threads,
         progress=progress,
     )
     return HeightMap(

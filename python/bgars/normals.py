@@ -37,6 +37,7 @@ def estimate_normals(
     saturation: float | None = None,
     threshold: float = DEFAULT_THRESHOLD,
     keep_sets: bool = False,
+    threads: int | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> NormalField:
     """Estimate the surface normal of every pixel.
@@ -47,8 +48,8 @@ def estimate_normals(
     Parameters
     ----------
     images : Capture or (L, H, W) array_like of uint8, uint16 or float32
-        A capture, or one image a light. Arrays are used as they are; they are copied only when they are not
-        C-contiguous or when they are float64.
+        A capture, or one image a light. A C-contiguous array, read-only or not, is used where it lies; strided and
+        Fortran-ordered ones (a crop, a transposed stack) and float64 are copied once.
     light_directions : (L, 3) array_like
         Unit vectors from the surface to the light; only with plain arrays.
     method : {"lambertian", "specular-filter", "robust-filter"}
@@ -66,6 +67,9 @@ def estimate_normals(
         Gap of ``specular-filter`` in grey levels of 255; scaled with the bit depth.
     keep_sets : bool
         Also return which lights were kept: `NormalField.kept_sets`, (H, W, L) bool.
+    threads : int, optional
+        Most threads to work on; by default what the environment variable ``RAYON_NUM_THREADS`` says, else one a core.
+        The result does not depend on it.
     progress : callable, optional
         Called with the fraction done, at most ten times a second.
 
@@ -120,6 +124,7 @@ def estimate_normals(
         method=method,
         threshold=threshold,
         keep_sets=keep_sets,
+        threads=threads,
         progress=progress,
     )
     return NormalField(

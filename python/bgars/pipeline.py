@@ -70,6 +70,7 @@ def reconstruct(
     threshold: float = 50.0,
     difference: Difference = "trapezoid",
     weights: Literal["confidence"] | None = None,
+    threads: int | None = None,
     progress: Callable[[Stage, float], object] | None = None,
 ) -> Reconstruction:
     """Turn a capture into normals, a height map and a mesh.
@@ -82,6 +83,8 @@ def reconstruct(
         See :func:`bgars.estimate_normals`.
     difference, weights
         See :func:`bgars.integrate_normals`.
+    threads : int, optional
+        Most threads to work on; see :func:`bgars.estimate_normals`.
     progress : callable, optional
         Called with (stage, fraction done of that stage); the solver's fraction is logarithmic in its residual.
 
@@ -106,13 +109,18 @@ def reconstruct(
 
     report("normals", 0.0)
     field = estimate_normals(
-        capture, method=method, threshold=threshold, progress=lambda fraction: report("normals", fraction)
+        capture,
+        method=method,
+        threshold=threshold,
+        threads=threads,
+        progress=lambda fraction: report("normals", fraction),
     )
     report("normals", 1.0)
     height = integrate_normals(
         field,
         difference=difference,
         weights=weights,
+        threads=threads,
         progress=lambda _, residual: report("height", solver_fraction(residual)),
     )
     report("height", 1.0)

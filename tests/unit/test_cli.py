@@ -134,22 +134,21 @@ def test_without_truth_evaluate_says_what_it_expected(capture_folder: Path) -> N
     assert "gt.npz" in run.stderr
 
 
-SOLVE_FOR_LONG = """
+ESTIMATE_FOR_LONG = """
 import numpy as np, bgars
-normals = np.random.default_rng(0).normal([0, 0, 2], 0.5, (2000, 2000, 3)).astype(np.float32)
-normals[..., 2] = np.abs(normals[..., 2])
+stack = np.random.default_rng(0).integers(0, 255, (24, 3000, 3000), dtype=np.uint8)
 print("ready", flush=True)
-bgars.integrate_normals(normals, relative_tolerance=1e-15, max_iters=1_000_000)
+bgars.estimate_normals(stack, bgars.LightRig.ring(24).directions)
 """
 
 
-def test_ctrl_c_stops_a_long_solve() -> None:
+def test_ctrl_c_stops_long_work() -> None:
     process = subprocess.Popen(
-        [sys.executable, "-c", SOLVE_FOR_LONG], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-c", ESTIMATE_FOR_LONG], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     assert process.stdout is not None
     assert process.stdout.readline() == "ready\n"
-    time.sleep(2.0)
+    time.sleep(0.5)
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=20)
     assert process.returncode != 0

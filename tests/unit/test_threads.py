@@ -7,66 +7,131 @@ import os
 import subprocess
 import sys
 import threading
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import bgars
 import numpy as np
+import pytest
+from bgars import _bgars
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 DIGEST = """
-import hashlib, bgars
-result = bgars.reconstruct(bgars.read_capture(bgars.sample_capture()))
+import hashlib, sys, bgars
+threads = int(sys.argv[1]) if len(sys.argv) > 1 else None
+result = bgars.reconstruct(bgars.read_capture(bgars.sample_capture()), threads=threads)
 print(hashlib.sha256(result.field.normals.tobytes() + result.height.height_px.tobytes()).hexdigest())
 """
+SIZE = 1200
 
 
-def test_one_and_two_threads_give_the_same_bits() -> None:
-    digests = {
-        subprocess.run(
-            [sys.executable, "-c", DIGEST],
-            env={**os.environ, "RAYON_NUM_THREADS": str(threads)},
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
-        for threads in (1, 2)
-    }
-    assert len(digests) == 1
-    assert len(digests.pop().strip()) == len(hashlib.sha256().hexdigest())
-
-
-def test_other_threads_run_while_the_solver_works() -> None:
-    normals = np.random.default_rng(0).normal([0, 0, 2], 0.3, (300, 300, 3)).astype(np.float32)
+def noisy_normals(size: int = SIZE) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
+    normals = np.random.default_rng(0).normal([0, 0, 2], 0.3, (size, size, 3)).astype(np.float32)
     normals[..., 2] = np.abs(normals[..., 2])
+    return normals
+
+
+def noisy_stack(size: int = SIZE) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+    return np.random.default_rng(1).integers(0, 255, (8, size, size), dtype=np.uint8)
+
+
+def digest(*arguments: str, **environment: str) -> str:
+    return subprocess.run(
+        [sys.executable, "-c", DIGEST, *arguments],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.strip()
+
+
+def test_one_and_two_threads_give_the_same_bits_however_they_are_asked_for() -> None:
+    digests = {digest(RAYON_NUM_THREADS="1"), digest(RAYON_NUM_THREADS="2"), digest("1"), digest("2"), digest("3")}
+    assert len(digests) == 1
+    assert len(digests.pop()) == 2 * hashlib.sha256().digest_size
+
+
+def work(name: str, folder: Path) -> Callable[[], Any]:
+    """One call into the compiled module that takes a good while."""
+    rig = bgars.LightRig.ring(8)
+    if name == "estimate_normals":
+        stack = noisy_stack()
+        return lambda: bgars.estimate_normals(stack, rig.directions)
+    if name == "integrate_normals":
+        normals = noisy_normals(2 * SIZE)
+        return lambda: bgars.integrate_normals(normals)
+    if name == "decode_stack":
+        noise = np.random.default_rng(2).integers(0, 65535, (SIZE, SIZE, 3), dtype=np.uint16)
+        paths = [folder / f"{index}.png" for index in range(3)]
+        for path in paths:
+            _bgars.write_png16(path, noise)
+        return lambda: _bgars.decode_stack(paths, channel="mean", response=None, gains=None, max_megapixels=100.0)
+    height = np.random.default_rng(3).normal(size=(2 * SIZE, 2 * SIZE)).astype(np.float32)
+    mask = np.ones(height.shape, dtype=np.bool_)
+    if name == "triangulate":
+        return lambda: [_bgars.triangulate(height, mask, 1.0) for _ in range(3)]
+    vertices, faces, _ = _bgars.triangulate(height, mask, 1.0)
+    write = _bgars.write_ply if name == "write_ply" else _bgars.write_obj
+    return lambda: write(folder / name, vertices, faces)
+
+
+@pytest.mark.parametrize(
+    "name", ["estimate_normals", "integrate_normals", "decode_stack", "triangulate", "write_ply", "write_obj"]
+)
+def test_other_threads_run_while_the_compiled_module_works(name: str, tmp_path: Path) -> None:
+    call = work(name, tmp_path)
     ticks = 0
-    done = threading.Event()
+    started, done = threading.Event(), threading.Event()
 
     def count() -> None:
         nonlocal ticks
-        while not done.wait(0.001):
+        started.set()
+        while not done.wait(0.0005):
             ticks += 1
 
     thread = threading.Thread(target=count)
     thread.start()
-    bgars.integrate_normals(normals)
+    started.wait()
+    ticks = 0
+    call()
+    counted = ticks
     done.set()
     thread.join()
-    assert ticks >= 3, "the GIL was held"
+    assert counted >= 3, "the GIL was held"
 
 
 def test_progress_is_reported_and_its_exception_stops_the_work() -> None:
-    normals = np.random.default_rng(0).normal([0, 0, 2], 0.3, (700, 700, 3)).astype(np.float32)
-    normals[..., 2] = np.abs(normals[..., 2])
-    seen: list[tuple[int, float]] = []
+    stack = noisy_stack(2 * SIZE)
+    seen: list[float] = []
 
-    def stop(iteration: int, residual: float) -> None:
-        seen.append((iteration, residual))
+    def stop(fraction: float) -> None:
+        seen.append(fraction)
         if len(seen) == 2:
             raise StopIteration
 
-    try:
-        bgars.integrate_normals(normals, progress=stop)
-    except StopIteration:
-        pass
-    else:
-        raise AssertionError("the exception of the callback was lost")
+    with pytest.raises(StopIteration):
+        bgars.estimate_normals(stack, bgars.LightRig.ring(8).directions, progress=stop)
     assert len(seen) == 2
-    assert seen[1][0] > seen[0][0]
+    assert 0.0 < seen[0] < seen[1] < 1.0
+
+
+@pytest.mark.parametrize("threads", [0, -1, 1 << 40])
+def test_a_senseless_number_of_threads_is_named(threads: int) -> None:
+    with pytest.raises(bgars.InputError, match=f"threads: must be 1 to 1024, got {threads}"):
+        bgars.integrate_normals(noisy_normals(4), threads=threads)
+
+
+def test_strided_fortran_ordered_and_read_only_arrays_give_the_same_normals() -> None:
+    stack = noisy_stack(40)
+    directions = bgars.LightRig.ring(8).directions
+    expected = bgars.estimate_normals(stack, directions, method="specular-filter").normals
+    twice = np.repeat(stack, 2, axis=2)
+    read_only = stack.copy()
+    read_only.setflags(write=False)
+    for variant in (np.asfortranarray(stack), twice[:, :, ::2], read_only, np.flip(np.flip(stack, 1).copy(), 1)):
+        found = bgars.estimate_normals(variant, directions, method="specular-filter").normals
+        np.testing.assert_array_equal(found, expected)
+    heights = bgars.integrate_normals(expected).height_px
+    np.testing.assert_array_equal(bgars.integrate_normals(np.asfortranarray(expected)).height_px, heights)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -71,8 +72,15 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object 
 @app.callback(invoke_without_command=True)
 def top(
     version: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False,
+    threads: Annotated[
+        int | None,
+        typer.Option(min=1, max=1024, help="Most threads to work on; one a core by default.", show_default=False),
+    ] = None,
 ) -> None:
     """Options of the command itself."""
+    if threads is not None:
+        # The compiled module starts its threads at its first work, so this comes in time for all of it.
+        os.environ["RAYON_NUM_THREADS"] = str(threads)
     if version:
         say(f"bgars {bgars.__version__}")
         raise typer.Exit

@@ -6,13 +6,14 @@ use pyo3::prelude::*;
 
 use crate::convert::{array2, slice2, slice3};
 use crate::errors::InputError;
-use crate::progress::Reporter;
+use crate::progress::watched;
 
 /// height, labels, components (pixels, first row, first column), iterations, residual.
 type Result5<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<i32>>, Vec<(usize, usize, usize)>, usize, f64);
 
 #[pyfunction]
-#[pyo3(signature = (normals, mask, weights, *, difference, relative_tolerance, absolute_tolerance, max_iters, progress))]
+#[pyo3(signature = (normals, mask, weights, *, difference, relative_tolerance, absolute_tolerance, max_iters,
+                    threads, progress))]
 #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)]
 pub fn integrate_normals<'py>(
     py: Python<'py>,
@@ -23,6 +24,7 @@ pub fn integrate_normals<'py>(
     relative_tolerance: f64,
     absolute_tolerance: f64,
     max_iters: usize,
+    threads: Option<i64>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Result5<'py>> {
     let difference = match difference {
@@ -35,13 +37,9 @@ pub fn integrate_normals<'py>(
     let normals = slice3(&normals, "normals")?;
     let mask = slice2(&mask, "mask")?;
     let weights = weights.as_ref().map(|weights| slice2(weights, "weights")).transpose()?;
-    let mut reporter = Reporter::new(progress);
-    let outcome = py.detach(|| {
-        integrate(normals, mask, shape[1], weights, &params, &mut |state| {
-            reporter.tick((state.iteration, state.residual))
-        })
-    });
-    let surface = reporter.resolve(outcome)?;
+    let surface = watched(py, threads, progress.as_ref(), |report| {
+        integrate(normals, mask, shape[1], weights, &params, &mut |state| report((state.iteration, state.residual)))
+    })?;
     let components = surface.components.iter().map(|part| (part.pixels, part.first_row, part.first_col)).collect();
     Ok((
         array2(py, surface.height_px, shape)?,

@@ -1,5 +1,7 @@
 //! `estimate_normals`.
 
+use std::ops::ControlFlow;
+
 use bgars_core::normals::{Method, NormalMap, RobustParams, estimate};
 use bgars_core::{ImageStack, Lights, Pixel, Radiometry};
 use numpy::{PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
@@ -7,7 +9,7 @@ use pyo3::prelude::*;
 
 use crate::convert::{Stack, array2, array3, slice2, slice3, triples};
 use crate::errors::{InputError, to_python};
-use crate::progress::Reporter;
+use crate::progress::watched;
 
 type Result5<'py> = (
     Bound<'py, PyArray3<f32>>,
@@ -37,7 +39,7 @@ impl Request<'_> {
         &self,
         images: &[P],
         dark: Option<&[P]>,
-        reporter: &mut Reporter,
+        report: &mut dyn FnMut((f64,)) -> ControlFlow<()>,
     ) -> bgars_core::Result<NormalMap> {
         let [lights, height, width] = self.shape;
         let stack = ImageStack::new(images, lights, height, width)?;
@@ -49,15 +51,13 @@ impl Request<'_> {
             full_scale: self.full_scale,
             intensities: self.intensities.clone(),
         };
-        estimate(&stack, &self.lights, &radiometry, self.mask, self.method, self.keep_sets, &mut |done| {
-            reporter.tick((done,))
-        })
+        estimate(&stack, &self.lights, &radiometry, self.mask, self.method, self.keep_sets, &mut |done| report((done,)))
     }
 }
 
 #[pyfunction]
 #[pyo3(signature = (images, *, lights, lights_are_positions, reference_px, intensities, response, dark, black_level,
-                    saturation, full_scale, mask, method, threshold, keep_sets, progress))]
+                    saturation, full_scale, mask, method, threshold, keep_sets, threads, progress))]
 #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)]
 pub fn estimate_normals<'py>(
     py: Python<'py>,
@@ -75,6 +75,7 @@ pub fn estimate_normals<'py>(
     method: &str,
     threshold: f32,
     keep_sets: bool,
+    threads: Option<i64>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Result5<'py>> {
     let vectors = triples(&lights, "lights")?;
@@ -101,13 +102,11 @@ pub fn estimate_normals<'py>(
         keep_sets,
         shape: [shape[0], shape[1], shape[2]],
     };
-    let mut reporter = Reporter::new(progress);
-    let outcome = match &images {
-        Stack::U8(images) => run(py, &request, images, dark.as_ref(), &mut reporter),
-        Stack::U16(images) => run(py, &request, images, dark.as_ref(), &mut reporter),
-        Stack::F32(images) => run(py, &request, images, dark.as_ref(), &mut reporter),
+    let map = match &images {
+        Stack::U8(images) => run(py, &request, images, dark.as_ref(), threads, progress.as_ref()),
+        Stack::U16(images) => run(py, &request, images, dark.as_ref(), threads, progress.as_ref()),
+        Stack::F32(images) => run(py, &request, images, dark.as_ref(), threads, progress.as_ref()),
     }?;
-    let map = reporter.resolve(outcome)?;
     let [lights, height, width] = request.shape;
     Ok((
         array3(py, map.normals, [height, width, 3])?,
@@ -125,10 +124,11 @@ fn run<P: Pixel + numpy::Element>(
     request: &Request<'_>,
     images: &PyReadonlyArray3<'_, P>,
     dark: Option<&Bound<'_, PyAny>>,
-    reporter: &mut Reporter,
-) -> PyResult<bgars_core::Result<NormalMap>> {
+    threads: Option<i64>,
+    progress: Option<&Py<PyAny>>,
+) -> PyResult<NormalMap> {
     let dark: Option<PyReadonlyArray2<'_, P>> = dark.map(PyAnyMethods::extract).transpose()?;
     let dark = dark.as_ref().map(|dark| slice2(dark, "dark")).transpose()?;
     let images = slice3(images, "images")?;
-    Ok(py.detach(|| request.run(images, dark, reporter)))
+    watched(py, threads, progress, |report| request.run(images, dark, report))
 }

@@ -1,52 +1,85 @@
-//! Progress to a Python callback, and Ctrl-C from it, while the GIL is released.
+//! Long work beside Python: on its own threads, watched from the calling one for Ctrl-C and progress.
 
 use std::ops::ControlFlow;
-use std::time::{Duration, Instant};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
+use pyo3::call::PyCallArgs;
 use pyo3::prelude::*;
+
+use crate::errors::{InputError, to_python};
+
+/// Most threads that an argument may ask for.
+const MAX_THREADS: usize = 1024;
 
 /// Time between two looks at Python.
 const INTERVAL: Duration = Duration::from_millis(100);
 
-/// Calls back at most every 100 ms; remembers the exception that stopped the work.
-pub struct Reporter {
-    callback: Option<Py<PyAny>>,
-    last: Instant,
-    pub error: Option<PyErr>,
+/// Runs `work` without the GIL, on at most `threads` threads (`None`: as many as `RAYON_NUM_THREADS` says, else one a core).
+///
+/// `work` reports its state as the arguments of `callback`, which is called at most every 100 ms, from the calling thread:
+/// only there can Python deliver Ctrl-C. An exception, from the callback or from Ctrl-C, stops the work and is raised.
+pub fn watched<T, A, W>(py: Python<'_>, threads: Option<i64>, callback: Option<&Py<PyAny>>, work: W) -> PyResult<T>
+where
+    T: Send,
+    A: for<'py> PyCallArgs<'py> + Send,
+    W: FnOnce(&mut dyn FnMut(A) -> ControlFlow<()>) -> bgars_core::Result<T> + Send,
+{
+    let pool = threads.map(pool).transpose()?;
+    let cancelled = AtomicBool::new(false);
+    let state = Mutex::new(None);
+    let mut report = |arguments: A| {
+        *state.lock().unwrap_or_else(PoisonError::into_inner) = Some(arguments);
+        if cancelled.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let mut raised = None;
+    let outcome = py.detach(|| {
+        std::thread::scope(|scope| {
+            let (sender, receiver) = channel();
+            let run = move || match &pool {
+                Some(pool) => pool.install(|| work(&mut report)),
+                None => work(&mut report),
+            };
+            let worker = scope.spawn(move || {
+                let outcome = run();
+                // The receiver waits until the sender is gone, whatever it sent.
+                drop(sender);
+                outcome
+            });
+            while receiver.recv_timeout(INTERVAL) == Err::<(), _>(RecvTimeoutError::Timeout) {
+                let arguments = state.lock().unwrap_or_else(PoisonError::into_inner).take();
+                if let Err(error) = look_at_python(callback, arguments) {
+                    cancelled.store(true, Ordering::Relaxed);
+                    raised.get_or_insert(error);
+                }
+            }
+            worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        })
+    });
+    match raised {
+        Some(error) => Err(error),
+        None => outcome.map_err(to_python),
+    }
 }
 
-impl Reporter {
-    pub fn new(callback: Option<Py<PyAny>>) -> Self {
-        Self { callback, last: Instant::now(), error: None }
-    }
+fn pool(threads: i64) -> PyResult<rayon::ThreadPool> {
+    let Some(count) = usize::try_from(threads).ok().filter(|&count| (1..=MAX_THREADS).contains(&count)) else {
+        return Err(InputError::new_err(format!("threads: must be 1 to {MAX_THREADS}, got {threads}")));
+    };
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(count)
+        .build()
+        .map_err(|error| InputError::new_err(format!("threads: cannot start {threads} of them: {error}")))
+}
 
-    /// Looks for Ctrl-C and calls the callback with `args`, if it is time to.
-    pub fn tick<A>(&mut self, args: A) -> ControlFlow<()>
-    where
-        A: for<'py> pyo3::call::PyCallArgs<'py>,
-    {
-        if self.last.elapsed() < INTERVAL {
-            return ControlFlow::Continue(());
+fn look_at_python<A: for<'py> PyCallArgs<'py>>(callback: Option<&Py<PyAny>>, arguments: Option<A>) -> PyResult<()> {
+    Python::attach(|py| {
+        py.check_signals()?;
+        if let (Some(callback), Some(arguments)) = (callback, arguments) {
+            callback.call1(py, arguments)?;
         }
-        let outcome = Python::attach(|py| {
-            py.check_signals()?;
-            if let Some(callback) = &self.callback {
-                callback.call1(py, args)?;
-            }
-            Ok(())
-        });
-        self.last = Instant::now();
-        match outcome {
-            Ok(()) => ControlFlow::Continue(()),
-            Err(error) => {
-                self.error = Some(error);
-                ControlFlow::Break(())
-            }
-        }
-    }
-
-    /// The exception raised in the callback, else the core's own error.
-    pub fn resolve<T>(self, outcome: bgars_core::Result<T>) -> PyResult<T> {
-        outcome.map_err(|error| self.error.unwrap_or_else(|| crate::errors::to_python(error)))
-    }
+        Ok(())
+    })
 }

@@ -54,7 +54,7 @@ impl Default for Params {
             difference: Difference::Trapezoid,
             relative_tolerance: 1e-8,
             absolute_tolerance: 1e-12,
-            max_iters: 20_000,
+            max_iters: 2_000,
         }
     }
 }
