@@ -76,7 +76,7 @@ fn slow_system(normals: &[f32], mask: &[bool], width: usize) -> (DMatrix<f64>, D
     let mut right = DVector::zeros(pixels);
     let mut edge = |a: usize, b: usize, axis: usize, sign: f64| {
         if mask[a] && mask[b] {
-            let mean = |axis: usize| (f64::from(normals[3 * a + axis]) + f64::from(normals[3 * b + axis])) / 2.0;
+            let mean = |axis: usize| f64::midpoint(f64::from(normals[3 * a + axis]), f64::from(normals[3 * b + axis]));
             let (weight, step) = (mean(2) * mean(2), -sign * mean(axis) / mean(2));
             matrix[(a, a)] += weight;
             matrix[(b, b)] += weight;

@@ -48,6 +48,7 @@ pub(crate) fn finish() {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp)]
 mod tests {
     #[test]
     fn streamed_values_arrive_at_every_alignment() {

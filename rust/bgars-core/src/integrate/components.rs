@@ -28,7 +28,7 @@ pub(super) struct Run {
 #[derive(Debug)]
 pub(super) struct Runs {
     width: usize,
-    runs: Vec<Run>,
+    all: Vec<Run>,
     /// First run of each row, and the end.
     row_starts: Vec<usize>,
     pub components: Vec<Component>,
@@ -77,12 +77,12 @@ impl Runs {
             runs[index].component = component;
             components[component].pixels += end - start;
         }
-        Self { width, runs, row_starts, components }
+        Self { width, all: runs, row_starts, components }
     }
 
     /// The runs of a row.
     pub fn row(&self, row: usize) -> &[Run] {
-        &self.runs[self.row_starts[row]..self.row_starts[row + 1]]
+        &self.all[self.row_starts[row]..self.row_starts[row + 1]]
     }
 
     /// Index of each pixel's component, row-major; -1 outside the mask.
@@ -101,9 +101,9 @@ impl Runs {
     /// Mean of `value(row, col)` over each component; summed in an order that does not depend on the threads.
     pub fn means(&self, value: impl Fn(usize, usize) -> f64 + Sync) -> Vec<f64> {
         let run_sum = |run: &Run| (run.start..run.end).map(|col| value(run.row, col)).sum::<f64>();
-        let run_sums: Vec<f64> = self.runs.par_iter().map(run_sum).collect();
+        let run_sums: Vec<f64> = self.all.par_iter().map(run_sum).collect();
         let mut means = vec![0.0; self.components.len()];
-        for (run, sum) in self.runs.iter().zip(run_sums) {
+        for (run, sum) in self.all.iter().zip(run_sums) {
             means[run.component] += sum;
         }
         for (mean, component) in means.iter_mut().zip(&self.components) {

@@ -77,6 +77,7 @@ fn grown_cutoffs<K: Key>(keys: &[Lanes<K>], gap: K) -> Lanes<K> {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp)]
 mod tests {
     use super::*;
 

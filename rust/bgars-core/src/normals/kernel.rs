@@ -6,7 +6,8 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::confidence::confidence;
-use super::lanes::{Choice, LaneKernel};
+use super::lane_solve::{Choice, LaneSolver};
+use super::lanes::{self, Input, Sink};
 use super::robust::{self, RobustFilter, RobustScratch};
 use super::solve::{Solution, SubsetSolver};
 use super::specular::specular_filter;
@@ -194,7 +195,7 @@ struct Kernel<'a, P> {
     robust: Option<RobustFilter>,
     solver: SubsetSolver,
     /// The fast kernel, where it can serve.
-    lanes: Option<LaneKernel>,
+    lanes: Option<LaneSolver>,
     /// The images.
     planes: Vec<&'a [P]>,
     /// 1 / intensity of each light.
@@ -301,7 +302,7 @@ impl<'a, P: Pixel> Kernel<'a, P> {
             Method::SpecularFilter { threshold } => Some(Choice::UpToGap(gap(threshold, radiometry.full_scale))),
             Method::RobustFilter(_) => None,
         };
-        let lanes = choice.and_then(|choice| LaneKernel::new(lights, choice, radiometry.full_scale));
+        let lanes = choice.and_then(|choice| LaneSolver::new(lights, choice));
         let planes = (0..stack.lights()).map(|light| stack.plane(light)).collect();
         Self { stack, lights, radiometry, mask, method, robust, solver, lanes, planes, scales, full_scale }
     }
@@ -310,8 +311,10 @@ impl<'a, P: Pixel> Kernel<'a, P> {
     fn task(&self, pixels: Range<usize>, out: &mut Out<'_>, scratch: &mut Scratch) {
         let first = pixels.start;
         let careful = &mut |pixel: usize, out: &mut Out<'_>| self.pixel(pixel, pixel - first, out, scratch);
-        if let Some(lanes) = &self.lanes {
-            lanes.run(&self.planes, self.radiometry, &self.scales, self.mask, pixels, out, careful);
+        if let Some(solver) = &self.lanes {
+            let input =
+                Input { planes: &self.planes, radiometry: self.radiometry, scales: &self.scales, mask: self.mask };
+            lanes::run(solver, &input, pixels, &mut Sink { out, careful });
             return;
         }
         for pixel in pixels {

@@ -1,480 +1,132 @@
-//! The fast kernel: least squares on 64 pixels at once, in `f32`, for distant lights.
+//! The fast kernel: blocks of 64 pixels, for distant lights.
 //!
 //! Plain loops over the lanes of a block, which the compiler turns into the vector instructions of the processor it runs on.
-//! A subset of lights whose equations are too badly conditioned for `f32` is left to the careful kernel, pixel by pixel.
 
 use std::ops::Range;
 
 use bytemuck::NoUninit;
 use multiversion::multiversion;
-use nalgebra::{Matrix3, Vector3};
 
 use super::confidence::{HALF_DEG, PRIOR_RESIDUAL};
 use super::cutoff::{LANES, Lanes, cutoffs};
 use super::kernel::Out;
-use super::solve::MAX_TABLE_LIGHTS;
-use crate::lights::conditioning;
-use crate::{Lights, Pixel, Radiometry, stream};
+use super::lane_solve::{Choice, LaneSolver, Solutions, is_kept, solve};
+use crate::{Pixel, Radiometry, stream};
 
-/// Subsets of lights below this [`conditioning`] are solved in `f64`: one refinement in `f32` no longer makes up for rounding.
-const MIN_LANE_CONDITIONING: f64 = 1e-3;
-
-/// What a block of pixels leaves undone: bit k is set where pixel k wants the careful kernel.
-pub(super) type Careful = u64;
-
-/// Which lights a block keeps.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Choice {
-    /// All of them.
-    All,
-    /// Up to the first gap of the sorted values, in linear grey levels.
-    UpToGap(f32),
+/// What every block reads.
+pub(super) struct Input<'a, P> {
+    /// The images.
+    pub planes: &'a [&'a [P]],
+    pub radiometry: &'a Radiometry<'a, P>,
+    /// 1 / intensity of each light.
+    pub scales: &'a [f32],
+    pub mask: Option<&'a [bool]>,
 }
 
-/// The six entries of a symmetric inverse, padded to a power of two; all zero where it is not to be used.
-type Inverse = [f32; 8];
-
-/// What does not change from pixel to pixel.
-#[derive(Debug)]
-pub(super) struct LaneKernel {
-    choice: Choice,
-    /// Unit vectors to the lights.
-    directions: Vec<[f32; 3]>,
-    /// `(L^T L)^-1 L^T`, a column a light.
-    pseudo_inverse: Vec<[f32; 3]>,
-    all: [f32; 6],
-    /// `L^T L` of all lights: xx, xy, xz, yy, yz, zz.
-    gram: [f32; 6],
-    /// The inverse for every subset (bit k: light k); empty for more than 12 lights.
-    table: Vec<Inverse>,
-    full_scale: f32,
+/// What every block writes to, and who does what the lanes leave over.
+pub(super) struct Sink<'a, 'b> {
+    /// The pixels of the task alone.
+    pub out: &'a mut Out<'b>,
+    /// Called with a pixel of the image; must write all of it.
+    pub careful: &'a mut dyn FnMut(usize, &mut Out<'b>),
 }
 
-impl LaneKernel {
-    /// `None` where the lanes cannot serve: near lights, or lights that are badly conditioned even together.
-    pub fn new(lights: &Lights, choice: Choice, full_scale: f32) -> Option<Self> {
-        let Lights::Directional(directions) = lights else { return None };
-        let gram = directions.iter().fold(Matrix3::zeros(), |gram, light| gram + light * light.transpose());
-        let exact = gram.try_inverse().filter(|_| conditioning(&gram) >= MIN_LANE_CONDITIONING)?;
-        let of_subset = |subset: usize| {
-            let lights = directions.iter().enumerate().filter(|(light, _)| subset >> light & 1 == 1);
-            inverse(&lights.fold(Matrix3::zeros(), |gram, (_, light)| gram + light * light.transpose()))
+/// Fills the keys of a block of pixels and, where there are any, the offsets.
+type Load<'a, K> = dyn FnMut(&Range<usize>, &mut [Lanes<K>], &mut Lanes<f32>) + 'a;
+
+/// Works on `pixels` (of the whole image).
+#[allow(clippy::float_cmp)] // intensities that are 1 by default
+pub(super) fn run<P: Pixel>(solver: &LaneSolver, input: &Input<'_, P>, pixels: Range<usize>, sink: &mut Sink<'_, '_>) {
+    let Input { planes, radiometry, scales, mask } = *input;
+    let plain = radiometry.response.is_none() && scales.iter().all(|&scale| scale == 1.0);
+    if plain {
+        let has_offsets = radiometry.dark.is_some() || radiometry.black_level != 0.0;
+        let mut keys = vec![[P::LEAST; LANES]; planes.len()];
+        let mut load = |block: &Range<usize>, keys: &mut [Lanes<P>], offsets: &mut Lanes<f32>| {
+            for (key, plane) in keys.iter_mut().zip(planes) {
+                match <&Lanes<P>>::try_from(&plane[block.clone()]) {
+                    Ok(full) => *key = *full,
+                    Err(_) => key[..block.len()].copy_from_slice(&plane[block.clone()]),
+                }
+            }
+            if has_offsets {
+                load_offsets(radiometry, block, offsets);
+            }
         };
-        let tabulated = directions.len() <= MAX_TABLE_LIGHTS && matches!(choice, Choice::UpToGap(_));
-        Some(Self {
-            choice,
-            directions: directions.iter().map(single).collect(),
-            pseudo_inverse: directions.iter().map(|light| single(&(exact * light))).collect(),
-            all: upper(&exact),
-            gram: upper(&gram),
-            table: if tabulated { (0..1 << directions.len()).map(of_subset).collect() } else { Vec::new() },
-            full_scale,
-        })
-    }
-
-    /// Works on `pixels` (of the whole image) and writes to `out` (of these pixels alone). `careful(pixel)` is called for
-    /// every pixel that is left over; it must write all of that pixel.
-    pub fn run<P: Pixel>(
-        &self,
-        planes: &[&[P]],
-        radiometry: &Radiometry<'_, P>,
-        scales: &[f32],
-        mask: Option<&[bool]>,
-        pixels: Range<usize>,
-        out: &mut Out<'_>,
-        careful: &mut dyn FnMut(usize, &mut Out<'_>),
-    ) {
-        let plain = radiometry.response.is_none() && scales.iter().all(|&scale| scale == 1.0);
-        let offsets = radiometry.dark.is_some() || radiometry.black_level != 0.0;
-        if plain {
-            let mut keys = vec![[P::LEAST; LANES]; planes.len()];
-            let mut load = |block: &Range<usize>, keys: &mut [Lanes<P>], offset: &mut Lanes<f32>| {
-                for (key, plane) in keys.iter_mut().zip(planes) {
-                    match <&Lanes<P>>::try_from(&plane[block.clone()]) {
-                        Ok(full) => *key = *full,
-                        Err(_) => key[..block.len()].copy_from_slice(&plane[block.clone()]),
-                    }
+        run_blocks(solver, &mut load, &mut keys, has_offsets, (mask, radiometry.full_scale), pixels, sink);
+    } else {
+        let mut keys = vec![[0.0f32; LANES]; planes.len()];
+        let mut load = |block: &Range<usize>, keys: &mut [Lanes<f32>], offsets: &mut Lanes<f32>| {
+            load_offsets(radiometry, block, offsets);
+            for ((key, plane), &scale) in keys.iter_mut().zip(planes).zip(scales) {
+                for ((key, &code), &offset) in key.iter_mut().zip(&plane[block.clone()]).zip(&*offsets) {
+                    *key = (radiometry.linearise(code) - offset) * scale;
                 }
-                if offsets {
-                    for (offset, pixel) in offset.iter_mut().zip(block.clone()) {
-                        *offset = radiometry.offset(pixel);
-                    }
-                }
-            };
-            run_blocks(self, &mut load, &mut keys, offsets, mask, pixels, out, careful);
-        } else {
-            let mut keys = vec![[0.0f32; LANES]; planes.len()];
-            let mut load = |block: &Range<usize>, keys: &mut [Lanes<f32>], _: &mut Lanes<f32>| {
-                let mut offset = [0.0; LANES];
-                for (offset, pixel) in offset.iter_mut().zip(block.clone()) {
-                    *offset = radiometry.offset(pixel);
-                }
-                for ((key, plane), &scale) in keys.iter_mut().zip(planes).zip(scales) {
-                    for ((key, &code), &offset) in key.iter_mut().zip(&plane[block.clone()]).zip(&offset) {
-                        *key = (radiometry.linearise(code) - offset) * scale;
-                    }
-                }
-            };
-            run_blocks(self, &mut load, &mut keys, false, mask, pixels, out, careful);
-        }
+            }
+        };
+        run_blocks(solver, &mut load, &mut keys, false, (mask, radiometry.full_scale), pixels, sink);
     }
 }
 
-/// The least squares of a block.
-struct Solutions {
-    /// `rho n`, by component.
-    scaled: [Lanes<f32>; 3],
-    squared_residuals: Lanes<f32>,
-    /// `tr C - n^T C n`, `C` the inverse in use.
-    turning: Lanes<f32>,
-    kept: Lanes<u16>,
-    careful: Careful,
+fn load_offsets<P: Pixel>(radiometry: &Radiometry<'_, P>, block: &Range<usize>, offsets: &mut Lanes<f32>) {
+    for (offset, pixel) in offsets.iter_mut().zip(block.clone()) {
+        *offset = radiometry.offset(pixel);
+    }
 }
 
 /// The hot loop, compiled for several instruction sets; one call a task.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl+avx512dq", "x86_64+avx2+fma"))]
 fn run_blocks<K: Pixel>(
-    kernel: &LaneKernel,
-    load: &mut dyn FnMut(&Range<usize>, &mut [Lanes<K>], &mut Lanes<f32>),
+    solver: &LaneSolver,
+    load: &mut Load<'_, K>,
     keys: &mut [Lanes<K>],
-    offsets: bool,
-    mask: Option<&[bool]>,
+    has_offsets: bool,
+    (mask, full_scale): (Option<&[bool]>, f32),
     pixels: Range<usize>,
-    out: &mut Out<'_>,
-    careful: &mut dyn FnMut(usize, &mut Out<'_>),
+    sink: &mut Sink<'_, '_>,
 ) {
-    let mut offset = [0.0; LANES];
+    let mut offsets = [0.0; LANES];
     for first in pixels.clone().step_by(LANES) {
         let block = first..(first + LANES).min(pixels.end);
-        let at = first - pixels.start;
+        let span = first - pixels.start..block.end - pixels.start;
         let used = mask.map(|mask| &mask[block.clone()]);
         if used.is_some_and(|used| !used.contains(&true)) {
-            out.clear(at..at + block.len());
+            sink.out.clear(span);
             continue;
         }
-        load(&block, keys, &mut offset);
-        let offset = offsets.then_some(&offset);
+        load(&block, keys, &mut offsets);
+        let offsets = has_offsets.then_some(&offsets);
         // The usual number of lights is unrolled.
         let solutions = match <&[Lanes<K>; 8]>::try_from(&*keys) {
-            Ok(keys) => solve(kernel, keys, offset),
-            Err(_) => solve(kernel, keys, offset),
+            Ok(keys) => solve(solver, keys, offsets),
+            Err(_) => solve(solver, keys, offsets),
         };
-        write(kernel, &solutions, used, at..at + block.len(), out);
-        if !out.kept_sets.is_empty() {
-            write_sets(kernel, keys, used, at..at + block.len(), out);
+        write(full_scale, &solutions, used, span.clone(), sink.out);
+        if !sink.out.kept_sets.is_empty() {
+            write_sets(solver.choice, keys, used, span, sink.out);
         }
         if solutions.careful != 0 {
             for lane in (0..block.len()).filter(|lane| solutions.careful >> lane & 1 == 1) {
                 if used.is_none_or(|used| used[lane]) {
-                    careful(first + lane, out);
+                    (sink.careful)(first + lane, sink.out);
                 }
             }
         }
     }
-    if out.streamed {
+    if sink.out.streamed {
         stream::finish();
     }
 }
 
-/// Chooses and solves; `keys` of a length known to the compiler are unrolled.
-#[inline(always)]
-fn solve<K: Pixel>(kernel: &LaneKernel, keys: &[Lanes<K>], offset: Option<&Lanes<f32>>) -> Solutions {
-    match kernel.choice {
-        Choice::All => solve_all(kernel, keys, offset),
-        Choice::UpToGap(gap) => {
-            let cutoffs = cutoffs(keys, K::gap(gap));
-            let mut any_dropped = false;
-            for key in keys {
-                for lane in 0..LANES {
-                    any_dropped |= !is_kept(key[lane], cutoffs[lane]);
-                }
-            }
-            if any_dropped { solve_kept(kernel, keys, &cutoffs, offset) } else { solve_all(kernel, keys, offset) }
-        }
-    }
-}
-
-/// The linear value of a light in one lane.
-#[inline(always)]
-fn value<K: Pixel>(key: K, offset: Option<&Lanes<f32>>, lane: usize) -> f32 {
-    offset.map_or(key.to_f32(), |offset| key.to_f32() - offset[lane])
-}
-
-/// Calls `$body` for the lights by eights, then fours, then one by one: `$keys`, `$vectors` are arrays of that size, over
-/// which the compiler unrolls, and `$first` is the first light.
-macro_rules! by_chunks {
-    ($all_keys:expr, $all_vectors:expr, |$keys:ident, $vectors:ident, $first:ident| $body:expr) => {{
-        let (mut keys_left, mut vectors_left) = ($all_keys, $all_vectors);
-        let mut $first = 0;
-        by_chunks!(@size 8, keys_left, vectors_left, $keys, $vectors, $first, $body);
-        by_chunks!(@size 4, keys_left, vectors_left, $keys, $vectors, $first, $body);
-        by_chunks!(@size 1, keys_left, vectors_left, $keys, $vectors, $first, $body);
-        let _ = ($first, keys_left, vectors_left);
-    }};
-    (@size $size:literal, $keys_left:ident, $vectors_left:ident, $keys:ident, $vectors:ident, $first:ident, $body:expr) => {
-        while let (Some(($keys, keys_rest)), Some(($vectors, vectors_rest))) =
-            ($keys_left.split_first_chunk::<$size>(), $vectors_left.split_first_chunk::<$size>())
-        {
-            $body;
-            ($keys_left, $vectors_left) = (keys_rest, vectors_rest);
-            $first += $size;
-        }
-    };
-}
-
-/// Every light of every lane is kept: one matrix for all.
-#[inline(always)]
-fn solve_all<K: Pixel>(kernel: &LaneKernel, keys: &[Lanes<K>], offset: Option<&Lanes<f32>>) -> Solutions {
-    let mut sums = [[0.0f32; LANES]; 4];
-    by_chunks!(keys, kernel.pseudo_inverse.as_slice(), |keys, columns, _first| add_columns(
-        keys, columns, offset, &mut sums
-    ));
-    let [scaled @ .., squares] = sums;
-    let [xx, xy, xz, yy, yz, zz] = kernel.gram;
-    let mut turning = [0.0f32; LANES];
-    let mut residuals = [0.0f32; LANES];
-    for lane in 0..LANES {
-        let [x, y, z] = [scaled[0][lane], scaled[1][lane], scaled[2][lane]];
-        // |I|^2 - |L g|^2; what rounding leaves is far below the prior of 2 %.
-        let explained = x * (xx * x + 2.0 * (xy * y + xz * z)) + y * (yy * y + 2.0 * yz * z) + z * (zz * z);
-        residuals[lane] = if squares[lane] > explained { squares[lane] - explained } else { 0.0 };
-        turning[lane] = turning_of(&kernel.all, [x, y, z]);
-    }
-    let kept = [keys.len() as u16; LANES];
-    Solutions { scaled, squared_residuals: residuals, turning, kept, careful: 0 }
-}
-
-/// `sums += (column * value, value^2)` over the lights of a chunk.
-#[inline(always)]
-fn add_columns<K: Pixel, const C: usize>(
-    keys: &[Lanes<K>; C],
-    columns: &[[f32; 3]; C],
-    offset: Option<&Lanes<f32>>,
-    sums: &mut [Lanes<f32>; 4],
-) {
-    for lane in 0..LANES {
-        let [mut x, mut y, mut z, mut square] = std::array::from_fn(|sum| sums[sum][lane]);
-        for light in 0..C {
-            let value = value(keys[light][lane], offset, lane);
-            let [a, b, c] = columns[light];
-            x += a * value;
-            y += b * value;
-            z += c * value;
-            square += value * value;
-        }
-        [sums[0][lane], sums[1][lane], sums[2][lane], sums[3][lane]] = [x, y, z, square];
-    }
-}
-
-/// Lights over the cutoff are dropped: normal equations of each lane, refined once.
-#[inline(always)]
-fn solve_kept<K: Pixel>(
-    kernel: &LaneKernel,
-    keys: &[Lanes<K>],
-    cutoffs: &Lanes<K>,
-    offset: Option<&Lanes<f32>>,
-) -> Solutions {
-    let directions = kernel.directions.as_slice();
-    let mut kept = [0u16; LANES];
-    let mut sums = [[0.0f32; LANES]; 3];
-    by_chunks!(keys, directions, |keys, directions, _first| add_kept(
-        keys, directions, cutoffs, offset, &mut sums, &mut kept
-    ));
-    let inverses = if kernel.table.is_empty() {
-        let mut gram = [[0.0f32; LANES]; 6];
-        by_chunks!(keys, directions, |keys, directions, _first| add_gram(keys, directions, cutoffs, &mut gram));
-        inverses_of(&gram)
-    } else {
-        let mut subsets = [0u16; LANES];
-        by_chunks!(keys, directions, |keys, _directions, first| add_bits(keys, cutoffs, first, &mut subsets));
-        tabulated_inverses(&kernel.table, &subsets)
-    };
-    let mut scaled = product(&inverses, &sums);
-    // One step of iterative refinement: the residual of each light, and what it corrects.
-    let mut corrections = [[0.0f32; LANES]; 4];
-    by_chunks!(keys, directions, |keys, directions, _first| {
-        add_residuals(keys, directions, cutoffs, offset, &scaled, &mut corrections);
-    });
-    let [corrections @ .., squared_residuals] = corrections;
-    let correction = product(&inverses, &corrections);
-    let mut turning = [0.0f32; LANES];
-    let mut careful = 0;
-    for lane in 0..LANES {
-        for axis in 0..3 {
-            scaled[axis][lane] += correction[axis][lane];
-        }
-        let inverse = std::array::from_fn(|entry| inverses[entry][lane]);
-        turning[lane] = turning_of(&inverse, [scaled[0][lane], scaled[1][lane], scaled[2][lane]]);
-    }
-    for lane in 0..LANES {
-        careful |= u64::from(inverses[0][lane] == 0.0) << lane;
-    }
-    Solutions { scaled, squared_residuals, turning, kept, careful }
-}
-
-/// True for a light that is kept.
-#[inline(always)]
-fn is_kept<K: Pixel>(key: K, cutoff: K) -> bool {
-    !key.is_over(cutoff, K::gap(0.0))
-}
-
-/// `sums += direction * value`, `counts += 1` over the kept lights of a chunk.
-#[inline(always)]
-fn add_kept<K: Pixel, const C: usize>(
-    keys: &[Lanes<K>; C],
-    directions: &[[f32; 3]; C],
-    cutoffs: &Lanes<K>,
-    offset: Option<&Lanes<f32>>,
-    sums: &mut [Lanes<f32>; 3],
-    counts: &mut Lanes<u16>,
-) {
-    for lane in 0..LANES {
-        for key in keys {
-            counts[lane] += u16::from(is_kept(key[lane], cutoffs[lane]));
-        }
-    }
-    for lane in 0..LANES {
-        let [mut x, mut y, mut z] = std::array::from_fn(|sum| sums[sum][lane]);
-        for light in 0..C {
-            let kept = is_kept(keys[light][lane], cutoffs[lane]);
-            let value = if kept { value(keys[light][lane], offset, lane) } else { 0.0 };
-            let [a, b, c] = directions[light];
-            x += a * value;
-            y += b * value;
-            z += c * value;
-        }
-        [sums[0][lane], sums[1][lane], sums[2][lane]] = [x, y, z];
-    }
-}
-
-/// `sums += (direction * residual, residual^2)` over the kept lights of a chunk, `scaled` being the solution so far.
-#[inline(always)]
-fn add_residuals<K: Pixel, const C: usize>(
-    keys: &[Lanes<K>; C],
-    directions: &[[f32; 3]; C],
-    cutoffs: &Lanes<K>,
-    offset: Option<&Lanes<f32>>,
-    scaled: &[Lanes<f32>; 3],
-    sums: &mut [Lanes<f32>; 4],
-) {
-    for lane in 0..LANES {
-        let [mut x, mut y, mut z, mut square] = std::array::from_fn(|sum| sums[sum][lane]);
-        let [u, v, w] = std::array::from_fn(|axis| scaled[axis][lane]);
-        for light in 0..C {
-            let [a, b, c] = directions[light];
-            let difference = value(keys[light][lane], offset, lane) - (a * u + b * v + c * w);
-            let residual = if is_kept(keys[light][lane], cutoffs[lane]) { difference } else { 0.0 };
-            x += a * residual;
-            y += b * residual;
-            z += c * residual;
-            square += residual * residual;
-        }
-        [sums[0][lane], sums[1][lane], sums[2][lane], sums[3][lane]] = [x, y, z, square];
-    }
-}
-
-/// Sets the bit of each kept light of a chunk.
-#[inline(always)]
-fn add_bits<K: Pixel, const C: usize>(
-    keys: &[Lanes<K>; C],
-    cutoffs: &Lanes<K>,
-    first: usize,
-    subsets: &mut Lanes<u16>,
-) {
-    for lane in 0..LANES {
-        let mut bits = 0u16;
-        for (light, key) in keys.iter().enumerate() {
-            bits |= if is_kept(key[lane], cutoffs[lane]) { 1 << light } else { 0 };
-        }
-        subsets[lane] |= bits << first;
-    }
-}
-
-/// `gram += direction direction^T` over the kept lights of a chunk.
-#[inline(always)]
-fn add_gram<K: Pixel, const C: usize>(
-    keys: &[Lanes<K>; C],
-    directions: &[[f32; 3]; C],
-    cutoffs: &Lanes<K>,
-    gram: &mut [Lanes<f32>; 6],
-) {
-    for lane in 0..LANES {
-        let mut sums: [f32; 6] = std::array::from_fn(|entry| gram[entry][lane]);
-        for (&[a, b, c], key) in directions.iter().zip(keys) {
-            let weight = if is_kept(key[lane], cutoffs[lane]) { 1.0 } else { 0.0 };
-            for (sum, product) in sums.iter_mut().zip([a * a, a * b, a * c, b * b, b * c, c * c]) {
-                *sum += weight * product;
-            }
-        }
-        for (gram, sum) in gram.iter_mut().zip(sums) {
-            gram[lane] = sum;
-        }
-    }
-}
-
-/// `tr C - n^T C n` of `g = rho n`.
-#[inline(always)]
-fn turning_of(inverse: &[f32; 6], [x, y, z]: [f32; 3]) -> f32 {
-    let [xx, xy, xz, yy, yz, zz] = *inverse;
-    let along = x * (xx * x + 2.0 * (xy * y + xz * z)) + y * (yy * y + 2.0 * yz * z) + z * (zz * z);
-    (xx + yy + zz) - along / (x * x + y * y + z * z)
-}
-
-#[inline(always)]
-fn product(inverses: &[Lanes<f32>; 6], vectors: &[Lanes<f32>; 3]) -> [Lanes<f32>; 3] {
-    let [xx, xy, xz, yy, yz, zz] = inverses;
-    let mut out = [[0.0f32; LANES]; 3];
-    for lane in 0..LANES {
-        let [x, y, z] = [vectors[0][lane], vectors[1][lane], vectors[2][lane]];
-        out[0][lane] = xx[lane] * x + xy[lane] * y + xz[lane] * z;
-        out[1][lane] = xy[lane] * x + yy[lane] * y + yz[lane] * z;
-        out[2][lane] = xz[lane] * x + yz[lane] * y + zz[lane] * z;
-    }
-    out
-}
-
-/// The inverse of each lane's subset of lights from the table.
-#[inline(always)]
-fn tabulated_inverses(table: &[Inverse], subsets: &Lanes<u16>) -> [Lanes<f32>; 6] {
-    let mut inverses = [[0.0f32; LANES]; 6];
-    for lane in 0..LANES {
-        let entry = &table[usize::from(subsets[lane])];
-        for (inverse, &entry) in inverses.iter_mut().zip(entry) {
-            inverse[lane] = entry;
-        }
-    }
-    inverses
-}
-
-/// The inverses of Gram matrices; zero where they are not to be used.
-#[inline(always)]
-fn inverses_of(gram: &[Lanes<f32>; 6]) -> [Lanes<f32>; 6] {
-    let mut inverses = [[0.0f32; LANES]; 6];
-    for lane in 0..LANES {
-        let [xx, xy, xz, yy, yz, zz] = std::array::from_fn(|entry| gram[entry][lane]);
-        let cofactors = [yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy];
-        let determinant = xx * cofactors[0] + xy * cofactors[1] + xz * cofactors[2];
-        let third = (xx + yy + zz) / 3.0;
-        let usable = determinant > MIN_LANE_CONDITIONING as f32 * (third * third * third);
-        let scale = if usable { 1.0 / determinant } else { 0.0 };
-        let entries =
-            [cofactors[0], cofactors[1], cofactors[2], xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy];
-        for (inverse, entry) in inverses.iter_mut().zip(entries) {
-            inverse[lane] = entry * scale;
-        }
-    }
-    inverses
-}
-
 /// Normals, albedo, mask, confidence and counts of a block.
 #[inline(always)]
-fn write(kernel: &LaneKernel, solutions: &Solutions, used: Option<&[bool]>, span: Range<usize>, out: &mut Out<'_>) {
+fn write(full_scale: f32, solutions: &Solutions, used: Option<&[bool]>, span: Range<usize>, out: &mut Out<'_>) {
     const DEG2: f32 = ((180.0 / std::f64::consts::PI) * (180.0 / std::f64::consts::PI) / (HALF_DEG * HALF_DEG)) as f32;
     const PRIOR2: f32 = (PRIOR_RESIDUAL * PRIOR_RESIDUAL) as f32;
     let mut normals = [0.0f32; 3 * LANES];
     let [mut albedo, mut confidence] = [[0.0f32; LANES]; 2];
     let mut valid = [false; LANES];
-    let per_full_scale = 1.0 / kernel.full_scale;
+    let per_full_scale = 1.0 / full_scale;
     for lane in 0..LANES {
         let [x, y, z] = [solutions.scaled[0][lane], solutions.scaled[1][lane], solutions.scaled[2][lane]];
         let square = x * x + y * y + z * z;
@@ -516,13 +168,13 @@ fn store<T: NoUninit, const N: usize>(block: &[T; N], out: &mut [T], streamed: b
 /// The kept lights themselves; asked for seldom, so they are found once more.
 #[inline(never)]
 fn write_sets<K: Pixel>(
-    kernel: &LaneKernel,
+    choice: Choice,
     keys: &[Lanes<K>],
     used: Option<&[bool]>,
     span: Range<usize>,
     out: &mut Out<'_>,
 ) {
-    let cutoffs = match kernel.choice {
+    let cutoffs = match choice {
         Choice::All => [K::LARGEST; LANES],
         Choice::UpToGap(gap) => cutoffs(keys, K::gap(gap)),
     };
@@ -533,23 +185,4 @@ fn write_sets<K: Pixel>(
             *kept = here && is_kept(key[lane], cutoffs[lane]);
         }
     }
-}
-
-/// The entries of the upper triangle: xx, xy, xz, yy, yz, zz.
-fn upper(matrix: &Matrix3<f64>) -> [f32; 6] {
-    [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|entry| matrix[entry] as f32)
-}
-
-fn inverse(gram: &Matrix3<f64>) -> Inverse {
-    match gram.try_inverse() {
-        Some(inverse) if conditioning(gram) >= MIN_LANE_CONDITIONING => {
-            let [xx, xy, xz, yy, yz, zz] = upper(&inverse);
-            [xx, xy, xz, yy, yz, zz, 0.0, 0.0]
-        }
-        _ => [0.0; 8],
-    }
-}
-
-fn single(vector: &Vector3<f64>) -> [f32; 3] {
-    [vector.x as f32, vector.y as f32, vector.z as f32]
 }

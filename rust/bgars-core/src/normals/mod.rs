@@ -7,6 +7,7 @@
 mod confidence;
 mod cutoff;
 mod kernel;
+mod lane_solve;
 mod lanes;
 mod robust;
 mod solve;
