@@ -75,20 +75,26 @@ pub(super) struct Solutions {
     pub careful: Careful,
 }
 
-/// Chooses and solves; `keys` of a length known to the compiler are unrolled.
+/// Chooses and solves; `keys` of a length known to the compiler are unrolled. `masks` is scratch of the same length.
 #[inline(always)]
-pub(super) fn solve<K: Pixel>(solver: &LaneSolver, keys: &[Lanes<K>], offset: Option<&Lanes<f32>>) -> Solutions {
+pub(super) fn solve<K: Pixel>(
+    solver: &LaneSolver,
+    keys: &[Lanes<K>],
+    masks: &mut [Lanes<u8>],
+    offset: Option<&Lanes<f32>>,
+) -> Solutions {
     match solver.choice {
         Choice::All => solve_all(solver, keys, offset),
         Choice::UpToGap(gap) => {
             let cutoffs = cutoffs(keys, K::gap(gap));
-            let mut any_dropped = false;
-            for key in keys {
+            let mut kept_by_all = 1;
+            for (mask, key) in masks.iter_mut().zip(keys) {
                 for lane in 0..LANES {
-                    any_dropped |= !is_kept(key[lane], cutoffs[lane]);
+                    mask[lane] = u8::from(is_kept(key[lane], cutoffs[lane]));
+                    kept_by_all &= mask[lane];
                 }
             }
-            if any_dropped { solve_kept(solver, keys, &cutoffs, offset) } else { solve_all(solver, keys, offset) }
+            if kept_by_all == 1 { solve_all(solver, keys, offset) } else { solve_kept(solver, keys, masks, offset) }
         }
     }
 }
@@ -165,34 +171,34 @@ fn add_columns<K: Pixel, const C: usize>(
     }
 }
 
-/// Lights over the cutoff are dropped: normal equations of each lane, refined once.
+/// Some lights of some lanes are dropped: normal equations of each lane, refined once.
 #[inline(always)]
 fn solve_kept<K: Pixel>(
     solver: &LaneSolver,
     keys: &[Lanes<K>],
-    cutoffs: &Lanes<K>,
+    masks: &[Lanes<u8>],
     offset: Option<&Lanes<f32>>,
 ) -> Solutions {
     let directions = solver.directions.as_slice();
     let mut kept = [0u16; LANES];
-    let mut sums = [[0.0f32; LANES]; 3];
-    by_chunks!(keys, directions, |keys, directions, _first| add_kept(
-        keys, directions, cutoffs, offset, &mut sums, &mut kept
-    ));
+    let mut subsets = [0u16; LANES];
+    by_chunks!(masks, directions, |masks, _directions, first| count(masks, first, &mut kept, &mut subsets));
     let inverses = if solver.table.is_empty() {
         let mut gram = [[0.0f32; LANES]; 6];
-        by_chunks!(keys, directions, |keys, directions, _first| add_gram(keys, directions, cutoffs, &mut gram));
+        by_chunks!(masks, directions, |masks, directions, _first| add_gram(masks, directions, &mut gram));
         inverses_of(&gram)
     } else {
-        let mut subsets = [0u16; LANES];
-        by_chunks!(keys, directions, |keys, _directions, first| add_bits(keys, cutoffs, first, &mut subsets));
         tabulated_inverses(&solver.table, &subsets)
     };
+    let mut sums = [[0.0f32; LANES]; 3];
+    by_chunks!(keys, directions, |keys, directions, first| {
+        add_kept(keys, directions, &masks[first..], offset, &mut sums);
+    });
     let mut scaled = product(&inverses, &sums);
     // One step of iterative refinement: the residual of each light, and what it corrects.
     let mut corrections = [[0.0f32; LANES]; 4];
-    by_chunks!(keys, directions, |keys, directions, _first| {
-        add_residuals(keys, directions, cutoffs, offset, &scaled, &mut corrections);
+    by_chunks!(keys, directions, |keys, directions, first| {
+        add_residuals(keys, directions, &masks[first..], offset, &scaled, &mut corrections);
     });
     let [corrections @ .., squared_residuals] = corrections;
     let correction = product(&inverses, &corrections);
@@ -205,8 +211,9 @@ fn solve_kept<K: Pixel>(
         let inverse = std::array::from_fn(|entry| inverses[entry][lane]);
         turning[lane] = turning_of(&inverse, [scaled[0][lane], scaled[1][lane], scaled[2][lane]]);
     }
-    for lane in 0..LANES {
-        careful |= u64::from(inverses[0][lane] == 0.0) << lane;
+    let unusable = |lane: usize| inverses[0][lane] == 0.0;
+    if (0..LANES).fold(false, |any, lane| any | unusable(lane)) {
+        careful = (0..LANES).fold(0, |bits, lane| bits | Careful::from(unusable(lane)) << lane);
     }
     Solutions { scaled, squared_residuals, turning, kept, careful }
 }
@@ -217,26 +224,37 @@ pub(super) fn is_kept<K: Pixel>(key: K, cutoff: K) -> bool {
     !key.is_over(cutoff, K::gap(0.0))
 }
 
-/// `sums += direction * value`, `counts += 1` over the kept lights of a chunk.
+/// The kept lights of a chunk: how many, and which as bits from `first` on (of no use beyond 16 lights).
+#[inline(always)]
+fn count<const C: usize>(masks: &[Lanes<u8>; C], first: usize, counts: &mut Lanes<u16>, subsets: &mut Lanes<u16>) {
+    let [mut bits, mut ones] = [[0u8; LANES]; 2];
+    for (light, mask) in masks.iter().enumerate() {
+        for lane in 0..LANES {
+            ones[lane] += mask[lane];
+            bits[lane] |= mask[lane].wrapping_neg() & (1 << light);
+        }
+    }
+    for lane in 0..LANES {
+        counts[lane] += u16::from(ones[lane]);
+        subsets[lane] |= u16::from(bits[lane]).unbounded_shl(first as u32);
+    }
+}
+
+/// `sums += direction * value` over the kept lights of a chunk.
 #[inline(always)]
 fn add_kept<K: Pixel, const C: usize>(
     keys: &[Lanes<K>; C],
     directions: &[[f32; 3]; C],
-    cutoffs: &Lanes<K>,
+    masks: &[Lanes<u8>],
     offset: Option<&Lanes<f32>>,
     sums: &mut [Lanes<f32>; 3],
-    counts: &mut Lanes<u16>,
 ) {
-    for lane in 0..LANES {
-        for key in keys {
-            counts[lane] += u16::from(is_kept(key[lane], cutoffs[lane]));
-        }
-    }
+    let masks = &masks[..C];
     for lane in 0..LANES {
         let [mut x, mut y, mut z] = std::array::from_fn(|sum| sums[sum][lane]);
         for light in 0..C {
-            let kept = is_kept(keys[light][lane], cutoffs[lane]);
-            let value = if kept { value(keys[light][lane], offset, lane) } else { 0.0 };
+            let value = value(keys[light][lane], offset, lane);
+            let value = if masks[light][lane] == 1 { value } else { 0.0 };
             let [a, b, c] = directions[light];
             x += a * value;
             y += b * value;
@@ -251,18 +269,19 @@ fn add_kept<K: Pixel, const C: usize>(
 fn add_residuals<K: Pixel, const C: usize>(
     keys: &[Lanes<K>; C],
     directions: &[[f32; 3]; C],
-    cutoffs: &Lanes<K>,
+    masks: &[Lanes<u8>],
     offset: Option<&Lanes<f32>>,
     scaled: &[Lanes<f32>; 3],
     sums: &mut [Lanes<f32>; 4],
 ) {
+    let masks = &masks[..C];
     for lane in 0..LANES {
         let [mut x, mut y, mut z, mut square] = std::array::from_fn(|sum| sums[sum][lane]);
         let [u, v, w] = std::array::from_fn(|axis| scaled[axis][lane]);
         for light in 0..C {
             let [a, b, c] = directions[light];
             let difference = value(keys[light][lane], offset, lane) - (a * u + b * v + c * w);
-            let residual = if is_kept(keys[light][lane], cutoffs[lane]) { difference } else { 0.0 };
+            let residual = if masks[light][lane] == 1 { difference } else { 0.0 };
             x += a * residual;
             y += b * residual;
             z += c * residual;
@@ -272,35 +291,13 @@ fn add_residuals<K: Pixel, const C: usize>(
     }
 }
 
-/// Sets the bit of each kept light of a chunk.
-#[inline(always)]
-fn add_bits<K: Pixel, const C: usize>(
-    keys: &[Lanes<K>; C],
-    cutoffs: &Lanes<K>,
-    first: usize,
-    subsets: &mut Lanes<u16>,
-) {
-    for lane in 0..LANES {
-        let mut bits = 0u16;
-        for (light, key) in keys.iter().enumerate() {
-            bits |= if is_kept(key[lane], cutoffs[lane]) { 1 << light } else { 0 };
-        }
-        subsets[lane] |= bits << first;
-    }
-}
-
 /// `gram += direction direction^T` over the kept lights of a chunk.
 #[inline(always)]
-fn add_gram<K: Pixel, const C: usize>(
-    keys: &[Lanes<K>; C],
-    directions: &[[f32; 3]; C],
-    cutoffs: &Lanes<K>,
-    gram: &mut [Lanes<f32>; 6],
-) {
+fn add_gram<const C: usize>(masks: &[Lanes<u8>; C], directions: &[[f32; 3]; C], gram: &mut [Lanes<f32>; 6]) {
     for lane in 0..LANES {
         let mut sums: [f32; 6] = std::array::from_fn(|entry| gram[entry][lane]);
-        for (&[a, b, c], key) in directions.iter().zip(keys) {
-            let weight = if is_kept(key[lane], cutoffs[lane]) { 1.0 } else { 0.0 };
+        for (&[a, b, c], mask) in directions.iter().zip(masks) {
+            let weight = f32::from(mask[lane]);
             for (sum, product) in sums.iter_mut().zip([a * a, a * b, a * c, b * b, b * c, c * c]) {
                 *sum += weight * product;
             }

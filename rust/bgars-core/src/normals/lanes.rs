@@ -86,6 +86,8 @@ fn run_blocks<K: Pixel>(
     sink: &mut Sink<'_, '_>,
 ) {
     let mut offsets = [0.0; LANES];
+    let mut eight_masks = [[0; LANES]; 8];
+    let mut masks = vec![[0; LANES]; keys.len()];
     for first in pixels.clone().step_by(LANES) {
         let block = first..(first + LANES).min(pixels.end);
         let span = first - pixels.start..block.end - pixels.start;
@@ -98,8 +100,8 @@ fn run_blocks<K: Pixel>(
         let offsets = has_offsets.then_some(&offsets);
         // The usual number of lights is unrolled.
         let solutions = match <&[Lanes<K>; 8]>::try_from(&*keys) {
-            Ok(keys) => solve(solver, keys, offsets),
-            Err(_) => solve(solver, keys, offsets),
+            Ok(keys) => solve(solver, keys, &mut eight_masks, offsets),
+            Err(_) => solve(solver, keys, &mut masks, offsets),
         };
         write(full_scale, &solutions, used, span.clone(), sink.out);
         if !sink.out.kept_sets.is_empty() {
@@ -123,25 +125,37 @@ fn run_blocks<K: Pixel>(
 fn write(full_scale: f32, solutions: &Solutions, used: Option<&[bool]>, span: Range<usize>, out: &mut Out<'_>) {
     const DEG2: f32 = ((180.0 / std::f64::consts::PI) * (180.0 / std::f64::consts::PI) / (HALF_DEG * HALF_DEG)) as f32;
     const PRIOR2: f32 = (PRIOR_RESIDUAL * PRIOR_RESIDUAL) as f32;
-    let mut normals = [0.0f32; 3 * LANES];
-    let [mut albedo, mut confidence] = [[0.0f32; LANES]; 2];
+    let [mut scale, mut albedo, mut confidence] = [[0.0f32; LANES]; 3];
     let mut valid = [false; LANES];
     let per_full_scale = 1.0 / full_scale;
     for lane in 0..LANES {
         let [x, y, z] = [solutions.scaled[0][lane], solutions.scaled[1][lane], solutions.scaled[2][lane]];
         let square = x * x + y * y + z * z;
         let length = square.sqrt();
-        valid[lane] = z > 0.0 && square < f32::INFINITY;
-        let scale = if valid[lane] { 1.0 / length } else { f32::NAN };
-        albedo[lane] = if valid[lane] { length * per_full_scale } else { f32::NAN };
+        // NaN spreads into everything that is computed from it.
+        let length = if z > 0.0 && square < f32::INFINITY { length } else { f32::NAN };
+        scale[lane] = 1.0 / length;
+        albedo[lane] = length * per_full_scale;
         // See `confidence`: the squared standard error over the squared half-way point.
         let variance = (solutions.squared_residuals[lane] + PRIOR2 * square) / (f32::from(solutions.kept[lane]) - 2.0);
         let turning = if solutions.turning[lane] > 0.0 { solutions.turning[lane] } else { 0.0 };
-        let ratio2 = variance * turning * DEG2 / square;
-        confidence[lane] = if valid[lane] { 1.0 / (1.0 + ratio2) } else { 0.0 };
-        normals[3 * lane] = x * scale;
-        normals[3 * lane + 1] = y * scale;
-        normals[3 * lane + 2] = z * scale;
+        let certainty = 1.0 / (1.0 + variance * turning * DEG2 / square);
+        confidence[lane] = if length > 0.0 { certainty } else { 0.0 };
+    }
+    for lane in 0..LANES {
+        valid[lane] = albedo[lane] >= 0.0;
+    }
+    let [mut x, mut y, mut z] = [[0.0f32; LANES]; 3];
+    for lane in 0..LANES {
+        x[lane] = solutions.scaled[0][lane] * scale[lane];
+        y[lane] = solutions.scaled[1][lane] * scale[lane];
+        z[lane] = solutions.scaled[2][lane] * scale[lane];
+    }
+    let mut normals = [0.0f32; 3 * LANES];
+    for lane in 0..LANES {
+        normals[3 * lane] = x[lane];
+        normals[3 * lane + 1] = y[lane];
+        normals[3 * lane + 2] = z[lane];
     }
     store(&normals, &mut out.normals[3 * span.start..3 * span.end], out.streamed);
     store(&albedo, &mut out.albedo[span.clone()], out.streamed);
