@@ -25,8 +25,8 @@ def serve(shape: str, side: int) -> None:
     """Integrate once for every line on the standard input; say how many iterations it took."""
     call = bgars_call(make_field(shape, side))
     sys.stdout.write("{}\n")
+    sys.stdout.flush()
     for _ in sys.stdin:
-        sys.stdout.flush()
         iterations = call().iterations
         sys.stdout.write(json.dumps({"iterations": iterations}) + "\n")
         sys.stdout.flush()
