@@ -22,7 +22,13 @@ if TYPE_CHECKING:
 
 GROUP = "integrate"
 TOLERANCE = 1e-6
-ITERATION_LIMITS = {"rectangle": 10, "disc with holes": 10, "winding slits": 15, "random slits": 15}
+ITERATION_LIMITS = {
+    "rectangle": 10,
+    "disc with holes": 10,
+    "winding slits": 15,
+    "random slits": 15,
+    "dense slits": None,
+}
 MAX_ITERS = 200
 """Where the count of iterations gives up: far beyond its limit, and reported as such."""
 DCT_WORKERS = 2

@@ -25,7 +25,7 @@ class Field(NamedTuple):
 
 
 def make_field(shape: str, side: int) -> Field:
-    """A square field: "rectangle" (the full image), "disc with holes", "winding slits" or "random slits"."""
+    """A square field: "rectangle" (the full image), "disc with holes", or a kind of slits: `MASKS`."""
     return Field(_wavy_normals(side), MASKS[shape](side))
 
 
@@ -71,14 +71,23 @@ def _winding_slits(side: int) -> NDArray[np.bool_]:
 
 def _random_slits(side: int) -> NDArray[np.bool_]:
     """Cuts one pixel thin and a quarter of the image long, along rows and columns, wherever they fall."""
+    return _cut(side, CUTS, side // 4)
+
+
+def _dense_slits(side: int) -> NDArray[np.bool_]:
+    """Cuts of 256 pixels, one for every 128 x 128: the longer the side, the more a coarse pixel has to keep apart."""
+    return _cut(side, (side // 128) ** 2, 256)
+
+
+def _cut(side: int, cuts: int, length: int) -> NDArray[np.bool_]:
     random = np.random.default_rng(0)
     mask = np.ones((side, side), dtype=np.bool_)
-    for cut in range(CUTS):
+    for cut in range(cuts):
         row, col = (random.random(2) * side).astype(int)
         if cut % 2:
-            mask[row : row + side // 4, col] = False
+            mask[row : row + length, col] = False
         else:
-            mask[row, col : col + side // 4] = False
+            mask[row, col : col + length] = False
     return mask
 
 
@@ -87,4 +96,5 @@ MASKS = {
     "disc with holes": _disc_with_holes,
     "winding slits": _winding_slits,
     "random slits": _random_slits,
+    "dense slits": _dense_slits,
 }
