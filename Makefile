@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-rust test-python lint format accuracy instructions clean
+.PHONY: demo test test-rust test-python lint format accuracy performance instructions clean
 
 demo: $(VENV)/.installed ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
@@ -36,6 +36,9 @@ accuracy: $(VENV)/.installed ## Rewrite the tables of docs/accuracy.md (needs BG
 
 instructions: ## Instructions a pixel of each kernel against the kept counts (needs valgrind)
 	python3 benches/count_instructions.py
+performance: $(VENV)/.installed ## Measure against the peers and rewrite docs/performance.md (long; leave the machine alone)
+	$(BIN)/python -m pip install --quiet --requirement benches/peers/requirements.txt
+	$(BIN)/python docs/make_performance.py
 
 clean:
 	rm -rf $(VENV) target demo-output

@@ -1,40 +1,34 @@
-//! Integration of a hemisphere: pixels a second by size.
+//! Integration to a relative residual of 1e-6: pixels a second by shape, size and threads.
 
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use std::ops::ControlFlow;
 
 use bgars_core::integrate::{Params, integrate};
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-
-fn hemisphere(side: usize) -> (Vec<f32>, Vec<bool>) {
-    let radius = side as f64 * 0.45;
-    let mut normals = Vec::with_capacity(side * side * 3);
-    let mut mask = Vec::with_capacity(side * side);
-    for pixel in 0..side * side {
-        let x = ((pixel % side) as f64 + 0.5 - side as f64 / 2.0) / radius;
-        let y = (side as f64 / 2.0 - (pixel / side) as f64 - 0.5) / radius;
-        let squared = 1.0 - x * x - y * y;
-        mask.push(squared > 0.0);
-        normals.extend([x as f32, y as f32, squared.max(0.0).sqrt() as f32]);
-    }
-    (normals, mask)
-}
+use bgars_suite::masks::{disc_with_holes, rectangle, wavy_normals};
+use bgars_suite::{THREADS, keep_short, on_threads};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
 fn integration(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("integrate/hemisphere");
-    group.sample_size(10);
-    for side in [128usize, 256, 512] {
-        let (normals, mask) = hemisphere(side);
-        group.throughput(Throughput::Elements((side * side) as u64));
-        group.bench_with_input(BenchmarkId::from_parameter(side), &side, |bencher, &side| {
-            bencher.iter(|| {
-                let proceed = &mut |_| ControlFlow::Continue(());
-                integrate(&normals, &mask, side, None, &Params::default(), proceed).unwrap()
-            });
-        });
+    let params = Params { relative_tolerance: 1e-6, ..Params::default() };
+    for side in [512, 1024, 2048] {
+        let normals = wavy_normals(side);
+        for (shape, mask) in [("rectangle", rectangle(side)), ("disc with holes", disc_with_holes(side))] {
+            let mut group = criterion.benchmark_group(format!("integrate/{shape}, {side} x {side}"));
+            keep_short(&mut group);
+            group.throughput(Throughput::Elements((side * side) as u64));
+            for threads in THREADS {
+                group.bench_function(format!("{threads} threads"), |bencher| {
+                    on_threads(threads, || {
+                        bencher.iter(|| {
+                            let proceed = &mut |_| ControlFlow::Continue(());
+                            integrate(&normals, &mask, side, None, &params, proceed).unwrap()
+                        });
+                    });
+                });
+            }
+        }
     }
-    group.finish();
 }
 
 criterion_group!(benches, integration);

@@ -1,0 +1,131 @@
+"""Measure bgars against its peers, or read what was measured; rewrite tables and plot of docs/performance.md.
+
+python docs/make_performance.py [--json measured.json]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+ROOT = Path(__file__).parents[1]
+PEERS = ROOT / "benches" / "peers"
+sys.path.insert(0, str(PEERS))
+from table import group_lines, machine_line, of_kind  # noqa: E402
+
+PAGE = ROOT / "docs" / "performance.md"
+PLOT = ROOT / "docs" / "images" / "scaling.png"
+START, END = "<!-- tables: make performance -->", "<!-- end of tables -->"
+COMMAND = "python benches/peers/compare.py"
+TITLES = {
+    "normals": "Normals: 8 lights of 8 bit, published filter",
+    "integrate": "Integration to a relative residual of 1e-6",
+    "read": "Files to normals",
+    "write": "Height map to mesh file",
+}
+COLORS = {"rectangle": "#1b6ca8", "disc with holes": "#c8553d"}
+LINES = {1: ("o", "--"), 2: ("s", "-")}
+ROOFLINE = (
+    "The roofline: a pass that did nothing but move its bytes would run at the copy rate, measured in the same process "
+    "by a plain copy between warm buffers of 256 MiB on as many threads. The share says how much of that is reached; "
+    "what is missing went into arithmetic (few bytes, many operations), fresh memory or waiting."
+)
+
+
+def measure() -> dict[str, Any]:
+    """Run all comparisons: long, and best on a machine that does nothing else."""
+    with tempfile.TemporaryDirectory() as folder:
+        record = Path(folder) / "measured.json"
+        subprocess.run([sys.executable, str(PEERS / "compare.py"), "--json", str(record)], check=True)
+        return dict(json.loads(record.read_text(encoding="utf-8")))
+
+
+def page_lines(record: dict[str, Any]) -> list[str]:
+    """Everything between the marks of the page."""
+    option = " --quick" if record["quick"] else ""
+    lines = [
+        f"{machine_line(record['machine'])} Seconds below belong to it; only ratios within one run mean something.",
+        "",
+    ]
+    if record["quick"]:
+        lines += ["**Quick run: small sizes only, to see that the tools work.**", ""]
+    for group, title in TITLES.items():
+        tables = group_lines(record["rows"], group)
+        if not tables:
+            continue
+        lines += [f"## {title}", "", f"`{COMMAND}{option} --only {group}`", "", *tables]
+        if of_kind(record["rows"], "point", group):
+            lines += ["![Seconds a megapixel against megapixels](images/scaling.png)", ""]
+        if of_kind(record["rows"], "roofline", group):
+            lines += [ROOFLINE, ""]
+    return lines[:-1]
+
+
+def draw(points: list[dict[str, Any]], path: Path) -> None:
+    """Seconds a megapixel against megapixels: level where the cost is linear."""
+    figure, axes = plt.subplots(figsize=(8.0, 4.5), layout="constrained")
+    for shape, color in COLORS.items():
+        for threads, (marker, style) in LINES.items():
+            chosen = sorted(
+                (point for point in points if (point["shape"], point["threads"]) == (shape, threads)),
+                key=lambda point: point["megapixels"],
+            )
+            axes.plot(
+                [point["megapixels"] for point in chosen],
+                [point["seconds"] / point["megapixels"] for point in chosen],
+                color=color,
+                marker=marker,
+                linestyle=style,
+                label=f"{shape}, {threads} thread{'s' if threads > 1 else ''}",
+            )
+    sizes = sorted({point["megapixels"] for point in points})
+    axes.set_xscale("log", base=2)
+    axes.set_xticks(sizes)
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.2g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel("image size (megapixels, holes included)", fontsize=12)
+    axes.set_ylabel("integration time (s / megapixel)", fontsize=12)
+    axes.tick_params(labelsize=11)
+    axes.grid(visible=True, alpha=0.3)
+    axes.legend(fontsize=11)
+    path.parent.mkdir(exist_ok=True)
+    figure.savefig(path, dpi=150)
+    plt.close(figure)
+
+
+def rewrite(page: Path, lines: list[str]) -> None:
+    """Put lines between the marks of a page."""
+    head, rest = page.read_text(encoding="utf-8").split(START)
+    tail = rest.split(END)[1]
+    body = "\n".join(lines)
+    page.write_text(f"{head}{START}\n\n{body}\n\n{END}{tail}", encoding="utf-8")
+
+
+def main() -> None:
+    """Rewrite page and plot."""
+    parser = argparse.ArgumentParser(description="rewrite docs/performance.md")
+    parser.add_argument(
+        "--json", type=Path, help="what compare.py --json wrote; without it, everything is measured now"
+    )
+    given = parser.parse_args().json
+    record = measure() if given is None else json.loads(given.read_text(encoding="utf-8"))
+    points = of_kind(record["rows"], "point")
+    if points:
+        draw(points, PLOT)
+    rewrite(PAGE, page_lines(record))
+
+
+if __name__ == "__main__":
+    main()
