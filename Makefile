@@ -36,6 +36,7 @@ accuracy: $(VENV)/.installed ## Rewrite the tables of docs/accuracy.md (needs BG
 
 instructions: ## Instructions a pixel of each kernel against the kept counts (needs valgrind)
 	python3 benches/count_instructions.py
+
 performance: $(VENV)/.installed ## Measure against the peers and rewrite docs/performance.md (long; leave the machine alone)
 	$(BIN)/python -m pip install --quiet --requirement benches/peers/requirements.txt
 	$(BIN)/python docs/make_performance.py
