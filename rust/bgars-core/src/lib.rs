@@ -16,6 +16,7 @@ pub mod normals;
 pub mod pixel;
 pub mod radiometry;
 pub mod stack;
+pub mod vertex_normals;
 
 pub use error::{Error, Result};
 pub use lights::Lights;
