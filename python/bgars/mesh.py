@@ -56,9 +56,9 @@ def mesh_from_height(height: HeightMap, field: NormalField | None = None) -> tri
     metadata = {"unit": height.unit, "components": len(height.components)}
     if field is None:
         # In the types that trimesh keeps, so that it does not convert them once more.
-        vertices, faces = vertices.astype(np.float64), faces.astype(np.int64)
-        normals = _bgars.vertex_normals(vertices, faces)
-        return trimesh.Trimesh(vertices, faces, vertex_normals=normals, process=False, metadata=metadata)
+        wide_vertices, wide_faces = vertices.astype(np.float64), faces.astype(np.int64)
+        normals = _bgars.vertex_normals(wide_vertices, wide_faces)
+        return trimesh.Trimesh(wide_vertices, wide_faces, vertex_normals=normals, process=False, metadata=metadata)
     normals = field.normals.reshape(-1, 3)[pixels]
     grey = field.albedo.ravel()[pixels]
     known = np.isfinite(grey)
