@@ -177,8 +177,11 @@ fn ply_and_obj_say_what_they_hold() {
     assert!(matches!(bad.check().unwrap_err(), Error::OutOfRange { argument: "faces", .. }));
 }
 
+/// Vertices, faces, normals, colours.
+type Mesh = (Vec<[f32; 3]>, Vec<[u32; 3]>, Vec<[f32; 3]>, Vec<[u8; 3]>);
+
 /// A strip of `vertices` vertices with values of many lengths, and the faces between neighbours.
-fn strip(vertices: u32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>, Vec<[f32; 3]>, Vec<[u8; 3]>) {
+fn strip(vertices: u32) -> Mesh {
     let points = (0..vertices).map(|index| {
         let along = index as f32;
         [along - 7.5, 1e-7 * along, (along * 0.37).sin() * 10f32.powi(index as i32 % 9 - 4)]

@@ -48,7 +48,8 @@ fn weighted_normals<V: Coordinate>(face: [[V; 3]; 3]) -> [[f64; 3]; 3] {
     let [a, b, c] = face.map(|vertex| vertex.map(Coordinate::to_f64));
     let (ab, ac, bc) = (minus(b, a), minus(c, a), minus(c, b));
     let normal = unit(cross(ab, ac));
-    if normal == [0.0; 3] {
+    if dot(normal, normal) < 0.5 {
+        // No area, no direction.
         return [[0.0; 3]; 3];
     }
     let [ab, ac, bc] = [ab, ac, bc].map(unit);

@@ -29,7 +29,11 @@ pub fn write_ply<V: Coordinate, I: VertexIndex>(
 }
 
 /// Records of the vertices, one array after the other: each is a loop without a branch.
-fn encode_vertices<V: Coordinate, I>(mesh: MeshView<'_, V, I>, vertices: Range<usize>, block: &mut Vec<u8>) {
+fn encode_vertices<V: Coordinate, I: VertexIndex>(
+    mesh: MeshView<'_, V, I>,
+    vertices: Range<usize>,
+    block: &mut Vec<u8>,
+) {
     let colors_at = if mesh.normals.is_some() { 2 * TRIPLE_BYTES } else { TRIPLE_BYTES };
     let record_bytes = if mesh.colors.is_some() { colors_at + 3 } else { colors_at };
     block.resize(vertices.len() * record_bytes, 0);
@@ -62,7 +66,7 @@ fn float_bytes<V: Coordinate>(values: [V; 3]) -> [u8; TRIPLE_BYTES] {
     bytemuck::cast(values.map(|value| value.to_f32().to_bits().to_le()))
 }
 
-fn header<V, I>(mesh: MeshView<'_, V, I>, comments: &[String]) -> String {
+fn header<V: Coordinate, I: VertexIndex>(mesh: MeshView<'_, V, I>, comments: &[String]) -> String {
     let mut header = String::from("ply\nformat binary_little_endian 1.0\n");
     for comment in comments {
         // A line break would end the comment and start a header line of its own.
