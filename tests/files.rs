@@ -176,3 +176,142 @@ fn ply_and_obj_say_what_they_hold() {
     let bad = MeshView { faces: &[[0, 1, 3]], ..mesh };
     assert!(matches!(bad.check().unwrap_err(), Error::OutOfRange { argument: "faces", .. }));
 }
+
+/// Vertices, faces, normals, colours.
+type Mesh = (Vec<[f32; 3]>, Vec<[u32; 3]>, Vec<[f32; 3]>, Vec<[u8; 3]>);
+
+/// A strip of `vertices` vertices with values of many lengths, and the faces between neighbours.
+fn strip(vertices: u32) -> Mesh {
+    let points = (0..vertices).map(|index| {
+        let along = index as f32;
+        [along - 7.5, 1e-7 * along, (along * 0.37).sin() * 10f32.powi(index as i32 % 9 - 4)]
+    });
+    let faces = (2..vertices).map(|index| [index - 2, index - 1, index]);
+    let normals = (0..vertices).map(|index| {
+        let angle = index as f32 * 0.01;
+        [angle.sin(), -angle.cos(), if index % 1000 == 0 { -0.0 } else { 1.0 }]
+    });
+    let colors = (0..vertices).map(|index| [index as u8, (index / 256) as u8, 128]);
+    (points.collect(), faces.collect(), normals.collect(), colors.collect())
+}
+
+/// The slow plain twin of `write_ply`, without its header.
+fn plain_ply(mesh: MeshView<'_>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for (index, vertex) in mesh.vertices.iter().enumerate() {
+        for value in vertex.iter().chain(mesh.normals.map_or(&[][..], |normals| &normals[index])) {
+            bytes.extend(value.to_le_bytes());
+        }
+        bytes.extend(mesh.colors.map_or(&[][..], |colors| &colors[index]));
+    }
+    for face in mesh.faces {
+        bytes.push(3);
+        bytes.extend(face.iter().flat_map(|index| index.to_le_bytes()));
+    }
+    bytes
+}
+
+#[test]
+fn mesh_files_do_not_depend_on_blocks_or_threads() {
+    let block = 1 << 14;
+    for count in [3, block - 1, block, block + 1, 5 * block + 2] {
+        let (vertices, faces, normals, colors) = strip(count);
+        for with in [false, true] {
+            let (normals, colors) = (with.then_some(&normals[..]), with.then_some(&colors[..]));
+            let mesh = MeshView { vertices: &vertices, faces: &faces, normals, colors };
+            let written = [1, 2, 3].map(|threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let (mut ply, mut obj) = (Vec::new(), Vec::new());
+                pool.install(|| write_ply(mesh, &[], &mut ply).and_then(|()| write_obj(mesh, &[], &mut obj))).unwrap();
+                (ply, obj)
+            });
+            assert!(written[0] == written[1] && written[0] == written[2], "{count} vertices");
+            let (ply, obj) = &written[0];
+            assert!(ply.ends_with(&plain_ply(mesh)), "{count} vertices");
+            check_obj(std::str::from_utf8(obj).unwrap(), mesh);
+        }
+    }
+}
+
+/// Reads every line back: coordinates bit for bit, normals and colours to their digits.
+fn check_obj(text: &str, mesh: MeshView<'_>) {
+    let mut lines = text.lines();
+    let numbers = |line: &str| -> Vec<f32> { line.split(' ').skip(1).map(|word| word.parse().unwrap()).collect() };
+    for (index, vertex) in mesh.vertices.iter().enumerate() {
+        let read = numbers(lines.next().unwrap());
+        assert_eq!(read[..3], *vertex);
+        for (read, level) in read[3..].iter().zip(mesh.colors.map_or([0; 3], |colors| colors[index])) {
+            assert!((read * 255.0 - f32::from(level)).abs() < 0.02, "vertex {index}");
+        }
+        assert_eq!(read.len(), if mesh.colors.is_some() { 6 } else { 3 });
+    }
+    for normal in mesh.normals.into_iter().flatten() {
+        let line = lines.next().unwrap();
+        let plain = normal.map(|value| format!("{value:.6}")).join(" ");
+        assert_eq!(line, format!("vn {plain}"));
+    }
+    for face in mesh.faces {
+        let [a, b, c] = face.map(|index| index + 1);
+        let expected =
+            if mesh.normals.is_some() { format!("f {a}//{a} {b}//{b} {c}//{c}") } else { format!("f {a} {b} {c}") };
+        assert_eq!(lines.next().unwrap(), expected);
+    }
+    assert_eq!(lines.next(), None);
+}
+
+#[test]
+fn a_mesh_may_keep_its_numbers_in_64_bits() {
+    let (vertices, faces, ..) = strip(50);
+    let narrow = MeshView { vertices: &vertices, faces: &faces, normals: None, colors: None };
+    let wide_vertices: Vec<[f64; 3]> = vertices.iter().map(|vertex| vertex.map(f64::from)).collect();
+    let wide_faces: Vec<[i64; 3]> = faces.iter().map(|face| face.map(i64::from)).collect();
+    let wide = MeshView { vertices: &wide_vertices, faces: &wide_faces, normals: None, colors: None };
+    let (mut a, mut b) = (Vec::new(), Vec::new());
+    write_ply(narrow, &[], &mut a).unwrap();
+    write_ply(wide, &[], &mut b).unwrap();
+    assert_eq!(a, b);
+    wide.check().unwrap();
+    let mut bad_faces = wide_faces.clone();
+    bad_faces[7][1] = -1;
+    let error = MeshView { faces: &bad_faces, ..wide }.check().unwrap_err();
+    assert!(matches!(error, Error::OutOfRange { argument: "faces", value: -1.0, .. }), "{error}");
+}
+
+#[test]
+fn a_mesh_that_cannot_be_written_reports_the_first_error() {
+    struct Full;
+    impl std::io::Write for Full {
+        fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
+            Err(std::io::ErrorKind::StorageFull.into())
+        }
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+    let (vertices, faces, ..) = strip(40_000);
+    let mesh = MeshView { vertices: &vertices, faces: &faces, normals: None, colors: None };
+    assert_eq!(write_ply(mesh, &[], &mut Full).unwrap_err().kind(), std::io::ErrorKind::StorageFull);
+    assert_eq!(write_obj(mesh, &[], &mut Full).unwrap_err().kind(), std::io::ErrorKind::StorageFull);
+}
+
+#[test]
+fn triangles_do_not_depend_on_threads() {
+    let (width, height) = (131, 97);
+    let mask: Vec<bool> = (0..width * height).map(|pixel| pixel * 7919 % 11 != 0).collect();
+    let height_px: Vec<f32> = (0..width * height).map(|pixel| (pixel as f32 * 0.1).sin()).collect();
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| triangulate(&height_px, &mask, width, 3.4)).unwrap()
+    };
+    let (one, two) = (on(1), on(2));
+    assert_eq!((&one.vertices, &one.faces, &one.pixels), (&two.vertices, &two.faces, &two.pixels));
+    assert_eq!(one.vertices.len(), mask.iter().filter(|&&valid| valid).count());
+    assert!(one.pixels.is_sorted() && one.pixels.iter().all(|&pixel| mask[pixel as usize]));
+    // Every face lies in one square of four pixels: its corners are neighbours.
+    for face in &one.faces {
+        let [a, b, c] = face.map(|vertex| one.pixels[vertex as usize] as usize);
+        for (a, b) in [(a, b), (b, c), (c, a)] {
+            assert!((a / width).abs_diff(b / width) <= 1 && (a % width).abs_diff(b % width) <= 1);
+        }
+    }
+}

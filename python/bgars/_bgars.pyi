@@ -14,6 +14,7 @@ __all__ = [
     "integrate_normals",
     "read_rgb16",
     "triangulate",
+    "vertex_normals",
     "write_obj",
     "write_ply",
     "write_png16",
@@ -71,21 +72,22 @@ def read_rgb16(path: str | PathLike[str], max_megapixels: float) -> NDArray[np.u
 def triangulate(
     height_px: NDArray[np.float32], mask: NDArray[np.bool_], pitch: float
 ) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32]]: ...
+def vertex_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float32]: ...
 def write_obj(
     path: str | PathLike[str],
-    vertices: NDArray[np.float32],
-    faces: NDArray[np.uint32],
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
     *,
-    normals: NDArray[np.float32] | None = None,
+    normals: NDArray[np.float64] | None = None,
     colors: NDArray[np.uint8] | None = None,
     comments: Sequence[str] = ...,
 ) -> None: ...
 def write_ply(
     path: str | PathLike[str],
-    vertices: NDArray[np.float32],
-    faces: NDArray[np.uint32],
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
     *,
-    normals: NDArray[np.float32] | None = None,
+    normals: NDArray[np.float64] | None = None,
     colors: NDArray[np.uint8] | None = None,
     comments: Sequence[str] = ...,
 ) -> None: ...

@@ -24,7 +24,8 @@ def mesh_from_height(height: HeightMap, field: NormalField | None = None) -> tri
     height : HeightMap
         Heights; vertices are in micrometres when its pixel pitch is known, else in pixels.
     field : NormalField, optional
-        Gives each vertex its estimated normal and its albedo as grey; without it, normals follow from the faces.
+        Gives each vertex its estimated normal and its albedo as grey; without it, normals follow from the faces
+        (weighted by their angles at the vertex, as trimesh does).
 
     Returns
     -------
@@ -54,7 +55,10 @@ def mesh_from_height(height: HeightMap, field: NormalField | None = None) -> tri
         raise InputError(msg)
     metadata = {"unit": height.unit, "components": len(height.components)}
     if field is None:
-        return trimesh.Trimesh(vertices, faces, process=False, metadata=metadata)
+        # In the types that trimesh keeps, so that it does not convert them once more.
+        wide_vertices, wide_faces = vertices.astype(np.float64), faces.astype(np.int64)
+        normals = _bgars.vertex_normals(wide_vertices, wide_faces)
+        return trimesh.Trimesh(wide_vertices, wide_faces, vertex_normals=normals, process=False, metadata=metadata)
     normals = field.normals.reshape(-1, 3)[pixels]
     grey = field.albedo.ravel()[pixels]
     known = np.isfinite(grey)

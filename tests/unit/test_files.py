@@ -80,6 +80,40 @@ def test_mesh(field: bgars.NormalField, tmp_path: Path, suffix: str, with_field:
             np.testing.assert_allclose(back.visual.vertex_colors[:, :3], mesh.visual.vertex_colors[:, :3], atol=1)
 
 
+def test_normals_of_a_height_map_are_those_of_its_faces(tmp_path: Path) -> None:
+    row, col = np.mgrid[:40, :50].astype(np.float32)
+    values = 3 * np.sin(row / 5) * np.cos(col / 7)
+    values[10:14, 20:30] = np.nan
+    values[0:2, 1:3] = np.nan  # leaves a corner pixel without a face
+    mesh = bgars.mesh_from_height(bgars.HeightMap.from_array(values))
+    plain = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    np.testing.assert_allclose(mesh.vertex_normals, plain.vertex_normals, atol=1e-6)
+    # A mesh from elsewhere, whose normals nobody has asked for.
+    other = trimesh.creation.icosphere(subdivisions=3)
+    bgars.write_mesh(other, tmp_path / "sphere.ply")
+    np.testing.assert_allclose(stored_normals(tmp_path / "sphere.ply"), other.vertex_normals, atol=1e-5)
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".obj"])
+def test_a_mesh_of_many_blocks(tmp_path: Path, suffix: str) -> None:
+    values = np.random.default_rng(3).normal(size=(181, 183)).astype(np.float32) * 1e-3
+    values[50:60, 70:90] = np.nan
+    mesh = bgars.mesh_from_height(bgars.HeightMap.from_array(values, pixel_pitch_um=3.4))
+    path = tmp_path / f"part{suffix}"
+    bgars.write_mesh(mesh, path)
+    back = trimesh.load_mesh(path, process=False)
+    np.testing.assert_array_equal(back.faces, mesh.faces)
+    np.testing.assert_allclose(back.vertices, mesh.vertices, rtol=1e-6)
+
+
+@pytest.mark.parametrize("faces", [[[0, 1, 3]], [[0, 1, -1]]])
+def test_a_face_of_no_vertex_is_refused(tmp_path: Path, faces: list[list[int]]) -> None:
+    mesh = trimesh.Trimesh(np.eye(3), faces, process=False)
+    with pytest.raises(bgars.InputError, match="faces"):
+        bgars.write_mesh(mesh, tmp_path / "part.ply")
+    assert list(tmp_path.iterdir()) == []
+
+
 def stored_normals(path: Path) -> np.ndarray:
     """Vertex normals as the file holds them: trimesh computes its own when it loads."""
     if path.suffix == ".obj":
@@ -87,6 +121,34 @@ def stored_normals(path: Path) -> np.ndarray:
         return np.array([line.split()[1:] for line in lines if line.startswith("vn ")], dtype=np.float64)
     vertices = trimesh.load_mesh(path, process=False).metadata["_ply_raw"]["vertex"]["data"]
     return np.column_stack([vertices[name] for name in ("nx", "ny", "nz")])
+
+
+TIFF_KINDS: list[dict[str, object]] = [
+    {},
+    {"rowsperstrip": 7},
+    {"byteorder": ">"},
+    {"compression": "zlib", "predictor": 2},
+    {"tile": (16, 32)},
+    {"photometric": "miniswhite"},
+]
+
+
+@pytest.mark.parametrize("kind", TIFF_KINDS, ids=str)
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_grey_tiff_of_every_kind(tmp_path: Path, kind: dict[str, object], dtype: type[np.unsignedinteger]) -> None:
+    top = np.iinfo(dtype).max
+    images = np.random.default_rng(1).integers(0, top, (4, 50, 61), dtype=dtype, endpoint=True)
+    for index, image in enumerate(images):
+        stored = top - image if "photometric" in kind else image
+        tifffile.imwrite(tmp_path / f"light_{index}.tif", stored, **kind)
+    np.savetxt(tmp_path / "light_directions.txt", bgars.LightRig.ring(4).directions)
+    capture = bgars.read_capture(tmp_path)
+    assert capture.images.dtype == dtype
+    np.testing.assert_array_equal(capture.images, images)
+    cut = tmp_path / "light_2.tif"
+    cut.write_bytes(cut.read_bytes()[: cut.stat().st_size // 2])
+    with pytest.raises(bgars.FileFormatError, match=r"light_2\.tif"):
+        bgars.read_capture(tmp_path)
 
 
 def test_mesh_vertices_sit_where_the_conventions_say() -> None:

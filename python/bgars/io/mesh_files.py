@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from os import PathLike
 
     import trimesh
+    from numpy.typing import NDArray
 
 __all__ = ["MESH_SUFFIXES", "write_mesh"]
 
@@ -63,11 +64,13 @@ def write_mesh(mesh: trimesh.Trimesh, path: str | PathLike[str]) -> None:
     with atomic_file(path) as temporary:
         if suffix in {".ply", ".obj"}:
             write = _bgars.write_ply if suffix == ".ply" else _bgars.write_obj
+            vertices = np.ascontiguousarray(mesh.vertices, dtype=np.float64)
+            faces = np.ascontiguousarray(mesh.faces, dtype=np.int64)
             write(
                 temporary,
-                np.ascontiguousarray(mesh.vertices, dtype=np.float32),
-                np.ascontiguousarray(mesh.faces, dtype=np.uint32),
-                normals=np.ascontiguousarray(mesh.vertex_normals, dtype=np.float32),
+                vertices,
+                faces,
+                normals=_normals(mesh, vertices, faces),
                 colors=_colors(mesh),
                 comments=[
                     f"bgars mesh, unit {mesh.metadata.get('unit', 'unknown')}, x right, y up, z toward the camera"
@@ -75,6 +78,14 @@ def write_mesh(mesh: trimesh.Trimesh, path: str | PathLike[str]) -> None:
             )
         else:
             mesh.export(temporary, file_type=suffix[1:])
+
+
+def _normals(mesh: trimesh.Trimesh, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(N, 3) vertex normals: those the mesh has, else those of its faces (seconds of work for trimesh)."""
+    # trimesh has no public way to ask; its own exporters look here too.
+    has_normals = "vertex_normals" in mesh._cache
+    normals = mesh.vertex_normals if has_normals else _bgars.vertex_normals(vertices, faces)
+    return np.ascontiguousarray(normals, dtype=np.float64)
 
 
 def _colors(mesh: trimesh.Trimesh) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]] | None:

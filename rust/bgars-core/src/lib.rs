@@ -18,6 +18,7 @@ pub mod pixel;
 pub mod radiometry;
 pub mod stack;
 mod stream;
+pub mod vertex_normals;
 
 pub use error::{Error, Result};
 pub use lights::Lights;

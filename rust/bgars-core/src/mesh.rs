@@ -1,5 +1,8 @@
 //! A height map as triangles.
 
+use rayon::prelude::*;
+
+use crate::memory::zeros;
 use crate::{Error, Result};
 
 /// Vertices and faces of a height map.
@@ -42,36 +45,75 @@ pub fn triangulate(height_px: &[f32], mask: &[bool], width: usize, pitch: f64) -
         return Err(Error::OutOfRange { argument: "height_px", rule: "at most 2^32 - 1 pixels", value });
     }
     let height = mask.len() / width;
-    let mut mesh = TriangleMesh::default();
-    let mut vertex_of_pixel = vec![u32::MAX; mask.len()];
-    for pixel in (0..mask.len()).filter(|&pixel| mask[pixel]) {
-        let (row, col) = (pixel / width, pixel % width);
-        vertex_of_pixel[pixel] = mesh.vertices.len() as u32;
-        mesh.pixels.push(pixel as u32);
-        mesh.vertices.push([
-            ((col as f64 + 0.5 - width as f64 / 2.0) * pitch) as f32,
-            ((height as f64 / 2.0 - row as f64 - 0.5) * pitch) as f32,
-            (f64::from(height_px[pixel]) * pitch) as f32,
-        ]);
-    }
-    for row in 1..height {
+    let vertices_of_row: Vec<usize> =
+        mask.par_chunks(width).map(|row| row.iter().filter(|&&valid| valid).count()).collect();
+    let vertex_count = vertices_of_row.iter().sum();
+    let mut mesh = TriangleMesh { vertices: zeros(vertex_count), faces: Vec::new(), pixels: zeros(vertex_count) };
+    let mut vertex_of_pixel = zeros::<u32>(mask.len());
+    let starts = starts(&vertices_of_row);
+    let rows = (split(&mut mesh.vertices, &vertices_of_row), split(&mut mesh.pixels, &vertices_of_row));
+    (starts, rows.0, rows.1, vertex_of_pixel.par_chunks_mut(width)).into_par_iter().enumerate().for_each(
+        |(row, (start, vertices, pixels, vertex_of_pixel))| {
+            let first = row * width;
+            let valid = (0..vertex_of_pixel.len()).filter(|&col| mask[first + col]);
+            for (index, col) in valid.enumerate() {
+                vertex_of_pixel[col] = (start + index) as u32;
+                pixels[index] = (first + col) as u32;
+                vertices[index] = [
+                    ((col as f64 + 0.5 - width as f64 / 2.0) * pitch) as f32,
+                    ((height as f64 / 2.0 - row as f64 - 0.5) * pitch) as f32,
+                    (f64::from(height_px[first + col]) * pitch) as f32,
+                ];
+            }
+        },
+    );
+
+    let corners = |row: usize, col: usize| {
+        let corner = row * width + col;
+        // Counter-clockwise seen from the camera: upper left, lower left, lower right, upper right.
+        [corner - width - 1, corner - 1, corner, corner - width]
+    };
+    let faces_at = |square: [usize; 4]| faces_of_square(square.map(|pixel| mask[pixel]));
+    let faces_of_row: Vec<usize> = (1..height.max(1))
+        .into_par_iter()
+        .map(|row| (1..width).map(|col| faces_at(corners(row, col)).len()).sum())
+        .collect();
+    mesh.faces = zeros(faces_of_row.iter().sum());
+    split(&mut mesh.faces, &faces_of_row).into_par_iter().enumerate().for_each(|(row, faces)| {
+        let mut faces = faces.iter_mut();
         for col in 1..width {
-            let corner = row * width + col;
-            // Counter-clockwise seen from the camera: upper left, lower left, lower right, upper right.
-            let square = [corner - width - 1, corner - 1, corner, corner - width];
-            let vertex = |index: usize| vertex_of_pixel[square[index]];
-            match square.map(|pixel| mask[pixel]) {
-                [true, true, true, true] => {
-                    mesh.faces.push([vertex(0), vertex(1), vertex(2)]);
-                    mesh.faces.push([vertex(0), vertex(2), vertex(3)]);
-                }
-                [false, true, true, true] => mesh.faces.push([vertex(1), vertex(2), vertex(3)]),
-                [true, false, true, true] => mesh.faces.push([vertex(0), vertex(2), vertex(3)]),
-                [true, true, false, true] => mesh.faces.push([vertex(0), vertex(1), vertex(3)]),
-                [true, true, true, false] => mesh.faces.push([vertex(0), vertex(1), vertex(2)]),
-                _ => {}
+            let square = corners(row + 1, col);
+            for (from, face) in faces_at(square).iter().zip(faces.by_ref()) {
+                *face = from.map(|corner| vertex_of_pixel[square[corner]]);
             }
         }
-    }
+    });
     Ok(mesh)
+}
+
+/// Corners of the faces in a square of four pixels, by which of them are in the mask.
+fn faces_of_square(valid: [bool; 4]) -> &'static [[usize; 3]] {
+    match valid {
+        [true, true, true, true] => &[[0, 1, 2], [0, 2, 3]],
+        [false, true, true, true] => &[[1, 2, 3]],
+        [true, false, true, true] => &[[0, 2, 3]],
+        [true, true, false, true] => &[[0, 1, 3]],
+        [true, true, true, false] => &[[0, 1, 2]],
+        _ => &[],
+    }
+}
+
+/// Sum of the lengths before each.
+fn starts(lengths: &[usize]) -> Vec<usize> {
+    lengths.iter().scan(0, |sum, &length| Some(std::mem::replace(sum, *sum + length))).collect()
+}
+
+/// Neighbouring parts of `items`, of the given lengths.
+fn split<'a, T>(mut items: &'a mut [T], lengths: &[usize]) -> Vec<&'a mut [T]> {
+    let part = |&length: &usize| {
+        let (part, rest) = std::mem::take(&mut items).split_at_mut(length);
+        items = rest;
+        part
+    };
+    lengths.iter().map(part).collect()
 }

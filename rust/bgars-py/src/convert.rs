@@ -51,10 +51,7 @@ pub fn array3<T: Element>(py: Python<'_>, data: Vec<T>, shape: [usize; 3]) -> Py
 }
 
 /// An array of shape (N, 3) from rows of three.
-pub fn array_of_triples<T: Element + bytemuck::Pod>(
-    py: Python<'_>,
-    data: Vec<[T; 3]>,
-) -> PyResult<Bound<'_, PyArray2<T>>> {
+pub fn array_of_triples<T: Element>(py: Python<'_>, data: Vec<[T; 3]>) -> PyResult<Bound<'_, PyArray2<T>>> {
     let rows = data.len();
-    array2(py, bytemuck::cast_vec(data.into_iter().flatten().collect()), [rows, 3])
+    array2(py, data.into_flattened(), [rows, 3])
 }

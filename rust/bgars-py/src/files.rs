@@ -66,13 +66,13 @@ pub fn write_png16(py: Python<'_>, path: PathBuf, rgb: PyReadonlyArray3<'_, u16>
 }
 
 /// One of the core's mesh writers.
-type Writer = fn(MeshView<'_>, &[String], &mut BufWriter<File>) -> std::io::Result<()>;
+type Writer = fn(MeshView<'_, f64, i64>, &[String], &mut BufWriter<File>) -> std::io::Result<()>;
 
-/// The arrays of a mesh as they come from numpy.
+/// The arrays of a mesh as trimesh keeps them: converting them here, block by block, costs no second copy of the mesh.
 struct MeshArrays<'py> {
-    vertices: PyReadonlyArray2<'py, f32>,
-    faces: PyReadonlyArray2<'py, u32>,
-    normals: Option<PyReadonlyArray2<'py, f32>>,
+    vertices: PyReadonlyArray2<'py, f64>,
+    faces: PyReadonlyArray2<'py, i64>,
+    normals: Option<PyReadonlyArray2<'py, f64>>,
     colors: Option<PyReadonlyArray2<'py, u8>>,
 }
 
@@ -100,9 +100,9 @@ impl MeshArrays<'_> {
 pub fn write_ply<'py>(
     py: Python<'py>,
     path: PathBuf,
-    vertices: PyReadonlyArray2<'py, f32>,
-    faces: PyReadonlyArray2<'py, u32>,
-    normals: Option<PyReadonlyArray2<'py, f32>>,
+    vertices: PyReadonlyArray2<'py, f64>,
+    faces: PyReadonlyArray2<'py, i64>,
+    normals: Option<PyReadonlyArray2<'py, f64>>,
     colors: Option<PyReadonlyArray2<'py, u8>>,
     comments: Vec<String>,
 ) -> PyResult<()> {
@@ -115,9 +115,9 @@ pub fn write_ply<'py>(
 pub fn write_obj<'py>(
     py: Python<'py>,
     path: PathBuf,
-    vertices: PyReadonlyArray2<'py, f32>,
-    faces: PyReadonlyArray2<'py, u32>,
-    normals: Option<PyReadonlyArray2<'py, f32>>,
+    vertices: PyReadonlyArray2<'py, f64>,
+    faces: PyReadonlyArray2<'py, i64>,
+    normals: Option<PyReadonlyArray2<'py, f64>>,
     colors: Option<PyReadonlyArray2<'py, u8>>,
     comments: Vec<String>,
 ) -> PyResult<()> {

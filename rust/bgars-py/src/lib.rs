@@ -26,6 +26,8 @@ mod _bgars {
     #[pymodule_export]
     use crate::mesh::triangulate;
     #[pymodule_export]
+    use crate::mesh::vertex_normals;
+    #[pymodule_export]
     use crate::normals::estimate_normals;
 
     #[pymodule_export]

@@ -1,10 +1,10 @@
-//! `triangulate`.
+//! `triangulate`, `vertex_normals`.
 
-use bgars_core::mesh;
+use bgars_core::{mesh, vertex_normals as normals};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::convert::{array_of_triples, slice2};
+use crate::convert::{array_of_triples, slice2, triples};
 use crate::errors::to_python;
 
 /// vertices (N, 3), faces (M, 3), pixel of each vertex (N,).
@@ -23,4 +23,17 @@ pub fn triangulate<'py>(
     let mask = slice2(&mask, "mask")?;
     let mesh = py.detach(|| mesh::triangulate(height_px, mask, width, pitch)).map_err(to_python)?;
     Ok((array_of_triples(py, mesh.vertices)?, array_of_triples(py, mesh.faces)?, PyArray1::from_vec(py, mesh.pixels)))
+}
+
+#[pyfunction]
+#[allow(clippy::needless_pass_by_value)]
+pub fn vertex_normals<'py>(
+    py: Python<'py>,
+    vertices: PyReadonlyArray2<'py, f64>,
+    faces: PyReadonlyArray2<'py, i64>,
+) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    let vertices = triples(&vertices, "vertices")?;
+    let faces = triples(&faces, "faces")?;
+    let normals = py.detach(|| normals::vertex_normals(vertices, faces)).map_err(to_python)?;
+    array_of_triples(py, normals)
 }

@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 use image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use rayon::prelude::*;
 
+use super::tiff_gray::read_gray_tiff;
+use crate::memory::zeros;
 use crate::{Error, Result};
 
 /// How a colour pixel becomes one value; always on linear values, never with a hidden gamma.
@@ -144,17 +146,17 @@ pub fn decode_stack(paths: &[PathBuf], color: &Color<'_>, max_megapixels: f64) -
     let linear = colored && color.needs_float();
     let data = match (first.bits(), linear || first.bits() == 32) {
         (8, false) => {
-            let mut data = vec![0u8; pixels * paths.len()];
+            let mut data = zeros::<u8>(pixels * paths.len());
             fill(paths, &mut data, pixels, |index, out| limit(&paths[index]).read_u8(out, color.channel))?;
             StackData::U8(data)
         }
         (16, false) => {
-            let mut data = vec![0u16; pixels * paths.len()];
+            let mut data = zeros::<u16>(pixels * paths.len());
             fill(paths, &mut data, pixels, |index, out| limit(&paths[index]).read_u16(out, color.channel))?;
             StackData::U16(data)
         }
         _ => {
-            let mut data = vec![0f32; pixels * paths.len()];
+            let mut data = zeros::<f32>(pixels * paths.len());
             fill(paths, &mut data, pixels, |index, out| limit(&paths[index]).read_f32(out, color, index))?;
             StackData::F32(data)
         }
@@ -185,11 +187,14 @@ pub(super) fn open(path: &Path, max_megapixels: f64) -> Result<impl ImageDecoder
         return Err(Error::Decode { path: path.to_path_buf(), reason });
     }
     let mut limits = Limits::default();
-    // 16 bytes a pixel (RGBA f32) is the most a decoder of this crate asks for; the claim itself is checked in `read_header`.
-    let bytes = (max_megapixels * 16e6) as u64;
-    limits.max_alloc = Some(bytes);
+    limits.max_alloc = Some(max_alloc_bytes(max_megapixels) as u64);
     reader.limits(limits);
     reader.into_decoder().map_err(|error| translate(path, error))
+}
+
+/// 16 bytes a pixel (RGBA f32) is the most a decoder of this crate asks for; the claim itself is checked in `read_header`.
+pub(super) fn max_alloc_bytes(max_megapixels: f64) -> usize {
+    (max_megapixels * 16e6) as usize
 }
 
 /// True when an end-of-image marker follows the last start of scan: the decoder fills what a truncated JPEG lacks with grey
@@ -234,6 +239,9 @@ struct Reader {
 
 impl Reader {
     fn read_u8(&self, out: &mut [u8], channel: Channel) -> Result<()> {
+        if read_gray_tiff(&self.path, 8, out, self.max_megapixels)? {
+            return Ok(());
+        }
         let decoder = open(&self.path, self.max_megapixels)?;
         if decoder.color_type() == ColorType::L8 {
             return decoder.read_image(out).map_err(|error| translate(&self.path, error));
@@ -251,6 +259,9 @@ impl Reader {
     }
 
     fn read_u16(&self, out: &mut [u16], channel: Channel) -> Result<()> {
+        if read_gray_tiff(&self.path, 16, bytemuck::cast_slice_mut(out), self.max_megapixels)? {
+            return Ok(());
+        }
         let decoder = open(&self.path, self.max_megapixels)?;
         if decoder.color_type() == ColorType::L16 {
             let bytes = bytemuck::cast_slice_mut(out);

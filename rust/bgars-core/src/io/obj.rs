@@ -2,34 +2,108 @@
 
 use std::io::Write;
 
-use super::MeshView;
+use super::blocks::write_blocks;
+use super::{Coordinate, MeshView, VertexIndex};
+
+/// Digits of a normal behind the point.
+const NORMAL_DIGITS: usize = 6;
+const NORMAL_UNITS: u32 = 1_000_000;
 
 /// Writes `mesh` as OBJ: `v x y z [r g b]` (colours 0..1, the common extension), `vn`, `f`; `comments` come first.
 ///
+/// # Method
+/// A coordinate has the fewest digits that give the same `f32` back (`12.5`, `1e-7`), a normal six behind the point.
+///
 /// # Errors
 /// Whatever `out` reports.
-pub fn write_obj(mesh: MeshView<'_>, comments: &[String], out: &mut impl Write) -> std::io::Result<()> {
+pub fn write_obj<V: Coordinate, I: VertexIndex>(
+    mesh: MeshView<'_, V, I>,
+    comments: &[String],
+    out: &mut (impl Write + Send),
+) -> std::io::Result<()> {
     for comment in comments {
         writeln!(out, "# {}", comment.replace(['\r', '\n'], " "))?;
     }
-    for (index, [x, y, z]) in mesh.vertices.iter().enumerate() {
-        write!(out, "v {x} {y} {z}")?;
-        if let Some(colors) = mesh.colors {
-            let [r, g, b] = colors[index].map(|level| f32::from(level) / 255.0);
-            write!(out, " {r:.4} {g:.4} {b:.4}")?;
+    let levels: Vec<String> = (0..=255u8).map(|level| format!(" {:.4}", f32::from(level) / 255.0)).collect();
+    let encode_vertices = |vertices: std::ops::Range<usize>, text: &mut Vec<u8>| {
+        text.clear();
+        for index in vertices {
+            text.push(b'v');
+            for value in mesh.vertices[index] {
+                push_shortest(text, value.to_f32());
+            }
+            for &level in mesh.colors.map_or(&[][..], |colors| &colors[index]) {
+                text.extend_from_slice(levels[usize::from(level)].as_bytes());
+            }
+            text.push(b'\n');
         }
-        writeln!(out)?;
+    };
+    write_blocks(mesh.vertices.len(), encode_vertices, out)?;
+    if let Some(normals) = mesh.normals {
+        let encode_normals = |vertices: std::ops::Range<usize>, text: &mut Vec<u8>| {
+            text.clear();
+            for normal in &normals[vertices] {
+                text.extend_from_slice(b"vn");
+                for value in normal {
+                    push_fixed(text, value.to_f32());
+                }
+                text.push(b'\n');
+            }
+        };
+        write_blocks(normals.len(), encode_normals, out)?;
     }
-    for [x, y, z] in mesh.normals.into_iter().flatten() {
-        writeln!(out, "vn {x:.6} {y:.6} {z:.6}")?;
+    let encode_faces = |faces: std::ops::Range<usize>, text: &mut Vec<u8>| {
+        text.clear();
+        for face in &mesh.faces[faces] {
+            push_face(text, face.map(|index| index.to_u64().wrapping_add(1)), mesh.normals.is_some());
+        }
+    };
+    write_blocks(mesh.faces.len(), encode_faces, out)
+}
+
+/// A space and the shortest decimal that reads back as `value`.
+fn push_shortest(text: &mut Vec<u8>, value: f32) {
+    let mut digits = zmij::Buffer::new();
+    let digits = digits.format(value);
+    text.push(b' ');
+    text.extend_from_slice(digits.strip_suffix(".0").unwrap_or(digits).as_bytes());
+}
+
+/// A space and `value` rounded to [`NORMAL_DIGITS`] digits behind the point.
+fn push_fixed(text: &mut Vec<u8>, value: f32) {
+    let units = (f64::from(value.abs()) * f64::from(NORMAL_UNITS) + 0.5).floor();
+    if !(units < f64::from(10 * NORMAL_UNITS)) {
+        // No component of a unit normal, but what it is must be seen.
+        text.extend_from_slice(format!(" {value:.NORMAL_DIGITS$}").as_bytes());
+        return;
     }
-    for face in mesh.faces {
-        let [a, b, c] = face.map(|index| u64::from(index) + 1);
-        if mesh.normals.is_some() {
-            writeln!(out, "f {a}//{a} {b}//{b} {c}//{c}")?;
-        } else {
-            writeln!(out, "f {a} {b} {c}")?;
+    let mut rest = units as u32;
+    let mut digits = *b" -0.000000";
+    for digit in digits[4..].iter_mut().rev() {
+        *digit = b'0' + (rest % 10) as u8;
+        rest /= 10;
+    }
+    digits[2] = b'0' + rest as u8;
+    if value.is_sign_negative() {
+        text.extend_from_slice(&digits);
+    } else {
+        digits[1] = b' ';
+        text.extend_from_slice(&digits[1..]);
+    }
+}
+
+/// `f a b c`, or `f a//a b//b c//c` where vertices have normals; counted from 1.
+fn push_face(text: &mut Vec<u8>, face: [u64; 3], with_normals: bool) {
+    text.push(b'f');
+    for index in face {
+        let mut digits = itoa::Buffer::new();
+        let digits = digits.format(index).as_bytes();
+        text.push(b' ');
+        text.extend_from_slice(digits);
+        if with_normals {
+            text.extend_from_slice(b"//");
+            text.extend_from_slice(digits);
         }
     }
-    Ok(())
+    text.push(b'\n');
 }
