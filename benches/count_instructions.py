@@ -19,7 +19,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 KEPT = ROOT / "benches" / "instructions.json"
-KERNELS = ("normals-u8", "normals-u16", "normals-f32", "normals-robust-u8", "integrate-6-iterations")
+KERNELS = ("lambertian-u8", "normals-u8", "normals-u16", "normals-f32", "normals-robust-u8", "integrate-6-iterations")
 PIXELS = 256 * 256
 TOLERANCE = 1.10
 

@@ -69,6 +69,7 @@ fn main() {
     let filter = Method::SpecularFilter { threshold: 50.0 };
     let levels = levels();
     match name.as_str() {
+        "lambertian-u8" => estimate(&levels, 255.0, Method::Lambertian, times),
         "normals-u8" => estimate(&levels, 255.0, filter, times),
         "normals-u16" => {
             let wide: Vec<u16> = levels.iter().map(|&level| u16::from(level) * 257).collect();

@@ -5,7 +5,6 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::cutoff::{LANES, Lanes, cutoffs};
-use super::solve::MAX_TABLE_LIGHTS;
 use crate::lights::conditioning;
 use crate::{Lights, Pixel};
 
@@ -24,9 +23,6 @@ pub(super) enum Choice {
     UpToGap(f32),
 }
 
-/// The six entries of a symmetric inverse, padded to a power of two; all zero where it is not to be used.
-type Inverse = [f32; 8];
-
 /// What does not change from pixel to pixel.
 #[derive(Debug)]
 pub(super) struct LaneSolver {
@@ -38,8 +34,6 @@ pub(super) struct LaneSolver {
     all: [f32; 6],
     /// `L^T L` of all lights: xx, xy, xz, yy, yz, zz.
     gram: [f32; 6],
-    /// The inverse for every subset (bit k: light k); empty for more than 12 lights.
-    table: Vec<Inverse>,
 }
 
 impl LaneSolver {
@@ -48,18 +42,12 @@ impl LaneSolver {
         let Lights::Directional(directions) = lights else { return None };
         let gram = directions.iter().fold(Matrix3::zeros(), |gram, light| gram + light * light.transpose());
         let exact = gram.try_inverse().filter(|_| conditioning(&gram) >= MIN_LANE_CONDITIONING)?;
-        let of_subset = |subset: usize| {
-            let lights = directions.iter().enumerate().filter(|(light, _)| subset >> light & 1 == 1);
-            inverse(&lights.fold(Matrix3::zeros(), |gram, (_, light)| gram + light * light.transpose()))
-        };
-        let tabulated = directions.len() <= MAX_TABLE_LIGHTS && matches!(choice, Choice::UpToGap(_));
         Some(Self {
             choice,
             directions: directions.iter().map(single).collect(),
             pseudo_inverse: directions.iter().map(|light| single(&(exact * light))).collect(),
             all: upper(&exact),
             gram: upper(&gram),
-            table: if tabulated { (0..1 << directions.len()).map(of_subset).collect() } else { Vec::new() },
         })
     }
 }
@@ -69,10 +57,19 @@ pub(super) struct Solutions {
     /// `rho n`, by component.
     pub scaled: [Lanes<f32>; 3],
     pub squared_residuals: Lanes<f32>,
-    /// `tr C - n^T C n`, `C` the inverse in use.
-    pub turning: Lanes<f32>,
+    /// `tr C`, `C` the inverse in use.
+    pub trace: Lanes<f32>,
+    /// `g^T C g` of `g = rho n`.
+    pub along: Lanes<f32>,
     pub kept: Lanes<u16>,
     pub careful: Careful,
+}
+
+impl Solutions {
+    pub fn new() -> Self {
+        let zeros = [0.0; LANES];
+        Self { scaled: [zeros; 3], squared_residuals: zeros, trace: zeros, along: zeros, kept: [0; LANES], careful: 0 }
+    }
 }
 
 /// Chooses and solves; `keys` of a length known to the compiler are unrolled. `masks` is scratch of the same length.
@@ -82,9 +79,10 @@ pub(super) fn solve<K: Pixel>(
     keys: &[Lanes<K>],
     masks: &mut [Lanes<u8>],
     offset: Option<&Lanes<f32>>,
-) -> Solutions {
+    out: &mut Solutions,
+) {
     match solver.choice {
-        Choice::All => solve_all(solver, keys, offset),
+        Choice::All => solve_all(solver, keys, offset, out),
         Choice::UpToGap(gap) => {
             let cutoffs = cutoffs(keys, K::gap(gap));
             let mut kept_by_all = 1;
@@ -94,7 +92,11 @@ pub(super) fn solve<K: Pixel>(
                     kept_by_all &= mask[lane];
                 }
             }
-            if kept_by_all == 1 { solve_all(solver, keys, offset) } else { solve_kept(solver, keys, masks, offset) }
+            if kept_by_all == 1 {
+                solve_all(solver, keys, offset, out);
+            } else {
+                solve_kept(solver, keys, masks, offset, out);
+            }
         }
     }
 }
@@ -129,24 +131,22 @@ macro_rules! by_chunks {
 
 /// Every light of every lane is kept: one matrix for all.
 #[inline(always)]
-fn solve_all<K: Pixel>(solver: &LaneSolver, keys: &[Lanes<K>], offset: Option<&Lanes<f32>>) -> Solutions {
+fn solve_all<K: Pixel>(solver: &LaneSolver, keys: &[Lanes<K>], offset: Option<&Lanes<f32>>, out: &mut Solutions) {
     let mut sums = [[0.0f32; LANES]; 4];
     by_chunks!(keys, solver.pseudo_inverse.as_slice(), |keys, columns, _first| add_columns(
         keys, columns, offset, &mut sums
     ));
-    let [scaled @ .., squares] = sums;
-    let [xx, xy, xz, yy, yz, zz] = solver.gram;
-    let mut turning = [0.0f32; LANES];
-    let mut residuals = [0.0f32; LANES];
     for lane in 0..LANES {
-        let [x, y, z] = [scaled[0][lane], scaled[1][lane], scaled[2][lane]];
+        let [x, y, z, squares] = std::array::from_fn(|sum| sums[sum][lane]);
         // |I|^2 - |L g|^2; what rounding leaves is far below the prior of 2 %.
-        let explained = x * (xx * x + 2.0 * (xy * y + xz * z)) + y * (yy * y + 2.0 * yz * z) + z * (zz * z);
-        residuals[lane] = if squares[lane] > explained { squares[lane] - explained } else { 0.0 };
-        turning[lane] = turning_of(&solver.all, [x, y, z]);
+        let explained = along(solver.gram, [x, y, z]);
+        out.squared_residuals[lane] = if squares > explained { squares - explained } else { 0.0 };
+        out.along[lane] = along(solver.all, [x, y, z]);
+        out.trace[lane] = solver.all[0] + solver.all[3] + solver.all[5];
+        [out.scaled[0][lane], out.scaled[1][lane], out.scaled[2][lane]] = [x, y, z];
+        out.kept[lane] = keys.len() as u16;
     }
-    let kept = [keys.len() as u16; LANES];
-    Solutions { scaled, squared_residuals: residuals, turning, kept, careful: 0 }
+    out.careful = 0;
 }
 
 /// `sums += (column * value, value^2)` over the lights of a chunk.
@@ -178,44 +178,46 @@ fn solve_kept<K: Pixel>(
     keys: &[Lanes<K>],
     masks: &[Lanes<u8>],
     offset: Option<&Lanes<f32>>,
-) -> Solutions {
+    out: &mut Solutions,
+) {
     let directions = solver.directions.as_slice();
-    let mut kept = [0u16; LANES];
-    let mut subsets = [0u16; LANES];
-    by_chunks!(masks, directions, |masks, _directions, first| count(masks, first, &mut kept, &mut subsets));
-    let inverses = if solver.table.is_empty() {
-        let mut gram = [[0.0f32; LANES]; 6];
-        by_chunks!(masks, directions, |masks, directions, _first| add_gram(masks, directions, &mut gram));
-        inverses_of(&gram)
-    } else {
-        tabulated_inverses(&solver.table, &subsets)
-    };
+    out.kept = [0; LANES];
+    let mut gram = [[0.0f32; LANES]; 6];
+    by_chunks!(masks, directions, |masks, directions, _first| {
+        count(masks, &mut out.kept);
+        add_gram(masks, directions, &mut gram);
+    });
+    let inverses = inverses_of(&gram);
     let mut sums = [[0.0f32; LANES]; 3];
     by_chunks!(keys, directions, |keys, directions, first| {
         add_kept(keys, directions, &masks[first..], offset, &mut sums);
     });
-    let mut scaled = product(&inverses, &sums);
-    // One step of iterative refinement: the residual of each light, and what it corrects.
-    let mut corrections = [[0.0f32; LANES]; 4];
-    by_chunks!(keys, directions, |keys, directions, first| {
-        add_residuals(keys, directions, &masks[first..], offset, &scaled, &mut corrections);
-    });
-    let [corrections @ .., squared_residuals] = corrections;
-    let correction = product(&inverses, &corrections);
-    let mut turning = [0.0f32; LANES];
-    let mut careful = 0;
     for lane in 0..LANES {
-        for axis in 0..3 {
-            scaled[axis][lane] += correction[axis][lane];
+        let [x, y, z] = product(&inverses, &sums, lane);
+        [out.scaled[0][lane], out.scaled[1][lane], out.scaled[2][lane]] = [x, y, z];
+    }
+    // One step of iterative refinement: the residual of each light, and what it corrects.
+    let mut corrections = [[0.0f32; LANES]; 3];
+    out.squared_residuals = [0.0; LANES];
+    by_chunks!(keys, directions, |keys, directions, first| {
+        add_residuals(keys, directions, &masks[first..], offset, &mut corrections, out);
+    });
+    let mut usable = true;
+    for lane in 0..LANES {
+        let correction = product(&inverses, &corrections, lane);
+        let facet: [f32; 3] = std::array::from_fn(|axis| out.scaled[axis][lane] + correction[axis]);
+        [out.scaled[0][lane], out.scaled[1][lane], out.scaled[2][lane]] = facet;
+        let inverse: [f32; 6] = std::array::from_fn(|entry| inverses[entry][lane]);
+        out.along[lane] = along(inverse, facet);
+        out.trace[lane] = inverse[0] + inverse[3] + inverse[5];
+        usable &= inverse[0] != 0.0;
+    }
+    out.careful = 0;
+    if !usable {
+        for lane in 0..LANES {
+            out.careful |= Careful::from(inverses[0][lane] == 0.0) << lane;
         }
-        let inverse = std::array::from_fn(|entry| inverses[entry][lane]);
-        turning[lane] = turning_of(&inverse, [scaled[0][lane], scaled[1][lane], scaled[2][lane]]);
     }
-    let unusable = |lane: usize| inverses[0][lane] == 0.0;
-    if (0..LANES).fold(false, |any, lane| any | unusable(lane)) {
-        careful = (0..LANES).fold(0, |bits, lane| bits | Careful::from(unusable(lane)) << lane);
-    }
-    Solutions { scaled, squared_residuals, turning, kept, careful }
 }
 
 /// True for a light that is kept.
@@ -224,19 +226,17 @@ pub(super) fn is_kept<K: Pixel>(key: K, cutoff: K) -> bool {
     !key.is_over(cutoff, K::gap(0.0))
 }
 
-/// The kept lights of a chunk: how many, and which as bits from `first` on (of no use beyond 16 lights).
+/// `counts += 1` for the kept lights of a chunk.
 #[inline(always)]
-fn count<const C: usize>(masks: &[Lanes<u8>; C], first: usize, counts: &mut Lanes<u16>, subsets: &mut Lanes<u16>) {
-    let [mut bits, mut ones] = [[0u8; LANES]; 2];
-    for (light, mask) in masks.iter().enumerate() {
+fn count<const C: usize>(masks: &[Lanes<u8>; C], counts: &mut Lanes<u16>) {
+    let mut ones = [0u8; LANES];
+    for mask in masks {
         for lane in 0..LANES {
             ones[lane] += mask[lane];
-            bits[lane] |= mask[lane].wrapping_neg() & (1 << light);
         }
     }
     for lane in 0..LANES {
         counts[lane] += u16::from(ones[lane]);
-        subsets[lane] |= u16::from(bits[lane]).unbounded_shl(first as u32);
     }
 }
 
@@ -264,20 +264,21 @@ fn add_kept<K: Pixel, const C: usize>(
     }
 }
 
-/// `sums += (direction * residual, residual^2)` over the kept lights of a chunk, `scaled` being the solution so far.
+/// `sums += direction * residual` over the kept lights of a chunk, for the facets in `out`, and the squares to `out`.
 #[inline(always)]
 fn add_residuals<K: Pixel, const C: usize>(
     keys: &[Lanes<K>; C],
     directions: &[[f32; 3]; C],
     masks: &[Lanes<u8>],
     offset: Option<&Lanes<f32>>,
-    scaled: &[Lanes<f32>; 3],
-    sums: &mut [Lanes<f32>; 4],
+    sums: &mut [Lanes<f32>; 3],
+    out: &mut Solutions,
 ) {
     let masks = &masks[..C];
     for lane in 0..LANES {
-        let [mut x, mut y, mut z, mut square] = std::array::from_fn(|sum| sums[sum][lane]);
-        let [u, v, w] = std::array::from_fn(|axis| scaled[axis][lane]);
+        let [mut x, mut y, mut z] = std::array::from_fn(|sum| sums[sum][lane]);
+        let mut square = out.squared_residuals[lane];
+        let [u, v, w] = std::array::from_fn(|axis| out.scaled[axis][lane]);
         for light in 0..C {
             let [a, b, c] = directions[light];
             let difference = value(keys[light][lane], offset, lane) - (a * u + b * v + c * w);
@@ -287,7 +288,8 @@ fn add_residuals<K: Pixel, const C: usize>(
             z += c * residual;
             square += residual * residual;
         }
-        [sums[0][lane], sums[1][lane], sums[2][lane], sums[3][lane]] = [x, y, z, square];
+        [sums[0][lane], sums[1][lane], sums[2][lane]] = [x, y, z];
+        out.squared_residuals[lane] = square;
     }
 }
 
@@ -297,9 +299,8 @@ fn add_gram<const C: usize>(masks: &[Lanes<u8>; C], directions: &[[f32; 3]; C], 
     for lane in 0..LANES {
         let mut sums: [f32; 6] = std::array::from_fn(|entry| gram[entry][lane]);
         for (&[a, b, c], mask) in directions.iter().zip(masks) {
-            let weight = f32::from(mask[lane]);
             for (sum, product) in sums.iter_mut().zip([a * a, a * b, a * c, b * b, b * c, c * c]) {
-                *sum += weight * product;
+                *sum += if mask[lane] == 1 { product } else { 0.0 };
             }
         }
         for (gram, sum) in gram.iter_mut().zip(sums) {
@@ -308,38 +309,18 @@ fn add_gram<const C: usize>(masks: &[Lanes<u8>; C], directions: &[[f32; 3]; C], 
     }
 }
 
-/// `tr C - n^T C n` of `g = rho n`.
+/// `g^T C g`.
 #[inline(always)]
-fn turning_of(inverse: &[f32; 6], [x, y, z]: [f32; 3]) -> f32 {
-    let [xx, xy, xz, yy, yz, zz] = *inverse;
-    let along = x * (xx * x + 2.0 * (xy * y + xz * z)) + y * (yy * y + 2.0 * yz * z) + z * (zz * z);
-    (xx + yy + zz) - along / (x * x + y * y + z * z)
+fn along([xx, xy, xz, yy, yz, zz]: [f32; 6], [x, y, z]: [f32; 3]) -> f32 {
+    x * (xx * x + 2.0 * (xy * y + xz * z)) + y * (yy * y + 2.0 * yz * z) + z * (zz * z)
 }
 
+/// A lane's matrix times its vector.
 #[inline(always)]
-fn product(inverses: &[Lanes<f32>; 6], vectors: &[Lanes<f32>; 3]) -> [Lanes<f32>; 3] {
-    let [xx, xy, xz, yy, yz, zz] = inverses;
-    let mut out = [[0.0f32; LANES]; 3];
-    for lane in 0..LANES {
-        let [x, y, z] = [vectors[0][lane], vectors[1][lane], vectors[2][lane]];
-        out[0][lane] = xx[lane] * x + xy[lane] * y + xz[lane] * z;
-        out[1][lane] = xy[lane] * x + yy[lane] * y + yz[lane] * z;
-        out[2][lane] = xz[lane] * x + yz[lane] * y + zz[lane] * z;
-    }
-    out
-}
-
-/// The inverse of each lane's subset of lights from the table.
-#[inline(always)]
-fn tabulated_inverses(table: &[Inverse], subsets: &Lanes<u16>) -> [Lanes<f32>; 6] {
-    let mut inverses = [[0.0f32; LANES]; 6];
-    for lane in 0..LANES {
-        let entry = &table[usize::from(subsets[lane])];
-        for (inverse, &entry) in inverses.iter_mut().zip(entry) {
-            inverse[lane] = entry;
-        }
-    }
-    inverses
+fn product(inverses: &[Lanes<f32>; 6], vectors: &[Lanes<f32>; 3], lane: usize) -> [f32; 3] {
+    let [xx, xy, xz, yy, yz, zz] = std::array::from_fn(|entry| inverses[entry][lane]);
+    let [x, y, z] = std::array::from_fn(|axis| vectors[axis][lane]);
+    [xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z]
 }
 
 /// The inverses of Gram matrices; zero where they are not to be used.
@@ -365,16 +346,6 @@ fn inverses_of(gram: &[Lanes<f32>; 6]) -> [Lanes<f32>; 6] {
 /// The entries of the upper triangle: xx, xy, xz, yy, yz, zz.
 fn upper(matrix: &Matrix3<f64>) -> [f32; 6] {
     [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|entry| matrix[entry] as f32)
-}
-
-fn inverse(gram: &Matrix3<f64>) -> Inverse {
-    match gram.try_inverse() {
-        Some(inverse) if conditioning(gram) >= MIN_LANE_CONDITIONING => {
-            let [xx, xy, xz, yy, yz, zz] = upper(&inverse);
-            [xx, xy, xz, yy, yz, zz, 0.0, 0.0]
-        }
-        _ => [0.0; 8],
-    }
 }
 
 fn single(vector: &Vector3<f64>) -> [f32; 3] {

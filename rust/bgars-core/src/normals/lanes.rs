@@ -86,6 +86,7 @@ fn run_blocks<K: Pixel>(
     sink: &mut Sink<'_, '_>,
 ) {
     let mut offsets = [0.0; LANES];
+    let mut solutions = Solutions::new();
     let mut eight_masks = [[0; LANES]; 8];
     let mut masks = vec![[0; LANES]; keys.len()];
     for first in pixels.clone().step_by(LANES) {
@@ -99,10 +100,10 @@ fn run_blocks<K: Pixel>(
         load(&block, keys, &mut offsets);
         let offsets = has_offsets.then_some(&offsets);
         // The usual number of lights is unrolled.
-        let solutions = match <&[Lanes<K>; 8]>::try_from(&*keys) {
-            Ok(keys) => solve(solver, keys, &mut eight_masks, offsets),
-            Err(_) => solve(solver, keys, &mut masks, offsets),
-        };
+        match <&[Lanes<K>; 8]>::try_from(&*keys) {
+            Ok(keys) => solve(solver, keys, &mut eight_masks, offsets, &mut solutions),
+            Err(_) => solve(solver, keys, &mut masks, offsets, &mut solutions),
+        }
         write(full_scale, &solutions, used, span.clone(), sink.out);
         if !sink.out.kept_sets.is_empty() {
             write_sets(solver.choice, keys, used, span, sink.out);
@@ -134,12 +135,16 @@ fn write(full_scale: f32, solutions: &Solutions, used: Option<&[bool]>, span: Ra
         let length = square.sqrt();
         // NaN spreads into everything that is computed from it.
         let length = if z > 0.0 && square < f32::INFINITY { length } else { f32::NAN };
-        scale[lane] = 1.0 / length;
+        let inverse = 1.0 / length;
+        let inverse2 = inverse * inverse;
+        scale[lane] = inverse;
         albedo[lane] = length * per_full_scale;
-        // See `confidence`: the squared standard error over the squared half-way point.
-        let variance = (solutions.squared_residuals[lane] + PRIOR2 * square) / (f32::from(solutions.kept[lane]) - 2.0);
-        let turning = if solutions.turning[lane] > 0.0 { solutions.turning[lane] } else { 0.0 };
-        let certainty = 1.0 / (1.0 + variance * turning * DEG2 / square);
+        // See `confidence`: the squared standard error over the squared half-way point, with one division in all.
+        let freedom = f32::from(solutions.kept[lane]) - 2.0;
+        let squares = solutions.squared_residuals[lane] + PRIOR2 * square;
+        let turning = solutions.trace[lane] - solutions.along[lane] * inverse2;
+        let turning = if turning > 0.0 { turning } else { 0.0 };
+        let certainty = freedom / (freedom + squares * turning * inverse2 * DEG2);
         confidence[lane] = if length > 0.0 { certainty } else { 0.0 };
     }
     for lane in 0..LANES {

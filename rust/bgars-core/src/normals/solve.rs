@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::lights::{MIN_CONDITIONING, conditioning};
 
 /// Most lights for which every subset's inverse is computed beforehand (4,096 matrices, 350 KB).
-pub(super) const MAX_TABLE_LIGHTS: usize = 12;
+const MAX_TABLE_LIGHTS: usize = 12;
 
 /// The Gram matrix `L^T L` of a subset of lights, as a solver wants it.
 #[derive(Clone, Copy, Debug)]
