@@ -5,7 +5,7 @@
 use std::ops::ControlFlow;
 
 use bgars_core::integrate::{Params, integrate};
-use bgars_core::normals::{Method, NormalMap, RobustParams, estimate_into};
+use bgars_core::normals::{Method, RobustParams, estimate, estimate_into};
 use bgars_core::{ImageStack, Lights, Pixel, Radiometry};
 
 const SIDE: usize = 256;
@@ -23,7 +23,7 @@ fn levels() -> Vec<u8> {
         .collect()
 }
 
-fn estimate<P: Pixel>(images: &[P], full_scale: f32, method: Method, times: usize) {
+fn estimate_times<P: Pixel>(images: &[P], full_scale: f32, method: Method, times: usize) {
     let ring: Vec<[f64; 3]> = (0..LIGHTS)
         .map(|light| {
             let (y, x) = (light as f64 * std::f64::consts::TAU / LIGHTS as f64).sin_cos();
@@ -33,10 +33,11 @@ fn estimate<P: Pixel>(images: &[P], full_scale: f32, method: Method, times: usiz
     let lights = Lights::directional(&ring).unwrap();
     let stack = ImageStack::new(images, LIGHTS, SIDE, SIDE).unwrap();
     let radiometry = Radiometry::linear(LIGHTS, full_scale);
-    let mut map = NormalMap::default();
-    for _ in 0..times {
+    let mut map =
+        estimate(&stack, &lights, &radiometry, None, method, false, &mut |_| ControlFlow::Continue(())).unwrap();
+    for _ in 1..times {
         let proceed = &mut |_| ControlFlow::Continue(());
-        estimate_into(&stack, &lights, &radiometry, None, method, false, proceed, &mut map).unwrap();
+        estimate_into(&stack, &lights, &radiometry, None, method, proceed, map.as_mut()).unwrap();
     }
     std::hint::black_box(&map);
 }
@@ -69,17 +70,17 @@ fn main() {
     let filter = Method::SpecularFilter { threshold: 50.0 };
     let levels = levels();
     match name.as_str() {
-        "lambertian-u8" => estimate(&levels, 255.0, Method::Lambertian, times),
-        "normals-u8" => estimate(&levels, 255.0, filter, times),
+        "lambertian-u8" => estimate_times(&levels, 255.0, Method::Lambertian, times),
+        "normals-u8" => estimate_times(&levels, 255.0, filter, times),
         "normals-u16" => {
             let wide: Vec<u16> = levels.iter().map(|&level| u16::from(level) * 257).collect();
-            estimate(&wide, 65535.0, filter, times);
+            estimate_times(&wide, 65535.0, filter, times);
         }
         "normals-f32" => {
             let floats: Vec<f32> = levels.iter().map(|&level| f32::from(level)).collect();
-            estimate(&floats, 255.0, filter, times);
+            estimate_times(&floats, 255.0, filter, times);
         }
-        "normals-robust-u8" => estimate(&levels, 255.0, Method::RobustFilter(RobustParams::default()), times),
+        "normals-robust-u8" => estimate_times(&levels, 255.0, Method::RobustFilter(RobustParams::default()), times),
         "integrate-6-iterations" => integrate_waves(times),
         other => panic!("unknown kernel {other}"),
     }

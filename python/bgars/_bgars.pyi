@@ -7,6 +7,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars.records import NormalField
+
 __all__ = [
     "DEBUG_BUILD",
     "decode_stack",
@@ -45,17 +47,10 @@ def estimate_normals(
     mask: NDArray[np.bool_] | None,
     method: str,
     threshold: float,
-    keep_sets: bool,
     threads: int | None,
     progress: Callable[[float], object] | None,
-) -> tuple[
-    NDArray[np.float32],
-    NDArray[np.float32],
-    NDArray[np.bool_],
-    NDArray[np.float32],
-    NDArray[np.uint16],
-    NDArray[np.bool_] | None,
-]: ...
+    out: NormalField,
+) -> None: ...
 def integrate_normals(
     normals: NDArray[np.float32],
     mask: NDArray[np.bool_],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
@@ -37,6 +38,7 @@ def estimate_normals(
     saturation: float | None = None,
     threshold: float = DEFAULT_THRESHOLD,
     keep_sets: bool = False,
+    out: NormalField | None = None,
     threads: int | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> NormalField:
@@ -67,6 +69,9 @@ def estimate_normals(
         Gap of ``specular-filter`` in grey levels of 255; scaled with the bit depth.
     keep_sets : bool
         Also return which lights were kept: `NormalField.kept_sets`, (H, W, L) bool.
+    out : NormalField, optional
+        Result of an earlier call on images of the same size, to be overwritten and returned: on a line that measures
+        one part after the other, its memory is used again.
     threads : int, optional
         Most threads to work on; by default what the environment variable ``RAYON_NUM_THREADS`` says, else one a core.
         The result does not depend on it.
@@ -112,7 +117,8 @@ def estimate_normals(
     else:
         capture = _capture_from_arrays(images, light_directions, light_intensities, saturation)
     use = _combined_mask(capture, mask)
-    normals, albedo, valid, confidence, lights_kept, kept_sets = _bgars.estimate_normals(
+    field = _result(capture, method, keep_sets, out)
+    _bgars.estimate_normals(
         capture.images,
         **_light_arguments(capture),
         response=capture.response,
@@ -123,21 +129,38 @@ def estimate_normals(
         mask=use,
         method=method,
         threshold=threshold,
-        keep_sets=keep_sets,
         threads=threads,
         progress=progress,
+        out=field,
     )
-    return NormalField(
-        normals=normals,
-        albedo=albedo,
-        mask=valid,
-        confidence=confidence,
-        measured=valid.copy(),
-        lights_kept=lights_kept,
-        method=method,
-        pixel_pitch_um=capture.pixel_pitch_um,
-        kept_sets=kept_sets,
-    )
+    np.copyto(field.measured, field.mask)
+    return field
+
+
+def _result(capture: Capture, method: Method, keep_sets: bool, out: NormalField | None) -> NormalField:
+    """The arrays to be written: fresh ones, or those of an earlier result."""
+    lights, height, width = capture.images.shape
+    sets_shape = (height, width, lights) if keep_sets else None
+    if out is None:
+        return NormalField(
+            normals=np.zeros((height, width, 3), np.float32),
+            albedo=np.zeros((height, width), np.float32),
+            mask=np.zeros((height, width), np.bool_),
+            confidence=np.zeros((height, width), np.float32),
+            measured=np.zeros((height, width), np.bool_),
+            lights_kept=np.zeros((height, width), np.uint16),
+            method=method,
+            pixel_pitch_um=capture.pixel_pitch_um,
+            kept_sets=None if sets_shape is None else np.zeros(sets_shape, np.bool_),
+        )
+    shape = out.normals.shape
+    if shape != (height, width, 3):
+        msg = f"out: must be the result for images of {width} x {height} pixels, got one for {shape[1]} x {shape[0]}"
+        raise InputError(msg)
+    if (None if out.kept_sets is None else out.kept_sets.shape) != sets_shape:
+        msg = "out: must have kept sets, for the same number of lights, exactly when keep_sets is asked for"
+        raise InputError(msg)
+    return replace(out, method=method, pixel_pitch_um=capture.pixel_pitch_um)
 
 
 def _capture_from_arrays(
@@ -163,7 +186,7 @@ def _capture_from_arrays(
     return Capture(
         images=stack,
         rig=rig,
-        mask=np.ones(stack.shape[1:], dtype=np.bool_),
+        mask=np.broadcast_to(np.True_, stack.shape[1:]),
         saturation=clip,
         full_scale=full_scale,
     )
@@ -183,8 +206,11 @@ def pixel_stack(images: ArrayLike) -> PixelArray:
     return np.ascontiguousarray(stack)
 
 
-def _combined_mask(capture: Capture, mask: ArrayLike | None) -> NDArray[np.bool_]:
+def _combined_mask(capture: Capture, mask: ArrayLike | None) -> NDArray[np.bool_] | None:
+    """The pixels to use; None for all of them."""
     if mask is None:
+        if capture.mask.strides == (0, 0) and capture.mask[:1, :1].all():
+            return None  # one True for all pixels, as captures without a mask have it
         return np.ascontiguousarray(capture.mask)
     given = np.asarray(mask)
     if given.dtype != np.bool_ or given.shape != capture.images.shape[1:]:

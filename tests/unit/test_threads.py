@@ -73,6 +73,7 @@ def work(name: str, folder: Path) -> Callable[[], Any]:
     if name == "triangulate":
         return lambda: [_bgars.triangulate(height, mask, 1.0) for _ in range(3)]
     vertices, faces, _ = _bgars.triangulate(height, mask, 1.0)
+    vertices, faces = vertices.astype(np.float64), faces.astype(np.int64)  # as trimesh holds them
     write = _bgars.write_ply if name == "write_ply" else _bgars.write_obj
     return lambda: write(folder / name, vertices, faces)
 
@@ -135,3 +136,26 @@ def test_strided_fortran_ordered_and_read_only_arrays_give_the_same_normals() ->
         np.testing.assert_array_equal(found, expected)
     heights = bgars.integrate_normals(expected).height_px
     np.testing.assert_array_equal(bgars.integrate_normals(np.asfortranarray(expected)).height_px, heights)
+
+
+def test_results_go_into_the_memory_of_an_earlier_field() -> None:
+    directions = bgars.LightRig.ring(8).directions
+    first, second = noisy_stack(50), noisy_stack(50)[::-1].copy()
+    expected = bgars.estimate_normals(second, directions, keep_sets=True)
+    field = bgars.estimate_normals(first, directions, method="lambertian", keep_sets=True)
+    again = bgars.estimate_normals(second, directions, keep_sets=True, out=field)
+    assert again.normals is field.normals
+    assert again.method == expected.method
+    for name in ("normals", "albedo", "mask", "confidence", "measured", "lights_kept", "kept_sets"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(expected, name), err_msg=name)
+
+
+def test_a_field_of_another_size_is_refused_before_it_is_touched() -> None:
+    directions = bgars.LightRig.ring(8).directions
+    field = bgars.estimate_normals(noisy_stack(20), directions)
+    before = field.normals.copy()
+    with pytest.raises(bgars.InputError, match="out: must be the result for images of 21 x 21 pixels"):
+        bgars.estimate_normals(noisy_stack(21), directions, out=field)
+    with pytest.raises(bgars.InputError, match="kept sets"):
+        bgars.estimate_normals(noisy_stack(20), directions, keep_sets=True, out=field)
+    np.testing.assert_array_equal(field.normals, before)

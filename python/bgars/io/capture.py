@@ -109,7 +109,7 @@ def _load(
         paths, channel=channel, response=table, gains=gains, max_megapixels=max_megapixels
     )
     shape = (images.shape[1], images.shape[2])
-    mask = np.ones(shape, dtype=np.bool_) if recipe.mask is None else read_mask(folder / recipe.mask, shape)
+    mask = np.broadcast_to(np.True_, shape) if recipe.mask is None else read_mask(folder / recipe.mask, shape)
     _refuse_nan(images, mask, paths)
 
     levels = _levels(folder, recipe, images, code_scale)

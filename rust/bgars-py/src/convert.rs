@@ -1,7 +1,9 @@
 //! The only file that knows numpy: arrays to slices without a copy, vectors to arrays without a copy.
 
+use numpy::ndarray::Dimension;
 use numpy::{
-    Element, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
+    Element, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyReadwriteArray,
+    PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 
@@ -26,6 +28,14 @@ pub fn slice2<'a, T: Element>(array: &'a PyReadonlyArray2<'_, T>, name: &str) ->
 /// The same for three dimensions.
 pub fn slice3<'a, T: Element>(array: &'a PyReadonlyArray3<'_, T>, name: &str) -> PyResult<&'a [T]> {
     array.as_slice().map_err(|_| InputError::new_err(format!("{name}: must be C-contiguous")))
+}
+
+/// The elements of a C-contiguous array, to be written.
+pub fn slice_mut<'a, T: Element, D: Dimension>(
+    array: &'a mut PyReadwriteArray<'_, T, D>,
+    name: &str,
+) -> PyResult<&'a mut [T]> {
+    array.as_slice_mut().map_err(|_| InputError::new_err(format!("out.{name}: must be C-contiguous")))
 }
 
 /// Rows of three, shape (N, 3).

@@ -2,23 +2,43 @@
 
 use std::ops::ControlFlow;
 
-use bgars_core::normals::{Method, NormalMap, RobustParams, estimate};
+use bgars_core::normals::{Method, NormalMapMut, RobustParams, estimate_into};
 use bgars_core::{ImageStack, Lights, Pixel, Radiometry};
-use numpy::{PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{
+    PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadwriteArray2, PyReadwriteArray3, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
-use crate::convert::{Stack, array2, array3, slice2, slice3, triples};
+use crate::convert::{Stack, slice_mut, slice2, slice3, triples};
 use crate::errors::{InputError, to_python};
 use crate::progress::watched;
 
-type Result5<'py> = (
-    Bound<'py, PyArray3<f32>>,
-    Bound<'py, PyArray2<f32>>,
-    Bound<'py, PyArray2<bool>>,
-    Bound<'py, PyArray2<f32>>,
-    Bound<'py, PyArray2<u16>>,
-    Option<Bound<'py, PyArray3<bool>>>,
-);
+/// The arrays to write: normals (H, W, 3), albedo, mask, confidence, lights_kept (H, W), and the kept sets (H, W, L).
+#[derive(FromPyObject)]
+pub struct Outputs<'py> {
+    normals: PyReadwriteArray3<'py, f32>,
+    albedo: PyReadwriteArray2<'py, f32>,
+    mask: PyReadwriteArray2<'py, bool>,
+    confidence: PyReadwriteArray2<'py, f32>,
+    lights_kept: PyReadwriteArray2<'py, u16>,
+    kept_sets: Option<PyReadwriteArray3<'py, bool>>,
+}
+
+impl Outputs<'_> {
+    fn as_map(&mut self) -> PyResult<NormalMapMut<'_>> {
+        Ok(NormalMapMut {
+            normals: slice_mut(&mut self.normals, "normals")?,
+            albedo: slice_mut(&mut self.albedo, "albedo")?,
+            mask: slice_mut(&mut self.mask, "mask")?,
+            confidence: slice_mut(&mut self.confidence, "confidence")?,
+            lights_kept: slice_mut(&mut self.lights_kept, "lights_kept")?,
+            kept_sets: match &mut self.kept_sets {
+                Some(sets) => slice_mut(sets, "kept_sets")?,
+                None => &mut [],
+            },
+        })
+    }
+}
 
 /// Everything but the images, borrowed from Python.
 struct Request<'a> {
@@ -30,7 +50,6 @@ struct Request<'a> {
     full_scale: f32,
     mask: Option<&'a [bool]>,
     method: Method,
-    keep_sets: bool,
     shape: [usize; 3],
 }
 
@@ -40,7 +59,8 @@ impl Request<'_> {
         images: &[P],
         dark: Option<&[P]>,
         report: &mut dyn FnMut((f64,)) -> ControlFlow<()>,
-    ) -> bgars_core::Result<NormalMap> {
+        out: NormalMapMut<'_>,
+    ) -> bgars_core::Result<()> {
         let [lights, height, width] = self.shape;
         let stack = ImageStack::new(images, lights, height, width)?;
         let radiometry = Radiometry {
@@ -51,13 +71,14 @@ impl Request<'_> {
             full_scale: self.full_scale,
             intensities: self.intensities.clone(),
         };
-        estimate(&stack, &self.lights, &radiometry, self.mask, self.method, self.keep_sets, &mut |done| report((done,)))
+        let progress = &mut |done| report((done,));
+        estimate_into(&stack, &self.lights, &radiometry, self.mask, self.method, progress, out)
     }
 }
 
 #[pyfunction]
 #[pyo3(signature = (images, *, lights, lights_are_positions, reference_px, intensities, response, dark, black_level,
-                    saturation, full_scale, mask, method, threshold, keep_sets, threads, progress))]
+                    saturation, full_scale, mask, method, threshold, threads, progress, out))]
 #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)]
 pub fn estimate_normals<'py>(
     py: Python<'py>,
@@ -74,10 +95,10 @@ pub fn estimate_normals<'py>(
     mask: Option<PyReadonlyArray2<'py, bool>>,
     method: &str,
     threshold: f32,
-    keep_sets: bool,
     threads: Option<i64>,
     progress: Option<Py<PyAny>>,
-) -> PyResult<Result5<'py>> {
+    mut out: Outputs<'py>,
+) -> PyResult<()> {
     let vectors = triples(&lights, "lights")?;
     let lights = if lights_are_positions { Lights::near(vectors, &reference_px) } else { Lights::directional(vectors) };
     let shape = match &images {
@@ -99,23 +120,15 @@ pub fn estimate_normals<'py>(
             "robust-filter" => Method::RobustFilter(RobustParams::default()),
             _ => return Err(InputError::new_err(format!("method: unknown method {method:?}"))),
         },
-        keep_sets,
         shape: [shape[0], shape[1], shape[2]],
     };
-    let map = match &images {
-        Stack::U8(images) => run(py, &request, images, dark.as_ref(), threads, progress.as_ref()),
-        Stack::U16(images) => run(py, &request, images, dark.as_ref(), threads, progress.as_ref()),
-        Stack::F32(images) => run(py, &request, images, dark.as_ref(), threads, progress.as_ref()),
-    }?;
-    let [lights, height, width] = request.shape;
-    Ok((
-        array3(py, map.normals, [height, width, 3])?,
-        array2(py, map.albedo, [height, width])?,
-        array2(py, map.mask, [height, width])?,
-        array2(py, map.confidence, [height, width])?,
-        array2(py, map.lights_kept, [height, width])?,
-        keep_sets.then(|| array3(py, map.kept_sets, [height, width, lights])).transpose()?,
-    ))
+    let out = out.as_map()?;
+    let (dark, progress) = (dark.as_ref(), progress.as_ref());
+    match &images {
+        Stack::U8(images) => run(py, &request, images, dark, threads, progress, out),
+        Stack::U16(images) => run(py, &request, images, dark, threads, progress, out),
+        Stack::F32(images) => run(py, &request, images, dark, threads, progress, out),
+    }
 }
 
 /// Borrows images and dark frame of one dtype and runs without the GIL.
@@ -126,9 +139,10 @@ fn run<P: Pixel + numpy::Element>(
     dark: Option<&Bound<'_, PyAny>>,
     threads: Option<i64>,
     progress: Option<&Py<PyAny>>,
-) -> PyResult<NormalMap> {
+    out: NormalMapMut<'_>,
+) -> PyResult<()> {
     let dark: Option<PyReadonlyArray2<'_, P>> = dark.map(PyAnyMethods::extract).transpose()?;
     let dark = dark.as_ref().map(|dark| slice2(dark, "dark")).transpose()?;
     let images = slice3(images, "images")?;
-    watched(py, threads, progress, |report| request.run(images, dark, report))
+    watched(py, threads, progress, |report| request.run(images, dark, report, out))
 }

@@ -11,7 +11,7 @@ use super::lanes::{self, Input, Sink};
 use super::robust::{self, RobustFilter, RobustScratch};
 use super::solve::{Solution, SubsetSolver};
 use super::specular::specular_filter;
-use super::{Method, NormalMap};
+use super::{Method, NormalMap, NormalMapMut};
 use crate::memory::zeros;
 use crate::{Error, ImageStack, Lights, Pixel, Radiometry, Result, stream};
 
@@ -67,40 +67,41 @@ pub fn estimate<P: Pixel>(
     keep_sets: bool,
     progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<NormalMap> {
-    let mut map = NormalMap::default();
-    estimate_into(stack, lights, radiometry, mask, method, keep_sets, progress, &mut map)?;
+    let pixels = stack.pixels();
+    let mut map = NormalMap {
+        normals: zeros(pixels * 3),
+        albedo: zeros(pixels),
+        mask: zeros(pixels),
+        confidence: zeros(pixels),
+        lights_kept: zeros(pixels),
+        kept_sets: if keep_sets { zeros(pixels * stack.lights()) } else { Vec::new() },
+    };
+    estimate_into(stack, lights, radiometry, mask, method, progress, map.as_mut())?;
     Ok(map)
 }
 
-/// [`estimate`] into a map that is there already: its memory is used again, which on a line that measures one part after the
-/// other saves the operating system's handing out of fresh pages. After an error the map's content means nothing.
+/// [`estimate`] into memory that is there already: on a line that measures one part after the other, this saves the operating
+/// system's handing out of fresh pages, which takes as long as the estimate. After an error the content means nothing.
 ///
 /// # Errors
-/// Those of [`estimate`].
-#[allow(clippy::too_many_arguments)]
+/// Those of [`estimate`], and arrays of another length than the image needs.
 pub fn estimate_into<P: Pixel>(
     stack: &ImageStack<'_, P>,
     lights: &Lights,
     radiometry: &Radiometry<'_, P>,
     mask: Option<&[bool]>,
     method: Method,
-    keep_sets: bool,
     progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
-    map: &mut NormalMap,
+    mut out: NormalMapMut<'_>,
 ) -> Result<()> {
     check(stack, lights, radiometry, mask, method)?;
+    out.check(stack.pixels(), stack.lights())?;
     let kernel = Kernel::new(stack, lights, radiometry, mask, method);
     let pixels = stack.pixels();
-    fit(&mut map.normals, pixels * 3);
-    fit(&mut map.albedo, pixels);
-    fit(&mut map.mask, pixels);
-    fit(&mut map.confidence, pixels);
-    fit(&mut map.lights_kept, pixels);
-    fit(&mut map.kept_sets, if keep_sets { pixels * stack.lights() } else { 0 });
     let band_pixels = if kernel.lanes.is_some() { LANE_BAND_PIXELS } else { BAND_PIXELS };
     for start in (0..pixels).step_by(band_pixels) {
         let band = start..(start + band_pixels).min(pixels);
-        let tasks = Out::split(map, &band, if keep_sets { stack.lights() } else { 0 });
+        let tasks = Out::split(&mut out, &band);
         tasks.into_par_iter().enumerate().for_each_init(
             || Scratch::new(lights),
             |scratch, (task, mut out)| {
@@ -113,13 +114,6 @@ pub fn estimate_into<P: Pixel>(
         }
     }
     Ok(())
-}
-
-/// Gives `array` a length; what is in it afterwards means nothing.
-fn fit<T: bytemuck::Zeroable + Clone>(array: &mut Vec<T>, len: usize) {
-    if array.len() != len {
-        *array = zeros(len);
-    }
 }
 
 /// A gap in the grey levels of the images from one in grey levels of 255.
@@ -218,9 +212,10 @@ pub(super) struct Out<'a> {
 }
 
 impl<'a> Out<'a> {
-    /// The tasks of a band of pixels; `set_lights` is the number of lights of the kept sets, 0 without these.
-    fn split(map: &'a mut NormalMap, band: &Range<usize>, set_lights: usize) -> Vec<Self> {
+    /// The tasks of a band of pixels.
+    fn split(map: &'a mut NormalMapMut<'_>, band: &Range<usize>) -> Vec<Self> {
         let streamed = map.albedo.len() >= stream::MIN_PIXELS;
+        let set_lights = map.kept_sets.len() / map.albedo.len();
         let mut kept_sets = &mut map.kept_sets[band.start * set_lights..band.end * set_lights];
         let mut tasks = Vec::with_capacity(band.len().div_ceil(TASK_PIXELS));
         let scalars = map.normals[band.start * 3..band.end * 3]

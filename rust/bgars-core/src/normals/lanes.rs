@@ -93,10 +93,13 @@ fn run_blocks<K: Pixel>(
         let block = first..(first + LANES).min(pixels.end);
         let span = first - pixels.start..block.end - pixels.start;
         let used = mask.map(|mask| &mask[block.clone()]);
-        if used.is_some_and(|used| !used.contains(&true)) {
+        // A block that is all in, or all out, needs no look at its pixels.
+        let count = used.map_or(block.len(), |used| used.iter().map(|&used| usize::from(used)).sum());
+        if count == 0 {
             sink.out.clear(span);
             continue;
         }
+        let used = used.filter(|_| count < block.len());
         load(&block, keys, &mut offsets);
         let offsets = has_offsets.then_some(&offsets);
         // The usual number of lights is unrolled.

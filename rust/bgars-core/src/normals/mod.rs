@@ -13,6 +13,8 @@ mod robust;
 mod solve;
 mod specular;
 
+use crate::{Error, Result};
+
 pub use kernel::{estimate, estimate_into};
 pub use robust::{RobustParams, robust_filter};
 pub use specular::specular_filter;
@@ -46,4 +48,54 @@ pub struct NormalMap {
     pub lights_kept: Vec<u16>,
     /// The kept lights themselves, `lights` values a pixel; empty unless asked for.
     pub kept_sets: Vec<bool>,
+}
+
+/// The arrays of a [`NormalMap`], wherever they are, to be written.
+#[derive(Debug)]
+pub struct NormalMapMut<'a> {
+    /// 3 values a pixel.
+    pub normals: &'a mut [f32],
+    /// 1 value a pixel.
+    pub albedo: &'a mut [f32],
+    /// 1 value a pixel.
+    pub mask: &'a mut [bool],
+    /// 1 value a pixel.
+    pub confidence: &'a mut [f32],
+    /// 1 value a pixel.
+    pub lights_kept: &'a mut [u16],
+    /// `lights` values a pixel, or empty: not wanted.
+    pub kept_sets: &'a mut [bool],
+}
+
+impl NormalMap {
+    /// The arrays, to be written.
+    pub fn as_mut(&mut self) -> NormalMapMut<'_> {
+        NormalMapMut {
+            normals: &mut self.normals,
+            albedo: &mut self.albedo,
+            mask: &mut self.mask,
+            confidence: &mut self.confidence,
+            lights_kept: &mut self.lights_kept,
+            kept_sets: &mut self.kept_sets,
+        }
+    }
+}
+
+impl NormalMapMut<'_> {
+    fn check(&self, pixels: usize, lights: usize) -> Result<()> {
+        let kept_sets = if self.kept_sets.is_empty() { 0 } else { pixels * lights };
+        for (argument, expected, actual) in [
+            ("normals", pixels * 3, self.normals.len()),
+            ("albedo", pixels, self.albedo.len()),
+            ("mask", pixels, self.mask.len()),
+            ("confidence", pixels, self.confidence.len()),
+            ("lights_kept", pixels, self.lights_kept.len()),
+            ("kept_sets", kept_sets, self.kept_sets.len()),
+        ] {
+            if expected != actual {
+                return Err(Error::LengthMismatch { argument, expected, actual });
+            }
+        }
+        Ok(())
+    }
 }
