@@ -58,6 +58,7 @@ def total(binary: Path, kernel: str, times: int) -> int:
 
 
 def main() -> int:
+    """Count, compare, and keep the counts if asked to."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--update", action="store_true", help="keep the counts of this run")
     update = parser.parse_args().update

@@ -36,6 +36,22 @@ pub(crate) fn copy<T: bytemuck::NoUninit>(from: &[T], to: &mut [T]) {
     to.copy_from_slice(from);
 }
 
+/// Has the processor fetch the cache line of `values[index]`, if there is one, while it works on something else.
+#[inline(always)]
+pub(crate) fn prefetch<T>(values: &[T], index: usize) {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(value) = values.get(index) {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: a hint about memory that is borrowed; it reads nothing into the program. SSE is part of x86_64.
+        #[allow(unsafe_code, unused_unsafe)]
+        unsafe {
+            _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(value).cast());
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (values, index);
+}
+
 /// Makes streamed writes visible to other threads in order.
 #[inline]
 pub(crate) fn finish() {

@@ -13,6 +13,12 @@ use super::kernel::Out;
 use super::lane_solve::{Choice, LaneSolver, Solutions, is_kept, solve};
 use crate::{Pixel, Radiometry, stream};
 
+/// How far ahead the images are fetched: as many streams as lights are more than processors follow by themselves.
+const AHEAD_PIXELS: usize = 16 * LANES;
+
+/// Bytes of a cache line.
+const LINE_BYTES: usize = 64;
+
 /// What every block reads.
 pub(super) struct Input<'a, P> {
     /// The images.
@@ -44,6 +50,9 @@ pub(super) fn run<P: Pixel>(solver: &LaneSolver, input: &Input<'_, P>, pixels: R
         let mut keys = vec![[P::LEAST; LANES]; planes.len()];
         let mut load = |block: &Range<usize>, keys: &mut [Lanes<P>], offsets: &mut Lanes<f32>| {
             for (key, plane) in keys.iter_mut().zip(planes) {
+                for line in 0..size_of::<Lanes<P>>() / LINE_BYTES {
+                    stream::prefetch(plane, block.start + AHEAD_PIXELS + line * (LINE_BYTES / size_of::<P>()));
+                }
                 match <&Lanes<P>>::try_from(&plane[block.clone()]) {
                     Ok(full) => *key = *full,
                     Err(_) => key[..block.len()].copy_from_slice(&plane[block.clone()]),
