@@ -42,9 +42,10 @@ def integrate_normals(
     """Integrate normals to heights by weighted least squares.
 
     Minimises the sum over neighbouring pixels of ``(n_z dz + n_x)^2`` along x and ``(n_z dz + n_y)^2`` along y (up), by
-    conjugate gradient on the normal equations, preconditioned by multigrid: about 8 iterations whatever the size. **What this cannot give**: heights across an occluding contour.
-    Between a ball and its board the surface jumps where no pixel sees it, so the stand-off height is not in the
-    normals, and parts that do not touch (components) each float freely.
+    conjugate gradient on the normal equations, preconditioned by multigrid: about 8 iterations whatever the size.
+    **What this cannot give**: heights across an occluding contour. Between a ball and its board the surface jumps where
+    no pixel sees it, so the stand-off height is not in the normals, and parts that do not touch (components) each float
+    freely.
 
     Parameters
     ----------
