@@ -14,8 +14,10 @@ __all__ = [
     "decode_stack",
     "estimate_normals",
     "integrate_normals",
+    "normal_arrays",
     "read_rgb16",
     "triangulate",
+    "usable_normals",
     "vertex_normals",
     "write_obj",
     "write_ply",
@@ -51,6 +53,18 @@ def estimate_normals(
     progress: Callable[[float], object] | None,
     out: NormalField,
 ) -> None: ...
+def normal_arrays(
+    height: int, width: int, set_lights: int
+) -> tuple[
+    NDArray[np.float32],
+    NDArray[np.float32],
+    NDArray[np.bool_],
+    NDArray[np.float32],
+    NDArray[np.bool_],
+    NDArray[np.uint16],
+    NDArray[np.bool_] | None,
+]: ...
+def usable_normals(normals: NDArray[np.float32]) -> NDArray[np.bool_]: ...
 def integrate_normals(
     normals: NDArray[np.float32],
     mask: NDArray[np.bool_],

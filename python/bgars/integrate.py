@@ -141,8 +141,8 @@ def _normal_array(normals: ArrayLike, mask: ArrayLike | None) -> tuple[FloatArra
         raise InputError(msg)
     if mask is not None:
         return vectors, np.ones(vectors.shape[:2], dtype=np.bool_)
-    usable: BoolArray = np.isfinite(vectors).all(axis=2) & (vectors[..., 2] > 0)
-    return vectors, usable
+    vectors = np.ascontiguousarray(vectors)
+    return vectors, _bgars.usable_normals(vectors)
 
 
 def _bool_mask(mask: ArrayLike, shape: tuple[int, ...]) -> BoolArray:

@@ -142,16 +142,19 @@ def _result(capture: Capture, method: Method, keep_sets: bool, out: NormalField 
     lights, height, width = capture.images.shape
     sets_shape = (height, width, lights) if keep_sets else None
     if out is None:
+        normals, albedo, valid, confidence, measured, lights_kept, kept_sets = _bgars.normal_arrays(
+            height, width, lights if keep_sets else 0
+        )
         return NormalField(
-            normals=np.zeros((height, width, 3), np.float32),
-            albedo=np.zeros((height, width), np.float32),
-            mask=np.zeros((height, width), np.bool_),
-            confidence=np.zeros((height, width), np.float32),
-            measured=np.zeros((height, width), np.bool_),
-            lights_kept=np.zeros((height, width), np.uint16),
+            normals=normals,
+            albedo=albedo,
+            mask=valid,
+            confidence=confidence,
+            measured=measured,
+            lights_kept=lights_kept,
             method=method,
             pixel_pitch_um=capture.pixel_pitch_um,
-            kept_sets=None if sets_shape is None else np.zeros(sets_shape, np.bool_),
+            kept_sets=kept_sets,
         )
     shape = out.normals.shape
     if shape != (height, width, 3):

@@ -1,6 +1,6 @@
 //! `integrate_normals`.
 
-use bgars_core::integrate::{Difference, Params, integrate};
+use bgars_core::integrate::{Difference, Params, integrate, usable};
 use numpy::{PyArray2, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
@@ -48,4 +48,16 @@ pub fn integrate_normals<'py>(
         surface.iterations,
         surface.residual,
     ))
+}
+
+#[pyfunction]
+#[allow(clippy::needless_pass_by_value)]
+pub fn usable_normals<'py>(
+    py: Python<'py>,
+    normals: PyReadonlyArray3<'py, f32>,
+) -> PyResult<Bound<'py, PyArray2<bool>>> {
+    let shape = [normals.shape()[0], normals.shape()[1]];
+    let normals = slice3(&normals, "normals")?;
+    let mask = py.detach(|| usable(normals));
+    array2(py, mask, shape)
 }

@@ -24,11 +24,15 @@ mod _bgars {
     #[pymodule_export]
     use crate::integrate::integrate_normals;
     #[pymodule_export]
+    use crate::integrate::usable_normals;
+    #[pymodule_export]
     use crate::mesh::triangulate;
     #[pymodule_export]
     use crate::mesh::vertex_normals;
     #[pymodule_export]
     use crate::normals::estimate_normals;
+    #[pymodule_export]
+    use crate::normals::normal_arrays;
 
     #[pymodule_export]
     const DEBUG_BUILD: bool = cfg!(debug_assertions);

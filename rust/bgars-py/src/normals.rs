@@ -2,16 +2,44 @@
 
 use std::ops::ControlFlow;
 
-use bgars_core::normals::{Method, NormalMapMut, RobustParams, estimate_into};
+use bgars_core::normals::{Method, NormalMap, NormalMapMut, RobustParams, estimate_into};
 use bgars_core::{ImageStack, Lights, Pixel, Radiometry};
 use numpy::{
-    PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadwriteArray2, PyReadwriteArray3, PyUntypedArrayMethods,
+    PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadwriteArray2, PyReadwriteArray3,
+    PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 
-use crate::convert::{Stack, slice_mut, slice2, slice3, triples};
+use crate::convert::{Stack, array2, array3, slice_mut, slice2, slice3, triples};
 use crate::errors::{InputError, to_python};
 use crate::progress::watched;
+
+/// normals (H, W, 3), albedo, mask, confidence, measured, lights_kept (H, W), kept sets (H, W, L).
+type Arrays<'py> = (
+    Bound<'py, PyArray3<f32>>,
+    Bound<'py, PyArray2<f32>>,
+    Bound<'py, PyArray2<bool>>,
+    Bound<'py, PyArray2<f32>>,
+    Bound<'py, PyArray2<bool>>,
+    Bound<'py, PyArray2<u16>>,
+    Option<Bound<'py, PyArray3<bool>>>,
+);
+
+/// Zeros on large pages, for `estimate_normals` to write.
+#[pyfunction]
+pub fn normal_arrays(py: Python<'_>, height: usize, width: usize, set_lights: usize) -> PyResult<Arrays<'_>> {
+    let map = NormalMap::zeros(height * width, set_lights);
+    let shape = [height, width];
+    Ok((
+        array3(py, map.normals, [height, width, 3])?,
+        array2(py, map.albedo, shape)?,
+        array2(py, map.mask.clone(), shape)?,
+        array2(py, map.confidence, shape)?,
+        array2(py, map.mask, shape)?,
+        array2(py, map.lights_kept, shape)?,
+        (set_lights > 0).then(|| array3(py, map.kept_sets, [height, width, set_lights])).transpose()?,
+    ))
+}
 
 /// The arrays to write: normals (H, W, 3), albedo, mask, confidence, lights_kept (H, W), and the kept sets (H, W, L).
 #[derive(FromPyObject)]

@@ -21,7 +21,7 @@ mod system;
 mod transfer;
 
 pub use components::Component;
-pub use solve::integrate;
+pub use solve::{integrate, usable};
 pub use system::{Operator, System, VCycle};
 
 use std::ops::ControlFlow;

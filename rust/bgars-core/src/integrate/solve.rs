@@ -80,6 +80,25 @@ pub fn integrate(
     Ok(Surface { height_px, labels: runs.labels(), components: runs.components, iterations, residual })
 }
 
+/// The pixels whose normal can be integrated: finite, and toward the camera (`n_z > 0`). 3 values a pixel.
+///
+/// # Examples
+/// ```
+/// let normals = [0.0, 0.0, 1.0, f32::NAN, 0.0, 1.0, 1.0, 0.0, 0.0];
+/// assert_eq!(bgars_core::integrate::usable(&normals), [true, false, false]);
+/// ```
+#[must_use]
+pub fn usable(normals: &[f32]) -> Vec<bool> {
+    let mut usable = zeros(normals.len() / 3);
+    usable.par_chunks_mut(CHECK_PIXELS).zip(normals.par_chunks(3 * CHECK_PIXELS)).for_each(|(usable, normals)| {
+        for (usable, normal) in usable.iter_mut().zip(normals.chunks_exact(3)) {
+            // NaN and infinity spread into the sum of their products with zero.
+            *usable = normal[2] > 0.0 && (normal[0] * 0.0 + normal[1] * 0.0) + normal[2] * 0.0 == 0.0;
+        }
+    });
+    usable
+}
+
 /// Refuses what the solver cannot work on.
 pub(super) fn check(field: Field<'_>, params: &Params) -> Result<()> {
     let Field { normals, mask, weights, width } = field;

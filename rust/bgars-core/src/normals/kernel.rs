@@ -12,7 +12,6 @@ use super::robust::{self, RobustFilter, RobustScratch};
 use super::solve::{Solution, SubsetSolver};
 use super::specular::specular_filter;
 use super::{Method, NormalMap, NormalMapMut};
-use crate::memory::zeros;
 use crate::{Error, ImageStack, Lights, Pixel, Radiometry, Result, stream};
 
 /// Pixels between two calls of the progress callback.
@@ -67,15 +66,7 @@ pub fn estimate<P: Pixel>(
     keep_sets: bool,
     progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<NormalMap> {
-    let pixels = stack.pixels();
-    let mut map = NormalMap {
-        normals: zeros(pixels * 3),
-        albedo: zeros(pixels),
-        mask: zeros(pixels),
-        confidence: zeros(pixels),
-        lights_kept: zeros(pixels),
-        kept_sets: if keep_sets { zeros(pixels * stack.lights()) } else { Vec::new() },
-    };
+    let mut map = NormalMap::zeros(stack.pixels(), if keep_sets { stack.lights() } else { 0 });
     estimate_into(stack, lights, radiometry, mask, method, progress, map.as_mut())?;
     Ok(map)
 }

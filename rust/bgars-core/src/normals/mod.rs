@@ -13,6 +13,7 @@ mod robust;
 mod solve;
 mod specular;
 
+use crate::memory::zeros;
 use crate::{Error, Result};
 
 pub use kernel::{estimate, estimate_into};
@@ -68,6 +69,19 @@ pub struct NormalMapMut<'a> {
 }
 
 impl NormalMap {
+    /// Zeros for so many pixels, on large pages; `set_lights` is the number of lights of the kept sets, 0 without these.
+    #[must_use]
+    pub fn zeros(pixels: usize, set_lights: usize) -> Self {
+        Self {
+            normals: zeros(pixels * 3),
+            albedo: zeros(pixels),
+            mask: zeros(pixels),
+            confidence: zeros(pixels),
+            lights_kept: zeros(pixels),
+            kept_sets: zeros(pixels * set_lights),
+        }
+    }
+
     /// The arrays, to be written.
     pub fn as_mut(&mut self) -> NormalMapMut<'_> {
         NormalMapMut {
