@@ -83,7 +83,7 @@ real!(f64);
 
 /// The weights of all edges, kept at their red pixels: 8 bytes a pixel.
 ///
-/// A negative weight belongs to a *virtual* edge (see [`super::fill`]): it carries values between grids, but it is no part of
+/// A negative weight belongs to a *virtual* edge (see `fill`): it carries values between grids, but it is no part of
 /// the system.
 #[derive(Debug)]
 pub(super) struct Weights {

@@ -3,9 +3,9 @@
 //! Each edge between two pixels of the mask asks `n_z dz = -n_x` (along x) or `n_z dz = -n_y` (along y, up). The normal
 //! equations are a weighted graph Laplacian, a 5-point stencil that is never stored as a matrix.
 //!
-//! The way through the files: [`operator`] makes weights and right side of the normals on a [`checkerboard`]; [`reduction`]
-//! eliminates every other pixel; [`conjugate_gradient`] solves for the rest, preconditioned by [`multigrid`], whose grids come
-//! from [`coarsen`] (after [`fill`] has closed the smallest holes) and talk to each other by [`transfer`].
+//! The way through the files: `operator` makes weights and right side of the normals on a `checkerboard`; `reduction`
+//! eliminates every other pixel; `conjugate_gradient` solves for the rest, preconditioned by `multigrid`, whose grids come
+//! from `coarsen` (after `fill` has closed the smallest holes) and talk to each other by `transfer`.
 
 mod checkerboard;
 mod coarsen;

@@ -56,7 +56,7 @@ const TASK_PIXELS: usize = 1 << 13;
 /// ```
 ///
 /// # Cost
-/// O(L log L) a pixel, rayon over rows; the same bits for any number of threads.
+/// O(L log L) a pixel, rayon over blocks of pixels; the same bits for any number of threads.
 pub fn estimate<P: Pixel>(
     stack: &ImageStack<'_, P>,
     lights: &Lights,
