@@ -6,6 +6,7 @@
 
 mod confidence;
 mod cutoff;
+mod gram;
 mod kernel;
 mod lane_solve;
 mod lanes;
