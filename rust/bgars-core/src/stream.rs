@@ -25,7 +25,8 @@ pub(crate) fn copy<T: bytemuck::NoUninit>(from: &[T], to: &mut [T]) {
             // SAFETY: both slices are `bytes` long; the source has no uninitialised bytes (NoUninit) and is read without
             // alignment; the place is aligned, borrowed mutably, and gets bytes of its own type. SSE2 is part of x86_64.
             #[allow(unsafe_code)]
-            let move_word = |word: usize| unsafe { _mm_stream_si128(place.add(word), _mm_loadu_si128(source.add(word))) };
+            let move_word =
+                |word: usize| unsafe { _mm_stream_si128(place.add(word), _mm_loadu_si128(source.add(word))) };
             let words = bytes / WORD;
             // By cache lines, which saves most of the counting.
             for line in 0..words / 4 {

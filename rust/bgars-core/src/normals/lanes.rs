@@ -211,6 +211,7 @@ fn write(full_scale: f32, solutions: &Solutions, used: Option<&[bool]>, span: Ra
     store(&confidence, &mut out.confidence[span.clone()], out.streamed);
     store(&solutions.kept, &mut out.lights_kept[span.clone()], out.streamed);
     store(&valid, &mut out.mask[span.clone()], out.streamed);
+    store(&valid, &mut out.measured[span.clone()], out.streamed);
     if let Some(used) = used {
         for (lane, _) in used.iter().enumerate().filter(|(_, used)| !**used) {
             out.clear(span.start + lane..span.start + lane + 1);
