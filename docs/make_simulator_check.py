@@ -1,7 +1,4 @@
-"""Rebuild scenes of an independent renderer with `bgars.simulate` and compare pixel by pixel; Markdown on stdout.
-
-    BGARS_DATA=... python docs/make_simulator_check.py
-"""
+"""Rebuild scenes of an independent renderer with `bgars.simulate`, compare them, rewrite the tables of docs/simulator.md."""
 
 from __future__ import annotations
 
@@ -19,12 +16,17 @@ import imageio.v3 as iio
 import numpy as np
 from numpy.typing import NDArray
 
-SCENES = ("A_one_ball_diffuse", "C_grid_4x4_paper", "D_grid_5x5_defects")
+SCENES = ("A_one_ball_diffuse", "C_grid_4x4_paper", "D_grid_5x5_defects", "D2_grid_5x5_defects_bow")
+NOISY_SCENE = "C2_grid_4x4_gamma"
+PAGE = Path(__file__).parent / "simulator.md"
+START, END = "<!-- tables: make simulator -->", "<!-- end of tables -->"
 SUPERSAMPLE = 8
 """The renderer averages 64 samples over a pixel; so does the check."""
 HIGHLIGHT_LEVELS = 1.0
 """A lit ball pixel belongs to the highlight where its specular part is above this many grey levels."""
 FULL = 255.0
+MIN_PIXELS = 1000
+LOWEST_LEVEL, HIGHEST_LEVEL = 40.0, 240.0
 Bool = NDArray[np.bool_]
 Levels = NDArray[np.float64]
 
@@ -105,7 +107,7 @@ def rebuild(folder: Path) -> Rebuilt:
     truth["lit"] = np.stack([(truth["lit"] >> light) & 1 for light in range(count)]).astype(bool)
     rig = bgars.LightRig.from_directions(facts["lights"]["directions"], intensities=facts["lights"]["intensities"])
     material, gain = facts["material"], facts["radiance_to_signal_gain"]
-    # f = (1 - w) Id / pi + w F D G / (4 N.L N.V), with D = D / D_0 / (pi m^2): the lobe's peak is gain w F / (4 pi m^2).
+    # f = (1 - w) Id / pi + w F D G / (4 N.L N.V) with D_0 = 1 / (pi m^2): the peak of the lobe is gain w F D_0 / 4.
     cosine = math.sqrt((1.0 + float(rig.directions[0, 2])) / 2.0)
     mirror = conductor_reflectance(cosine, material["eta"], material["k"])
     i_s = gain * material["w"] * mirror / (4.0 * math.pi * material["alpha"] ** 2)
@@ -215,8 +217,34 @@ def truth_row(rebuilt: Rebuilt, truth: bgars.SimulatedTruth) -> str:
     )
 
 
+def noise_rows(folder: Path) -> list[str]:
+    """Deviations from the noise-free picture: of the renderer's noisy 8-bit gamma images, and of simulated ones."""
+    rebuilt = rebuild(folder)
+    noise = rebuilt.facts["noise"]
+    linear = replace(rebuilt.camera, bit_depth=16)
+    camera = replace(rebuilt.camera, bit_depth=8, gamma=2.2)
+    read_levels = noise["read_e"] / noise["full_well_e"] * FULL
+    noisy = replace(camera, full_well_e=noise["full_well_e"], read_noise_levels=read_levels)
+    matte, _ = replace(rebuilt, camera=linear).simulated(replace(rebuilt.material, i_s=0.0))
+    shiny, _ = replace(rebuilt, camera=linear).simulated(rebuilt.material)
+    clean, _ = replace(rebuilt, camera=replace(camera, bit_depth=16)).simulated(rebuilt.material)
+    ours, _ = replace(rebuilt, camera=noisy).simulated(rebuilt.material)
+    # Pixels about to clip have one-sided noise, and near black a gamma is anything but straight.
+    steady = (clean > LOWEST_LEVEL) & (clean < HIGHEST_LEVEL)
+    rows = []
+    for kind, mask in classes_of(rebuilt, shiny - matte).items():
+        chosen = mask & steady
+        if chosen.sum() > MIN_PIXELS:
+            cells = []
+            for images in (rebuilt.images, ours):
+                residual = (images - clean)[chosen]
+                cells.append(f" {residual.mean():+.3f} | {residual.std():.3f} |")
+            rows.append(f"| C2 | {kind} | {int(chosen.sum())} |{''.join(cells)}")
+    return rows
+
+
 def main() -> None:
-    """Print both tables."""
+    """Rewrite the tables between the marks of the page."""
     data = Path(os.environ["BGARS_DATA"]) / "scenes"
     lines = [
         "| scene | class | pixels x lights | median | 95 % | max | with Smith's masking: median | 95 % | max |",
@@ -229,19 +257,30 @@ def main() -> None:
     ]
     for name in SCENES:
         results, rebuilt, truth, clipped = check(data / name)
+        short = name.split("_", maxsplit=1)[0]
         for kind, ours in results["cook-torrance"].items():
-            theirs = results["smith"][kind]
-            cells = [f"| {name.split('_')[0]} | {kind} | {ours.size} |"]
-            for values in (ours, theirs):
-                if values.size:
-                    cells.append(f" {np.median(values):.2f} | {np.percentile(values, 95):.2f} | {values.max():.2f} |")
-                else:
-                    cells.append(" - | - | - |")
-            lines.append("".join(cells))
-        lines.append(f"| {name.split('_')[0]} | clipped in both (left out above) | {clipped} | - | - | - | - | - | - |")
+            lines.append(f"| {short} | {kind} | {ours.size} |{shown(ours)}{shown(results['smith'][kind])}")
+        lines.append(f"| {short} | clipped in both (left out above) | {clipped} | - | - | - | - | - | - |")
         truths.append(truth_row(rebuilt, truth))
         sys.stderr.write(f"{name}\n")
-    sys.stdout.write("\n".join([*lines, "", *truths, ""]))
+    noises = [
+        "| scene | class | pixels x lights | renderer: mean | standard deviation | bgars: mean | standard deviation |",
+        "| --- | --- | ---: | ---: | ---: | ---: | ---: |",
+        *noise_rows(data / NOISY_SCENE),
+    ]
+    head, rest = PAGE.read_text(encoding="utf-8").split(START)
+    tail = rest.split(END)[1]
+    body = "\n".join(
+        ["### Grey levels", "", *lines, "", "### Truth", "", *truths, "", "### Noise and response", "", *noises]
+    )
+    PAGE.write_text(f"{head}{START}\n\n{body}\n\n{END}{tail}", encoding="utf-8")
+
+
+def shown(differences: Levels) -> str:
+    """Three cells: median, 95th percentile, largest."""
+    if not differences.size:
+        return " - | - | - |"
+    return f" {np.median(differences):.2f} | {np.percentile(differences, 95):.2f} | {differences.max():.2f} |"
 
 
 if __name__ == "__main__":

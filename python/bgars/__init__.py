@@ -29,6 +29,7 @@ from bgars.io.truth import read_truth
 from bgars.mesh import mesh_from_height
 from bgars.normals import estimate_normals
 from bgars.pipeline import Reconstruction, reconstruct
+from bgars.recipes import named_recipes, read_scene, write_simulation
 from bgars.records import Capture, Component, HeightMap, NormalField, Truth
 from bgars.report.overview import write_overview
 from bgars.rig import LightRig
@@ -88,9 +89,11 @@ __all__ = [
     "evaluate",
     "integrate_normals",
     "mesh_from_height",
+    "named_recipes",
     "read_capture",
     "read_height",
     "read_normal_map",
+    "read_scene",
     "read_truth",
     "reconstruct",
     "sample_capture",
@@ -99,4 +102,5 @@ __all__ = [
     "write_mesh",
     "write_normal_map",
     "write_overview",
+    "write_simulation",
 ]

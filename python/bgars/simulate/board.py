@@ -146,4 +146,4 @@ class Board:
         bend = -2.0 * self.bow_um / self.bow_radius_um**2
         along_x, along_y = slope_x + bend * x_um, slope_y + bend * y_um
         length = np.sqrt(along_x * along_x + along_y * along_y + 1.0)
-        return -along_x / length, -along_y / length, 1.0 / length
+        return (0.0 - along_x) / length, (0.0 - along_y) / length, 1.0 / length

@@ -181,9 +181,10 @@ class Scene:
 
 
 def _frame_um(balls: Sequence[Ball]) -> tuple[float, float]:
-    """Width and height around the origin that hold the balls with half a radius of board around them."""
-    reach_x = max(abs(ball.x_um) + 1.5 * ball.radius_um for ball in balls)
-    reach_y = max(abs(ball.y_um) + 1.5 * ball.radius_um for ball in balls)
+    """Width and height around the origin that hold the balls and the shadows of a light at 45 degrees."""
+    margins = [1.5 * ball.radius_um + max(ball.centre_z_um, 0.0) for ball in balls]
+    reach_x = max(abs(ball.x_um) + margin for ball, margin in zip(balls, margins, strict=True))
+    reach_y = max(abs(ball.y_um) + margin for ball, margin in zip(balls, margins, strict=True))
     return 2.0 * reach_x, 2.0 * reach_y
 
 

@@ -13,11 +13,16 @@ if TYPE_CHECKING:
     from bgars.simulate.camera import Camera
     from bgars.simulate.solids import Array
 
-__all__ = ["Sensor"]
+__all__ = ["Sensor", "stream_key"]
 
 EIGHT_BITS = 8
 LIGHT_SHIFT = 32
 """Noise streams are keyed by light and row, so that no tiling and no thread order changes a bit."""
+
+
+def stream_key(seed: int, number: int) -> NDArray[np.uint64]:
+    """Key of a counter-based random stream (Salmon et al. 2011); whole numbers, so no two of them round alike."""
+    return np.array([seed, number], dtype=np.uint64)
 
 
 @dataclass(frozen=True)
@@ -58,7 +63,7 @@ class Sensor:
     def _noisy(self, row: Array, light: int, number: int) -> Array:
         """Shot noise (Poisson in electrons) and read noise (normal), drawn from the row's own stream."""
         camera = self.camera
-        random = np.random.Generator(np.random.Philox(key=[self.seed, (light << LIGHT_SHIFT) | number]))
+        random = np.random.Generator(np.random.Philox(key=stream_key(self.seed, (light << LIGHT_SHIFT) | number)))
         if camera.full_well_e is not None:
             row = random.poisson(row * camera.full_well_e).astype(np.float64) / camera.full_well_e
         if camera.read_noise_levels > 0:
@@ -70,9 +75,9 @@ class Sensor:
         camera = self.camera
         if camera.response_table is not None:
             levels, radiances = self._table()
-            return np.interp(radiances[0] + signal * (radiances[-1] - radiances[0]), radiances, levels)
-        encoded: Array = signal if camera.gamma == 1.0 else signal ** (1.0 / camera.gamma)
-        return encoded * camera.full_scale
+            return np.asarray(np.interp(radiances[0] + signal * (radiances[-1] - radiances[0]), radiances, levels))
+        encoded = signal if camera.gamma == 1.0 else np.power(signal, 1.0 / camera.gamma)
+        return np.asarray(encoded * camera.full_scale)
 
     def _signal_of(self, level: Array) -> Array:
         """Inverse response: grey level to linear signal in [0, 1]."""

@@ -59,7 +59,8 @@ def _smith_beckmann(cosine: Array, roughness: Array | float) -> Array:
     tangent = np.sqrt(np.maximum(1.0 - cosine * cosine, 0.0)) / cosine
     a = 1.0 / np.maximum(roughness * tangent, 1e-12)
     rational = (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a)
-    return np.where(a < 1.6, rational, 1.0)  # noqa: PLR2004 - Walter et al. 2007, eq. 27
+    # The rational function overshoots 1 by 6e-5 just before a = 1.6, where it ends.
+    return np.where(a < 1.6, np.minimum(rational, 1.0), 1.0)  # noqa: PLR2004 - Walter et al. 2007, eq. 27
 
 
 def _smith_ggx(cosine: Array, roughness: Array | float) -> Array:

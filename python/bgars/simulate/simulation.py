@@ -11,7 +11,7 @@ from bgars.records import Capture
 from bgars.simulate.array import truncated_normal
 from bgars.simulate.checks import require
 from bgars.simulate.render import Studio, render
-from bgars.simulate.sensor import Sensor
+from bgars.simulate.sensor import Sensor, stream_key
 from bgars.simulate.shading import Finish
 from bgars.simulate.shadows import check_lights
 from bgars.simulate.surface import World
@@ -150,7 +150,7 @@ def _finishes(variation: Variation, solids: list[Solid], seed: int) -> Finish:
     spread = np.array([variation.i_d, variation.i_s, variation.roughness])
     for index, solid in enumerate(solids):
         if solid.label > 0 and spread.any():
-            random = np.random.Generator(np.random.Philox(key=[seed, VARIATION_KEY | solid.label]))
+            random = np.random.Generator(np.random.Philox(key=stream_key(seed, VARIATION_KEY | solid.label)))
             factors[:, index] += spread * [truncated_normal(random) for _ in spread]
     return Finish(*factors)
 
