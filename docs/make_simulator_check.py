@@ -1,4 +1,4 @@
-"""Rebuild scenes of an independent renderer with `bgars.simulate`, compare them, rewrite the tables of docs/simulator.md."""
+"""Rebuild an independent renderer's scenes with `bgars.simulate`, compare, rewrite the tables of docs/simulator.md."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ def seating_plane(apexes_um: Array, gravity_um: Array) -> PlaneTruth | None:
     --------
     >>> import numpy as np
     >>> apexes = np.array([[-1.0, -1, 5], [1, -1, 5], [1, 1, 5], [-1, 1, 4]])
-    >>> seating_plane(apexes, np.zeros(2)).coplanarity_um
+    >>> round(seating_plane(apexes, np.zeros(2)).coplanarity_um, 9)
     1.0
     """
     if len(apexes_um) < MIN_BALLS:
@@ -106,7 +106,7 @@ def regression_plane(apexes_um: Array) -> PlaneTruth | None:
     --------
     >>> import numpy as np
     >>> apexes = np.array([[-1.0, -1, 5], [1, -1, 5], [1, 1, 5], [-1, 1, 5]])
-    >>> regression_plane(apexes).c_um
+    >>> round(regression_plane(apexes).c_um, 9)
     5.0
     """
     if len(apexes_um) < MIN_BALLS:

@@ -113,7 +113,7 @@ def _render_tile(studio: Studio, frames: Frames, first: int, last: int) -> None:
     frames.height_px[inside] = centre.z_um / camera.pixel_pitch_um
     frames.labels[inside] = studio.world.labels[centre.owner]
     direct = camera.supersample == 1 and camera.halo_px == 0
-    signals = [np.zeros(centre.z_um.shape)] * lights if direct else _box_filtered(studio, first, last)
+    signals = [] if direct else _box_filtered(studio, first, last)
     for light in range(lights):
         beam = beam_at(studio.rig, light, centre)
         lit = is_lit(studio.world, studio.rig, light, centre, beam, studio.floor_um)

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Scene"]
 
+MAX_BALLS = 32_767
+
 
 @dataclass(frozen=True, eq=False)
 class Scene:
@@ -51,6 +53,8 @@ class Scene:
         object.__setattr__(self, "bridges", tuple(self.bridges))
         positive("scene.size_um[0]", self.size_um[0])
         positive("scene.size_um[1]", self.size_um[1])
+        count = len(self.balls)
+        require(count <= MAX_BALLS, "scene.balls", f"must be {MAX_BALLS} or fewer (labels are int16)", count)
         names = [ball.name for ball in self.balls]
         twice = sorted({name for name in names if names.count(name) > 1}) if len(set(names)) < len(names) else []
         require(not twice, "scene.balls", "must have different names", ", ".join(twice))
@@ -154,7 +158,8 @@ class Scene:
 
         Examples
         --------
-        >>> scene = Scene.ball_array(4, 4, defects={"B2": Defect.missing()})
+        >>> import bgars
+        >>> scene = Scene.ball_array(4, 4, defects={"B2": bgars.Defect.missing()})
         >>> [ball.name for ball in scene.balls if not ball.present]
         ['B2']
         """
