@@ -144,20 +144,30 @@ def rebuild(folder: Path) -> Rebuilt:
 
 
 def texture_from(images: Levels, truth: dict[str, Any], rig: bgars.LightRig) -> Levels:
-    """Signal of a facing board from the images: the median over the lights that reach a pixel."""
+    """Signal of a facing board from the images: the median over the lights that reach all of a pixel's neighbourhood.
+
+    Where there is none, over those that reach the pixel's centre: shadows mix in there.
+    """
     facing = rig.directions[:, 2, None, None] * rig.intensities[:, None, None]
-    with np.errstate(all="ignore"):
-        lit = np.where(truth["lit"] & (truth["id"] == 0), images / FULL / facing, np.nan)
-    known = np.isfinite(lit).any(axis=0)
-    signal: Levels = np.zeros(known.shape)
-    signal[known] = np.nanmedian(lit[:, known], axis=0)
-    return signal
+    reached = truth["lit"] & (truth["id"] == 0)
+    clear = reached & ~contours_of(truth)
+    signal: Levels = np.zeros(truth["id"].shape)
+    for chosen in (reached, clear):
+        known = chosen.any(axis=0)
+        signal[known] = np.nanmedian(np.where(chosen, images / FULL / facing, np.nan)[:, known], axis=0)
+    # Under the rim of a ball the board is seen by a part of the pixel only, and its albedo not known at all.
+    return np.where(reached.any(axis=0), signal, np.median(signal[clear.any(axis=0)]))
+
+
+def contours_of(truth: dict[str, Any]) -> Bool:
+    """(L, H, W) pixels whose neighbourhood has another label or another shadow."""
+    return np.stack([_edges(truth["id"]) | _edges(mask) | truth["mixed"] for mask in truth["lit"]])
 
 
 def classes_of(rebuilt: Rebuilt, specular: Levels) -> dict[str, Bool]:
     """Pixel classes, one (L, H, W) mask each, from the renderer's own truth and the size of the specular part."""
     ids, lit = rebuilt.truth["id"], rebuilt.truth["lit"]
-    contour = np.stack([_edges(ids) | _edges(mask) | rebuilt.truth["mixed"] for mask in lit])
+    contour = contours_of(rebuilt.truth)
     ball = np.broadcast_to(ids > 0, lit.shape)
     shiny = specular > HIGHLIGHT_LEVELS
     return {
@@ -171,13 +181,15 @@ def classes_of(rebuilt: Rebuilt, specular: Levels) -> dict[str, Bool]:
 
 
 def _edges(values: NDArray[Any]) -> Bool:
-    """Pixels with another value among their eight neighbours."""
+    """Pixels with another value among their eight neighbours, and the image border, whose neighbours nobody sees."""
     padded = np.pad(values, 1, mode="edge")
     rows, cols = values.shape
     found: Bool = np.zeros(values.shape, dtype=np.bool_)
     for down in range(3):
         for right in range(3):
             found |= padded[down : down + rows, right : right + cols] != values
+    found[[0, -1]] = True
+    found[:, [0, -1]] = True
     return found
 
 
