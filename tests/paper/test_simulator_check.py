@@ -51,6 +51,20 @@ def test_scenes_of_the_renderer(
         assert truth.regression_coplanarity_um == pytest.approx(planes["lsq_range_mm"] * 1e3, rel=1e-3, abs=1e-3)
 
 
+@pytest.mark.parametrize("scene", ["F_grid_6x6_near", "H_bridge", "D2_grid_5x5_defects_bow"])
+def test_truth_under_near_lights_of_bridges_and_of_bowed_boards(
+    data_folder: Path, page: ModuleType, scene: str
+) -> None:
+    rebuilt, truth = page.truth_of(data_folder / "scenes" / scene)
+    np.testing.assert_array_equal(truth.ball_ids, rebuilt.truth["id"])
+    np.testing.assert_allclose(truth.height_um, rebuilt.truth["z"] * 1e3, atol=0.1)  # the rim
+    assert (truth.lit != rebuilt.truth["lit"]).mean() < 2e-5
+    # The renderer measures along z, not at right angles to the plane.
+    for ours, name in ((truth.seating, "seating_max_dev_mm"), (truth.regression, "lsq_range_mm")):
+        along_z = ours.coplanarity_um * np.sqrt(1 + ours.a**2 + ours.b**2)
+        assert along_z == pytest.approx(rebuilt.facts["coplanarity"][name] * 1e3, abs=2e-3)
+
+
 def test_noise_through_a_gamma_is_the_renderer_s(data_folder: Path, page: ModuleType) -> None:
     for row in page.noise_rows(data_folder / "scenes" / page.NOISY_SCENE):
         kind, _, mean, deviation, our_mean, our_deviation = [cell.strip() for cell in row.split("|")][2:8]

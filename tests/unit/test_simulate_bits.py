@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -225,6 +226,17 @@ def test_an_own_recipe_and_another_seed(tmp_path: Path) -> None:
     a, b = (bgars.read_capture(tmp_path / name).images for name in "ab")
     assert (a != b).any()
     assert json.loads((tmp_path / "b" / "scene.json").read_text(encoding="utf-8"))["seed"] == 5
+
+
+def test_the_guide_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "simulator.md").read_text(encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    exec(code, {})
+    assert len(bgars.read_capture(tmp_path / "part").images) == 8
+    (recipe,) = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    (tmp_path / "recipe.toml").write_text(recipe, encoding="utf-8")
+    assert len(bgars.read_scene(tmp_path / "recipe.toml").scene.balls) == 25
 
 
 def test_a_failing_write_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
