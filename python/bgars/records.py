@@ -27,6 +27,7 @@ __all__ = [
     "HeightMap",
     "NormalField",
     "PixelArray",
+    "Truth",
     "float_full_scale",
     "integer_full_scale",
 ]
@@ -251,3 +252,25 @@ class HeightMap:
             "iterations": self.iterations,
             "residual": self.residual,
         }
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """What a capture should give.
+
+    Attributes
+    ----------
+    normals : (H, W, 3) float32
+        True unit normals; NaN where unknown.
+    ball_ids : (H, W) int16 or None
+        0 board, 1.. balls, -1 bridge; None for a photograph of something else.
+    mask : (H, W) bool
+        Pixels to judge: the balls of a scene, the object of a photograph.
+    height_um : (H, W) float32 or None
+        True height.
+    """
+
+    normals: FloatArray
+    ball_ids: NDArray[np.int16] | None
+    mask: BoolArray
+    height_um: FloatArray | None
