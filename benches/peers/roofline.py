@@ -26,15 +26,14 @@ NORMAL_BYTES = {
 NORMAL_OPERATIONS = {
     "sorting network, 19 exchanges of a least and a greatest": 38,
     "cut-off, 5 gaps of a difference, a comparison, a choice": 15,
-    "kept lights, 8 comparisons and counts": 24,
-    "Gram matrix, 6 masked sums over 8 lights": 96,
+    "kept lights, 8 comparisons, choices and bits": 24,
+    "Gram matrix, 6 sums of 3 look-ups": 36,
     "its inverse": 35,
-    "three masked sums over 8 lights": 56,
-    "inverse times sums, twice": 30,
-    "refinement: 8 residuals and four masked sums": 112,
+    "four sums over 8 lights": 64,
+    "solution, its length in the inverse, residual": 38,
     "length, normal, albedo, confidence": 40,
 }
-"""Of a pixel that loses a light; where a block keeps all of them, the Gram matrix and the refinement fall away."""
+"""Of a pixel that loses a light; where a block keeps all of them, the Gram matrix falls away."""
 ITERATION_BYTES = {
     "direction: z and p read, p written": 2 + 4 + 4,
     "product: weights and p read, q written": 8 + 4 + 4,

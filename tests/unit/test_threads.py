@@ -14,6 +14,7 @@ import bgars
 import numpy as np
 import pytest
 from bgars import _bgars
+from bgars.io.images import decode_stack
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -67,20 +68,23 @@ def work(name: str, folder: Path) -> Callable[[], Any]:
         paths = [folder / f"{index}.png" for index in range(3)]
         for path in paths:
             _bgars.write_png16(path, noise)
-        return lambda: _bgars.decode_stack(paths, channel="mean", response=None, gains=None, max_megapixels=100.0)
+        return lambda: decode_stack(paths, channel="mean", max_megapixels=100.0)
     height = np.random.default_rng(3).normal(size=(2 * SIZE, 2 * SIZE)).astype(np.float32)
-    mask = np.ones(height.shape, dtype=np.bool_)
     if name == "triangulate":
-        return lambda: [_bgars.triangulate(height, mask, 1.0) for _ in range(3)]
-    vertices, faces, _ = _bgars.triangulate(height, mask, 1.0)
-    vertices, faces = vertices.astype(np.float64), faces.astype(np.int64)  # as trimesh holds them
-    write = _bgars.write_ply if name == "write_ply" else _bgars.write_obj
-    return lambda: write(folder / name, vertices, faces)
+        mask = np.ones(height.shape, dtype=np.bool_)
+        return lambda: [_bgars.triangulate(height, mask, 1.0, threads=None) for _ in range(3)]
+    surface = bgars.HeightMap.from_array(height)
+    if name.startswith("height"):
+        return lambda: bgars.write_mesh(surface, folder / name)
+    mesh = bgars.mesh_from_height(surface)
+    return lambda: bgars.write_mesh(mesh, folder / name)
 
 
-@pytest.mark.parametrize(
-    "name", ["estimate_normals", "integrate_normals", "decode_stack", "triangulate", "write_ply", "write_obj"]
-)
+CALLS = ["estimate_normals", "integrate_normals", "decode_stack", "triangulate"]
+FILES = ["mesh.ply", "mesh.obj", "height.ply", "height.obj"]
+
+
+@pytest.mark.parametrize("name", CALLS + FILES)
 def test_other_threads_run_while_the_compiled_module_works(name: str, tmp_path: Path) -> None:
     call = work(name, tmp_path)
     ticks = 0
@@ -92,7 +96,7 @@ def test_other_threads_run_while_the_compiled_module_works(name: str, tmp_path: 
         while not done.wait(0.0005):
             ticks += 1
 
-    thread = threading.Thread(target=count)
+    thread = threading.Thread(target=count, daemon=True)
     thread.start()
     started.wait()
     ticks = 0

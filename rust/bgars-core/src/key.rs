@@ -2,6 +2,8 @@
 
 /// What is sorted: grey levels as they come, or linear values.
 pub trait Key: Copy {
+    /// Bits as wide as a key, so that loops over both take the same vectors.
+    type Bits: Copy + std::ops::BitOr<Output = Self::Bits> + From<u8>;
     /// Smaller than every other.
     const LEAST: Self;
     /// Larger than every other.
@@ -17,11 +19,14 @@ pub trait Key: Copy {
     fn is_over(self, below: Self, gap: Self) -> bool;
     /// The largest key step that is not over `gap` in values.
     fn gap(gap: f32) -> Self;
+    /// The lowest byte.
+    fn byte(bits: Self::Bits) -> u8;
 }
 
 macro_rules! integer_key {
     ($type:ty) => {
         impl Key for $type {
+            type Bits = Self;
             const LEAST: Self = 0;
             const LARGEST: Self = Self::MAX;
             const ZERO: Self = 0;
@@ -45,6 +50,11 @@ macro_rules! integer_key {
                 // Steps are whole; a float too large saturates, and then nothing is over it.
                 gap as Self
             }
+
+            #[inline(always)]
+            fn byte(bits: Self) -> u8 {
+                bits as u8
+            }
         }
     };
 }
@@ -52,6 +62,8 @@ integer_key!(u8);
 integer_key!(u16);
 
 impl Key for f32 {
+    type Bits = u32;
+
     const LEAST: Self = Self::NEG_INFINITY;
     const LARGEST: Self = Self::INFINITY;
     const ZERO: Self = 0.0;
@@ -74,5 +86,10 @@ impl Key for f32 {
 
     fn gap(gap: f32) -> Self {
         gap
+    }
+
+    #[inline(always)]
+    fn byte(bits: u32) -> u8 {
+        bits as u8
     }
 }

@@ -55,10 +55,12 @@ pub fn write_mesh_file(mesh: &impl MeshSource, format: MeshFormat, comments: &[S
 /// Asks for room, where the system knows how.
 fn reserve(file: &File, bytes: u64) -> io::Result<()> {
     #[cfg(target_os = "linux")]
-    match rustix::fs::fallocate(file, rustix::fs::FallocateFlags::empty(), 0, bytes) {
-        Err(full @ (rustix::io::Errno::NOSPC | rustix::io::Errno::DQUOT)) => return Err(full.into()),
-        // A pipe or a file system without this service: writing will show.
-        Ok(()) | Err(_) => {}
+    {
+        use rustix::{fs, io::Errno};
+        // Any other answer comes from a pipe or a file system without this service: writing will show.
+        if let Err(full @ (Errno::NOSPC | Errno::DQUOT)) = fs::fallocate(file, fs::FallocateFlags::empty(), 0, bytes) {
+            return Err(full.into());
+        }
     }
     #[cfg(not(target_os = "linux"))]
     let _ = (file, bytes);

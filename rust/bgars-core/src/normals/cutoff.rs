@@ -24,6 +24,8 @@ pub(super) fn cutoffs<K: Key>(keys: &[&Lanes<K>], gap: K) -> Lanes<K> {
 /// Eight lights: a sorting network of 19 exchanges (Knuth, The Art of Computer Programming 3, section 5.3.4), then the steps.
 #[inline(always)]
 fn sorted_cutoffs<K: Key>(keys: &[&Lanes<K>; 8], gap: K) -> Lanes<K> {
+    // One array instead of eight places, or the compiler does not vectorise floats.
+    let keys = keys.map(|key| *key);
     let mut cutoffs = [K::LEAST; LANES];
     for lane in 0..LANES {
         let mut s: [K; 8] = std::array::from_fn(|light| keys[light][lane]);

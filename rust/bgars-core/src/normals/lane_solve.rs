@@ -81,17 +81,18 @@ impl<K: Pixel> Kept<K> {
         let bytes = keys.chunks(BYTE_LIGHTS).zip(self.keys.chunks_mut(BYTE_LIGHTS)).zip(&mut self.bits);
         for ((keys, kept_keys), bits) in bytes {
             // Written to once, so that the compiler need not ask what overlaps.
-            let mut byte = [0; LANES];
+            let mut wide = [K::Bits::from(0); LANES];
             for (light, (&&key, kept_key)) in keys.iter().zip(kept_keys).enumerate() {
                 let mut kept = key;
                 for lane in 0..LANES {
                     let keep = is_kept(key[lane], cutoffs[lane]);
                     kept[lane] = if keep { key[lane] } else { K::ZERO };
-                    byte[lane] |= u8::from(keep) << light;
+                    let bit = K::Bits::from(if keep { 1 << light } else { 0 });
+                    wide[lane] = wide[lane] | bit;
                 }
                 *kept_key = kept;
             }
-            *bits = byte;
+            *bits = wide.map(K::byte);
             let everywhere = bits.iter().fold(u8::MAX, |everywhere, bits| everywhere & bits);
             all &= everywhere == u8::MAX >> (BYTE_LIGHTS - keys.len());
         }

@@ -42,8 +42,11 @@ enum Source<'a, K> {
     /// The images as they are.
     Images(&'a [&'a [K]]),
     /// Computed from them.
-    Made(&'a dyn Fn(&Range<usize>, &mut [Lanes<K>])),
+    Made(&'a Make<'a, K>),
 }
+
+/// Computes the keys of a block.
+type Make<'a, K> = dyn Fn(&Range<usize>, &mut [Lanes<K>]) + 'a;
 
 /// What is to be subtracted from the keys of a block.
 type Offsets<'a> = dyn Fn(&Range<usize>, &mut Lanes<f32>) + 'a;
