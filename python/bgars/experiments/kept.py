@@ -109,7 +109,9 @@ def run(how: Run) -> Outcome:
         limit=(
             f"Why: at I_d = {last['i_d']:g} the filter takes diffuse light for highlights at "
             f"{last['dropped_diffuse_percent']:.0f} % of the pixels and counts attached shadows as data at "
-            f"{last['kept_shadow_percent']:.0f} %; at I_d = {first['i_d']:g} it keeps a highlight at "
+            f"{last['kept_shadow_percent']:.0f} % ({last['filter_deg']:.1f} deg; {last['with_diffuse_deg']:.1f} with "
+            f"the diffuse lights back, {last['with_diffuse_without_shadows_deg']:.1f} without the shadows, too); at "
+            f"I_d = {first['i_d']:g} it keeps a highlight at "
             f"{first['kept_highlight_percent']:.0f} %."
         ),
     )

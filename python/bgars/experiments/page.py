@@ -65,10 +65,15 @@ def paragraph(outcome: Outcome) -> str:
     """What was done, what agrees, what does not."""
     parts = [outcome.about]
     if outcome.agrees:
-        parts.append(f"**Agrees:** {' '.join(outcome.agrees)}")
+        parts.append(f"**Agrees:** {joined(outcome.agrees)}")
     if outcome.differs:
-        parts.append(f"**Does not:** {' '.join(outcome.differs)}")
+        parts.append(f"**Does not:** {joined(outcome.differs)}")
     return " ".join(parts)
+
+
+def joined(sentences: tuple[str, ...]) -> str:
+    """Sentences that begin small, as one."""
+    return "; ".join(sentence.removesuffix(".") for sentence in sentences) + "."
 
 
 def page_of_all(

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bgars.experiments.curves import draw_errors
-from bgars.experiments.measure import COLUMNS, FILTER, NAIVE, Measurement, measure_all, profile_px
+from bgars.experiments.measure import COLUMNS, Measurement, measure_all, profile_px
 from bgars.experiments.outcome import Experiment, Outcome, Picture
 from bgars.experiments.setting import DIFFUSE, HARDNESS, SPECULAR, Setting
 from bgars.experiments.style import TRUTH_STYLE, new_figure, panels, tidy, value_colors
-from bgars.experiments.words import change, method_table, of_method, span, split_by_gain
+from bgars.experiments.words import change, method_table, of_method, ranges, span, split_by_gain
 from bgars.normals import METHODS
 
 if TYPE_CHECKING:
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["FIG10", "FIG11", "FIG12"]
 
 METHODS_A_LINE = 4
+WIDTH_IN = 12.5
 
 
 def run(how: Run, *, name: str, field: str, symbol: str, values: tuple[float, ...]) -> Outcome:
@@ -38,39 +39,45 @@ def run(how: Run, *, name: str, field: str, symbol: str, values: tuple[float, ..
         return float(getattr(one.setting, field))
 
     better, worse = split_by_gain(measurements, value_of)
+    _, flatter = split_by_gain(measurements, value_of, "height_rmse_px")
     true_px = profile_px(np.where(truth.mask, truth.height_px, np.float32(np.nan)))
-    rises = {
-        method: span((float(np.nanmax(one.profile_px)) for one in of_method(measurements, method)), 0)
-        for method in METHODS
-    }
     label = name.replace("fig", "Fig. ")
-    figure = draw(measurements, symbol, field, values, true_px)
-    others = [
-        f"{method}: mean error {span(one.mean_deg_nz03 for one in of_method(measurements, method))} deg, height RMSE "
-        f"{span((one.height_rmse_px for one in of_method(measurements, method)), 2)} px."
-        for method in METHODS
-        if method not in {NAIVE, FILTER}
-    ]
     gains = f"{symbol} = {change(measurements, value_of, better)}" if better else ""
     losses = f"{symbol} = {change(measurements, value_of, worse)}" if worse else ""
+    heights = f"{symbol} = {ranges(flatter, values)}" if flatter else ""
+    limits = [f"the filter is worse than naive least squares at {losses}"] if worse else []
+    limits += [f"the filter's height RMSE is no smaller at {heights}"] if flatter else []
     return Outcome(
-        pictures=(Picture(name, figure, f"Profiles through the centre over {symbol}, and both errors."),),
+        pictures=(
+            Picture(
+                name,
+                draw(measurements, symbol, field, values, true_px),
+                f"Profiles through the centre over {symbol}, and both errors.",
+            ),
+        ),
         columns=COLUMNS,
         rows=[one.row for one in measurements],
         table=method_table(symbol, measurements, value_of),
         about=(
-            f"One row of the height map through the centre, brought to a common minimum; the true one rises "
-            f"{np.nanmax(true_px):.0f} px between its last pixel centres. " + " ".join(others)
+            "One row of the height map through the centre, brought to a common minimum; between its last pixel centres "
+            f"the true one rises {np.nanmax(true_px):.0f} px. "
+            + " ".join(_facts(measurements, method) for method in METHODS)
         ),
         agrees=(f"the filter lowers the mean error at {gains}.",) if better else (),
         differs=((f"it raises it at {losses}.",) if worse else ())
-        + (
-            f"no profile of the paper's two methods has the true height: {NAIVE} rises {rises[NAIVE]} px, {FILTER} "
-            f"{rises[FILTER]} px over the sweep.",
-        ),
+        + ((f"its height RMSE is no smaller than that of least squares at {heights}.",) if flatter else ()),
         holds=f"{label}: the filter is better than naive least squares at {gains}." if better else "",
-        limit=f"{label}: the filter is worse than naive least squares at {losses}." if worse else "",
+        limit=f"{label}: {'; '.join(limits)}." if limits else "",
     )
+
+
+def _facts(measurements: list[Measurement], method: str) -> str:
+    """Errors and rise of a method over the sweep."""
+    own = of_method(measurements, method)
+    mean_deg = span((one.mean_deg_nz03 for one in own), 1)
+    rmse_px = span((one.height_rmse_px for one in own), 2)
+    rise_px = span((float(np.nanmax(one.profile_px)) for one in own), 0)
+    return f"{method}: mean error {mean_deg} deg, height RMSE {rmse_px} px, rise {rise_px} px."
 
 
 def draw(
@@ -80,8 +87,12 @@ def draw(
     methods = list(dict.fromkeys(one.method for one in measurements))
     cols = min(len(methods), METHODS_A_LINE)
     lines = -(-len(methods) // cols)
-    figure = new_figure(12.5, 3.9 * lines + 3.2)
-    parts: Any = figure.subfigures(2, 1, height_ratios=(3.9 * lines, 3.2))
+    # Panels true to scale: as wide as their share of the page, and as high as the highest profile needs.
+    highest_px = max([float(np.nanmax(true_px)), *(float(np.nanmax(one.profile_px)) for one in measurements)])
+    inch_per_px = (WIDTH_IN / cols - 0.45) / np.count_nonzero(np.isfinite(true_px))
+    upper_in = lines * (0.9 + 1.1 * inch_per_px * highest_px)
+    figure = new_figure(WIDTH_IN, upper_in + 3.2)
+    parts: Any = figure.subfigures(2, 1, height_ratios=(upper_in, 3.2))
     upper, lower = parts
     places = [axes for line in panels(upper, lines, cols, sharex=True, sharey=True) for axes in line]
     size = measurements[0].height_px.shape

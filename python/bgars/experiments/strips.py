@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +21,12 @@ if TYPE_CHECKING:
 __all__ = ["FIG7", "FIG8", "FIG9"]
 
 COLUMNS = ("i_d", "i_s", "hardness", "mean_grey", "max_grey", "clipped_percent", "black_percent", "highlight_percent")
+EFFECTS = {
+    "i_d": ("mean_grey", 1.0, "the ball brightens"),
+    "i_s": ("highlight_percent", 1.0, "the highlight grows"),
+    "hardness": ("highlight_percent", -1.0, "the highlight shrinks"),
+}
+"""What should change steadily with each quantity: column, direction, in words."""
 HIGHLIGHT_LEVELS = 10.0
 """A pixel counts as highlight where the lobe adds more than this to the diffuse grey level."""
 
@@ -66,7 +73,14 @@ def run(how: Run, *, name: str, field: str, symbol: str, values: tuple[float, ..
     if picture is not None:
         figure.colorbar(picture, ax=top, label="grey level", shrink=0.9)
     clipped = span(float(row["clipped_percent"]) for row in rows)
-    first, last = (f"{rows[end]['highlight_percent']:.0f} %" for end in (0, -1))
+    watched, sign, effect = EFFECTS[field]
+    course = [sign * float(row[watched]) for row in rows]
+    expected = all(later > earlier for earlier, later in pairwise(course))
+    told = (
+        f"{effect} with {symbol}: from {symbol} = {values[0]:g} to {values[-1]:g}, mean grey level "
+        f"{rows[0]['mean_grey']:.0f} to {rows[-1]['mean_grey']:.0f}, highlights {rows[0]['highlight_percent']:.0f} to "
+        f"{rows[-1]['highlight_percent']:.0f} % of the ball under a light"
+    )
     return Outcome(
         pictures=(Picture(name, figure, f"Image of the light at azimuth 0° over {symbol}; below, its centre row."),),
         columns=COLUMNS,
@@ -86,11 +100,9 @@ def run(how: Run, *, name: str, field: str, symbol: str, values: tuple[float, ..
             "Shares are of hemisphere pixels, over all lights; highlight: the lobe adds more than "
             f"{HIGHLIGHT_LEVELS:g} grey levels."
         ),
-        agrees=(
-            f"from {symbol} = {values[0]:g} to {values[-1]:g} the highlights change from {first} to {last} of the ball "
-            "under a light.",
-        ),
-        differs=(f"{clipped} % of the values are clipped; to the equation I = k_d L n they are data like any other.",),
+        agrees=(f"{told}.",) if expected else (),
+        differs=(() if expected else (f"not the steady change one expects: {told}.",))
+        + (f"{clipped} % of the values are clipped; to the equation I = k_d L n they are data like any other.",),
     )
 
 

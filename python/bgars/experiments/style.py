@@ -23,7 +23,13 @@ OKABE_ITO = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 """Okabe and Ito, Color universal design, 2008."""
 MARKERS = "os^Dv*"
 LINES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)))
-TRUTH_STYLE: dict[str, Any] = {"color": "black", "linewidth": 1.2, "linestyle": (0, (4, 2)), "label": "truth"}
+TRUTH_STYLE: dict[str, Any] = {
+    "color": "black",
+    "linewidth": 1.2,
+    "linestyle": (0, (4, 2)),
+    "zorder": 4,
+    "label": "truth",
+}
 DPI = 100
 SETTINGS = {"font.size": 10, "axes.titlesize": 10, "axes.labelsize": 10, "legend.fontsize": 9, "legend.frameon": False}
 

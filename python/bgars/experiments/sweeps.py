@@ -59,6 +59,8 @@ def run(how: Run, *, sweep: Sweep) -> Outcome:
     figure = new_figure(11.5, 4.2)
     draw_errors(figure, measurements, value_of, sweep.label)
     better, worse = split_by_gain(measurements, value_of)
+    _, flatter = split_by_gain(measurements, value_of, "height_rmse_px")
+    heights = f"{ranges(flatter, sweep.values)}{sweep.unit}" if flatter else ""
     extra = () if sweep.field in COLUMNS else (sweep.field,)
     ends = "; ".join(
         f"{method} {own[0].mean_deg_nz03:.1f} deg at {sweep.values[0]:g}{sweep.unit}, "
@@ -85,10 +87,11 @@ def run(how: Run, *, sweep: Sweep) -> Outcome:
             )
             if best is not filtered[-1]
             else ()
-        ),
+        )
+        + ((f"its height RMSE is no smaller than that of {NAIVE} at {heights}.",) if flatter else ()),
         limit=(
             f"{sweep.title}: the filter is no better than naive least squares at {ranges(worse, sweep.values)}"
-            f"{sweep.unit}."
+            f"{sweep.unit}" + (f", its height RMSE no smaller at {heights}." if flatter else ".")
             if worse
             else ""
         ),

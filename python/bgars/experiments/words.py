@@ -73,14 +73,14 @@ def of_method(measurements: Sequence[Measurement], method: str) -> list[Measurem
 
 
 def split_by_gain(
-    measurements: Sequence[Measurement], value: Callable[[Measurement], float]
+    measurements: Sequence[Measurement], value: Callable[[Measurement], float], error: str = "mean_deg_nz03"
 ) -> tuple[list[float], list[float]]:
-    """The values at which the specular filter has a smaller mean error than least squares, and the others."""
+    """The values at which the specular filter has a smaller error than least squares, and the others."""
     pairs = zip(of_method(measurements, NAIVE), of_method(measurements, FILTER), strict=True)
     better: list[float] = []
     worse: list[float] = []
     for naive, filtered in pairs:
-        (better if filtered.mean_deg_nz03 < naive.mean_deg_nz03 else worse).append(value(naive))
+        (better if getattr(filtered, error) < getattr(naive, error) else worse).append(value(naive))
     return better, worse
 
 
