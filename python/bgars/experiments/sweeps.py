@@ -85,7 +85,7 @@ def run(how: Run, *, sweep: Sweep) -> Outcome:
                 f"its error is least, {best.mean_deg_nz03:.1f} deg, at {value_of(best):g}{sweep.unit} and rises to "
                 f"{filtered[-1].mean_deg_nz03:.1f} at {value_of(filtered[-1]):g}.",
             )
-            if best is not filtered[-1]
+            if best not in (filtered[0], filtered[-1])
             else ()
         )
         + ((f"its height RMSE is no smaller than that of {NAIVE} at {heights}.",) if flatter else ()),
