@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-rust test-python lint format accuracy simulator performance instructions clean
+.PHONY: demo test test-rust test-python lint format accuracy simulator experiments performance instructions clean
 
 demo: $(VENV)/.installed ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
@@ -36,6 +36,9 @@ accuracy: $(VENV)/.installed ## Rewrite the tables of docs/accuracy.md (needs BG
 
 simulator: $(VENV)/.installed ## Rewrite the tables of docs/simulator.md (needs BGARS_DATA)
 	$(BIN)/python docs/make_simulator_check.py
+
+experiments: $(VENV)/.installed ## Run the paper's experiments again and rewrite docs/experiments.md
+	$(BIN)/bgars experiment all -o docs/images/experiments --page docs/experiments.md
 
 instructions: ## Instructions a pixel of each kernel against the kept counts (needs valgrind)
 	python3 benches/count_instructions.py

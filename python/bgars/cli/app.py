@@ -14,6 +14,7 @@ import typer
 import bgars
 from bgars.cli.console import EXIT_BAD_INPUT, fail, print_json, say, stage_progress
 from bgars.cli.describe import describe, describe_in_words
+from bgars.cli.experiment import register as register_experiment
 from bgars.cli.outputs import write_normals, write_reconstruction
 from bgars.cli.simulate import register as register_simulate
 from bgars.errors import BgarsError
@@ -266,6 +267,7 @@ def evaluate(
 
 
 register_simulate(app)
+register_experiment(app)
 
 
 def main() -> None:
