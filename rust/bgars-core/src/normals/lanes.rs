@@ -10,11 +10,14 @@ use multiversion::{multiversion, target::target_cfg_f};
 use super::confidence::{HALF_DEG, PRIOR_RESIDUAL};
 use super::cutoff::{LANES, Lanes, cutoffs};
 use super::kernel::Out;
-use super::lane_solve::{Choice, Kept, LaneSolver, Solutions, is_kept, solve};
+use super::lane_solve::{Careful, Choice, Kept, LaneSolver, Solutions, is_kept, solve};
 use crate::{Pixel, Radiometry, stream};
 
 /// How far ahead the images are fetched: as many streams as lights are more than processors follow by themselves.
 const AHEAD_PIXELS: usize = 16 * LANES;
+
+/// `n_z` below which `f32` cannot say whether a facet faces the camera.
+const GRAZING: f32 = 1e-5;
 
 /// Bytes of a cache line.
 const LINE_BYTES: usize = 64;
@@ -151,7 +154,7 @@ fn run_blocks_with<K: Pixel, const FMA: bool>(
             load(&block, &mut offset);
         }
         solve::<K, FMA>(solver, keys, &mut kept, offsets.map(|_| &offset), &mut solutions);
-        write(full_scale, &solutions, used, span.clone(), sink.out);
+        write(full_scale, &mut solutions, used, span.clone(), sink.out);
         if !sink.out.kept_sets.is_empty() {
             write_sets(solver.choice, keys, used, span, sink.out);
         }
@@ -168,18 +171,20 @@ fn run_blocks_with<K: Pixel, const FMA: bool>(
     }
 }
 
-/// Normals, albedo, mask, confidence and counts of a block.
+/// Normals, albedo, mask, confidence and counts of a block; facets seen from the side are left to the careful kernel, too.
 #[inline(always)]
-fn write(full_scale: f32, solutions: &Solutions, used: Option<&[bool]>, span: Range<usize>, out: &mut Out<'_>) {
+fn write(full_scale: f32, solutions: &mut Solutions, used: Option<&[bool]>, span: Range<usize>, out: &mut Out<'_>) {
     const DEG2: f32 = ((180.0 / std::f64::consts::PI) * (180.0 / std::f64::consts::PI) / (HALF_DEG * HALF_DEG)) as f32;
     const PRIOR2: f32 = (PRIOR_RESIDUAL * PRIOR_RESIDUAL) as f32;
     let [mut scale, mut albedo, mut confidence] = [[0.0f32; LANES]; 3];
     let mut valid = [false; LANES];
+    let mut grazing = [0u8; LANES];
     let per_full_scale = 1.0 / full_scale;
     for lane in 0..LANES {
         let [x, y, z] = [solutions.scaled[0][lane], solutions.scaled[1][lane], solutions.scaled[2][lane]];
         let square = x * x + y * y + z * z;
         let length = square.sqrt();
+        grazing[lane] = u8::from(z * z < GRAZING * GRAZING * square);
         // NaN spreads into everything that is computed from it.
         let length = if z > 0.0 && square < f32::INFINITY { length } else { f32::NAN };
         let inverse = 1.0 / length;
@@ -196,6 +201,11 @@ fn write(full_scale: f32, solutions: &Solutions, used: Option<&[bool]>, span: Ra
     }
     for lane in 0..LANES {
         valid[lane] = albedo[lane] >= 0.0;
+    }
+    if grazing.iter().fold(0, |any, grazing| any | grazing) != 0 {
+        for (lane, &grazing) in grazing.iter().enumerate() {
+            solutions.careful |= Careful::from(grazing) << lane;
+        }
     }
     let [mut x, mut y, mut z] = [[0.0f32; LANES]; 3];
     for lane in 0..LANES {
