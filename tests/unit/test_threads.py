@@ -122,6 +122,14 @@ def test_progress_is_reported_and_its_exception_stops_the_work() -> None:
     assert 0.0 < seen[0] < seen[1] < 1.0
 
 
+def test_reading_and_triangulating_take_a_number_of_threads() -> None:
+    one, two = (bgars.read_capture(bgars.sample_capture(), threads=threads).images for threads in (1, 2))
+    np.testing.assert_array_equal(one, two)
+    surface = bgars.HeightMap.from_array(np.random.default_rng(3).normal(size=(90, 70)))
+    one, two = (bgars.mesh_from_height(surface, threads=threads).faces for threads in (1, 2))
+    np.testing.assert_array_equal(one, two)
+
+
 @pytest.mark.parametrize("threads", [0, -1, 1 << 40])
 def test_a_senseless_number_of_threads_is_named(threads: int) -> None:
     with pytest.raises(bgars.InputError, match=f"threads: must be 1 to 1024, got {threads}"):

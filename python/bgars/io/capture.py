@@ -35,6 +35,7 @@ def read_capture(
     channel: ChannelName | None = None,
     images: Sequence[str] | None = None,
     max_megapixels: float = MAX_MEGAPIXELS,
+    threads: int | None = None,
 ) -> Capture:
     """Read a folder of photographs, one light at a time, with the description of its lights.
 
@@ -53,6 +54,8 @@ def read_capture(
         Use only these image files, in this order; their lights are picked by name.
     max_megapixels : float
         Images whose header claims more are refused before anything is allocated.
+    threads : int, optional
+        Most threads to decode on; by default what ``RAYON_NUM_THREADS`` says, else one a core.
 
     Returns
     -------
@@ -83,7 +86,7 @@ def read_capture(
     lights = read_lights(folder, recipe)
     names = image_names(folder, recipe, lights)
     lights, names = match(folder, lights, names, images)
-    return _load(folder, recipe, lights, names, channel or recipe.channel, max_megapixels)
+    return _load(folder, recipe, lights, names, channel or recipe.channel, max_megapixels, threads)
 
 
 class _Radiometry(NamedTuple):
@@ -95,7 +98,13 @@ class _Radiometry(NamedTuple):
 
 
 def _load(
-    folder: Path, recipe: CaptureRecipe, lights: Lights, names: list[str], channel: ChannelName, max_megapixels: float
+    folder: Path,
+    recipe: CaptureRecipe,
+    lights: Lights,
+    names: list[str],
+    channel: ChannelName,
+    max_megapixels: float,
+    threads: int | None,
 ) -> Capture:
     """Decode the images and bring them, the dark frame and the levels to what a Capture promises."""
     paths = [folder / name for name in names]
@@ -106,7 +115,7 @@ def _load(
     table = _response_table(folder, recipe, paths[0], max_megapixels)
     gains = _channel_gains(lights.intensities)
     images, linear, code_scale = decode_stack(
-        paths, channel=channel, response=table, gains=gains, max_megapixels=max_megapixels
+        paths, channel=channel, response=table, gains=gains, max_megapixels=max_megapixels, threads=threads
     )
     shape = (images.shape[1], images.shape[2])
     mask = np.broadcast_to(np.True_, shape) if recipe.mask is None else read_mask(folder / recipe.mask, shape)
