@@ -195,7 +195,8 @@ pub fn holes(side: usize, hole: usize, share: f64) -> Vec<bool> {
 pub fn islands(side: usize, island: usize) -> Vec<bool> {
     let pitch = island + 1;
     mask(side, |row, col| {
-        let bridge = row % pitch == island / 2 && (col / pitch + row / pitch) % 3 == 0 && col % pitch == island;
+        let bridge =
+            row % pitch == island / 2 && (col / pitch + row / pitch).is_multiple_of(3) && col % pitch == island;
         (row % pitch != island && col % pitch != island) || bridge
     })
 }
@@ -221,7 +222,7 @@ pub fn rooms(side: usize) -> Vec<bool> {
     let pitch = 64;
     mask(side, |row, col| {
         let inside = row % pitch < 50 && col % pitch < 50;
-        let lane = row % pitch == 21 || col % pitch == 21 && row / pitch % 3 == 0;
+        let lane = row % pitch == 21 || col % pitch == 21 && (row / pitch).is_multiple_of(3);
         inside || lane
     })
 }

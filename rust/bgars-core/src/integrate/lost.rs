@@ -141,7 +141,9 @@ impl Rim {
             return false;
         }
         // Two centres tied through a black without corners.
-        if (0..4).any(|side| open[side] && real.beyond[side] > 0.0 && real.rims[side] == [0.0; 2]) {
+        if (0..4)
+            .any(|side| open[side] && real.beyond[side] > 0.0 && real.rims[side].iter().all(|&weight| weight == 0.0))
+        {
             return true;
         }
         let joined = |c: usize| real.rims[c][0] > 0.0 && real.rims[c][1] > 0.0;

@@ -43,7 +43,9 @@ impl Strays {
             .map(|(&red, base)| {
                 let mut rest = base.clone();
                 let transferred = live_shares(weights, coarser, place(red, half));
-                transferred.iter().for_each(|&(pixel, share)| add_share(&mut rest, pixel, -share));
+                for (pixel, share) in transferred {
+                    add_share(&mut rest, pixel, -share);
+                }
                 rest
             })
             .collect();
@@ -139,7 +141,9 @@ fn bases(weights: &Weights, coarser: &Weights, reds: &[u32]) -> Vec<Shares> {
                     Ok(stray) => bases[stray].clone(),
                     Err(_) => live_shares(weights, coarser, (row, k)),
                 };
-                shares.iter().for_each(|&(pixel, share)| add_share(&mut mean, pixel, weight * share));
+                for (pixel, share) in shares {
+                    add_share(&mut mean, pixel, weight * share);
+                }
             }
             normalise(&mut mean);
             mean
@@ -158,7 +162,9 @@ fn normalise(shares: &mut Shares) {
     shares.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     shares.truncate(MAX_SHARES);
     let sum: f64 = shares.iter().map(|share| share.1).sum();
-    shares.iter_mut().for_each(|share| share.1 /= sum);
+    for share in shares {
+        share.1 /= sum;
+    }
 }
 
 /// The shares of the coarse pixels that have edges: the others are always 0.

@@ -30,7 +30,7 @@ pub(super) fn interpolation(graph: &Rows, coarse_of: &[u32]) -> Rows {
                     if coarse_of[node] == FINE {
                         let shares = sources.of(node);
                         let sum: f64 = shares.iter().map(|source| source.1).sum();
-                        for &(source, share) in &*shares {
+                        for &(source, share) in shares {
                             part.push(coarse_of[source as usize], (share / sum) as f32);
                         }
                     } else {

@@ -61,7 +61,9 @@ impl Rows {
         let mut part = Part::default();
         for row in rows {
             let before = part.columns.len();
-            row.iter().for_each(|&(column, value)| part.push(column as u32, value as f32));
+            for &(column, value) in row {
+                part.push(column as u32, value as f32);
+            }
             part.end_row(before);
         }
         Self::join(vec![part], width)

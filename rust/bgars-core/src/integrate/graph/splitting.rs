@@ -8,6 +8,7 @@ pub(super) const STRONG: f32 = 0.25;
 /// Stands for a node that does not become a coarse one.
 pub(super) const FINE: u32 = u32::MAX;
 
+const COARSE: u32 = 0;
 const UNDECIDED: u32 = u32::MAX - 1;
 const NONE: u32 = u32::MAX;
 
@@ -90,7 +91,6 @@ pub(super) fn split(graph: &Rows) -> Vec<u32> {
         ranking.rank[node] = wanted.min(1 << 14) as u16;
         ranking.insert(node);
     }
-    const COARSE: u32 = 0;
     while let Some(node) = ranking.pop() {
         coarse_of[node] = COARSE;
         for (other, weight) in graph.pairs(node) {
