@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-rust test-python lint format accuracy performance instructions clean
+.PHONY: demo test test-rust test-python lint format accuracy simulator performance instructions clean
 
 demo: $(VENV)/.installed ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
@@ -33,6 +33,9 @@ format: $(VENV)/.installed
 
 accuracy: $(VENV)/.installed ## Rewrite the tables of docs/accuracy.md (needs BGARS_DATA)
 	$(BIN)/python docs/make_accuracy.py
+
+simulator: $(VENV)/.installed ## Rewrite the tables of docs/simulator.md (needs BGARS_DATA)
+	$(BIN)/python docs/make_simulator_check.py
 
 instructions: ## Instructions a pixel of each kernel against the kept counts (needs valgrind)
 	python3 benches/count_instructions.py

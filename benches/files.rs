@@ -2,13 +2,11 @@
 
 #![allow(missing_docs, clippy::unwrap_used)]
 
-use std::fs::File;
-use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
 use bgars_core::io::decode::{Channel, Color, decode_stack};
-use bgars_core::io::{MeshView, obj::write_obj, ply::write_ply};
-use bgars_core::mesh::triangulate;
+use bgars_core::io::{HeightSource, MeshFormat, MeshView, write_mesh_file};
+use bgars_core::mesh::{HeightMesh, triangulate};
 use bgars_suite::masks::{rectangle, wavy_heights};
 use bgars_suite::stacks::wavy;
 use bgars_suite::{THREADS, keep_short, on_threads};
@@ -56,26 +54,24 @@ fn reading(criterion: &mut Criterion) {
 fn writing(criterion: &mut Criterion) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("mesh");
-    let mesh = triangulate(&wavy_heights(SIDE), &rectangle(SIDE), SIDE, 1.0).unwrap();
+    let (heights, mask) = (wavy_heights(SIDE), rectangle(SIDE));
+    let mesh = triangulate(&heights, &mask, SIDE, 1.0).unwrap();
     let view = MeshView { vertices: &mesh.vertices, faces: &mesh.faces, normals: None, colors: None };
     let mut group = criterion.benchmark_group(format!("write/{SIDE} x {SIDE}"));
     keep_short(&mut group);
     group.throughput(Throughput::Elements((SIDE * SIDE) as u64));
-    let open = || BufWriter::new(File::create(&path).unwrap());
-    group.bench_function("ply", |bencher| {
-        bencher.iter(|| {
-            let mut out = open();
-            write_ply(view, &[], &mut out).unwrap();
-            out.flush().unwrap();
+    for (name, format) in [("ply", MeshFormat::Ply), ("obj", MeshFormat::Obj)] {
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| write_mesh_file(&view, format, &[], &path).unwrap());
         });
-    });
-    group.bench_function("obj", |bencher| {
-        bencher.iter(|| {
-            let mut out = open();
-            write_obj(view, &[], &mut out).unwrap();
-            out.flush().unwrap();
+        group.bench_function(format!("height map to {name}"), |bencher| {
+            bencher.iter(|| {
+                let surface = HeightMesh::new(&heights, &mask, SIDE, 1.0).unwrap();
+                let source = HeightSource::new(surface, None, None).unwrap();
+                write_mesh_file(&source, format, &[], &path).unwrap();
+            });
         });
-    });
+    }
 }
 
 criterion_group!(benches, reading, writing);

@@ -160,7 +160,7 @@ fn ply_and_obj_say_what_they_hold() {
     let colors = [[255, 0, 128]; 3];
     let mesh = MeshView { vertices: &vertices, faces: &faces, normals: Some(&normals), colors: Some(&colors) };
     let mut ply = Vec::new();
-    write_ply(mesh, &["unit um\nelement vertex 9".to_owned()], &mut ply).unwrap();
+    write_ply(&mesh, &["unit um\nelement vertex 9".to_owned()], &mut ply).unwrap();
     let end = ply.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
     let header = String::from_utf8(ply[..end].to_vec()).unwrap();
     assert!(header.contains("comment unit um element vertex 9\n"), "a line break in a comment is harmless");
@@ -168,7 +168,7 @@ fn ply_and_obj_say_what_they_hold() {
     assert_eq!(ply.len() - end, 3 * (12 + 12 + 3) + 13);
 
     let mut obj = Vec::new();
-    write_obj(mesh, &[], &mut obj).unwrap();
+    write_obj(&mesh, &[], &mut obj).unwrap();
     let obj = String::from_utf8(obj).unwrap();
     assert_eq!(obj.lines().last(), Some("f 1//1 2//2 3//3"));
     assert!(obj.contains("v 0 1 0.5 1.0000 0.0000 0.5020\n"));
@@ -222,7 +222,8 @@ fn mesh_files_do_not_depend_on_blocks_or_threads() {
             let written = [1, 2, 3].map(|threads| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 let (mut ply, mut obj) = (Vec::new(), Vec::new());
-                pool.install(|| write_ply(mesh, &[], &mut ply).and_then(|()| write_obj(mesh, &[], &mut obj))).unwrap();
+                pool.install(|| write_ply(&mesh, &[], &mut ply).and_then(|()| write_obj(&mesh, &[], &mut obj)))
+                    .unwrap();
                 (ply, obj)
             });
             assert!(written[0] == written[1] && written[0] == written[2], "{count} vertices");
@@ -267,8 +268,8 @@ fn a_mesh_may_keep_its_numbers_in_64_bits() {
     let wide_faces: Vec<[i64; 3]> = faces.iter().map(|face| face.map(i64::from)).collect();
     let wide = MeshView { vertices: &wide_vertices, faces: &wide_faces, normals: None, colors: None };
     let (mut a, mut b) = (Vec::new(), Vec::new());
-    write_ply(narrow, &[], &mut a).unwrap();
-    write_ply(wide, &[], &mut b).unwrap();
+    write_ply(&narrow, &[], &mut a).unwrap();
+    write_ply(&wide, &[], &mut b).unwrap();
     assert_eq!(a, b);
     wide.check().unwrap();
     let mut bad_faces = wide_faces.clone();
@@ -290,8 +291,8 @@ fn a_mesh_that_cannot_be_written_reports_the_first_error() {
     }
     let (vertices, faces, ..) = strip(40_000);
     let mesh = MeshView { vertices: &vertices, faces: &faces, normals: None, colors: None };
-    assert_eq!(write_ply(mesh, &[], &mut Full).unwrap_err().kind(), std::io::ErrorKind::StorageFull);
-    assert_eq!(write_obj(mesh, &[], &mut Full).unwrap_err().kind(), std::io::ErrorKind::StorageFull);
+    assert_eq!(write_ply(&mesh, &[], &mut Full).unwrap_err().kind(), std::io::ErrorKind::StorageFull);
+    assert_eq!(write_obj(&mesh, &[], &mut Full).unwrap_err().kind(), std::io::ErrorKind::StorageFull);
 }
 
 #[test]

@@ -25,46 +25,82 @@ from bgars.io.capture import read_capture
 from bgars.io.height import read_height, write_height
 from bgars.io.mesh_files import write_mesh
 from bgars.io.normal_map import read_normal_map, write_normal_map
-from bgars.io.truth import Truth, read_truth
+from bgars.io.truth import read_truth
 from bgars.mesh import mesh_from_height
 from bgars.normals import estimate_normals
 from bgars.pipeline import Reconstruction, reconstruct
-from bgars.records import Capture, Component, HeightMap, NormalField
+from bgars.recipes import named_recipes, read_scene, write_simulation
+from bgars.records import Capture, Component, HeightMap, NormalField, Truth
 from bgars.report.overview import write_overview
 from bgars.rig import LightRig
 from bgars.samples import sample_capture
+from bgars.simulate import (
+    Ball,
+    BallTruth,
+    Board,
+    Bridge,
+    Camera,
+    Defect,
+    Jitter,
+    Lobe,
+    Material,
+    Scene,
+    SimulatedTruth,
+    SimulationSetup,
+    Texture,
+    Variation,
+    simulate,
+)
 
 __version__ = version("bgars")
 
 __all__ = [
+    "Ball",
+    "BallTruth",
     "BgarsError",
+    "Board",
+    "Bridge",
     "CalibrationError",
+    "Camera",
     "Capture",
     "Component",
     "ConvergenceError",
+    "Defect",
     "Evaluation",
     "FileFormatError",
     "HeightMap",
     "InputError",
+    "Jitter",
     "LightRig",
+    "Lobe",
+    "Material",
     "NormalField",
     "Reconstruction",
+    "Scene",
+    "SimulatedTruth",
+    "SimulationSetup",
+    "Texture",
     "Truth",
     "UnsupportedImageError",
+    "Variation",
     "__version__",
     "angular_error_deg",
     "estimate_normals",
     "evaluate",
     "integrate_normals",
     "mesh_from_height",
+    "named_recipes",
     "read_capture",
     "read_height",
     "read_normal_map",
+    "read_scene",
     "read_truth",
     "reconstruct",
     "sample_capture",
+    "simulate",
     "write_height",
     "write_mesh",
     "write_normal_map",
     "write_overview",
+    "write_simulation",
 ]

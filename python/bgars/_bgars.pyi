@@ -19,8 +19,8 @@ __all__ = [
     "triangulate",
     "usable_normals",
     "vertex_normals",
-    "write_obj",
-    "write_ply",
+    "write_height",
+    "write_mesh",
     "write_png16",
 ]
 
@@ -33,6 +33,7 @@ def decode_stack(
     response: NDArray[np.float32] | None,
     gains: NDArray[np.float32] | None,
     max_megapixels: float,
+    threads: int | None,
 ) -> tuple[Any, bool, int]: ...
 def estimate_normals(
     images: NDArray[Any],
@@ -79,25 +80,30 @@ def integrate_normals(
 ) -> tuple[NDArray[np.float32], NDArray[np.int32], list[tuple[int, int, int]], int, float]: ...
 def read_rgb16(path: str | PathLike[str], max_megapixels: float) -> NDArray[np.uint16]: ...
 def triangulate(
-    height_px: NDArray[np.float32], mask: NDArray[np.bool_], pitch: float
+    height_px: NDArray[np.float32], mask: NDArray[np.bool_], pitch: float, *, threads: int | None
 ) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32]]: ...
-def vertex_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float32]: ...
-def write_obj(
+def vertex_normals(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], *, threads: int | None
+) -> NDArray[np.float32]: ...
+def write_height(
     path: str | PathLike[str],
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
+    height_px: NDArray[np.float32],
+    mask: NDArray[np.bool_],
+    pitch: float,
     *,
-    normals: NDArray[np.float64] | None = None,
-    colors: NDArray[np.uint8] | None = None,
-    comments: Sequence[str] = ...,
+    normals: NDArray[np.float32] | None,
+    grey: NDArray[np.uint8] | None,
+    comments: Sequence[str],
+    threads: int | None,
 ) -> None: ...
-def write_ply(
+def write_mesh(
     path: str | PathLike[str],
     vertices: NDArray[np.float64],
     faces: NDArray[np.int64],
     *,
-    normals: NDArray[np.float64] | None = None,
-    colors: NDArray[np.uint8] | None = None,
-    comments: Sequence[str] = ...,
+    normals: NDArray[np.float64] | None,
+    colors: NDArray[np.uint8] | None,
+    comments: Sequence[str],
+    threads: int | None,
 ) -> None: ...
 def write_png16(path: str | PathLike[str], rgb: NDArray[np.uint16]) -> None: ...

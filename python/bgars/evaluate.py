@@ -9,7 +9,7 @@ import numpy as np
 
 from bgars.errors import ConvergenceError, InputError
 from bgars.integrate import integrate_normals
-from bgars.io.truth import Truth, read_truth
+from bgars.io.truth import read_truth
 from bgars.normals import DEFAULT_METHOD, Method, estimate_normals
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bgars.records import BoolArray, Capture, FloatArray, NormalField
+    from bgars.records import BoolArray, Capture, FloatArray, NormalField, Truth
 
 __all__ = ["AngularErrors", "Evaluation", "angular_error_deg", "evaluate"]
 

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 __all__ = ["mesh_from_height"]
 
 
-def mesh_from_height(height: HeightMap, field: NormalField | None = None) -> trimesh.Trimesh:
+def mesh_from_height(
+    height: HeightMap, field: NormalField | None = None, *, threads: int | None = None
+) -> trimesh.Trimesh:
     """Triangulate a height map: a vertex a pixel, faces between neighbours; masked pixels are left out.
 
     Parameters
@@ -26,6 +28,8 @@ def mesh_from_height(height: HeightMap, field: NormalField | None = None) -> tri
     field : NormalField, optional
         Gives each vertex its estimated normal and its albedo as grey; without it, normals follow from the faces
         (weighted by their angles at the vertex, as trimesh does).
+    threads : int, optional
+        Most threads to work on; by default what ``RAYON_NUM_THREADS`` says, else one a core.
 
     Returns
     -------
@@ -45,11 +49,9 @@ def mesh_from_height(height: HeightMap, field: NormalField | None = None) -> tri
     >>> mesh.vertices[0].tolist(), len(mesh.faces), mesh.metadata["unit"]
     ([-5.0, 5.0, 0.0], 2, 'um')
     """
-    if field is not None and field.mask.shape != height.mask.shape:
-        msg = f"field: must have the shape of the height map {height.mask.shape}, got {field.mask.shape}"
-        raise InputError(msg)
+    height.check_field(field)
     pitch = 1.0 if height.pixel_pitch_um is None else height.pixel_pitch_um
-    vertices, faces, pixels = _bgars.triangulate(height.height_px, height.mask, pitch)
+    vertices, faces, pixels = _bgars.triangulate(height.height_px, height.mask, pitch, threads=threads)
     if len(faces) == 0:
         msg = f"height: no three neighbouring pixels are valid ({len(vertices)} in all), so there is no face to make"
         raise InputError(msg)
@@ -57,14 +59,11 @@ def mesh_from_height(height: HeightMap, field: NormalField | None = None) -> tri
     if field is None:
         # In the types that trimesh keeps, so that it does not convert them once more.
         wide_vertices, wide_faces = vertices.astype(np.float64), faces.astype(np.int64)
-        normals = _bgars.vertex_normals(wide_vertices, wide_faces)
+        normals = _bgars.vertex_normals(wide_vertices, wide_faces, threads=threads)
         return trimesh.Trimesh(wide_vertices, wide_faces, vertex_normals=normals, process=False, metadata=metadata)
     normals = field.normals.reshape(-1, 3)[pixels]
-    grey = field.albedo.ravel()[pixels]
-    known = np.isfinite(grey)
-    top = float(np.percentile(grey[known], 99.0)) if known.any() else 1.0
-    level = np.where(known, np.clip(grey / max(top, 1e-12), 0.0, 1.0) * 255.0, 128.0).astype(np.uint8)
-    colors = np.column_stack([level, level, level, np.full_like(level, 255)])
+    colors = np.full((len(pixels), 4), 255, np.uint8)
+    colors[:, :3] = field.grey_levels().ravel()[pixels, np.newaxis]
     return trimesh.Trimesh(
         vertices, faces, vertex_normals=normals, vertex_colors=colors, process=False, metadata=metadata
     )

@@ -133,7 +133,6 @@ def estimate_normals(
         progress=progress,
         out=field,
     )
-    np.copyto(field.measured, field.mask)
     return field
 
 

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars.errors import InputError
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -25,6 +27,7 @@ __all__ = [
     "HeightMap",
     "NormalField",
     "PixelArray",
+    "Truth",
     "float_full_scale",
     "integer_full_scale",
 ]
@@ -93,6 +96,10 @@ class Capture:
         return "capture" if self.folder is None else self.folder.resolve().name
 
 
+PERCENTILE_PIXELS = 1 << 16
+"""Pixels that a percentile for display is taken from, about."""
+
+
 @dataclass(frozen=True, eq=False)
 class NormalField:
     """Estimated normals.
@@ -126,6 +133,16 @@ class NormalField:
     method: str
     pixel_pitch_um: float | None = None
     kept_sets: BoolArray | None = field(default=None, repr=False)
+
+    def grey_levels(self) -> NDArray[np.uint8]:
+        """Albedo as (H, W) grey for pictures: 255 at its 99th percentile (of a sample of pixels), 128 where invalid."""
+        step = max(1, self.albedo.size // PERCENTILE_PIXELS)
+        sample = self.albedo.ravel()[::step]
+        known = sample[np.isfinite(sample)]
+        top = max(float(np.percentile(known, 99.0)) if known.size else 1.0, 1e-12)
+        level = np.minimum(self.albedo * np.float32(255.0 / top), np.float32(255.0))
+        grey: NDArray[np.uint8] = np.where(np.isfinite(level), level, np.float32(128.0)).astype(np.uint8)
+        return grey
 
 
 @dataclass(frozen=True)
@@ -174,6 +191,12 @@ class HeightMap:
     residual: float
     components: tuple[Component, ...]
     labels: NDArray[np.int32]
+
+    def check_field(self, field: NormalField | None) -> None:
+        """Raise InputError unless a field, where there is one, has the size of this map."""
+        if field is not None and field.mask.shape != self.mask.shape:
+            msg = f"field: must have the shape of the height map {self.mask.shape}, got {field.mask.shape}"
+            raise InputError(msg)
 
     @classmethod
     def from_array(cls, height: NDArray[np.floating], *, pixel_pitch_um: float | None = None) -> HeightMap:
@@ -229,3 +252,25 @@ class HeightMap:
             "iterations": self.iterations,
             "residual": self.residual,
         }
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """What a capture should give.
+
+    Attributes
+    ----------
+    normals : (H, W, 3) float32
+        True unit normals; NaN where unknown.
+    ball_ids : (H, W) int16 or None
+        0 board, 1.. balls, -1 bridge; None for a photograph of something else.
+    mask : (H, W) bool
+        Pixels to judge: the balls of a scene, the object of a photograph.
+    height_um : (H, W) float32 or None
+        True height.
+    """
+
+    normals: FloatArray
+    ball_ids: NDArray[np.int16] | None
+    mask: BoolArray
+    height_um: FloatArray | None

@@ -93,7 +93,7 @@ def test_evaluate_on_the_sample() -> None:
     assert results["robust-filter"]["ball_height_rmse_um"] < results["lambertian"]["ball_height_rmse_um"]
 
 
-@pytest.mark.parametrize("command", ["", "demo", "reconstruct", "normals", "mesh", "info", "evaluate"])
+@pytest.mark.parametrize("command", ["", "demo", "reconstruct", "normals", "mesh", "info", "evaluate", "simulate"])
 def test_every_command_has_help(command: str) -> None:
     run = bgars_command(*command.split(), "--help")
     assert run.returncode == 0

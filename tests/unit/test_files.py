@@ -106,6 +106,46 @@ def test_a_mesh_of_many_blocks(tmp_path: Path, suffix: str) -> None:
     np.testing.assert_allclose(back.vertices, mesh.vertices, rtol=1e-6)
 
 
+@pytest.mark.parametrize("suffix", [".ply", ".obj"])
+def test_a_height_map_is_written_as_its_mesh_would_be(tmp_path: Path, suffix: str) -> None:
+    rng = np.random.default_rng(4)
+    values = rng.normal(size=(191, 163)).astype(np.float32)
+    values[rng.random(values.shape) < 0.2] = np.nan
+    height = bgars.HeightMap.from_array(values, pixel_pitch_um=3.4)
+    images = rng.integers(20, 200, (4, *values.shape)).astype(np.uint8)
+    field = bgars.estimate_normals(images, bgars.LightRig.ring(4).directions, method="lambertian")
+    bgars.write_mesh(bgars.mesh_from_height(height, field), tmp_path / f"mesh{suffix}")
+    bgars.write_mesh(height, tmp_path / f"height{suffix}", field=field, threads=1)
+    assert (tmp_path / f"mesh{suffix}").read_bytes() == (tmp_path / f"height{suffix}").read_bytes()
+
+
+def test_a_height_map_without_a_field_is_written_without_normals(tmp_path: Path) -> None:
+    values = np.random.default_rng(4).normal(size=(30, 40)).astype(np.float32)
+    values[5:9, 7:30] = np.nan
+    height = bgars.HeightMap.from_array(values)
+    bgars.write_mesh(height, tmp_path / "bare.ply")
+    bare, mesh = trimesh.load_mesh(tmp_path / "bare.ply", process=False), bgars.mesh_from_height(height)
+    np.testing.assert_array_equal(bare.faces, mesh.faces)
+    np.testing.assert_allclose(bare.vertices, mesh.vertices, rtol=1e-6)
+    assert b"nx" not in (tmp_path / "bare.ply").read_bytes()[:300]
+
+
+def test_a_height_map_that_cannot_be_written_says_why(tmp_path: Path) -> None:
+    height = bgars.HeightMap.from_array(np.zeros((3, 3), np.float32))
+    field = bgars.estimate_normals(np.full((3, 2, 2), 9, np.uint8), bgars.LightRig.ring(3).directions)
+    lone = bgars.HeightMap.from_array(np.float32([[0.0, np.nan], [np.nan, 0.0]]))
+    for call, message in [
+        (lambda: bgars.write_mesh(height, tmp_path / "a.stl"), r"a\.stl: a height map is written as \.ply or \.obj"),
+        (lambda: bgars.write_mesh(height, tmp_path / "a.ply", field=field), r"field: must have the shape .*\(3, 3\)"),
+        (lambda: bgars.write_mesh(lone, tmp_path / "a.ply"), "no three neighbouring pixels"),
+        (lambda: bgars.write_mesh(bgars.mesh_from_height(height), tmp_path / "a.ply", field=field), "field: goes with"),
+        (lambda: bgars.write_mesh(height, tmp_path / "a.ply", threads=0), "threads: must be 1 to"),
+    ]:
+        with pytest.raises(bgars.InputError, match=message):
+            call()
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("faces", [[[0, 1, 3]], [[0, 1, -1]]])
 def test_a_face_of_no_vertex_is_refused(tmp_path: Path, faces: list[list[int]]) -> None:
     mesh = trimesh.Trimesh(np.eye(3), faces, process=False)

@@ -15,6 +15,7 @@ import bgars
 from bgars.cli.console import EXIT_BAD_INPUT, fail, print_json, say, stage_progress
 from bgars.cli.describe import describe, describe_in_words
 from bgars.cli.outputs import write_normals, write_reconstruction
+from bgars.cli.simulate import register as register_simulate
 from bgars.errors import BgarsError
 from bgars.io.mesh_files import MESH_SUFFIXES
 from bgars.light_files import read_filenames
@@ -262,6 +263,9 @@ def evaluate(
             f"{result.method:<16} {errors.mean_deg:>7.3f} {errors.median_deg:>7.3f} {errors.p95_deg:>9.3f}"
             f" {errors.invalid:>19} {board:>18} {rmse:>23}"
         )
+
+
+register_simulate(app)
 
 
 def main() -> None:

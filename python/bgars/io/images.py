@@ -59,6 +59,7 @@ def decode_stack(
     response: FloatArray | None = None,
     gains: FloatArray | None = None,
     max_megapixels: float = MAX_MEGAPIXELS,
+    threads: int | None = None,
 ) -> DecodedStack:
     """Decode image files of equal size and depth.
 
@@ -75,6 +76,8 @@ def decode_stack(
         Factor of each channel of each image, applied to colour files.
     max_megapixels : float
         A header that claims more is refused before anything is allocated.
+    threads : int, optional
+        Most threads to decode on.
 
     Raises
     ------
@@ -83,7 +86,12 @@ def decode_stack(
     """
     try:
         images, linear, bits = _bgars.decode_stack(
-            list(paths), channel=channel, response=response, gains=gains, max_megapixels=max_megapixels
+            list(paths),
+            channel=channel,
+            response=response,
+            gains=gains,
+            max_megapixels=max_megapixels,
+            threads=threads,
         )
     except UnsupportedImageError:
         return _decode_with_imageio(paths, channel, response, gains, max_megapixels)

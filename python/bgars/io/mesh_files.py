@@ -11,6 +11,7 @@ from trimesh.visual import ColorVisuals
 from bgars import _bgars
 from bgars.errors import InputError
 from bgars.io.atomic import atomic_file
+from bgars.records import HeightMap
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -18,29 +19,46 @@ if TYPE_CHECKING:
     import trimesh
     from numpy.typing import NDArray
 
+    from bgars.records import NormalField
+
 __all__ = ["MESH_SUFFIXES", "write_mesh"]
 
 MESH_SUFFIXES = (".ply", ".obj", ".stl", ".glb")
+NATIVE_SUFFIXES = (".ply", ".obj")
+"""Written by the Rust core."""
 
 
-def write_mesh(mesh: trimesh.Trimesh, path: str | PathLike[str]) -> None:
-    """Write a mesh; the suffix chooses the format.
+def write_mesh(
+    mesh: trimesh.Trimesh | HeightMap,
+    path: str | PathLike[str],
+    *,
+    field: NormalField | None = None,
+    threads: int | None = None,
+) -> None:
+    """Write a mesh, or a height map as one; the suffix chooses the format.
 
     ``.ply`` (binary) and ``.obj`` carry vertex normals and, where the mesh has them, vertex colours; ``.stl`` carries
     faces only; ``.glb`` is for viewers. Numbers stay in the mesh's unit (``metadata["unit"]``), which PLY and OBJ
-    name in a comment. The file appears whole or not at all.
+    name in a comment. The file appears whole or not at all. A height map goes to PLY and OBJ without a mesh in memory,
+    row by row; masked pixels and the faces at them are left out.
 
     Parameters
     ----------
-    mesh : trimesh.Trimesh
+    mesh : trimesh.Trimesh or HeightMap
         For instance from :func:`bgars.mesh_from_height`.
     path : path
         File to write, ending in .ply, .obj, .stl or .glb.
+    field : NormalField, optional
+        With a height map: gives each vertex its estimated normal and its albedo as grey. Without it a file carries
+        neither; viewers compute normals from the faces.
+    threads : int, optional
+        Most threads to work on; by default what ``RAYON_NUM_THREADS`` says, else one a core.
 
     Raises
     ------
     InputError
-        An unknown suffix or a mesh without faces.
+        An unknown suffix, a mesh without faces, a height map to .stl or .glb, a field with a mesh or of another size
+        than the height map.
     FileFormatError
         The file cannot be written.
 
@@ -58,33 +76,64 @@ def write_mesh(mesh: trimesh.Trimesh, path: str | PathLike[str]) -> None:
     if suffix not in MESH_SUFFIXES:
         msg = f"{path}: a mesh file must end in {', '.join(MESH_SUFFIXES)}; got {suffix!r}"
         raise InputError(msg)
+    if isinstance(mesh, HeightMap):
+        if suffix in NATIVE_SUFFIXES:
+            _write_height(mesh, field, path, threads)
+            return
+        msg = (
+            f"{path}: a height map is written as {' or '.join(NATIVE_SUFFIXES)}; for {suffix}, make a mesh of it first"
+        )
+        raise InputError(msg)
+    if field is not None:
+        msg = "field: goes with a height map; a mesh brings its own normals and colours"
+        raise InputError(msg)
     if len(mesh.faces) == 0:
         msg = f"mesh: has no faces to write to {path}"
         raise InputError(msg)
     with atomic_file(path) as temporary:
-        if suffix in {".ply", ".obj"}:
-            write = _bgars.write_ply if suffix == ".ply" else _bgars.write_obj
+        if suffix in NATIVE_SUFFIXES:
             vertices = np.ascontiguousarray(mesh.vertices, dtype=np.float64)
             faces = np.ascontiguousarray(mesh.faces, dtype=np.int64)
-            write(
+            _bgars.write_mesh(
                 temporary,
                 vertices,
                 faces,
-                normals=_normals(mesh, vertices, faces),
+                normals=_normals(mesh, vertices, faces, threads),
                 colors=_colors(mesh),
-                comments=[
-                    f"bgars mesh, unit {mesh.metadata.get('unit', 'unknown')}, x right, y up, z toward the camera"
-                ],
+                comments=_comments(mesh.metadata.get("unit", "unknown")),
+                threads=threads,
             )
         else:
             mesh.export(temporary, file_type=suffix[1:])
 
 
-def _normals(mesh: trimesh.Trimesh, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+def _write_height(height: HeightMap, field: NormalField | None, path: Path, threads: int | None) -> None:
+    """A height map to PLY or OBJ, streamed."""
+    height.check_field(field)
+    with atomic_file(path) as temporary:
+        _bgars.write_height(
+            temporary,
+            np.ascontiguousarray(height.height_px),
+            np.ascontiguousarray(height.mask),
+            1.0 if height.pixel_pitch_um is None else height.pixel_pitch_um,
+            normals=None if field is None else np.ascontiguousarray(field.normals),
+            grey=None if field is None else field.grey_levels(),
+            comments=_comments(height.unit),
+            threads=threads,
+        )
+
+
+def _comments(unit: str) -> list[str]:
+    return [f"bgars mesh, unit {unit}, x right, y up, z toward the camera"]
+
+
+def _normals(
+    mesh: trimesh.Trimesh, vertices: NDArray[np.float64], faces: NDArray[np.int64], threads: int | None
+) -> NDArray[np.float64]:
     """(N, 3) vertex normals: those the mesh has, else those of its faces (seconds of work for trimesh)."""
     # trimesh has no public way to ask; its own exporters look here too.
     has_normals = "vertex_normals" in mesh._cache
-    normals = mesh.vertex_normals if has_normals else _bgars.vertex_normals(vertices, faces)
+    normals = mesh.vertex_normals if has_normals else _bgars.vertex_normals(vertices, faces, threads=threads)
     return np.ascontiguousarray(normals, dtype=np.float64)
 
 

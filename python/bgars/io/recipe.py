@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
-import sys
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from bgars.errors import FileFormatError, InputError
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from bgars.io.strict_toml import Strict, checked, read_values
 
 __all__ = [
     "RECIPE_NAME",
@@ -33,23 +26,19 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Vector = tuple[float, float, float]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=False)
-
-
-class GammaResponse(_Strict):
+class GammaResponse(Strict):
     """Camera that encodes ``signal^(1/gamma)``."""
 
     gamma: Positive
 
 
-class TableResponse(_Strict):
+class TableResponse(Strict):
     """Measured response: a CSV of grey level and radiance."""
 
     table: str
 
 
-class RingRecipe(_Strict):
+class RingRecipe(Strict):
     """Evenly spaced distant lights, counter-clockwise from +x."""
 
     count: Annotated[int, Field(ge=3)]
@@ -57,7 +46,7 @@ class RingRecipe(_Strict):
     azimuth0_deg: float = 0.0
 
 
-class LightsRecipe(_Strict):
+class LightsRecipe(Strict):
     """The ``[lights]`` table: exactly one of the first five keys."""
 
     directions: str | list[Vector] | None = None
@@ -81,7 +70,7 @@ class LightsRecipe(_Strict):
         return self
 
 
-class CaptureRecipe(_Strict):
+class CaptureRecipe(Strict):
     """The whole of ``capture.toml``; file names are relative to its folder."""
 
     pixel_pitch_um: Positive | None = None
@@ -105,52 +94,4 @@ def read_recipe(path: Path) -> CaptureRecipe:
     InputError
         An unknown key (the nearest known one is named), a wrong type or a value out of range.
     """
-    try:
-        with path.open("rb") as stream:
-            values = tomllib.load(stream)
-    except OSError as error:
-        msg = f"{path}: cannot be read ({error.strerror})"
-        raise FileFormatError(msg) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        msg = f"{path}: is not valid TOML ({error})"
-        raise FileFormatError(msg) from error
-    try:
-        return CaptureRecipe.model_validate(values)
-    except ValidationError as error:
-        raise InputError(_explain(path, error)) from None
-
-
-def _explain(path: Path, error: ValidationError) -> str:
-    """One line for the first mistake, unknown keys first: they are usually the cause of the others."""
-    details = sorted(error.errors(include_url=False), key=lambda detail: detail["type"] != "extra_forbidden")
-    first = details[0]
-    # pydantic puts the branch of a union it tried into the location: those are no keys of the file.
-    keys = [str(part) for part in first["loc"] if not _is_branch(part)]
-    key = ".".join(keys)
-    if first["type"] == "extra_forbidden":
-        known = _known_keys(first["loc"][:-1])
-        nearest = difflib.get_close_matches(keys[-1], known, n=1, cutoff=0.0)
-        hint = f"; the nearest known key is '{nearest[0]}'" if nearest else ""
-        return f"{path}: unknown key '{key}'{hint} (known: {', '.join(known)})"
-    reason = first["msg"].removeprefix("Value error, ")
-    value = "" if isinstance(first["input"], dict) else f", got {first['input']!r}"
-    return f"{path}: {key or 'recipe'}: {reason}{value}"
-
-
-def _is_branch(part: str | int) -> bool:
-    return isinstance(part, str) and (part in {"GammaResponse", "TableResponse", "str"} or "[" in part)
-
-
-def _known_keys(location: tuple[int | str, ...]) -> list[str]:
-    model: type[BaseModel] = CaptureRecipe
-    nested: dict[Any, type[BaseModel]] = {
-        "lights": LightsRecipe,
-        "ring": RingRecipe,
-        "GammaResponse": GammaResponse,
-        "TableResponse": TableResponse,
-    }
-    for part in location:
-        model = nested.get(part, model)
-    if model in {GammaResponse, TableResponse}:
-        return ["gamma", "table"]
-    return list(model.model_fields)
+    return checked(CaptureRecipe, read_values(path), path)

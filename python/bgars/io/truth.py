@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,40 +9,15 @@ import numpy as np
 
 from bgars.errors import FileFormatError
 from bgars.io.images import read_mask
+from bgars.records import Truth
 
 if TYPE_CHECKING:
     from os import PathLike
-
-    from numpy.typing import NDArray
-
-    from bgars.records import BoolArray, FloatArray
 
 __all__ = ["Truth", "read_truth"]
 
 SCENE_TRUTH = "gt.npz"
 NORMAL_TRUTH = "Normal_gt.npy"
-
-
-@dataclass(frozen=True, eq=False)
-class Truth:
-    """What a capture should give.
-
-    Attributes
-    ----------
-    normals : (H, W, 3) float32
-        True unit normals; NaN where unknown.
-    ball_ids : (H, W) int16 or None
-        0 board, 1.. balls, -1 bridge; None for a photograph of something else.
-    mask : (H, W) bool
-        Pixels to judge: the balls of a scene, the object of a photograph.
-    height_um : (H, W) float32 or None
-        True height.
-    """
-
-    normals: FloatArray
-    ball_ids: NDArray[np.int16] | None
-    mask: BoolArray
-    height_um: FloatArray | None
 
 
 def read_truth(folder: str | PathLike[str]) -> Truth:

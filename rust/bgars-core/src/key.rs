@@ -6,6 +6,8 @@ pub trait Key: Copy {
     const LEAST: Self;
     /// Larger than every other.
     const LARGEST: Self;
+    /// What a dropped light counts as in a sum.
+    const ZERO: Self;
 
     /// The smaller of both.
     fn least(self, other: Self) -> Self;
@@ -22,6 +24,7 @@ macro_rules! integer_key {
         impl Key for $type {
             const LEAST: Self = 0;
             const LARGEST: Self = Self::MAX;
+            const ZERO: Self = 0;
 
             #[inline(always)]
             fn least(self, other: Self) -> Self {
@@ -51,6 +54,7 @@ integer_key!(u16);
 impl Key for f32 {
     const LEAST: Self = Self::NEG_INFINITY;
     const LARGEST: Self = Self::INFINITY;
+    const ZERO: Self = 0.0;
 
     // Not f32::min and f32::max: these take care of NaN, which costs three instructions instead of one.
     #[inline(always)]

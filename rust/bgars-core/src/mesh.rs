@@ -16,15 +16,120 @@ pub struct TriangleMesh {
     pub pixels: Vec<u32>,
 }
 
-/// Triangulates the pixels of `mask`: a vertex at each pixel centre, two faces in each square of four pixels, one face
-/// where three of the four are in the mask.
-///
-/// # Inputs
-/// `height_px` and `mask` row-major in rows of `width`; `pitch` scales pixels to the unit wanted (1: stay in pixels).
-/// World axes: x right, y up, z to the camera, origin at the image centre.
+/// A height map as triangles that are made when they are asked for, row by row: a vertex at each pixel centre of the mask,
+/// two faces in each square of four pixels, one where three of the four are in the mask.
+#[derive(Clone, Debug)]
+pub struct HeightMesh<'a> {
+    height_px: &'a [f32],
+    mask: &'a [bool],
+    width: usize,
+    pitch: f64,
+    /// Vertices before each row, and all of them.
+    vertex_starts: Vec<usize>,
+    /// Faces before each row; those between a row and the one above belong to it.
+    face_starts: Vec<usize>,
+}
+
+impl<'a> HeightMesh<'a> {
+    /// # Inputs
+    /// `height_px` and `mask` row-major in rows of `width`; `pitch` scales pixels to the unit wanted (1: stay in pixels).
+    /// World axes: x right, y up, z to the camera, origin at the image centre.
+    ///
+    /// # Errors
+    /// Mismatched lengths, an empty mask, more than 2^32 - 1 pixels.
+    pub fn new(height_px: &'a [f32], mask: &'a [bool], width: usize, pitch: f64) -> Result<Self> {
+        if height_px.len() != mask.len() {
+            return Err(Error::LengthMismatch { argument: "height_px", expected: mask.len(), actual: height_px.len() });
+        }
+        if width == 0 || !mask.contains(&true) {
+            return Err(Error::EmptyMask);
+        }
+        if u32::try_from(mask.len()).is_err() {
+            let value = mask.len() as f64;
+            return Err(Error::OutOfRange { argument: "height_px", rule: "at most 2^32 - 1 pixels", value });
+        }
+        let mut mesh = Self { height_px, mask, width, pitch, vertex_starts: Vec::new(), face_starts: Vec::new() };
+        let rows = 0..mask.len() / width;
+        let vertices: Vec<usize> =
+            rows.clone().into_par_iter().map(|row| mesh.row_mask(row).iter().filter(|&&valid| valid).count()).collect();
+        let faces: Vec<usize> = rows
+            .into_par_iter()
+            .map(|row| mesh.squares(row).map(|square| faces_of_square(square).len()).sum())
+            .collect();
+        mesh.vertex_starts = starts(&vertices);
+        mesh.face_starts = starts(&faces);
+        Ok(mesh)
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.mask.len() / self.width
+    }
+
+    /// Pixels in a row.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Number of vertices.
+    #[must_use]
+    pub fn vertex_count(&self) -> usize {
+        self.vertex_starts[self.rows()]
+    }
+
+    /// Number of faces.
+    #[must_use]
+    pub fn face_count(&self) -> usize {
+        self.face_starts[self.rows()]
+    }
+
+    /// Calls `vertex` with pixel (row * width + column) and `[x, y, z]` of each vertex of a row, from left to right.
+    #[inline]
+    pub fn row_vertices(&self, row: usize, mut vertex: impl FnMut(usize, [f32; 3])) {
+        let y = ((self.rows() as f64 / 2.0 - row as f64 - 0.5) * self.pitch) as f32;
+        for (col, _) in self.row_mask(row).iter().enumerate().filter(|(_, valid)| **valid) {
+            let pixel = row * self.width + col;
+            let x = ((col as f64 + 0.5 - self.width as f64 / 2.0) * self.pitch) as f32;
+            vertex(pixel, [x, y, (f64::from(self.height_px[pixel]) * self.pitch) as f32]);
+        }
+    }
+
+    /// Calls `face` with the vertices of each face between a row and the one above, from left to right; none for row 0.
+    #[inline]
+    pub fn row_faces(&self, row: usize, mut face: impl FnMut([u32; 3])) {
+        if row == 0 {
+            return;
+        }
+        // Vertices of the square's left column, if they are there, and how many there were before the right one.
+        let [mut upper, mut lower] = [self.vertex_starts[row - 1] as u32, self.vertex_starts[row] as u32];
+        let [upper_mask, lower_mask] = [self.row_mask(row - 1), self.row_mask(row)];
+        for (upper_pair, lower_pair) in upper_mask.windows(2).zip(lower_mask.windows(2)) {
+            let corners = [upper, lower, lower + u32::from(lower_pair[0]), upper + u32::from(upper_pair[0])];
+            for from in faces_of_square([upper_pair[0], lower_pair[0], lower_pair[1], upper_pair[1]]) {
+                face(from.map(|corner| corners[corner]));
+            }
+            [upper, lower] = [corners[3], corners[2]];
+        }
+    }
+
+    fn row_mask(&self, row: usize) -> &'a [bool] {
+        &self.mask[row * self.width..(row + 1) * self.width]
+    }
+
+    /// Which corners are valid in each square between a row and the one above: upper left, lower left, lower right, upper
+    /// right, which is counter-clockwise seen from the camera.
+    fn squares(&self, row: usize) -> impl Iterator<Item = [bool; 4]> {
+        let [upper, lower] = if row == 0 { [&[][..]; 2] } else { [self.row_mask(row - 1), self.row_mask(row)] };
+        upper.windows(2).zip(lower.windows(2)).map(|(upper, lower)| [upper[0], lower[0], lower[1], upper[1]])
+    }
+}
+
+/// Triangulates the pixels of `mask`: all of a [`HeightMesh`] at once.
 ///
 /// # Errors
-/// Mismatched lengths, an empty mask, more than 2^32 - 1 pixels.
+/// Those of [`HeightMesh::new`].
 ///
 /// # Examples
 /// ```
@@ -34,60 +139,33 @@ pub struct TriangleMesh {
 /// # Ok::<(), bgars_core::Error>(())
 /// ```
 pub fn triangulate(height_px: &[f32], mask: &[bool], width: usize, pitch: f64) -> Result<TriangleMesh> {
-    if height_px.len() != mask.len() {
-        return Err(Error::LengthMismatch { argument: "height_px", expected: mask.len(), actual: height_px.len() });
-    }
-    if width == 0 || !mask.contains(&true) {
-        return Err(Error::EmptyMask);
-    }
-    if u32::try_from(mask.len()).is_err() {
-        let value = mask.len() as f64;
-        return Err(Error::OutOfRange { argument: "height_px", rule: "at most 2^32 - 1 pixels", value });
-    }
-    let height = mask.len() / width;
-    let vertices_of_row: Vec<usize> =
-        mask.par_chunks(width).map(|row| row.iter().filter(|&&valid| valid).count()).collect();
-    let vertex_count = vertices_of_row.iter().sum();
-    let mut mesh = TriangleMesh { vertices: zeros(vertex_count), faces: Vec::new(), pixels: zeros(vertex_count) };
-    let mut vertex_of_pixel = zeros::<u32>(mask.len());
-    let starts = starts(&vertices_of_row);
-    let rows = (split(&mut mesh.vertices, &vertices_of_row), split(&mut mesh.pixels, &vertices_of_row));
-    (starts, rows.0, rows.1, vertex_of_pixel.par_chunks_mut(width)).into_par_iter().enumerate().for_each(
-        |(row, (start, vertices, pixels, vertex_of_pixel))| {
-            let first = row * width;
-            let valid = (0..vertex_of_pixel.len()).filter(|&col| mask[first + col]);
-            for (index, col) in valid.enumerate() {
-                vertex_of_pixel[col] = (start + index) as u32;
-                pixels[index] = (first + col) as u32;
-                vertices[index] = [
-                    ((col as f64 + 0.5 - width as f64 / 2.0) * pitch) as f32,
-                    ((height as f64 / 2.0 - row as f64 - 0.5) * pitch) as f32,
-                    (f64::from(height_px[first + col]) * pitch) as f32,
-                ];
-            }
-        },
-    );
-
-    let corners = |row: usize, col: usize| {
-        let corner = row * width + col;
-        // Counter-clockwise seen from the camera: upper left, lower left, lower right, upper right.
-        [corner - width - 1, corner - 1, corner, corner - width]
+    let source = HeightMesh::new(height_px, mask, width, pitch)?;
+    let mut mesh = TriangleMesh {
+        vertices: zeros(source.vertex_count()),
+        faces: zeros(source.face_count()),
+        pixels: zeros(source.vertex_count()),
     };
-    let faces_at = |square: [usize; 4]| faces_of_square(square.map(|pixel| mask[pixel]));
-    let faces_of_row: Vec<usize> = (1..height.max(1))
+    (
+        split(&mut mesh.vertices, &source.vertex_starts),
+        split(&mut mesh.pixels, &source.vertex_starts),
+        split(&mut mesh.faces, &source.face_starts),
+    )
         .into_par_iter()
-        .map(|row| (1..width).map(|col| faces_at(corners(row, col)).len()).sum())
-        .collect();
-    mesh.faces = zeros(faces_of_row.iter().sum());
-    split(&mut mesh.faces, &faces_of_row).into_par_iter().enumerate().for_each(|(row, faces)| {
-        let mut faces = faces.iter_mut();
-        for col in 1..width {
-            let square = corners(row + 1, col);
-            for (from, face) in faces_at(square).iter().zip(faces.by_ref()) {
-                *face = from.map(|corner| vertex_of_pixel[square[corner]]);
-            }
-        }
-    });
+        .enumerate()
+        .for_each(|(row, (vertices, pixels, faces))| {
+            let mut places = vertices.iter_mut().zip(pixels);
+            source.row_vertices(row, |pixel, position| {
+                if let Some((vertex, place)) = places.next() {
+                    (*vertex, *place) = (position, pixel as u32);
+                }
+            });
+            let mut places = faces.iter_mut();
+            source.row_faces(row, |corners| {
+                if let Some(face) = places.next() {
+                    *face = corners;
+                }
+            });
+        });
     Ok(mesh)
 }
 
@@ -103,17 +181,23 @@ fn faces_of_square(valid: [bool; 4]) -> &'static [[usize; 3]] {
     }
 }
 
-/// Sum of the lengths before each.
+/// Sum of the lengths before each, and of all.
 fn starts(lengths: &[usize]) -> Vec<usize> {
-    lengths.iter().scan(0, |sum, &length| Some(std::mem::replace(sum, *sum + length))).collect()
+    let mut sum = 0;
+    std::iter::once(0)
+        .chain(lengths.iter().map(|length| {
+            sum += length;
+            sum
+        }))
+        .collect()
 }
 
-/// Neighbouring parts of `items`, of the given lengths.
-fn split<'a, T>(mut items: &'a mut [T], lengths: &[usize]) -> Vec<&'a mut [T]> {
-    let part = |&length: &usize| {
-        let (part, rest) = std::mem::take(&mut items).split_at_mut(length);
+/// The parts of `items` between neighbouring starts.
+fn split<'a, T>(mut items: &'a mut [T], starts: &[usize]) -> Vec<&'a mut [T]> {
+    let part = |ends: &[usize]| {
+        let (part, rest) = std::mem::take(&mut items).split_at_mut(ends[1] - ends[0]);
         items = rest;
         part
     };
-    lengths.iter().map(part).collect()
+    starts.windows(2).map(part).collect()
 }

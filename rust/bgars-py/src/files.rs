@@ -1,23 +1,19 @@
-//! Files: `decode_stack`, `write_ply`, `write_obj`.
+//! Files: `decode_stack`, `write_mesh`, `write_height`.
 
-use std::fs::File;
-use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use bgars_core::Error;
 use bgars_core::io::decode::{self, Channel, Color, StackData};
-use bgars_core::io::{MeshView, obj, ply, rgb16};
+use bgars_core::io::{HeightSource, MeshFormat, MeshView, rgb16, write_mesh_file};
+use bgars_core::mesh::HeightMesh;
 use numpy::{PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::convert::{array3, slice3, triples};
+use crate::convert::{array3, slice2, slice3, triples};
 use crate::errors::{InputError, to_python};
-
-/// Buffer of a mesh file, bytes.
-const WRITE_BUFFER: usize = 1 << 20;
+use crate::progress::on_threads;
 
 #[pyfunction]
-#[pyo3(signature = (paths, *, channel, response, gains, max_megapixels))]
+#[pyo3(signature = (paths, *, channel, response, gains, max_megapixels, threads))]
 #[allow(clippy::needless_pass_by_value)]
 pub fn decode_stack<'py>(
     py: Python<'py>,
@@ -26,6 +22,7 @@ pub fn decode_stack<'py>(
     response: Option<PyReadonlyArray1<'py, f32>>,
     gains: Option<PyReadonlyArray2<'py, f32>>,
     max_megapixels: f64,
+    threads: Option<i64>,
 ) -> PyResult<(Bound<'py, PyAny>, bool, u16)> {
     let channel = match channel {
         "luminance" => Channel::Luminance,
@@ -40,7 +37,7 @@ pub fn decode_stack<'py>(
         response: response.as_ref().map(|table| table.as_slice()).transpose()?,
         gains: gains.as_ref().map(|gains| triples(gains, "gains")).transpose()?,
     };
-    let stack = py.detach(|| decode::decode_stack(&paths, &color, max_megapixels)).map_err(to_python)?;
+    let stack = on_threads(py, threads, || decode::decode_stack(&paths, &color, max_megapixels))?;
     let shape = [paths.len(), stack.height, stack.width];
     let array = match stack.data {
         StackData::U8(data) => array3(py, data, shape)?.into_any(),
@@ -65,39 +62,20 @@ pub fn write_png16(py: Python<'_>, path: PathBuf, rgb: PyReadonlyArray3<'_, u16>
     py.detach(|| rgb16::write_png16(&path, data, height, width)).map_err(to_python)
 }
 
-/// One of the core's mesh writers.
-type Writer = fn(MeshView<'_, f64, i64>, &[String], &mut BufWriter<File>) -> std::io::Result<()>;
-
-/// The arrays of a mesh as trimesh keeps them: converting them here, block by block, costs no second copy of the mesh.
-struct MeshArrays<'py> {
-    vertices: PyReadonlyArray2<'py, f64>,
-    faces: PyReadonlyArray2<'py, i64>,
-    normals: Option<PyReadonlyArray2<'py, f64>>,
-    colors: Option<PyReadonlyArray2<'py, u8>>,
-}
-
-impl MeshArrays<'_> {
-    fn write(&self, py: Python<'_>, path: &Path, comments: &[String], writer: Writer) -> PyResult<()> {
-        let mesh = MeshView {
-            vertices: triples(&self.vertices, "vertices")?,
-            faces: triples(&self.faces, "faces")?,
-            normals: self.normals.as_ref().map(|normals| triples(normals, "normals")).transpose()?,
-            colors: self.colors.as_ref().map(|colors| triples(colors, "colors")).transpose()?,
-        };
-        let write = || {
-            mesh.check()?;
-            let io_error = |source| Error::Io { path: path.to_path_buf(), source };
-            let mut out = BufWriter::with_capacity(WRITE_BUFFER, File::create(path).map_err(io_error)?);
-            writer(mesh, comments, &mut out).and_then(|()| out.flush()).map_err(io_error)
-        };
-        py.detach(write).map_err(to_python)
+/// The format of a mesh file, by its suffix.
+fn mesh_format(path: &Path) -> PyResult<MeshFormat> {
+    match path.extension().and_then(|suffix| suffix.to_str()).map(str::to_ascii_lowercase).as_deref() {
+        Some("ply") => Ok(MeshFormat::Ply),
+        Some("obj") => Ok(MeshFormat::Obj),
+        _ => Err(InputError::new_err(format!("path: must end in .ply or .obj, got {}", path.display()))),
     }
 }
 
+/// Vertices and faces as trimesh keeps them: converting them here, piece by piece, costs no second copy of the mesh.
 #[pyfunction]
-#[pyo3(signature = (path, vertices, faces, *, normals=None, colors=None, comments=Vec::new()))]
-#[allow(clippy::needless_pass_by_value)]
-pub fn write_ply<'py>(
+#[pyo3(signature = (path, vertices, faces, *, normals, colors, comments, threads))]
+#[allow(clippy::needless_pass_by_value, clippy::too_many_arguments)]
+pub fn write_mesh<'py>(
     py: Python<'py>,
     path: PathBuf,
     vertices: PyReadonlyArray2<'py, f64>,
@@ -105,21 +83,49 @@ pub fn write_ply<'py>(
     normals: Option<PyReadonlyArray2<'py, f64>>,
     colors: Option<PyReadonlyArray2<'py, u8>>,
     comments: Vec<String>,
+    threads: Option<i64>,
 ) -> PyResult<()> {
-    MeshArrays { vertices, faces, normals, colors }.write(py, &path, &comments, ply::write_ply)
+    let format = mesh_format(&path)?;
+    let mesh = MeshView {
+        vertices: triples(&vertices, "vertices")?,
+        faces: triples(&faces, "faces")?,
+        normals: normals.as_ref().map(|normals| triples(normals, "normals")).transpose()?,
+        colors: colors.as_ref().map(|colors| triples(colors, "colors")).transpose()?,
+    };
+    on_threads(py, threads, || {
+        mesh.check()?;
+        write_mesh_file(&mesh, format, &comments, &path)
+    })
 }
 
 #[pyfunction]
-#[pyo3(signature = (path, vertices, faces, *, normals=None, colors=None, comments=Vec::new()))]
-#[allow(clippy::needless_pass_by_value)]
-pub fn write_obj<'py>(
+#[pyo3(signature = (path, height_px, mask, pitch, *, normals, grey, comments, threads))]
+#[allow(clippy::needless_pass_by_value, clippy::too_many_arguments)]
+pub fn write_height<'py>(
     py: Python<'py>,
     path: PathBuf,
-    vertices: PyReadonlyArray2<'py, f64>,
-    faces: PyReadonlyArray2<'py, i64>,
-    normals: Option<PyReadonlyArray2<'py, f64>>,
-    colors: Option<PyReadonlyArray2<'py, u8>>,
+    height_px: PyReadonlyArray2<'py, f32>,
+    mask: PyReadonlyArray2<'py, bool>,
+    pitch: f64,
+    normals: Option<PyReadonlyArray3<'py, f32>>,
+    grey: Option<PyReadonlyArray2<'py, u8>>,
     comments: Vec<String>,
+    threads: Option<i64>,
 ) -> PyResult<()> {
-    MeshArrays { vertices, faces, normals, colors }.write(py, &path, &comments, obj::write_obj)
+    let format = mesh_format(&path)?;
+    let width = mask.shape()[1];
+    let (height_px, mask) = (slice2(&height_px, "height_px")?, slice2(&mask, "mask")?);
+    let normals = normals.as_ref().map(|normals| slice3(normals, "normals")).transpose()?;
+    let grey = grey.as_ref().map(|grey| slice2(grey, "grey")).transpose()?;
+    let mesh = on_threads(py, threads, || HeightMesh::new(height_px, mask, width, pitch))?;
+    if mesh.face_count() == 0 {
+        let vertices = mesh.vertex_count();
+        let message =
+            format!("height: no three neighbouring pixels are valid ({vertices} in all), so there is no face to write");
+        return Err(InputError::new_err(message));
+    }
+    on_threads(py, threads, || {
+        let normals = normals.map(|normals| normals.as_chunks().0);
+        write_mesh_file(&HeightSource::new(mesh, normals, grey)?, format, &comments, &path)
+    })
 }

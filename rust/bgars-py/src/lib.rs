@@ -16,9 +16,9 @@ mod _bgars {
     #[pymodule_export]
     use crate::files::read_rgb16;
     #[pymodule_export]
-    use crate::files::write_obj;
+    use crate::files::write_height;
     #[pymodule_export]
-    use crate::files::write_ply;
+    use crate::files::write_mesh;
     #[pymodule_export]
     use crate::files::write_png16;
     #[pymodule_export]

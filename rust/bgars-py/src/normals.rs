@@ -33,21 +33,22 @@ pub fn normal_arrays(py: Python<'_>, height: usize, width: usize, set_lights: us
     Ok((
         array3(py, map.normals, [height, width, 3])?,
         array2(py, map.albedo, shape)?,
-        array2(py, map.mask.clone(), shape)?,
-        array2(py, map.confidence, shape)?,
         array2(py, map.mask, shape)?,
+        array2(py, map.confidence, shape)?,
+        array2(py, map.measured, shape)?,
         array2(py, map.lights_kept, shape)?,
         (set_lights > 0).then(|| array3(py, map.kept_sets, [height, width, set_lights])).transpose()?,
     ))
 }
 
-/// The arrays to write: normals (H, W, 3), albedo, mask, confidence, lights_kept (H, W), and the kept sets (H, W, L).
+/// The arrays to write: normals (H, W, 3), albedo, mask, confidence, measured, lights_kept (H, W), and the kept sets (H, W, L).
 #[derive(FromPyObject)]
 pub struct Outputs<'py> {
     normals: PyReadwriteArray3<'py, f32>,
     albedo: PyReadwriteArray2<'py, f32>,
     mask: PyReadwriteArray2<'py, bool>,
     confidence: PyReadwriteArray2<'py, f32>,
+    measured: PyReadwriteArray2<'py, bool>,
     lights_kept: PyReadwriteArray2<'py, u16>,
     kept_sets: Option<PyReadwriteArray3<'py, bool>>,
 }
@@ -59,6 +60,7 @@ impl Outputs<'_> {
             albedo: slice_mut(&mut self.albedo, "albedo")?,
             mask: slice_mut(&mut self.mask, "mask")?,
             confidence: slice_mut(&mut self.confidence, "confidence")?,
+            measured: slice_mut(&mut self.measured, "measured")?,
             lights_kept: slice_mut(&mut self.lights_kept, "lights_kept")?,
             kept_sets: match &mut self.kept_sets {
                 Some(sets) => slice_mut(sets, "kept_sets")?,

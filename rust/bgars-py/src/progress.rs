@@ -64,6 +64,15 @@ where
     }
 }
 
+/// [`watched`] for work that reports nothing; Ctrl-C is raised when it is done.
+pub fn on_threads<T: Send>(
+    py: Python<'_>,
+    threads: Option<i64>,
+    work: impl FnOnce() -> bgars_core::Result<T> + Send,
+) -> PyResult<T> {
+    watched::<T, (f64,), _>(py, threads, None, |_| work())
+}
+
 fn pool(threads: i64) -> PyResult<rayon::ThreadPool> {
     let Some(count) = usize::try_from(threads).ok().filter(|&count| (1..=MAX_THREADS).contains(&count)) else {
         return Err(InputError::new_err(format!("threads: must be 1 to {MAX_THREADS}, got {threads}")));

@@ -2,9 +2,10 @@
 
 use rayon::prelude::*;
 
+use super::mesh_source::{MeshSource, Vertices};
 use crate::{Error, Result};
 
-/// Faces checked at a time.
+/// Vertices or faces of a piece, and faces checked at a time: they stay in the second-level cache.
 const BLOCK: usize = 1 << 14;
 
 /// A number that a coordinate may be; files hold it as `f32`.
@@ -102,4 +103,51 @@ impl<V: Coordinate, I: VertexIndex> MeshView<'_, V, I> {
             }),
         }
     }
+}
+
+impl<V: Coordinate, I: VertexIndex> MeshSource for MeshView<'_, V, I> {
+    fn vertex_count(&self) -> usize {
+        self.vertices.len()
+    }
+
+    fn face_count(&self) -> usize {
+        self.faces.len()
+    }
+
+    fn has_normals(&self) -> bool {
+        self.normals.is_some()
+    }
+
+    fn has_colors(&self) -> bool {
+        self.colors.is_some()
+    }
+
+    fn vertex_pieces(&self) -> usize {
+        self.vertices.len().div_ceil(BLOCK)
+    }
+
+    fn face_pieces(&self) -> usize {
+        self.faces.len().div_ceil(BLOCK)
+    }
+
+    fn vertices(&self, piece: usize, out: &mut Vertices) {
+        let single = |vectors: &[[V; 3]], out: &mut Vec<[f32; 3]>| {
+            out.clear();
+            out.extend(part(vectors, piece).iter().map(|vector| vector.map(V::to_f32)));
+        };
+        single(self.vertices, &mut out.positions);
+        single(self.normals.unwrap_or_default(), &mut out.normals);
+        out.colors.clear();
+        out.colors.extend_from_slice(part(self.colors.unwrap_or_default(), piece));
+    }
+
+    fn faces(&self, piece: usize, out: &mut Vec<[u32; 3]>) {
+        out.clear();
+        out.extend(part(self.faces, piece).iter().map(|face| face.map(|index| index.to_u64() as u32)));
+    }
+}
+
+/// One block of `items`; nothing beyond the last.
+fn part<T>(items: &[T], piece: usize) -> &[T] {
+    items.chunks(BLOCK).nth(piece).unwrap_or_default()
 }

@@ -2,10 +2,14 @@
 
 mod blocks;
 pub mod decode;
+mod mesh_file;
+mod mesh_source;
 mod mesh_view;
 pub mod obj;
 pub mod ply;
 pub mod rgb16;
 mod tiff_gray;
 
+pub use mesh_file::{MeshFormat, write_mesh_file};
+pub use mesh_source::{HeightSource, MeshSource, Vertices};
 pub use mesh_view::{Coordinate, MeshView, VertexIndex};

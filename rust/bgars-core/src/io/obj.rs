@@ -2,8 +2,8 @@
 
 use std::io::Write;
 
-use super::blocks::write_blocks;
-use super::{Coordinate, MeshView, VertexIndex};
+use super::blocks::write_pieces;
+use super::{MeshSource, Vertices};
 
 /// Digits of a normal behind the point.
 const NORMAL_DIGITS: usize = 6;
@@ -16,49 +16,48 @@ const NORMAL_UNITS: u32 = 1_000_000;
 ///
 /// # Errors
 /// Whatever `out` reports.
-pub fn write_obj<V: Coordinate, I: VertexIndex>(
-    mesh: MeshView<'_, V, I>,
-    comments: &[String],
-    out: &mut (impl Write + Send),
-) -> std::io::Result<()> {
+pub fn write_obj(mesh: &impl MeshSource, comments: &[String], out: &mut (impl Write + Send)) -> std::io::Result<()> {
     for comment in comments {
         writeln!(out, "# {}", comment.replace(['\r', '\n'], " "))?;
     }
     let levels: Vec<String> = (0..=255u8).map(|level| format!(" {:.4}", f32::from(level) / 255.0)).collect();
-    let encode_vertices = |vertices: std::ops::Range<usize>, text: &mut Vec<u8>| {
+    let encode_vertices = |piece: usize, vertices: &mut Vertices, text: &mut Vec<u8>| {
+        mesh.vertices(piece, vertices);
         text.clear();
-        for index in vertices {
+        for (index, position) in vertices.positions.iter().enumerate() {
             text.push(b'v');
-            for value in mesh.vertices[index] {
-                push_shortest(text, value.to_f32());
+            for &value in position {
+                push_shortest(text, value);
             }
-            for &level in mesh.colors.map_or(&[][..], |colors| &colors[index]) {
+            for &level in vertices.colors.get(index).into_iter().flatten() {
                 text.extend_from_slice(levels[usize::from(level)].as_bytes());
             }
             text.push(b'\n');
         }
     };
-    write_blocks(mesh.vertices.len(), encode_vertices, out)?;
-    if let Some(normals) = mesh.normals {
-        let encode_normals = |vertices: std::ops::Range<usize>, text: &mut Vec<u8>| {
+    write_pieces(mesh.vertex_pieces(), encode_vertices, out)?;
+    if mesh.has_normals() {
+        let encode_normals = |piece: usize, vertices: &mut Vertices, text: &mut Vec<u8>| {
+            mesh.vertices(piece, vertices);
             text.clear();
-            for normal in &normals[vertices] {
+            for normal in &vertices.normals {
                 text.extend_from_slice(b"vn");
-                for value in normal {
-                    push_fixed(text, value.to_f32());
+                for &value in normal {
+                    push_fixed(text, value);
                 }
                 text.push(b'\n');
             }
         };
-        write_blocks(normals.len(), encode_normals, out)?;
+        write_pieces(mesh.vertex_pieces(), encode_normals, out)?;
     }
-    let encode_faces = |faces: std::ops::Range<usize>, text: &mut Vec<u8>| {
+    let encode_faces = |piece: usize, faces: &mut Vec<[u32; 3]>, text: &mut Vec<u8>| {
+        mesh.faces(piece, faces);
         text.clear();
-        for face in &mesh.faces[faces] {
-            push_face(text, face.map(|index| index.to_u64().wrapping_add(1)), mesh.normals.is_some());
+        for face in faces {
+            push_face(text, face.map(|index| u64::from(index) + 1), mesh.has_normals());
         }
     };
-    write_blocks(mesh.faces.len(), encode_faces, out)
+    write_pieces(mesh.face_pieces(), encode_faces, out)
 }
 
 /// A space and the shortest decimal that reads back as `value`.

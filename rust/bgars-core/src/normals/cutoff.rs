@@ -14,7 +14,7 @@ pub(super) type Lanes<T> = [T; LANES];
 ///
 /// `keys` has one entry a light, at least 3.
 #[inline(always)]
-pub(super) fn cutoffs<K: Key>(keys: &[Lanes<K>], gap: K) -> Lanes<K> {
+pub(super) fn cutoffs<K: Key>(keys: &[&Lanes<K>], gap: K) -> Lanes<K> {
     match keys.try_into() {
         Ok(keys) => sorted_cutoffs(keys, gap),
         Err(_) => grown_cutoffs(keys, gap),
@@ -23,7 +23,7 @@ pub(super) fn cutoffs<K: Key>(keys: &[Lanes<K>], gap: K) -> Lanes<K> {
 
 /// Eight lights: a sorting network of 19 exchanges (Knuth, The Art of Computer Programming 3, section 5.3.4), then the steps.
 #[inline(always)]
-fn sorted_cutoffs<K: Key>(keys: &[Lanes<K>; 8], gap: K) -> Lanes<K> {
+fn sorted_cutoffs<K: Key>(keys: &[&Lanes<K>; 8], gap: K) -> Lanes<K> {
     let mut cutoffs = [K::LEAST; LANES];
     for lane in 0..LANES {
         let mut s: [K; 8] = std::array::from_fn(|light| keys[light][lane]);
@@ -44,7 +44,7 @@ fn sorted_cutoffs<K: Key>(keys: &[Lanes<K>; 8], gap: K) -> Lanes<K> {
 
 /// Any number of lights without sorting: start at the third darkest, and take in what is within the gap until nothing is.
 #[inline(always)]
-fn grown_cutoffs<K: Key>(keys: &[Lanes<K>], gap: K) -> Lanes<K> {
+fn grown_cutoffs<K: Key>(keys: &[&Lanes<K>], gap: K) -> Lanes<K> {
     let [mut first, mut second, mut cutoffs] = [[K::LARGEST; LANES]; 3];
     for key in keys {
         for lane in 0..LANES {
@@ -105,11 +105,11 @@ mod tests {
         for (lights, gap) in [(3, 0), (4, 20), (5, 50), (8, 0), (8, 50), (8, 255), (9, 30), (24, 10), (96, 3)] {
             for seed in 0..50 {
                 let keys = random_keys(lights, seed);
-                let found = cutoffs(&keys, gap);
+                let found = cutoffs(&keys.iter().collect::<Vec<_>>(), gap);
                 let wide: Vec<Lanes<u16>> = keys.iter().map(|key| key.map(u16::from)).collect();
                 let float: Vec<Lanes<f32>> = keys.iter().map(|key| key.map(f32::from)).collect();
-                assert_eq!(cutoffs(&wide, u16::from(gap)), found.map(u16::from));
-                assert_eq!(cutoffs(&float, f32::from(gap)), found.map(f32::from));
+                assert_eq!(cutoffs(&wide.iter().collect::<Vec<_>>(), u16::from(gap)), found.map(u16::from));
+                assert_eq!(cutoffs(&float.iter().collect::<Vec<_>>(), f32::from(gap)), found.map(f32::from));
                 for lane in 0..LANES {
                     let values: Vec<u8> = keys.iter().map(|key| key[lane]).collect();
                     assert_eq!(found[lane], slow_cutoff(&values, gap), "{values:?}, gap {gap}");

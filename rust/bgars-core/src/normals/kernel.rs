@@ -195,6 +195,7 @@ pub(super) struct Out<'a> {
     pub albedo: &'a mut [f32],
     pub mask: &'a mut [bool],
     pub confidence: &'a mut [f32],
+    pub measured: &'a mut [bool],
     pub lights_kept: &'a mut [u16],
     /// Empty unless asked for.
     pub kept_sets: &'a mut [bool],
@@ -214,11 +215,21 @@ impl<'a> Out<'a> {
             .zip(map.albedo[band.clone()].chunks_mut(TASK_PIXELS))
             .zip(map.mask[band.clone()].chunks_mut(TASK_PIXELS))
             .zip(map.confidence[band.clone()].chunks_mut(TASK_PIXELS))
+            .zip(map.measured[band.clone()].chunks_mut(TASK_PIXELS))
             .zip(map.lights_kept[band.clone()].chunks_mut(TASK_PIXELS));
-        for ((((normals, albedo), mask), confidence), lights_kept) in scalars {
+        for (((((normals, albedo), mask), confidence), measured), lights_kept) in scalars {
             let (task_sets, rest) = std::mem::take(&mut kept_sets).split_at_mut(albedo.len() * set_lights);
             kept_sets = rest;
-            tasks.push(Self { normals, albedo, mask, confidence, lights_kept, kept_sets: task_sets, streamed });
+            tasks.push(Self {
+                normals,
+                albedo,
+                mask,
+                confidence,
+                measured,
+                lights_kept,
+                kept_sets: task_sets,
+                streamed,
+            });
         }
         tasks
     }
@@ -236,7 +247,8 @@ impl<'a> Out<'a> {
         self.normals[span.start * 3..span.end * 3].fill(f32::NAN);
         self.albedo[span.clone()].fill(f32::NAN);
         self.confidence[span.clone()].fill(0.0);
-        self.mask[span].fill(false);
+        self.mask[span.clone()].fill(false);
+        self.measured[span].fill(false);
     }
 }
 
@@ -342,6 +354,7 @@ impl<'a, P: Pixel> Kernel<'a, P> {
         out.confidence[at] =
             confidence(&scaled, &solution.inverse, squared_residuals, usize::from(out.lights_kept[at]));
         out.mask[at] = true;
+        out.measured[at] = true;
     }
 
     /// The pixel's values in linear grey levels at unit light intensity, its clipped lights, and near lights' directions.

@@ -5,11 +5,15 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::cutoff::{LANES, Lanes, cutoffs};
+use super::gram::{BYTE_LIGHTS, ENTRIES, GramTables};
 use crate::lights::conditioning;
 use crate::{Lights, Pixel};
 
 /// Subsets of lights below this [`conditioning`] are solved in `f64`: one refinement in `f32` no longer makes up for rounding.
 const MIN_LANE_CONDITIONING: f64 = 1e-3;
+
+/// Below this one, they are refined; above, rounding turns a normal by less than 2e-4 degrees.
+const MIN_ROUGH_CONDITIONING: f32 = 0.1;
 
 /// What a block of pixels leaves undone: bit k is set where pixel k wants the careful solver.
 pub(super) type Careful = u64;
@@ -31,9 +35,12 @@ pub(super) struct LaneSolver {
     directions: Vec<[f32; 3]>,
     /// `(L^T L)^-1 L^T`, a column a light.
     pseudo_inverse: Vec<[f32; 3]>,
-    all: [f32; 6],
-    /// `L^T L` of all lights: xx, xy, xz, yy, yz, zz.
-    gram: [f32; 6],
+    /// `(L^T L)^-1` of all lights.
+    all: [f32; ENTRIES],
+    /// `L^T L` of all lights.
+    gram: [f32; ENTRIES],
+    /// `L^T L` of any lights, a table for every eight of them.
+    tables: Vec<GramTables>,
 }
 
 impl LaneSolver {
@@ -42,13 +49,65 @@ impl LaneSolver {
         let Lights::Directional(directions) = lights else { return None };
         let gram = directions.iter().fold(Matrix3::zeros(), |gram, light| gram + light * light.transpose());
         let exact = gram.try_inverse().filter(|_| conditioning(&gram) >= MIN_LANE_CONDITIONING)?;
-        Some(Self {
-            choice,
-            directions: directions.iter().map(single).collect(),
-            pseudo_inverse: directions.iter().map(|light| single(&(exact * light))).collect(),
-            all: upper(&exact),
-            gram: upper(&gram),
-        })
+        let pseudo_inverse = directions.iter().map(|light| single(&(exact * light))).collect();
+        let directions: Vec<[f32; 3]> = directions.iter().map(single).collect();
+        let tables = directions.chunks(BYTE_LIGHTS).map(GramTables::new).collect();
+        Some(Self { choice, directions, pseudo_inverse, all: upper(&exact), gram: upper(&gram), tables })
+    }
+
+    /// Their number.
+    pub fn lights(&self) -> usize {
+        self.directions.len()
+    }
+}
+
+/// The lights that a block keeps.
+pub(super) struct Kept<K> {
+    /// The keys; of a light that is dropped, zero.
+    keys: Vec<Lanes<K>>,
+    /// A bit a light, a byte for every eight.
+    bits: Vec<Lanes<u8>>,
+}
+
+impl<K: Pixel> Kept<K> {
+    pub fn new(lights: usize) -> Self {
+        Self { keys: vec![[K::ZERO; LANES]; lights], bits: vec![[0; LANES]; lights.div_ceil(BYTE_LIGHTS)] }
+    }
+
+    /// Takes the keys up to the cutoffs; true when these are all.
+    #[inline(always)]
+    fn choose(&mut self, keys: &[&Lanes<K>], cutoffs: &Lanes<K>) -> bool {
+        let mut all = true;
+        let bytes = keys.chunks(BYTE_LIGHTS).zip(self.keys.chunks_mut(BYTE_LIGHTS)).zip(&mut self.bits);
+        for ((keys, kept_keys), bits) in bytes {
+            // Written to once, so that the compiler need not ask what overlaps.
+            let mut byte = [0; LANES];
+            for (light, (&&key, kept_key)) in keys.iter().zip(kept_keys).enumerate() {
+                let mut kept = key;
+                for lane in 0..LANES {
+                    let keep = is_kept(key[lane], cutoffs[lane]);
+                    kept[lane] = if keep { key[lane] } else { K::ZERO };
+                    byte[lane] |= u8::from(keep) << light;
+                }
+                *kept_key = kept;
+            }
+            *bits = byte;
+            let everywhere = bits.iter().fold(u8::MAX, |everywhere, bits| everywhere & bits);
+            all &= everywhere == u8::MAX >> (BYTE_LIGHTS - keys.len());
+        }
+        all
+    }
+
+    /// How many they are.
+    #[inline(always)]
+    fn counts(&self) -> Lanes<u16> {
+        let mut counts = [0; LANES];
+        for bits in &self.bits {
+            for lane in 0..LANES {
+                counts[lane] += bits[lane].count_ones() as u16;
+            }
+        }
+        counts
     }
 }
 
@@ -72,39 +131,22 @@ impl Solutions {
     }
 }
 
-/// Chooses and solves; `keys` of a length known to the compiler are unrolled. `masks` is scratch of the same length.
+/// Chooses and solves; with `FMA`, products are added without rounding between, for processors that do so in one step.
 #[inline(always)]
-pub(super) fn solve<K: Pixel>(
+pub(super) fn solve<K: Pixel, const FMA: bool>(
     solver: &LaneSolver,
-    keys: &[Lanes<K>],
-    masks: &mut [Lanes<u8>],
+    keys: &[&Lanes<K>],
+    kept: &mut Kept<K>,
     offset: Option<&Lanes<f32>>,
     out: &mut Solutions,
 ) {
-    match solver.choice {
-        Choice::All => solve_all(solver, keys, offset, out),
-        Choice::UpToGap(gap) => {
-            let cutoffs = cutoffs(keys, K::gap(gap));
-            let mut kept_by_all = 1;
-            for (mask, key) in masks.iter_mut().zip(keys) {
-                for lane in 0..LANES {
-                    mask[lane] = u8::from(is_kept(key[lane], cutoffs[lane]));
-                    kept_by_all &= mask[lane];
-                }
-            }
-            if kept_by_all == 1 {
-                solve_all(solver, keys, offset, out);
-            } else {
-                solve_kept(solver, keys, masks, offset, out);
-            }
+    if let Choice::UpToGap(gap) = solver.choice {
+        let cutoffs = cutoffs(keys, K::gap(gap));
+        if !kept.choose(keys, &cutoffs) {
+            return solve_kept::<K, FMA>(solver, kept, offset, out);
         }
     }
-}
-
-/// The linear value of a light in one lane.
-#[inline(always)]
-fn value<K: Pixel>(key: K, offset: Option<&Lanes<f32>>, lane: usize) -> f32 {
-    offset.map_or(key.to_f32(), |offset| key.to_f32() - offset[lane])
+    solve_all::<K, FMA>(solver, keys, offset, out);
 }
 
 /// Calls `$body` for the lights by eights, then fours, then one by one: `$keys`, `$vectors` are arrays of that size, over
@@ -131,17 +173,25 @@ macro_rules! by_chunks {
 
 /// Every light of every lane is kept: one matrix for all.
 #[inline(always)]
-fn solve_all<K: Pixel>(solver: &LaneSolver, keys: &[Lanes<K>], offset: Option<&Lanes<f32>>, out: &mut Solutions) {
+fn solve_all<K: Pixel, const FMA: bool>(
+    solver: &LaneSolver,
+    keys: &[&Lanes<K>],
+    offset: Option<&Lanes<f32>>,
+    out: &mut Solutions,
+) {
     let mut sums = [[0.0f32; LANES]; 4];
-    by_chunks!(keys, solver.pseudo_inverse.as_slice(), |keys, columns, _first| add_columns(
-        keys, columns, offset, &mut sums
-    ));
+    by_chunks!(keys, solver.pseudo_inverse.as_slice(), |keys, columns, _first| {
+        let keys = keys.map(|key| *key);
+        add_products::<FMA, _>(columns, &mut sums, |light, lane| {
+            offset.map_or(keys[light][lane].to_f32(), |offset| keys[light][lane].to_f32() - offset[lane])
+        });
+    });
     for lane in 0..LANES {
         let [x, y, z, squares] = std::array::from_fn(|sum| sums[sum][lane]);
         // |I|^2 - |L g|^2; what rounding leaves is far below the prior of 2 %.
-        let explained = along(solver.gram, [x, y, z]);
+        let explained = along::<FMA>(solver.gram, [x, y, z]);
         out.squared_residuals[lane] = if squares > explained { squares - explained } else { 0.0 };
-        out.along[lane] = along(solver.all, [x, y, z]);
+        out.along[lane] = along::<FMA>(solver.all, [x, y, z]);
         out.trace[lane] = solver.all[0] + solver.all[3] + solver.all[5];
         [out.scaled[0][lane], out.scaled[1][lane], out.scaled[2][lane]] = [x, y, z];
         out.kept[lane] = keys.len() as u16;
@@ -149,73 +199,80 @@ fn solve_all<K: Pixel>(solver: &LaneSolver, keys: &[Lanes<K>], offset: Option<&L
     out.careful = 0;
 }
 
-/// `sums += (column * value, value^2)` over the lights of a chunk.
+/// Some lights of some lanes are dropped: the normal equations of each lane.
 #[inline(always)]
-fn add_columns<K: Pixel, const C: usize>(
-    keys: &[Lanes<K>; C],
-    columns: &[[f32; 3]; C],
-    offset: Option<&Lanes<f32>>,
-    sums: &mut [Lanes<f32>; 4],
-) {
-    for lane in 0..LANES {
-        let [mut x, mut y, mut z, mut square] = std::array::from_fn(|sum| sums[sum][lane]);
-        for light in 0..C {
-            let value = value(keys[light][lane], offset, lane);
-            let [a, b, c] = columns[light];
-            x += a * value;
-            y += b * value;
-            z += c * value;
-            square += value * value;
-        }
-        [sums[0][lane], sums[1][lane], sums[2][lane], sums[3][lane]] = [x, y, z, square];
-    }
-}
-
-/// Some lights of some lanes are dropped: normal equations of each lane, refined once.
-#[inline(always)]
-fn solve_kept<K: Pixel>(
+fn solve_kept<K: Pixel, const FMA: bool>(
     solver: &LaneSolver,
-    keys: &[Lanes<K>],
-    masks: &[Lanes<u8>],
+    kept: &Kept<K>,
     offset: Option<&Lanes<f32>>,
     out: &mut Solutions,
 ) {
-    let directions = solver.directions.as_slice();
-    out.kept = [0; LANES];
-    let mut gram = [[0.0f32; LANES]; 6];
-    by_chunks!(masks, directions, |masks, directions, _first| {
-        count(masks, &mut out.kept);
-        add_gram(masks, directions, &mut gram);
-    });
-    let inverses = inverses_of(&gram);
-    let mut sums = [[0.0f32; LANES]; 3];
-    by_chunks!(keys, directions, |keys, directions, first| {
-        add_kept(keys, directions, &masks[first..], offset, &mut sums);
-    });
-    for lane in 0..LANES {
-        let [x, y, z] = product(&inverses, &sums, lane);
-        [out.scaled[0][lane], out.scaled[1][lane], out.scaled[2][lane]] = [x, y, z];
+    let mut gram = [[0.0f32; LANES]; ENTRIES];
+    for (tables, bits) in solver.tables.iter().zip(&kept.bits) {
+        tables.add(bits, &mut gram);
     }
-    // One step of iterative refinement: the residual of each light, and what it corrects.
-    let mut corrections = [[0.0f32; LANES]; 3];
-    out.squared_residuals = [0.0; LANES];
-    by_chunks!(keys, directions, |keys, directions, first| {
-        add_residuals(keys, directions, &masks[first..], offset, &mut corrections, out);
+    let mut sums = [[0.0f32; LANES]; 4];
+    by_chunks!(kept.keys.as_slice(), solver.directions.as_slice(), |keys, directions, first| {
+        let (keys, bits) = (*keys, kept.bits[first / BYTE_LIGHTS]);
+        add_products::<FMA, _>(directions, &mut sums, |light, lane| {
+            // A dropped key is zero already, but not less an offset.
+            offset.map_or(keys[light][lane].to_f32(), |offset| {
+                let is_kept = bits[lane] >> (first % BYTE_LIGHTS + light) & 1 == 1;
+                if is_kept { keys[light][lane].to_f32() - offset[lane] } else { 0.0 }
+            })
+        });
     });
-    let mut usable = true;
+    let [mut unusable, mut rough] = [[0u8; LANES]; 2];
     for lane in 0..LANES {
-        let correction = product(&inverses, &corrections, lane);
-        let facet: [f32; 3] = std::array::from_fn(|axis| out.scaled[axis][lane] + correction[axis]);
-        [out.scaled[0][lane], out.scaled[1][lane], out.scaled[2][lane]] = facet;
-        let inverse: [f32; 6] = std::array::from_fn(|entry| inverses[entry][lane]);
-        out.along[lane] = along(inverse, facet);
+        let Inverse { entries: inverse, determinant, largest } = inverse_of::<FMA>(&gram, lane);
+        let [x, y, z, squares] = std::array::from_fn(|sum| sums[sum][lane]);
+        let facet = product::<FMA>(inverse, [x, y, z]);
+        let explained = dot::<FMA>(facet, [x, y, z]);
+        out.squared_residuals[lane] = if squares > explained { squares - explained } else { 0.0 };
+        out.along[lane] = dot::<FMA>(facet, product::<FMA>(inverse, facet));
         out.trace[lane] = inverse[0] + inverse[3] + inverse[5];
-        usable &= inverse[0] != 0.0;
+        [out.scaled[0][lane], out.scaled[1][lane], out.scaled[2][lane]] = facet;
+        // Written so that NaN is unusable.
+        unusable[lane] = u8::from(!(determinant > MIN_LANE_CONDITIONING as f32 * largest));
+        rough[lane] = u8::from(determinant < MIN_ROUGH_CONDITIONING * largest);
+    }
+    out.kept = kept.counts();
+    if rough.iter().fold(0, |any, rough| any | rough) != 0 {
+        refine::<K, FMA>(solver, kept, offset, &gram, &rough, out);
     }
     out.careful = 0;
-    if !usable {
-        for lane in 0..LANES {
-            out.careful |= Careful::from(inverses[0][lane] == 0.0) << lane;
+    if unusable.iter().fold(0, |any, unusable| any | unusable) != 0 {
+        for (lane, &unusable) in unusable.iter().enumerate() {
+            out.careful |= Careful::from(unusable) << lane;
+        }
+    }
+}
+
+/// One step of iterative refinement in the lanes that ask for it: what the residuals of the lights correct.
+#[inline(always)]
+fn refine<K: Pixel, const FMA: bool>(
+    solver: &LaneSolver,
+    kept: &Kept<K>,
+    offset: Option<&Lanes<f32>>,
+    gram: &[Lanes<f32>; ENTRIES],
+    rough: &Lanes<u8>,
+    out: &mut Solutions,
+) {
+    let mut sums = [[0.0f32; LANES]; 4];
+    by_chunks!(kept.keys.as_slice(), solver.directions.as_slice(), |keys, directions, first| {
+        let (keys, bits) = (*keys, kept.bits[first / BYTE_LIGHTS]);
+        add_products::<FMA, _>(directions, &mut sums, |light, lane| {
+            let value = keys[light][lane].to_f32() - offset.map_or(0.0, |offset| offset[lane]);
+            let residual = value - dot::<FMA>(directions[light], std::array::from_fn(|axis| out.scaled[axis][lane]));
+            let is_kept = bits[lane] >> (first % BYTE_LIGHTS + light) & 1 == 1;
+            if is_kept { residual } else { 0.0 }
+        });
+    });
+    for lane in 0..LANES {
+        let correction =
+            product::<FMA>(inverse_of::<FMA>(gram, lane).entries, std::array::from_fn(|axis| sums[axis][lane]));
+        for (scaled, correction) in out.scaled.iter_mut().zip(correction) {
+            scaled[lane] += if rough[lane] == 1 { correction } else { 0.0 };
         }
     }
 }
@@ -226,125 +283,77 @@ pub(super) fn is_kept<K: Pixel>(key: K, cutoff: K) -> bool {
     !key.is_over(cutoff, K::gap(0.0))
 }
 
-/// `counts += 1` for the kept lights of a chunk.
+/// `sums += (vector * value, value^2)` over the lights of a chunk; `value_of` takes the light and the lane.
 #[inline(always)]
-fn count<const C: usize>(masks: &[Lanes<u8>; C], counts: &mut Lanes<u16>) {
-    let mut ones = [0u8; LANES];
-    for mask in masks {
-        for lane in 0..LANES {
-            ones[lane] += mask[lane];
-        }
-    }
-    for lane in 0..LANES {
-        counts[lane] += u16::from(ones[lane]);
-    }
-}
-
-/// `sums += direction * value` over the kept lights of a chunk.
-#[inline(always)]
-fn add_kept<K: Pixel, const C: usize>(
-    keys: &[Lanes<K>; C],
-    directions: &[[f32; 3]; C],
-    masks: &[Lanes<u8>],
-    offset: Option<&Lanes<f32>>,
-    sums: &mut [Lanes<f32>; 3],
+fn add_products<const FMA: bool, const C: usize>(
+    vectors: &[[f32; 3]; C],
+    sums: &mut [Lanes<f32>; 4],
+    value_of: impl Fn(usize, usize) -> f32,
 ) {
-    let masks = &masks[..C];
     for lane in 0..LANES {
-        let [mut x, mut y, mut z] = std::array::from_fn(|sum| sums[sum][lane]);
-        for light in 0..C {
-            let value = value(keys[light][lane], offset, lane);
-            let value = if masks[light][lane] == 1 { value } else { 0.0 };
-            let [a, b, c] = directions[light];
-            x += a * value;
-            y += b * value;
-            z += c * value;
+        let [mut x, mut y, mut z, mut square] = std::array::from_fn(|sum| sums[sum][lane]);
+        for (light, &[a, b, c]) in vectors.iter().enumerate() {
+            let value = value_of(light, lane);
+            x = add_product::<FMA>(x, a, value);
+            y = add_product::<FMA>(y, b, value);
+            z = add_product::<FMA>(z, c, value);
+            square = add_product::<FMA>(square, value, value);
         }
-        [sums[0][lane], sums[1][lane], sums[2][lane]] = [x, y, z];
+        [sums[0][lane], sums[1][lane], sums[2][lane], sums[3][lane]] = [x, y, z, square];
     }
 }
 
-/// `sums += direction * residual` over the kept lights of a chunk, for the facets in `out`, and the squares to `out`.
+/// `sum + a b`.
 #[inline(always)]
-fn add_residuals<K: Pixel, const C: usize>(
-    keys: &[Lanes<K>; C],
-    directions: &[[f32; 3]; C],
-    masks: &[Lanes<u8>],
-    offset: Option<&Lanes<f32>>,
-    sums: &mut [Lanes<f32>; 3],
-    out: &mut Solutions,
-) {
-    let masks = &masks[..C];
-    for lane in 0..LANES {
-        let [mut x, mut y, mut z] = std::array::from_fn(|sum| sums[sum][lane]);
-        let mut square = out.squared_residuals[lane];
-        let [u, v, w] = std::array::from_fn(|axis| out.scaled[axis][lane]);
-        for light in 0..C {
-            let [a, b, c] = directions[light];
-            let difference = value(keys[light][lane], offset, lane) - (a * u + b * v + c * w);
-            let residual = if masks[light][lane] == 1 { difference } else { 0.0 };
-            x += a * residual;
-            y += b * residual;
-            z += c * residual;
-            square += residual * residual;
-        }
-        [sums[0][lane], sums[1][lane], sums[2][lane]] = [x, y, z];
-        out.squared_residuals[lane] = square;
-    }
+fn add_product<const FMA: bool>(sum: f32, a: f32, b: f32) -> f32 {
+    if FMA { a.mul_add(b, sum) } else { sum + a * b }
 }
 
-/// `gram += direction direction^T` over the kept lights of a chunk.
 #[inline(always)]
-fn add_gram<const C: usize>(masks: &[Lanes<u8>; C], directions: &[[f32; 3]; C], gram: &mut [Lanes<f32>; 6]) {
-    for lane in 0..LANES {
-        let mut sums: [f32; 6] = std::array::from_fn(|entry| gram[entry][lane]);
-        for (&[a, b, c], mask) in directions.iter().zip(masks) {
-            for (sum, product) in sums.iter_mut().zip([a * a, a * b, a * c, b * b, b * c, c * c]) {
-                *sum += if mask[lane] == 1 { product } else { 0.0 };
-            }
-        }
-        for (gram, sum) in gram.iter_mut().zip(sums) {
-            gram[lane] = sum;
-        }
-    }
+fn dot<const FMA: bool>([a, b, c]: [f32; 3], [x, y, z]: [f32; 3]) -> f32 {
+    add_product::<FMA>(add_product::<FMA>(a * x, b, y), c, z)
 }
 
 /// `g^T C g`.
 #[inline(always)]
-fn along([xx, xy, xz, yy, yz, zz]: [f32; 6], [x, y, z]: [f32; 3]) -> f32 {
-    x * (xx * x + 2.0 * (xy * y + xz * z)) + y * (yy * y + 2.0 * yz * z) + z * (zz * z)
+fn along<const FMA: bool>(matrix: [f32; ENTRIES], facet: [f32; 3]) -> f32 {
+    dot::<FMA>(facet, product::<FMA>(matrix, facet))
 }
 
-/// A lane's matrix times its vector.
+/// A symmetric matrix times a vector.
 #[inline(always)]
-fn product(inverses: &[Lanes<f32>; 6], vectors: &[Lanes<f32>; 3], lane: usize) -> [f32; 3] {
-    let [xx, xy, xz, yy, yz, zz] = std::array::from_fn(|entry| inverses[entry][lane]);
-    let [x, y, z] = std::array::from_fn(|axis| vectors[axis][lane]);
-    [xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z]
+fn product<const FMA: bool>([xx, xy, xz, yy, yz, zz]: [f32; ENTRIES], vector: [f32; 3]) -> [f32; 3] {
+    [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]].map(|row| dot::<FMA>(row, vector))
 }
 
-/// The inverses of Gram matrices; zero where they are not to be used.
+/// The inverse of a Gram matrix; `determinant / largest` is its conditioning.
+struct Inverse {
+    entries: [f32; ENTRIES],
+    determinant: f32,
+    /// The largest determinant at this trace.
+    largest: f32,
+}
+
 #[inline(always)]
-fn inverses_of(gram: &[Lanes<f32>; 6]) -> [Lanes<f32>; 6] {
-    let mut inverses = [[0.0f32; LANES]; 6];
-    for lane in 0..LANES {
-        let [xx, xy, xz, yy, yz, zz] = std::array::from_fn(|entry| gram[entry][lane]);
-        let cofactors = [yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy];
-        let determinant = xx * cofactors[0] + xy * cofactors[1] + xz * cofactors[2];
-        let third = (xx + yy + zz) / 3.0;
-        let usable = determinant > MIN_LANE_CONDITIONING as f32 * (third * third * third);
-        let scale = if usable { 1.0 / determinant } else { 0.0 };
-        let entries =
-            [cofactors[0], cofactors[1], cofactors[2], xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy];
-        for (inverse, entry) in inverses.iter_mut().zip(entries) {
-            inverse[lane] = entry * scale;
-        }
-    }
-    inverses
+fn inverse_of<const FMA: bool>(gram: &[Lanes<f32>; ENTRIES], lane: usize) -> Inverse {
+    let [xx, xy, xz, yy, yz, zz] = std::array::from_fn(|entry| gram[entry][lane]);
+    let minor = |a: f32, b: f32, c: f32, d: f32| add_product::<FMA>(a * b, -c, d);
+    let cofactors = [
+        minor(yy, zz, yz, yz),
+        minor(xz, yz, xy, zz),
+        minor(xy, yz, xz, yy),
+        minor(xx, zz, xz, xz),
+        minor(xy, xz, xx, yz),
+        minor(xx, yy, xy, xy),
+    ];
+    let determinant = dot::<FMA>([xx, xy, xz], [cofactors[0], cofactors[1], cofactors[2]]);
+    let third = (xx + yy + zz) * (1.0 / 3.0);
+    let scale = 1.0 / determinant;
+    Inverse { entries: cofactors.map(|cofactor| cofactor * scale), determinant, largest: third * third * third }
 }
 
 /// The entries of the upper triangle: xx, xy, xz, yy, yz, zz.
-fn upper(matrix: &Matrix3<f64>) -> [f32; 6] {
+fn upper(matrix: &Matrix3<f64>) -> [f32; ENTRIES] {
     [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|entry| matrix[entry] as f32)
 }
 

@@ -5,12 +5,12 @@
 use std::ops::Range;
 
 use bytemuck::NoUninit;
-use multiversion::multiversion;
+use multiversion::{multiversion, target::target_cfg_f};
 
 use super::confidence::{HALF_DEG, PRIOR_RESIDUAL};
 use super::cutoff::{LANES, Lanes, cutoffs};
 use super::kernel::Out;
-use super::lane_solve::{Choice, LaneSolver, Solutions, is_kept, solve};
+use super::lane_solve::{Choice, Kept, LaneSolver, Solutions, is_kept, solve};
 use crate::{Pixel, Radiometry, stream};
 
 /// How far ahead the images are fetched: as many streams as lights are more than processors follow by themselves.
@@ -37,67 +37,77 @@ pub(super) struct Sink<'a, 'b> {
     pub careful: &'a mut dyn FnMut(usize, &mut Out<'b>),
 }
 
-/// Fills the keys of a block of pixels and, where there are any, the offsets.
-type Load<'a, K> = dyn FnMut(&Range<usize>, &mut [Lanes<K>], &mut Lanes<f32>) + 'a;
+/// Where the keys of a block come from.
+enum Source<'a, K> {
+    /// The images as they are.
+    Images(&'a [&'a [K]]),
+    /// Computed from them.
+    Made(&'a dyn Fn(&Range<usize>, &mut [Lanes<K>])),
+}
+
+/// What is to be subtracted from the keys of a block.
+type Offsets<'a> = dyn Fn(&Range<usize>, &mut Lanes<f32>) + 'a;
 
 /// Works on `pixels` (of the whole image).
 #[allow(clippy::float_cmp)] // intensities that are 1 by default
 pub(super) fn run<P: Pixel>(solver: &LaneSolver, input: &Input<'_, P>, pixels: Range<usize>, sink: &mut Sink<'_, '_>) {
     let Input { planes, radiometry, scales, mask } = *input;
     let plain = radiometry.response.is_none() && scales.iter().all(|&scale| scale == 1.0);
+    let has_offsets = radiometry.dark.is_some() || radiometry.black_level != 0.0;
+    let load_offsets = |block: &Range<usize>, offsets: &mut Lanes<f32>| {
+        for (offset, pixel) in offsets.iter_mut().zip(block.clone()) {
+            *offset = radiometry.offset(pixel);
+        }
+    };
+    let common = (mask, radiometry.full_scale);
     if plain {
-        let has_offsets = radiometry.dark.is_some() || radiometry.black_level != 0.0;
-        let mut keys = vec![[P::LEAST; LANES]; planes.len()];
-        let mut load = |block: &Range<usize>, keys: &mut [Lanes<P>], offsets: &mut Lanes<f32>| {
-            for (key, plane) in keys.iter_mut().zip(planes) {
-                for line in 0..size_of::<Lanes<P>>() / LINE_BYTES {
-                    stream::prefetch(plane, block.start + AHEAD_PIXELS + line * (LINE_BYTES / size_of::<P>()));
-                }
-                match <&Lanes<P>>::try_from(&plane[block.clone()]) {
-                    Ok(full) => *key = *full,
-                    Err(_) => key[..block.len()].copy_from_slice(&plane[block.clone()]),
-                }
-            }
-            if has_offsets {
-                load_offsets(radiometry, block, offsets);
-            }
-        };
-        run_blocks(solver, &mut load, &mut keys, has_offsets, (mask, radiometry.full_scale), pixels, sink);
+        let offsets: Option<&Offsets<'_>> = if has_offsets { Some(&load_offsets) } else { None };
+        run_blocks(solver, &Source::Images(planes), offsets, common, pixels, sink);
     } else {
-        let mut keys = vec![[0.0f32; LANES]; planes.len()];
-        let mut load = |block: &Range<usize>, keys: &mut [Lanes<f32>], offsets: &mut Lanes<f32>| {
-            load_offsets(radiometry, block, offsets);
+        let make = |block: &Range<usize>, keys: &mut [Lanes<f32>]| {
+            let mut offsets = [0.0; LANES];
+            load_offsets(block, &mut offsets);
             for ((key, plane), &scale) in keys.iter_mut().zip(planes).zip(scales) {
-                for ((key, &code), &offset) in key.iter_mut().zip(&plane[block.clone()]).zip(&*offsets) {
+                for ((key, &code), &offset) in key.iter_mut().zip(&plane[block.clone()]).zip(&offsets) {
                     *key = (radiometry.linearise(code) - offset) * scale;
                 }
             }
         };
-        run_blocks(solver, &mut load, &mut keys, false, (mask, radiometry.full_scale), pixels, sink);
-    }
-}
-
-fn load_offsets<P: Pixel>(radiometry: &Radiometry<'_, P>, block: &Range<usize>, offsets: &mut Lanes<f32>) {
-    for (offset, pixel) in offsets.iter_mut().zip(block.clone()) {
-        *offset = radiometry.offset(pixel);
+        run_blocks(solver, &Source::Made(&make), None, common, pixels, sink);
     }
 }
 
 /// The hot loop, compiled for several instruction sets; one call a task.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl+avx512dq", "x86_64+avx2+fma"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl+avx512dq+fma", "x86_64+avx2+fma"))]
 fn run_blocks<K: Pixel>(
     solver: &LaneSolver,
-    load: &mut Load<'_, K>,
-    keys: &mut [Lanes<K>],
-    has_offsets: bool,
+    source: &Source<'_, K>,
+    offsets: Option<&Offsets<'_>>,
+    common: (Option<&[bool]>, f32),
+    pixels: Range<usize>,
+    sink: &mut Sink<'_, '_>,
+) {
+    if target_cfg_f!(any(target_feature = "fma", target_arch = "aarch64")) {
+        run_blocks_with::<K, true>(solver, source, offsets, common, pixels, sink);
+    } else {
+        run_blocks_with::<K, false>(solver, source, offsets, common, pixels, sink);
+    }
+}
+
+#[inline(always)]
+fn run_blocks_with<K: Pixel, const FMA: bool>(
+    solver: &LaneSolver,
+    source: &Source<'_, K>,
+    offsets: Option<&Offsets<'_>>,
     (mask, full_scale): (Option<&[bool]>, f32),
     pixels: Range<usize>,
     sink: &mut Sink<'_, '_>,
 ) {
-    let mut offsets = [0.0; LANES];
+    let mut kept = Kept::new(solver.lights());
+    let mut copies = vec![[K::ZERO; LANES]; solver.lights()];
+    let mut in_place = Vec::with_capacity(solver.lights());
+    let mut offset = [0.0; LANES];
     let mut solutions = Solutions::new();
-    let mut eight_masks = [[0; LANES]; 8];
-    let mut masks = vec![[0; LANES]; keys.len()];
     for first in pixels.clone().step_by(LANES) {
         let block = first..(first + LANES).min(pixels.end);
         let span = first - pixels.start..block.end - pixels.start;
@@ -109,13 +119,35 @@ fn run_blocks<K: Pixel>(
             continue;
         }
         let used = used.filter(|_| count < block.len());
-        load(&block, keys, &mut offsets);
-        let offsets = has_offsets.then_some(&offsets);
-        // The usual number of lights is unrolled.
-        match <&[Lanes<K>; 8]>::try_from(&*keys) {
-            Ok(keys) => solve(solver, keys, &mut eight_masks, offsets, &mut solutions),
-            Err(_) => solve(solver, keys, &mut masks, offsets, &mut solutions),
+        let copied: Vec<&Lanes<K>>;
+        let keys = match source {
+            Source::Images(planes) if block.len() == LANES => {
+                in_place.clear();
+                in_place.extend(planes.iter().filter_map(|plane| {
+                    for line in 0..size_of::<Lanes<K>>() / LINE_BYTES {
+                        stream::prefetch(plane, first + AHEAD_PIXELS + line * (LINE_BYTES / size_of::<K>()));
+                    }
+                    plane[block.clone()].first_chunk()
+                }));
+                &in_place
+            }
+            Source::Images(planes) => {
+                for (copy, plane) in copies.iter_mut().zip(*planes) {
+                    copy[..block.len()].copy_from_slice(&plane[block.clone()]);
+                }
+                copied = copies.iter().collect();
+                &copied
+            }
+            Source::Made(make) => {
+                make(&block, &mut copies);
+                copied = copies.iter().collect();
+                &copied
+            }
+        };
+        if let Some(load) = offsets {
+            load(&block, &mut offset);
         }
+        solve::<K, FMA>(solver, keys, &mut kept, offsets.map(|_| &offset), &mut solutions);
         write(full_scale, &solutions, used, span.clone(), sink.out);
         if !sink.out.kept_sets.is_empty() {
             write_sets(solver.choice, keys, used, span, sink.out);
@@ -179,6 +211,7 @@ fn write(full_scale: f32, solutions: &Solutions, used: Option<&[bool]>, span: Ra
     store(&confidence, &mut out.confidence[span.clone()], out.streamed);
     store(&solutions.kept, &mut out.lights_kept[span.clone()], out.streamed);
     store(&valid, &mut out.mask[span.clone()], out.streamed);
+    store(&valid, &mut out.measured[span.clone()], out.streamed);
     if let Some(used) = used {
         for (lane, _) in used.iter().enumerate().filter(|(_, used)| !**used) {
             out.clear(span.start + lane..span.start + lane + 1);
@@ -200,7 +233,7 @@ fn store<T: NoUninit, const N: usize>(block: &[T; N], out: &mut [T], streamed: b
 #[inline(never)]
 fn write_sets<K: Pixel>(
     choice: Choice,
-    keys: &[Lanes<K>],
+    keys: &[&Lanes<K>],
     used: Option<&[bool]>,
     span: Range<usize>,
     out: &mut Out<'_>,

@@ -6,6 +6,7 @@
 
 mod confidence;
 mod cutoff;
+mod gram;
 mod kernel;
 mod lane_solve;
 mod lanes;
@@ -45,6 +46,8 @@ pub struct NormalMap {
     pub mask: Vec<bool>,
     /// Trust in (0, 1]: `1 / (1 + (s / 5 deg)^2)` with `s` the standard error of the direction; 0 where `mask` is false.
     pub confidence: Vec<f32>,
+    /// True where the normal was measured, not filled in from a prior.
+    pub measured: Vec<bool>,
     /// Number of lights kept; 0 for a pixel that was not asked for.
     pub lights_kept: Vec<u16>,
     /// The kept lights themselves, `lights` values a pixel; empty unless asked for.
@@ -63,6 +66,8 @@ pub struct NormalMapMut<'a> {
     /// 1 value a pixel.
     pub confidence: &'a mut [f32],
     /// 1 value a pixel.
+    pub measured: &'a mut [bool],
+    /// 1 value a pixel.
     pub lights_kept: &'a mut [u16],
     /// `lights` values a pixel, or empty: not wanted.
     pub kept_sets: &'a mut [bool],
@@ -77,6 +82,7 @@ impl NormalMap {
             albedo: zeros(pixels),
             mask: zeros(pixels),
             confidence: zeros(pixels),
+            measured: zeros(pixels),
             lights_kept: zeros(pixels),
             kept_sets: zeros(pixels * set_lights),
         }
@@ -89,6 +95,7 @@ impl NormalMap {
             albedo: &mut self.albedo,
             mask: &mut self.mask,
             confidence: &mut self.confidence,
+            measured: &mut self.measured,
             lights_kept: &mut self.lights_kept,
             kept_sets: &mut self.kept_sets,
         }
@@ -103,6 +110,7 @@ impl NormalMapMut<'_> {
             ("albedo", pixels, self.albedo.len()),
             ("mask", pixels, self.mask.len()),
             ("confidence", pixels, self.confidence.len()),
+            ("measured", pixels, self.measured.len()),
             ("lights_kept", pixels, self.lights_kept.len()),
             ("kept_sets", kept_sets, self.kept_sets.len()),
         ] {

@@ -1,0 +1,117 @@
+"""Recipes in TOML or JSON, checked against a pydantic model: one clear line for the first mistake."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import sys
+from typing import TYPE_CHECKING, Any, TypeVar, get_args
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from bgars.errors import FileFormatError, InputError
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+__all__ = ["Strict", "checked", "read_values"]
+
+Model = TypeVar("Model", bound=BaseModel)
+SCALARS = {"str", "int", "float", "bool"}
+
+
+class Strict(BaseModel):
+    """A table whose unknown keys are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=False)
+
+
+def read_values(path: Path) -> dict[str, Any]:
+    """Read a ``.toml`` file, or a ``.json`` file with one object.
+
+    Raises
+    ------
+    FileFormatError
+        The file is missing or does not parse.
+    """
+    is_json = path.suffix.lower() == ".json"
+    kind = "JSON" if is_json else "TOML"
+    try:
+        content = path.read_bytes().decode("utf-8")
+        values = json.loads(content) if is_json else tomllib.loads(content)
+    except OSError as error:
+        msg = f"{path}: cannot be read ({error.strerror})"
+        raise FileFormatError(msg) from error
+    except ValueError as error:  # both decoders' errors, and bytes that are no text
+        msg = f"{path}: is not valid {kind} ({error})"
+        raise FileFormatError(msg) from error
+    if not isinstance(values, dict):
+        msg = f"{path}: must hold one object, got {type(values).__name__}"
+        raise FileFormatError(msg)
+    return values
+
+
+def checked(model: type[Model], values: dict[str, Any], path: Path) -> Model:
+    """Return the model of some values.
+
+    Raises
+    ------
+    InputError
+        An unknown key (the nearest known one is named), a wrong type or a value out of range.
+    """
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        raise InputError(_explain(model, path, error)) from None
+
+
+def _explain(model: type[BaseModel], path: Path, error: ValidationError) -> str:
+    """One line for the first mistake, unknown keys first: they are usually the cause of the others."""
+    details = sorted(error.errors(include_url=False), key=lambda detail: detail["type"] != "extra_forbidden")
+    first = details[0]
+    is_unknown = first["type"] == "extra_forbidden"
+    keys, known = _walk(model, first["loc"][:-1] if is_unknown else first["loc"])
+    if is_unknown:
+        name = str(first["loc"][-1])
+        nearest = difflib.get_close_matches(name, known, n=1, cutoff=0.0)
+        hint = f"; the nearest known key is '{nearest[0]}'" if nearest else ""
+        return f"{path}: unknown key '{'.'.join([*keys, name])}'{hint} (known: {', '.join(known)})"
+    reason = first["msg"].removeprefix("Value error, ")
+    value = "" if isinstance(first["input"], dict) else f", got {first['input']!r}"
+    return f"{path}: {'.'.join(keys) or 'recipe'}: {reason}{value}"
+
+
+def _walk(model: type[BaseModel], location: tuple[int | str, ...]) -> tuple[list[str], list[str]]:
+    """Keys of the file along a location, and the keys known at its end.
+
+    pydantic puts the branch of a union that it tried into the location: those are no keys of the file.
+    """
+    models, keys = [model], []
+    for part in location:
+        fields = [at.model_fields[part].annotation for at in models if part in at.model_fields]
+        if fields:
+            models = [found for field in fields for found in _models_in(field)] or models
+        elif any(_is_tag(at, part) for at in models):
+            models = [at for at in models if _is_tag(at, part)]
+            continue
+        elif part in SCALARS or part in {at.__name__ for at in models} or "[" in str(part):
+            continue
+        keys.append(str(part))
+    known = dict.fromkeys(name for at in models for name in at.model_fields)
+    return keys, list(known)
+
+
+def _is_tag(model: type[BaseModel], part: int | str) -> bool:
+    kind = model.model_fields.get("kind")
+    return kind is not None and part in get_args(kind.annotation)
+
+
+def _models_in(annotation: Any) -> list[type[BaseModel]]:  # noqa: ANN401 - whatever an annotation is
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for part in get_args(annotation) for model in _models_in(part)]
