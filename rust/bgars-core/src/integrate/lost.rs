@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::checkerboard::Weights;
+use super::detours::Window;
 use super::places::{Place, blacks_around, diagonal};
 use super::strays::is_alone;
 
@@ -13,14 +14,14 @@ pub(super) struct Lost {
 }
 
 impl Lost {
-    /// The centres that get lost: those that tie together what the coarser grid would not, corners without coarse edges
-    /// between them, or that have no corner at all.
-    pub fn centres(weights: &Weights) -> Self {
+    /// The centres that get lost: those that tie together what the `coarser` grid does not join nearby, or that have no corner
+    /// at all.
+    pub fn centres(weights: &Weights, coarser: &Weights) -> Self {
         let half = weights.grid.half();
         let rows = (0..weights.grid.height / 2).into_par_iter();
         let lost = rows.flat_map_iter(|cell_row| {
             let row = 2 * cell_row + 1;
-            lost_in_row(weights, row as isize).into_iter().map(move |k| (row * half + k) as u32)
+            lost_in_row(weights, coarser, row as isize).into_iter().map(move |k| (row * half + k) as u32)
         });
         Self { reds: lost.collect() }
     }
@@ -54,7 +55,7 @@ fn tied_centres(weights: &Weights, row: isize, k: usize) -> impl Iterator<Item =
 }
 
 /// The lost centres of odd `row`.
-fn lost_in_row(weights: &Weights, row: isize) -> Vec<usize> {
+fn lost_in_row(weights: &Weights, coarser: &Weights, row: isize) -> Vec<usize> {
     let n = weights.grid.half();
     let rows = CellRow::new(weights, row);
     // All edges there is the common case: one fast pass finds the cells that are worth a look.
@@ -64,7 +65,28 @@ fn lost_in_row(weights: &Weights, row: isize) -> Vec<usize> {
             *weakest = weakest.min(weight.abs());
         }
     }
-    (0..n).filter(|&k| weakest[k] == 0.0 && rows.rim(k).is_lost()).collect()
+    (0..n).filter(|&k| weakest[k] == 0.0 && rows.rim(k).is_lost() && !has_detour(weights, coarser, row, k)).collect()
+}
+
+/// Whether the coarser grid joins all that centre `k` of odd `row` ties together by a short way around.
+fn has_detour(weights: &Weights, coarser: &Weights, row: isize, k: usize) -> bool {
+    let grid = weights.grid;
+    let rim = Rim::around(weights, row, k).without_virtual();
+    let mut pixels = rim.corners(0, 0);
+    if pixels == 0 {
+        return false;
+    }
+    for (side, (down, right)) in [(-1, 0), (0, 1), (1, 0), (0, -1)].into_iter().enumerate() {
+        let beside = (row + 2 * down, k.wrapping_add_signed(right));
+        if rim.leads_to_centre(side) && grid.contains(beside.0) && beside.1 < grid.half() {
+            let corners = Rim::around(weights, beside.0, beside.1).without_virtual().corners(down, right);
+            if corners == 0 {
+                return false;
+            }
+            pixels |= corners;
+        }
+    }
+    Window::around(coarser, (row / 2) as usize, k).joins(pixels)
 }
 
 /// The weights of the edges in a row of cells.
@@ -133,17 +155,30 @@ impl Rim {
         tied(c, 0) || tied(before, 1)
     }
 
+    /// The cell without its virtual corners.
+    fn without_virtual(&self) -> Self {
+        Self { rims: self.rims.map(|rim| rim.map(|weight| weight.max(0.0))), ..*self }
+    }
+
+    /// Whether the centre is tied to the next one on a side through a black that has no corner.
+    fn leads_to_centre(&self, side: usize) -> bool {
+        self.spokes[side] > 0.0 && self.beyond[side] > 0.0 && self.rims[side].iter().all(|&weight| weight == 0.0)
+    }
+
+    /// The tied corners as pixels of a window; the cell is `down` and `right` of the window's.
+    fn corners(&self, down: isize, right: isize) -> u64 {
+        let places = [(0, 0), (0, 1), (1, 1), (1, 0)].into_iter().enumerate();
+        let tied = places.filter(|&(c, _)| self.is_tied(c));
+        tied.map(|(_, place)| Window::pixel(down + place.0, right + place.1)).fold(0, |all, pixel| all | pixel)
+    }
+
     fn is_lost(&self) -> bool {
         // Virtual corners hold nothing, and a centre outside the mask has nothing to hold.
-        let real = Self { rims: self.rims.map(|rim| rim.map(|weight| weight.max(0.0))), ..*self };
-        let open = real.spokes.map(|spoke| spoke > 0.0);
-        if !open.contains(&true) {
+        let real = self.without_virtual();
+        if real.spokes.iter().all(|&spoke| spoke <= 0.0) {
             return false;
         }
-        // Two centres tied through a black without corners.
-        if (0..4)
-            .any(|side| open[side] && real.beyond[side] > 0.0 && real.rims[side].iter().all(|&weight| weight == 0.0))
-        {
+        if (0..4).any(|side| real.leads_to_centre(side)) {
             return true;
         }
         let joined = |c: usize| real.rims[c][0] > 0.0 && real.rims[c][1] > 0.0;

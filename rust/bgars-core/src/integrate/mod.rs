@@ -12,6 +12,7 @@ mod checkerboard;
 mod coarsen;
 mod components;
 mod conjugate_gradient;
+mod detours;
 mod fill;
 mod graph;
 mod lost;

@@ -85,7 +85,8 @@ impl<'a> Multigrid<'a> {
             if pixels <= DIRECT_PIXELS {
                 break;
             }
-            let mut lost = Lost::centres(weights);
+            let mut coarser = coarsen(weights);
+            let mut lost = Lost::centres(weights, &coarser);
             stray_count += lost.reds.len();
             if is_too_coarse(stray_count, levels.len(), finest.grid) {
                 // A grid that is nearly all lanes is no good neighbour for the strays of the one before.
@@ -96,7 +97,6 @@ impl<'a> Multigrid<'a> {
                 }
                 break;
             }
-            let mut coarser = coarsen(weights);
             if !lost.reds.is_empty() {
                 lost.add_corners(weights, &coarser);
             }
