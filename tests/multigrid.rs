@@ -257,6 +257,26 @@ fn a_millionth_takes_fifteen_iterations_on_thin_slits_of_any_kind() {
 }
 
 #[test]
+fn scattered_holes_stay_on_grids_and_mazes_do_not() {
+    let size = 512;
+    let normals = wavy_normals(size, size, 4);
+    let graph_unknowns = |mask: &[bool]| {
+        let system = System::new(&normals, mask, size, None, Difference::Trapezoid).unwrap();
+        system.preconditioner().graph_unknowns()
+    };
+    for share in [0.01, 0.05] {
+        let mask = slits::holes(size, 1, share);
+        let surface = solve(&normals, &mask, size, 1e-6);
+        assert!(surface.iterations <= 10, "{share}: {} iterations", surface.iterations);
+        // At least three grids above the graph.
+        let unknowns = graph_unknowns(&mask);
+        assert!(unknowns <= size * size / 100, "{share}: {unknowns} unknowns");
+    }
+    // Every second pixel of every second row and what joins them: nothing that a coarser grid could hold.
+    assert!(graph_unknowns(&slits::maze(size, 1)) > size * size / 10);
+}
+
+#[test]
 fn thin_slits_under_weights_that_vary_by_ten_thousand_converge() {
     let size = 300;
     let normals = wavy_normals(size, size, 8);

@@ -11,6 +11,8 @@ use super::strays::is_alone;
 #[derive(Debug)]
 pub(super) struct Lost {
     pub reds: Vec<u32>,
+    /// Centres that the coarser grid serves badly or not at all.
+    pub doubtful: usize,
 }
 
 impl Lost {
@@ -19,11 +21,14 @@ impl Lost {
     pub fn centres(weights: &Weights, coarser: &Weights) -> Self {
         let half = weights.grid.half();
         let rows = (0..weights.grid.height / 2).into_par_iter();
-        let lost = rows.flat_map_iter(|cell_row| {
-            let row = 2 * cell_row + 1;
-            lost_in_row(weights, coarser, row as isize).into_iter().map(move |k| (row * half + k) as u32)
-        });
-        Self { reds: lost.collect() }
+        let doubtful: Vec<(usize, usize)> = rows
+            .flat_map_iter(|cell_row| {
+                let row = 2 * cell_row + 1;
+                doubtful_in_row(weights, row as isize).into_iter().map(move |k| (row, k))
+            })
+            .collect();
+        let lost = doubtful.par_iter().filter(|&&(row, k)| !has_detour(weights, coarser, row as isize, k));
+        Self { reds: lost.map(|&(row, k)| (row * half + k) as u32).collect(), doubtful: doubtful.len() }
     }
 
     /// Adds the corners without edges on the `coarser` grid, and the centres tied to them.
@@ -54,8 +59,8 @@ fn tied_centres(weights: &Weights, row: isize, k: usize) -> impl Iterator<Item =
     })
 }
 
-/// The lost centres of odd `row`.
-fn lost_in_row(weights: &Weights, coarser: &Weights, row: isize) -> Vec<usize> {
+/// The centres of odd `row` that tie together what has no coarse edge along the rim of their cell.
+fn doubtful_in_row(weights: &Weights, row: isize) -> Vec<usize> {
     let n = weights.grid.half();
     let rows = CellRow::new(weights, row);
     // All edges there is the common case: one fast pass finds the cells that are worth a look.
@@ -65,7 +70,7 @@ fn lost_in_row(weights: &Weights, coarser: &Weights, row: isize) -> Vec<usize> {
             *weakest = weakest.min(weight.abs());
         }
     }
-    (0..n).filter(|&k| weakest[k] == 0.0 && rows.rim(k).is_lost() && !has_detour(weights, coarser, row, k)).collect()
+    (0..n).filter(|&k| weakest[k] == 0.0 && rows.rim(k).is_doubtful()).collect()
 }
 
 /// Whether the coarser grid joins all that centre `k` of odd `row` ties together by a short way around.
@@ -172,7 +177,7 @@ impl Rim {
         tied.map(|(_, place)| Window::pixel(down + place.0, right + place.1)).fold(0, |all, pixel| all | pixel)
     }
 
-    fn is_lost(&self) -> bool {
+    fn is_doubtful(&self) -> bool {
         // Virtual corners hold nothing, and a centre outside the mask has nothing to hold.
         let real = self.without_virtual();
         if real.spokes.iter().all(|&spoke| spoke <= 0.0) {

@@ -20,7 +20,7 @@ use crate::memory::zeros;
 /// A grid of at most this many pixels is solved directly.
 const DIRECT_PIXELS: usize = 256;
 
-/// A grid that loses one pixel in so many is left to the graph, whatever it costs.
+/// A grid on which one pixel in so many is doubtful is left to the graph, whatever it costs.
 const HOPELESS: usize = 20;
 
 /// A V-cycle on the reds of the finest grid: symmetric, positive definite, and linear up to rounding in `f32`.
@@ -88,9 +88,10 @@ impl<'a> Multigrid<'a> {
             let mut coarser = coarsen(weights);
             let mut lost = Lost::centres(weights, &coarser);
             stray_count += lost.reds.len();
-            if is_too_coarse(stray_count, levels.len(), finest.grid) {
+            // Where detours are the rule, they are no longer short and wide.
+            let hopeless = lost.doubtful > pixels / HOPELESS;
+            if hopeless || is_too_coarse(stray_count, levels.len(), finest.grid) {
                 // A grid that is nearly all lanes is no good neighbour for the strays of the one before.
-                let hopeless = lost.reds.len() > pixels / HOPELESS;
                 if hopeless && strays.last().is_some_and(|strays: &Strays| strays.len() > 0) {
                     levels.pop();
                     strays.pop();
@@ -108,6 +109,11 @@ impl<'a> Multigrid<'a> {
         let graph = GraphCycle::new(&weights, &strays);
         let vectors = Vectors { levels: levels.iter().map(LevelVectors::new).collect(), graph: graph.vectors() };
         Self { finest, levels, strays, graph, vectors: Mutex::new(vectors) }
+    }
+
+    /// Unknowns of the graph that takes over from the grids.
+    pub fn graph_unknowns(&self) -> usize {
+        self.graph.unknowns()
     }
 
     /// `x = M b`; returns `<b, x>`.
@@ -164,8 +170,7 @@ fn is_too_coarse(strays: usize, level: usize, finest: Grid) -> bool {
     let pixels = finest.height * finest.width;
     let at_least = match level {
         0 => pixels / HOPELESS,
-        1 => (pixels / 65_536).max(16),
-        2 => 16,
+        1 | 2 => (pixels / 65_536).max(16),
         _ => 0,
     };
     strays > at_least

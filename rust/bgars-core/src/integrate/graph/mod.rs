@@ -91,6 +91,11 @@ impl GraphCycle {
         Self { nodes, bases, levels, direct }
     }
 
+    /// Nodes of the first graph, strays included.
+    pub fn unknowns(&self) -> usize {
+        self.nodes.len() + self.bases.len()
+    }
+
     /// Memory for [`Self::solve`].
     pub fn vectors(&self) -> GraphVectors {
         let sizes = self.levels.iter().map(|level| level.graph.len()).chain([self.direct.len()]);
