@@ -6,7 +6,7 @@
 //! The way through the files: `operator` makes weights and right side of the normals on a `checkerboard`; `reduction`
 //! eliminates every other pixel; `conjugate_gradient` solves for the rest, preconditioned by `multigrid`, whose grids come
 //! from `coarsen` (after `fill` has closed the smallest holes) and talk to each other by `transfer`. What a coarser grid
-//! cannot hold is found by `lost`; it goes as `strays` to the `graph` that takes over from the last grid.
+//! cannot hold, nor lead around (`detours`), is found by `lost`; it goes as `strays` to the `graph` that takes over from the last grid.
 
 mod checkerboard;
 mod coarsen;

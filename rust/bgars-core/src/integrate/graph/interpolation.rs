@@ -14,7 +14,7 @@ const NONE: u32 = u32::MAX;
 
 /// A row a node: 1 for a coarse node, else shares of coarse nodes that add up to 1.
 ///
-/// Extended+i interpolation (De Sterck, Falgout, Nolting, Yang 2008, section 4.3): a fine node hangs on the coarse ones it
+/// Extended+i interpolation (De Sterck, Falgout, Nolting, Yang 2008): a fine node hangs on the coarse ones it
 /// depends on, and through the fine ones it depends on, on theirs. Rows of a Laplacian add up to zero, hence the shares to
 /// one. Of many sources the largest are kept.
 pub(super) fn interpolation(graph: &Rows, coarse_of: &[u32]) -> Rows {

@@ -71,26 +71,31 @@ impl Rows {
 
     /// The graph with further `edges` (from, to, weight; ascending), and nodes up to `len`.
     pub fn with_edges(self, edges: &[(u32, u32, f64)], len: usize) -> Self {
-        let mut part = Part::default();
+        let most = self.entries() + edges.len();
+        let mut starts = Vec::with_capacity(len + 1);
+        let mut columns: Vec<u32> = Vec::with_capacity(most);
+        let mut values: Vec<f32> = Vec::with_capacity(most);
+        starts.push(0);
         let mut rest = edges;
         for row in 0..len {
-            let before = part.columns.len();
+            let before = columns.len();
             if row < self.len() {
-                let (columns, values) = self.row(row);
-                part.columns.extend_from_slice(columns);
-                part.values.extend_from_slice(values);
+                let (own_columns, own_values) = self.row(row);
+                columns.extend_from_slice(own_columns);
+                values.extend_from_slice(own_values);
             }
-            let (own, later) = rest.split_at(rest.partition_point(|edge| edge.0 as usize <= row));
-            for &(_, to, weight) in own {
-                match part.columns[before..].iter().position(|&column| column == to) {
-                    Some(place) => part.values[before + place] += weight as f32,
-                    None => part.push(to, weight as f32),
+            while let Some((&(_, to, weight), later)) = rest.split_first().filter(|(edge, _)| edge.0 as usize == row) {
+                if let Some(place) = columns[before..].iter().position(|&column| column == to) {
+                    values[before + place] += weight as f32;
+                } else {
+                    columns.push(to);
+                    values.push(weight as f32);
                 }
+                rest = later;
             }
-            part.end_row(before);
-            rest = later;
+            starts.push(columns.len() as u32);
         }
-        Self::join(vec![part], len)
+        Self { starts, columns, values, width: len }
     }
 
     /// Number of rows.

@@ -2,7 +2,7 @@
 //!
 //! Each chunk of nodes is swept by itself and takes its neighbours in other chunks as they were before. With half the weight of
 //! the edges to other chunks added to the diagonal the sweep converges on every graph (l1 smoothers: Baker, Falgout, Kolev,
-//! Yang 2011, section 5), so that forward and backward sweep make the V-cycle symmetric and positive definite.
+//! Yang 2011), so that forward and backward sweep make the V-cycle symmetric and positive definite.
 
 use rayon::prelude::*;
 

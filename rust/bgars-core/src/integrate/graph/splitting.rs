@@ -2,7 +2,7 @@
 
 use super::matrix::Rows;
 
-/// A node depends strongly on a neighbour whose edge weighs at least this share of its heaviest (Ruge and Stüben 1987, 4.6.1).
+/// A node depends strongly on a neighbour whose edge weighs at least this share of its heaviest (Ruge and Stüben 1987).
 pub(super) const STRONG: f32 = 0.25;
 
 /// Stands for a node that does not become a coarse one.
