@@ -4,6 +4,7 @@
 use std::ops::ControlFlow;
 
 use bgars_core::integrate::{Difference, Params, Surface, System, integrate};
+use bgars_suite::{on_threads, slits};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::matrix_free::InitialGuessStatus;
 use faer::matrix_free::LinOp;
@@ -151,12 +152,14 @@ fn the_operator_is_the_schur_complement_of_the_plain_matrix() {
 
 #[test]
 fn the_preconditioner_is_symmetric_and_positive() {
-    for (name, size, inside) in [
-        ("rectangle", 96, Box::new(|_, _| true) as Box<dyn Fn(f64, f64) -> bool>),
-        ("disc with holes", 131, Box::new(disc_with_holes)),
-        ("slits", 160, Box::new(slits(160))),
-    ] {
-        let mask = mask(size, size, inside);
+    let easy = [
+        ("rectangle", 96, mask(96, 96, |_, _| true)),
+        ("disc with holes", 131, mask(131, 131, disc_with_holes)),
+        ("slits", 160, mask(160, 160, slits(160))),
+    ];
+    // Grids alone, grids with strays, and graphs from every level on.
+    let hard = slits::gallery(130).into_iter().map(|(name, mask)| (name, 130, mask));
+    for (name, size, mask) in easy.into_iter().chain(hard) {
         let system = System::new(&wavy_normals(size, size, 1), &mask, size, None, Difference::Trapezoid).unwrap();
         let preconditioner = system.preconditioner();
         let n = system.right_side().len();
@@ -238,6 +241,82 @@ fn a_millionth_takes_ten_iterations_at_any_size_and_fifteen_with_slits() {
             assert!(surface.residual <= 1e-6);
             assert!(surface.iterations <= limit, "{name} of {size}: {} iterations", surface.iterations);
         }
+    }
+}
+
+#[test]
+fn a_millionth_takes_fifteen_iterations_on_thin_slits_of_any_kind() {
+    for size in [255, 512, 777] {
+        let normals = wavy_normals(size, size, 4);
+        for (name, mask) in slits::gallery(size) {
+            let surface = solve(&normals, &mask, size, 1e-6);
+            assert!(surface.residual <= 1e-6);
+            assert!(surface.iterations <= 15, "{name} of {size}: {} iterations", surface.iterations);
+        }
+    }
+}
+
+#[test]
+fn scattered_holes_stay_on_grids_and_mazes_do_not() {
+    let size = 512;
+    let normals = wavy_normals(size, size, 4);
+    let graph_unknowns = |mask: &[bool]| {
+        let system = System::new(&normals, mask, size, None, Difference::Trapezoid).unwrap();
+        system.preconditioner().graph_unknowns()
+    };
+    for share in [0.01, 0.05] {
+        let mask = slits::holes(size, 1, share);
+        let surface = solve(&normals, &mask, size, 1e-6);
+        assert!(surface.iterations <= 10, "{share}: {} iterations", surface.iterations);
+        // At least three grids above the graph.
+        let unknowns = graph_unknowns(&mask);
+        assert!(unknowns <= size * size / 100, "{share}: {unknowns} unknowns");
+    }
+    // Every second pixel of every second row and what joins them: nothing that a coarser grid could hold.
+    assert!(graph_unknowns(&slits::maze(size, 1)) > size * size / 10);
+}
+
+#[test]
+fn thin_slits_under_weights_that_vary_by_ten_thousand_converge() {
+    let size = 300;
+    let normals = wavy_normals(size, size, 8);
+    let weights: Vec<f32> = (0..size * size)
+        .map(|pixel| [1.0, 1e-2, 1e-4, 0.3][(pixel / size / 37 * 7 + pixel % size / 37 * 3) % 4])
+        .collect();
+    let params = Params { relative_tolerance: 1e-6, ..Params::default() };
+    for (name, mask) in slits::gallery(size) {
+        let proceed = &mut |_| ControlFlow::Continue(());
+        let surface = integrate(&normals, &mask, size, Some(&weights), &params, proceed).unwrap();
+        assert!(surface.residual <= 1e-6, "{name}: {}", surface.residual);
+    }
+}
+
+#[test]
+fn heights_over_thin_slits_are_the_same_bits_on_any_number_of_threads() {
+    let size = 400;
+    let normals = wavy_normals(size, size, 3);
+    for (name, mask) in slits::gallery(size) {
+        let [one, three] = [1, 3].map(|threads| on_threads(threads, || solve(&normals, &mask, size, 1e-6).height_px));
+        let same = one.iter().zip(&three).all(|(one, three)| one.to_bits() == three.to_bits());
+        assert!(same, "{name}");
+    }
+}
+
+#[test]
+fn heights_over_narrow_lanes_solve_the_plain_normal_equations() {
+    let size = 34;
+    let normals = wavy_normals(size, size, 5);
+    for (name, mask) in slits::gallery(size) {
+        let surface = solve(&normals, &mask, size, 1e-10);
+        let (matrix, right) = slow_system(&normals, &mask, size);
+        let heights = DVector::from_iterator(
+            mask.len(),
+            surface.height_px.iter().map(|&z| if z.is_nan() { 0.0 } else { f64::from(z) }),
+        );
+        // Heights are returned in f32, and a lane can be a thousand pixels long.
+        let scale = heights.amax().max(1.0);
+        let error = (&matrix * heights - &right).amax();
+        assert!(error <= 2e-6 * scale, "{name}: {error}");
     }
 }
 

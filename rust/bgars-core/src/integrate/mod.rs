@@ -5,18 +5,23 @@
 //!
 //! The way through the files: `operator` makes weights and right side of the normals on a `checkerboard`; `reduction`
 //! eliminates every other pixel; `conjugate_gradient` solves for the rest, preconditioned by `multigrid`, whose grids come
-//! from `coarsen` (after `fill` has closed the smallest holes) and talk to each other by `transfer`.
+//! from `coarsen` (after `fill` has closed the smallest holes) and talk to each other by `transfer`. What a coarser grid
+//! cannot hold, nor lead around (`detours`), is found by `lost`; it goes as `strays` to the `graph` that takes over from the last grid.
 
 mod checkerboard;
 mod coarsen;
-mod coarsest;
 mod components;
 mod conjugate_gradient;
+mod detours;
 mod fill;
+mod graph;
+mod lost;
 mod multigrid;
 mod operator;
+mod places;
 mod reduction;
 mod solve;
+mod strays;
 mod system;
 mod transfer;
 

@@ -1,29 +1,46 @@
-//! Geometric multigrid: one V-cycle as the preconditioner of the reduced system.
+//! Multigrid: one V-cycle as the preconditioner of the reduced system.
+//!
+//! Grids as long as their pixels hold all that the mask keeps apart, and from there a graph; what a grid loses here and there
+//! goes to the graph as `strays`.
 
 use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
-use super::checkerboard::{Weights, join_row};
+use super::checkerboard::{Grid, Real, Weights, join_row};
 use super::coarsen::coarsen;
-use super::coarsest::Coarsest;
 use super::fill::fill_corners;
+use super::graph::{GraphCycle, GraphVectors};
+use super::lost::Lost;
 use super::reduction::{eliminate_blacks, fill_blacks};
+use super::strays::Strays;
 use super::transfer::{prolong, restrict};
 use crate::memory::zeros;
 
 /// A grid of at most this many pixels is solved directly.
 const DIRECT_PIXELS: usize = 256;
 
+/// A grid on which one pixel in so many is doubtful is left to the graph, whatever it costs.
+const HOPELESS: usize = 20;
+
 /// A V-cycle on the reds of the finest grid: symmetric, positive definite, and linear up to rounding in `f32`.
 #[derive(Debug)]
 pub(super) struct Multigrid<'a> {
     finest: &'a Weights,
-    /// Coarser and coarser, all but the last.
+    /// The coarser grids, down to the last whose pixels hold all that the mask keeps apart.
     levels: Vec<Weights>,
-    coarsest: Coarsest,
+    /// The strays of each grid but the last.
+    strays: Vec<Strays>,
+    /// Solves for the reds of the last grid.
+    graph: GraphCycle,
     /// Memory of the coarser grids, reused from cycle to cycle.
-    vectors: Mutex<Vec<LevelVectors>>,
+    vectors: Mutex<Vectors>,
+}
+
+#[derive(Debug)]
+struct Vectors {
+    levels: Vec<LevelVectors>,
+    graph: GraphVectors,
 }
 
 /// Right side and solution of a coarser grid.
@@ -57,41 +74,104 @@ impl LevelVectors {
 }
 
 impl<'a> Multigrid<'a> {
-    /// Coarsens `finest` until a grid is small enough to be solved directly.
+    /// Coarsens `finest` as far as grids go, and from there as a graph.
     pub fn new(finest: &'a Weights) -> Self {
-        let mut levels = Vec::new();
-        let mut weights = coarsen(finest);
-        fill_corners(&mut weights);
-        while weights.grid.height * weights.grid.width > DIRECT_PIXELS {
-            let mut coarser = coarsen(&weights);
+        let mut levels: Vec<Weights> = Vec::new();
+        let mut strays = Vec::new();
+        let mut stray_count = 0;
+        loop {
+            let weights = levels.last().unwrap_or(finest);
+            let pixels = weights.grid.height * weights.grid.width;
+            if pixels <= DIRECT_PIXELS {
+                break;
+            }
+            let mut coarser = coarsen(weights);
+            let mut lost = Lost::centres(weights, &coarser);
+            stray_count += lost.reds.len();
+            // Where detours are the rule, they are no longer short and wide.
+            let hopeless = lost.doubtful > pixels / HOPELESS;
+            if hopeless || is_too_coarse(stray_count, levels.len(), finest.grid) {
+                // A grid that is nearly all lanes is no good neighbour for the strays of the one before.
+                if hopeless && strays.last().is_some_and(|strays: &Strays| strays.len() > 0) {
+                    levels.pop();
+                    strays.pop();
+                }
+                break;
+            }
+            if !lost.reds.is_empty() {
+                lost.add_corners(weights, &coarser);
+            }
+            strays.push(Strays::new(weights, &coarser, &lost));
             fill_corners(&mut coarser);
-            levels.push(std::mem::replace(&mut weights, coarser));
+            levels.push(coarser);
         }
-        let vectors = levels.iter().chain([&weights]).map(LevelVectors::new).collect();
-        Self { finest, coarsest: Coarsest::new(&weights), levels, vectors: Mutex::new(vectors) }
+        let weights: Vec<&Weights> = std::iter::once(finest).chain(&levels).collect();
+        let graph = GraphCycle::new(&weights, &strays);
+        let vectors = Vectors { levels: levels.iter().map(LevelVectors::new).collect(), graph: graph.vectors() };
+        Self { finest, levels, strays, graph, vectors: Mutex::new(vectors) }
+    }
+
+    /// Unknowns of the graph that takes over from the grids.
+    pub fn graph_unknowns(&self) -> usize {
+        self.graph.unknowns()
     }
 
     /// `x = M b`; returns `<b, x>`.
     pub fn cycle(&self, b: &[f64], x: &mut [f32]) -> f64 {
         let mut vectors = self.vectors.lock().unwrap_or_else(PoisonError::into_inner);
-        let first = &mut vectors[0];
-        restrict(self.finest, b, &mut first.reds, &mut first.blacks);
-        self.solve(0, &mut vectors);
-        prolong(self.finest, b, &vectors[0].solution, x)
+        let Vectors { levels, graph } = &mut *vectors;
+        self.reds(0, b, x, levels, graph, 0)
+    }
+
+    /// Solves for the reds of a grid (0 is the finest) by a V-cycle; `coarser` are the grids below, `first_stray` counts the
+    /// strays of the finer grids. Returns `<b, x>`.
+    fn reds<T: Real>(
+        &self,
+        level: usize,
+        b: &[T],
+        x: &mut [f32],
+        coarser: &mut [LevelVectors],
+        graph: &mut GraphVectors,
+        first_stray: usize,
+    ) -> f64 {
+        let Some((next, coarser)) = coarser.split_first_mut() else { return self.graph.solve(b, x, graph) };
+        let weights = if level == 0 { self.finest } else { &self.levels[level - 1] };
+        let strays = &self.strays[level];
+        let own = first_stray..first_stray + strays.len();
+        restrict(weights, b, &mut next.reds, &mut next.blacks);
+        strays.restrict(b, &mut graph.strays[own.clone()], &mut next.reds, &mut next.blacks);
+        self.whole(level + 1, next, coarser, graph, own.end);
+        let product = prolong(weights, b, &next.solution, x);
+        product + strays.prolong(b, &graph.strays[own], &next.solution, x)
     }
 
     /// Solves for the whole of a coarser grid: blacks eliminated, reds by a V-cycle, blacks filled in.
-    fn solve(&self, level: usize, vectors: &mut [LevelVectors]) {
-        let Some((here, coarser)) = vectors.split_first_mut() else { return };
-        let Some(weights) = self.levels.get(level) else {
-            self.coarsest.solve(&here.reds, &here.blacks, &mut here.solution);
-            return;
-        };
+    fn whole(
+        &self,
+        level: usize,
+        here: &mut LevelVectors,
+        coarser: &mut [LevelVectors],
+        graph: &mut GraphVectors,
+        first_stray: usize,
+    ) {
+        let weights = &self.levels[level - 1];
         eliminate_blacks(weights, &mut here.reds, &here.blacks);
-        restrict(weights, &here.reds, &mut coarser[0].reds, &mut coarser[0].blacks);
-        self.solve(level + 1, coarser);
-        prolong(weights, &here.reds, &coarser[0].solution, &mut here.red_solution);
+        self.reds(level, &here.reds, &mut here.red_solution, coarser, graph, first_stray);
         fill_blacks(weights, &here.red_solution, &mut here.blacks);
         here.join();
     }
+}
+
+/// True where a graph must take over from the grid of `level`, which with all finer ones leaves `strays`.
+///
+/// Every grid between a stray and the graph costs iterations, for its smoothing does not know of the stray; a graph of many
+/// nodes costs time and memory. The bounds are chosen by measurement; `tests/multigrid.rs` holds their effect.
+fn is_too_coarse(strays: usize, level: usize, finest: Grid) -> bool {
+    let pixels = finest.height * finest.width;
+    let at_least = match level {
+        0 => pixels / HOPELESS,
+        1 | 2 => (pixels / 65_536).max(16),
+        _ => 0,
+    };
+    strays > at_least
 }

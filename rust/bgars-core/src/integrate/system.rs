@@ -83,6 +83,15 @@ pub struct VCycle<'a> {
     size: usize,
 }
 
+impl VCycle<'_> {
+    /// How many unknowns the grids leave to the graph, which costs several times as much for each: a few where the mask has
+    /// no narrow lanes, up to half the pixels where it has nothing else.
+    #[must_use]
+    pub fn graph_unknowns(&self) -> usize {
+        self.multigrid.graph_unknowns()
+    }
+}
+
 /// A vector from faer, as a slice.
 fn slice(x: MatRef<'_, f64>) -> &[f64] {
     x.col(0).try_as_col_major().expect("faer hands over contiguous vectors").as_slice()
