@@ -27,7 +27,7 @@ ITERATION_LIMITS = {
     "disc with holes": 10,
     "winding slits": 15,
     "random slits": 15,
-    "dense slits": None,
+    "dense slits": 15,
 }
 MAX_ITERS = 200
 """Where the count of iterations gives up: far beyond its limit, and reported as such."""
