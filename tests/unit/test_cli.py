@@ -137,7 +137,8 @@ def test_without_truth_evaluate_says_what_it_expected(capture_folder: Path) -> N
 
 
 ESTIMATE_FOR_LONG = """
-import numpy as np, bgars
+import signal, numpy as np, bgars
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a parent in the background may have it ignored
 stack = np.random.default_rng(0).integers(0, 255, (24, 3000, 3000), dtype=np.uint8)
 print("ready", flush=True)
 bgars.estimate_normals(stack, bgars.LightRig.ring(24).directions)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,8 @@ NAN = float("nan")
 def run(scene: bgars.Scene | None = None, rig: bgars.LightRig = RIG, **options: Any) -> None:  # noqa: ANN401
     bgars.simulate(scene or bgars.Scene.ball(), rig, bgars.Material(), CAMERA, **options)
 
+
+BALL = bgars.Ball(0, 0, 300, 200, name="A")
 
 CASES: list[tuple[Callable[[], object], list[str]]] = [
     # Scenes
@@ -86,7 +88,7 @@ CASES: list[tuple[Callable[[], object], list[str]]] = [
     (lambda: bgars.Variation(i_d=0.5), ["variation.i_d", "0.3 or less", "0.5"]),
     # Cameras
     (lambda: bgars.Camera(pixel_pitch_um=-1.0), ["camera.pixel_pitch_um", "above 0", "-1"]),
-    (lambda: bgars.Camera(shape=(0, 5)), ["camera.shape", "1 or more", "(0, 5)"]),
+    (lambda: bgars.Camera(shape=(0, 5)), ["camera.shape", "1 or more", "got 0"]),
     (lambda: bgars.Camera(bit_depth=9), ["camera.bit_depth", "8, 10, 12, 16", "9"]),  # type: ignore[arg-type]
     (lambda: bgars.Camera(gain=0.0), ["camera.gain", "above 0"]),
     (lambda: bgars.Camera(full_well_e=0.0), ["camera.full_well_e", "10 or more", "0"]),
@@ -114,7 +116,17 @@ CASES: list[tuple[Callable[[], object], list[str]]] = [
         ["rig.positions_um[0]", "highest ball (500 um)", "400"],
     ),
     # Arguments
-    (lambda: run(seed=-1), ["seed", "[0, ", "-1"]),
+    (lambda: run(seed=-1), ["seed", "0 to", "-1"]),
+    (lambda: run(seed=1.5), ["seed", "whole number", "1.5"]),
+    (lambda: run(seed="1"), ["seed", "whole number", "'1'"]),
+    (lambda: run(threads=1.5), ["threads", "whole number", "1.5"]),
+    (lambda: bgars.Camera(shape=5), ["camera.shape", "two whole numbers", "5"]),  # type: ignore[arg-type]
+    (lambda: bgars.Camera(gain="1"), ["camera.gain", "finite number", "'1'"]),  # type: ignore[arg-type]
+    (lambda: bgars.Camera(full_well_e=1e30), ["camera.full_well_e", "1e+15", "1e+30"]),
+    (
+        lambda: bgars.Scene((BALL, replace(BALL, name="B")), (bgars.Bridge("A", "B", 100),)),
+        ["bridge A-B", "different places"],
+    ),
     (lambda: run(threads=0), ["threads", "1 or more", "0"]),
     (lambda: run(tile_rows=0), ["tile_rows", "1 or more", "0"]),
 ]

@@ -249,3 +249,13 @@ def test_a_failing_write_leaves_nothing(tmp_path: Path, monkeypatch: pytest.Monk
     with pytest.raises(bgars.FileFormatError, match="No space left"):
         bgars.write_simulation(made, truth, tmp_path / "part")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_numbers_of_numpy_are_numbers(tmp_path: Path) -> None:
+    camera = bgars.Camera(pixel_pitch_um=np.float32(20.0), shape=(np.int64(40), np.int64(50)), supersample=np.int64(2))
+    scene, rig, material = bgars.Scene.hemisphere(300.0), bgars.LightRig.ring(8), bgars.Material(i_d=np.float64(0.5))
+    capture, truth = bgars.simulate(scene, rig, material, camera, seed=np.int64(3))
+    bgars.write_simulation(capture, truth, tmp_path / "a")
+    again = bgars.read_scene(tmp_path / "a" / "scene.json")
+    images = bgars.simulate(again.scene, again.rig, again.material, again.camera, seed=again.seed)[0].images
+    np.testing.assert_array_equal(images, capture.images)

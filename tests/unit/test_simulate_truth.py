@@ -209,3 +209,32 @@ def test_names_follow_jedec() -> None:
     assert "".join(letters[:20]) == "ABCDEFGHJKLMNPRTUVWY"
     assert letters[20:22] == ["AA", "AB"]
     assert letters[40:42] == ["BA", "BB"]
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.7])
+@pytest.mark.parametrize(("rows", "cols"), [(1, 5), (3, 3), (4, 4), (5, 4), (5, 5)])
+def test_a_bowed_board_rests_as_every_triple_of_apexes_says(rows: int, cols: int, tilt: float) -> None:
+    # Regular arrays have their centre of gravity on lines between apexes: the part rocks, and many triangles tie.
+    x, y = np.meshgrid((np.arange(cols) - (cols - 1) / 2) * 1000.0, (np.arange(rows) - (rows - 1) / 2) * 1000.0)
+    for bow in (20.0, -20.0, 25.6):
+        z = 500 + bow * (1 - (x**2 + y**2) / 2000**2) + tilt * x / 1000
+        apexes = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+        found, expected = seating_plane(apexes, np.zeros(2)), rests(apexes)
+        assert (found is None) == (not expected)
+        if found is not None:
+            assert found.deviations_um.min() > -1e-6, "no apex above the plane"
+            assert found.coplanarity_um == pytest.approx(max(expected), abs=1e-5)
+
+
+def rests(apexes: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> list[float]:
+    """Coplanarity from every plane of three apexes around the origin that no apex is above."""
+    found = []
+    for triple in combinations(range(len(apexes)), 3):
+        matrix = np.column_stack([apexes[list(triple), :2], np.ones(3)])
+        if abs(np.linalg.det(matrix)) < 1e-6 or np.linalg.solve(matrix.T, [0.0, 0.0, 1.0]).min() < -1e-9:
+            continue
+        a, b, c = np.linalg.solve(matrix, apexes[list(triple), 2])
+        below = (a * apexes[:, 0] + b * apexes[:, 1] + c - apexes[:, 2]) / np.sqrt(1 + a * a + b * b)
+        if below.min() > -1e-7:
+            found.append(float(below.max()))
+    return found

@@ -157,8 +157,16 @@ def _plane_values(plane: PlaneTruth | None, names: list[str]) -> dict[str, Any] 
     }
 
 
+def _plain(value: object) -> object:
+    """A number of numpy as one of Python."""
+    if isinstance(value, np.generic):
+        return value.item()
+    msg = f"{type(value).__name__} is not a value of a recipe"
+    raise TypeError(msg)
+
+
 def _write_json(path: Path, values: dict[str, Any]) -> None:
-    _write_text(path, json.dumps(values, indent=2, allow_nan=False) + "\n")
+    _write_text(path, json.dumps(values, indent=2, allow_nan=False, default=_plain) + "\n")
 
 
 def _write_text(path: Path, text: str) -> None:

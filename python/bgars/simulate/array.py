@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bgars.simulate.balls import Ball, ball_name
-from bgars.simulate.checks import at_least, number, positive, require
+from bgars.simulate.checks import at_least, number, positive, whole
 
 __all__ = ["Jitter", "array_balls", "truncated_normal"]
 
@@ -62,13 +62,13 @@ def array_balls(
 ) -> list[Ball]:
     """Return the balls of a grid in reading order; see :meth:`bgars.Scene.ball_array`."""
     for name, count in (("scene.rows", rows), ("scene.cols", cols)):
-        require(isinstance(count, int) and count >= 1, name, "must be a whole number of 1 or more", count)
+        whole(name, count, 1)
     for name, value in (("pitch_um", pitch_um), ("diameter_um", diameter_um), ("height_um", height_um)):
         positive(f"scene.{name}", value)
     number("scene.rotation_deg", rotation_deg)
     for value in centre_um:
         number("scene.centre_um", value)
-    require(seed >= 0, "scene.seed", "must be 0 or more", seed)
+    whole("scene.seed", seed, 0)
     random = np.random.default_rng(seed)
     cosine, sine = math.cos(math.radians(rotation_deg)), math.sin(math.radians(rotation_deg))
     balls = []

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bgars.simulate.checks import fraction, number, positive, require
+from bgars.simulate.checks import fraction, number, positive, require, whole
 from bgars.simulate.material import Material
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class Texture:
     def __post_init__(self) -> None:
         fraction("board.texture.contrast", self.contrast)
         positive("board.texture.scale_um", self.scale_um)
-        require(self.seed >= 0, "board.texture.seed", "must be 0 or more", self.seed)
+        whole("board.texture.seed", self.seed, 0)
 
     @cached_property
     def _lattices(self) -> list[NDArray[np.float64]]:

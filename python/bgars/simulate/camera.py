@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from bgars.simulate.checks import at_least, one_of, positive, require
+from bgars.simulate.checks import at_least, one_of, positive, require, whole
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,6 +20,7 @@ BIT_DEPTHS = (8, 10, 12, 16)
 MAX_SUPERSAMPLE = 32
 MAX_BLUR_PX = 10.0
 MAX_MEGAPIXELS = 256.0
+MAX_ELECTRONS = 1e15
 BLUR_REACH = 4.0
 """The Gaussian blur is cut off at this many sigma."""
 
@@ -84,18 +86,21 @@ class Camera:
     def __post_init__(self) -> None:
         positive("camera.pixel_pitch_um", self.pixel_pitch_um)
         if self.shape is not None:
-            pair = len(self.shape) == 2 and all(isinstance(count, int) and count >= 1 for count in self.shape)  # noqa: PLR2004
-            require(pair, "camera.shape", "must be two whole numbers of 1 or more (rows, columns)", self.shape)
+            pair = isinstance(self.shape, Sequence) and len(self.shape) == 2  # noqa: PLR2004
+            require(pair, "camera.shape", "must be two whole numbers (rows, columns)", self.shape)
+            for count in self.shape:
+                whole("camera.shape", count, 1)
             object.__setattr__(self, "shape", tuple(self.shape))
         one_of("camera.bit_depth", self.bit_depth, BIT_DEPTHS)
         positive("camera.gain", self.gain)
         if self.full_well_e is not None:
             at_least("camera.full_well_e", self.full_well_e, 10.0)
+            rule = f"times the gain of {self.gain:g}, must be {MAX_ELECTRONS:g} or less"
+            require(self.full_well_e * self.gain <= MAX_ELECTRONS, "camera.full_well_e", rule, self.full_well_e)
         at_least("camera.read_noise_levels", self.read_noise_levels, 0.0)
         positive("camera.gamma", self.gamma)
         self._check_levels()
-        samples = isinstance(self.supersample, int) and 1 <= self.supersample <= MAX_SUPERSAMPLE
-        require(samples, "camera.supersample", f"must be a whole number of 1 to {MAX_SUPERSAMPLE}", self.supersample)
+        whole("camera.supersample", self.supersample, 1, MAX_SUPERSAMPLE)
         at_least("camera.blur_px", self.blur_px, 0.0)
         require(self.blur_px <= MAX_BLUR_PX, "camera.blur_px", f"must be {MAX_BLUR_PX:g} or less", self.blur_px)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -16,6 +16,10 @@ __all__ = ["PlaneTruth", "regression_plane", "seating_plane"]
 MIN_BALLS = 3
 START_DIRECTIONS = 12
 TINY = 1e-9
+TOUCH_UM = 1e-6
+"""An apex this close to a plane lies on it."""
+STEEP = 10.0
+"""Slopes that no part rests at."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +59,9 @@ def seating_plane(apexes_um: Array, gravity_um: Array) -> PlaneTruth | None:
 
     Among the triangles of three apexes that contain the centre of gravity, the plane of the one that is highest there
     lies above every apex. Triangles are tried one by one on a few apexes; the apex that sticks out most is added
-    until none does, so the result is that of all triples. Where the part can rock (four apexes on two such planes),
-    both are the same height at the centre of gravity; the worse coplanarity is returned.
+    until none does, so the result is that of all triples. Where the part can rock, because the centre of gravity is
+    above an apex or the line between two, every plane on which it comes to rest has the same height there; the worst
+    coplanarity of them is returned.
 
     Parameters
     ----------
@@ -88,13 +93,11 @@ def seating_plane(apexes_um: Array, gravity_um: Array) -> PlaneTruth | None:
                 return None
             chosen.append(remaining[0])
             continue
-        # Every plane that is as high at the centre of gravity; degenerate parts have several.
-        above = [plane for plane in planes if plane.deviations_um.min() >= -TINY]
-        if above:
-            return max(above, key=lambda plane: plane.coplanarity_um)
-        worst = int(np.argmin(planes[0].deviations_um))
-        if worst in chosen:
-            return planes[0]
+        # Triangles with the centre of gravity on an edge tie; one of them at least is above all that are chosen.
+        plane = max(planes, key=lambda plane: plane.deviations_um[chosen].min())
+        worst = int(np.argmin(plane.deviations_um))
+        if plane.deviations_um[worst] >= -TOUCH_UM:
+            return max([plane, *_rocked(apexes_um, plane, gravity_um)], key=lambda plane: plane.coplanarity_um)
         chosen.append(worst)
     return None
 
@@ -118,6 +121,34 @@ def regression_plane(apexes_um: Array) -> PlaneTruth | None:
     residuals = apexes_um[:, 2] - system @ np.array([a, b, c_um])
     highest = int(np.argmax(residuals))
     return PlaneTruth.through(float(a), float(b), float(c_um + residuals[highest]), (highest,), apexes_um)
+
+
+def _rocked(apexes_um: Array, plane: PlaneTruth, gravity_um: Array) -> list[PlaneTruth]:
+    """The other planes above every apex that are as high at the centre of gravity, where the part can rock."""
+    shares = _barycentric(apexes_um[None, list(plane.balls), :2], gravity_um)[0]
+    if shares.min() > TINY:
+        return []
+    height_um = plane.a * gravity_um[0] + plane.b * gravity_um[1] + plane.c_um
+    # Slopes allowed: a polygon, cut by the half-plane of each apex; what is left of the frame is no place to rest.
+    slopes = STEEP * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    for x_um, y_um, z_um in apexes_um - [*gravity_um, height_um]:
+        room = slopes @ [x_um, y_um] - (z_um - TINY)
+        kept = []
+        for index in range(len(slopes)):
+            here, before = room[index], room[index - 1]
+            if (here >= 0) != (before >= 0):
+                share = before / (before - here)
+                kept.append(slopes[index - 1] + share * (slopes[index] - slopes[index - 1]))
+            if here >= 0:
+                kept.append(slopes[index])
+        slopes = np.array(kept).reshape(-1, 2)
+    planes = []
+    for a, b in slopes[np.abs(slopes).max(axis=1, initial=0.0) < 0.99 * STEEP]:
+        c_um = float((apexes_um[:, 2] - a * apexes_um[:, 0] - b * apexes_um[:, 1]).max())
+        found = PlaneTruth.through(float(a), float(b), c_um, (), apexes_um)
+        balls = tuple(int(ball) for ball in np.flatnonzero(found.deviations_um <= TOUCH_UM))
+        planes.append(replace(found, balls=balls))
+    return planes
 
 
 def _outline(apexes_um: Array) -> list[int]:

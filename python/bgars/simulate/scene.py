@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -198,8 +199,10 @@ def _check_bridges(balls: tuple[Ball, ...], bridges: tuple[Bridge, ...]) -> None
     for bridge in bridges:
         pair = f"bridge {bridge.first}-{bridge.second}"
         for name in (bridge.first, bridge.second):
-            require(name in by_name, pair, "must join balls that are present", repr(name))
+            require(name in by_name, pair, "must join balls that are present", name)
         ends = [by_name[bridge.first], by_name[bridge.second]]
+        length_um = math.dist(*((ball.x_um, ball.y_um) for ball in ends))
+        require(length_um > 0, pair, "must join balls at different places; their distance is", length_um)
         z_um = bridge.z_um if bridge.z_um is not None else (ends[0].centre_z_um + ends[1].centre_z_um) / 2
         for ball in ends:
             room_um = min(ball.radius_um, ball.q * ball.radius_um) - abs(z_um - ball.centre_z_um)

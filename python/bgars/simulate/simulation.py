@@ -9,7 +9,7 @@ import numpy as np
 
 from bgars.records import Capture
 from bgars.simulate.array import truncated_normal
-from bgars.simulate.checks import require
+from bgars.simulate.checks import require, whole
 from bgars.simulate.render import Studio, render
 from bgars.simulate.sensor import Sensor, stream_key
 from bgars.simulate.shading import Finish
@@ -103,9 +103,11 @@ def simulate(
     >>> capture.images.shape, capture.images.dtype.name, float(truth.height_px.max()).__round__()
     ((8, 270, 270), 'uint8', 90)
     """
-    require(0 <= seed <= MAX_SEED, "seed", f"must lie in [0, {MAX_SEED}]", seed)
-    require(threads is None or threads >= 1, "threads", "must be 1 or more", threads)
-    require(tile_rows is None or tile_rows >= 1, "tile_rows", "must be 1 or more", tile_rows)
+    whole("seed", seed, 0, MAX_SEED)
+    for name, count in (("threads", threads), ("tile_rows", tile_rows)):
+        if count is not None:
+            whole(name, count, 1)
+    seed = int(seed)
     shape = camera.framed(scene.size_um)
     camera = replace(camera, shape=shape)
     board = scene.board

@@ -19,6 +19,9 @@ const AHEAD_PIXELS: usize = 16 * LANES;
 /// `n_z` below which `f32` cannot say whether a facet faces the camera.
 const GRAZING: f32 = 1e-5;
 
+/// Least `|rho n|^2` that leaves residuals and inverses in the normal range of `f32`, and one over the largest.
+const MIN_SQUARE: f32 = 1e-30;
+
 /// Bytes of a cache line.
 const LINE_BYTES: usize = 64;
 
@@ -171,20 +174,24 @@ fn run_blocks_with<K: Pixel, const FMA: bool>(
     }
 }
 
-/// Normals, albedo, mask, confidence and counts of a block; facets seen from the side are left to the careful kernel, too.
+/// Normals, albedo, mask, confidence and counts of a block; facets seen from the side, and
+/// values far from 1, are left to the careful kernel, too.
 #[inline(always)]
 fn write(full_scale: f32, solutions: &mut Solutions, used: Option<&[bool]>, span: Range<usize>, out: &mut Out<'_>) {
     const DEG2: f32 = ((180.0 / std::f64::consts::PI) * (180.0 / std::f64::consts::PI) / (HALF_DEG * HALF_DEG)) as f32;
     const PRIOR2: f32 = (PRIOR_RESIDUAL * PRIOR_RESIDUAL) as f32;
     let [mut scale, mut albedo, mut confidence] = [[0.0f32; LANES]; 3];
     let mut valid = [false; LANES];
-    let mut grazing = [0u8; LANES];
+    let mut doubtful = [0u8; LANES];
     let per_full_scale = 1.0 / full_scale;
     for lane in 0..LANES {
         let [x, y, z] = [solutions.scaled[0][lane], solutions.scaled[1][lane], solutions.scaled[2][lane]];
         let square = x * x + y * y + z * z;
         let length = square.sqrt();
-        grazing[lane] = u8::from(z * z < GRAZING * GRAZING * square);
+        // Seen from the side, or of a size at which squares leave the range of floats; NaN counts, too.
+        let in_range =
+            square > MIN_SQUARE && square < 1.0 / MIN_SQUARE || square == 0.0 && x == 0.0 && y == 0.0 && z == 0.0;
+        doubtful[lane] = u8::from(z * z < GRAZING * GRAZING * square || !in_range);
         // NaN spreads into everything that is computed from it.
         let length = if z > 0.0 && square < f32::INFINITY { length } else { f32::NAN };
         let inverse = 1.0 / length;
@@ -202,9 +209,9 @@ fn write(full_scale: f32, solutions: &mut Solutions, used: Option<&[bool]>, span
     for lane in 0..LANES {
         valid[lane] = albedo[lane] >= 0.0;
     }
-    if grazing.iter().fold(0, |any, grazing| any | grazing) != 0 {
-        for (lane, &grazing) in grazing.iter().enumerate() {
-            solutions.careful |= Careful::from(grazing) << lane;
+    if doubtful.iter().fold(0, |any, doubtful| any | doubtful) != 0 {
+        for (lane, &doubtful) in doubtful.iter().enumerate() {
+            solutions.careful |= Careful::from(doubtful) << lane;
         }
     }
     let [mut x, mut y, mut z] = [[0.0f32; LANES]; 3];
