@@ -76,13 +76,13 @@ def estimate_normals(
         Most threads to work on; by default what the environment variable ``RAYON_NUM_THREADS`` says, else one a core.
         The result does not depend on it.
     progress : callable, optional
-        Called with the fraction done, at most ten times a second.
+        Called with the fraction done, at most ten times a second; not at all where the work is done before that.
 
     Returns
     -------
     NormalField
-        A pixel whose kept lights are coplanar, whose solution is zero or faces away from the camera is invalid: NaN,
-        mask False.
+        A pixel whose kept lights are coplanar or nearly so (27 det / tr^3 of ``L^T L`` below 1e-6), whose solution is
+        zero or faces away from the camera is invalid: NaN, mask False.
 
     Raises
     ------

@@ -50,7 +50,11 @@ def simulate(
     output: Annotated[
         Path,
         typer.Option(
-            "--output", "-o", metavar="OUT", help="Folder of the capture; made if missing.", show_default=False
+            "--output",
+            "-o",
+            metavar="OUT",
+            help="Folder of the capture; made if missing, files of the same names replaced.",
+            show_default=False,
         ),
     ],
     seed: Annotated[

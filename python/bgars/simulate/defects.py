@@ -51,6 +51,9 @@ class Defect:
         for name in ("scale", "height", "width"):
             positive(f"defect.{name}", getattr(self, name))
         at_least("defect.flat_um", self.flat_um, 0.0)
+        require(
+            self.kind != "size" or self.scale != 1.0, "defect.scale", "of kind 'size', must differ from 1", self.scale
+        )
 
     @classmethod
     def missing(cls) -> Defect:
