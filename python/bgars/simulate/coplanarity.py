@@ -97,7 +97,10 @@ def seating_plane(apexes_um: Array, gravity_um: Array) -> PlaneTruth | None:
         plane = max(planes, key=lambda plane: plane.deviations_um[chosen].min())
         worst = int(np.argmin(plane.deviations_um))
         if plane.deviations_um[worst] >= -TOUCH_UM:
-            return max([plane, *_rocked(apexes_um, plane, gravity_um)], key=lambda plane: plane.coplanarity_um)
+            others = _rocked(apexes_um, plane, gravity_um)
+            other = max(others, key=lambda plane: plane.coplanarity_um, default=plane)
+            # Those come from a polygon with a little play; the plane itself is exact.
+            return other if other.coplanarity_um > plane.coplanarity_um + TOUCH_UM else plane
         chosen.append(worst)
     return None
 
