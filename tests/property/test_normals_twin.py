@@ -68,3 +68,28 @@ def test_the_unit_of_float_images_does_not_matter(method: bgars.normals.Method) 
     one = bgars.estimate_normals(images, rig.directions, method="lambertian", saturation=2.0)
     lengths = np.linalg.norm(one.normals[one.mask], axis=1)
     np.testing.assert_allclose(lengths, 1.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("elevation_deg", [20.0, 35.0, 45.0, 60.0, 75.0])
+@pytest.mark.parametrize("lights", [4, 6, 8, 12])
+def test_normals_under_rings_are_those_of_f64_to_two_ten_thousandths_of_a_degree(
+    lights: int, elevation_deg: float
+) -> None:
+    rng = np.random.default_rng(lights)
+    directions = bgars.LightRig.ring(lights, elevation_deg=elevation_deg).directions
+    normals = rng.normal(size=(200, 200, 3))
+    normals[..., 2] = np.abs(normals[..., 2]) + 0.2
+    shading = np.clip(normals @ directions.T / np.linalg.norm(normals, axis=-1, keepdims=True), 0.0, None)
+    values = shading * rng.uniform(20.0, 200.0, (200, 200, 1))
+    values += (rng.random(values.shape) < 0.3) * rng.uniform(0.0, 200.0, values.shape)  # highlights
+    images = np.clip(values, 0.0, 255.0).astype(np.uint8).transpose(2, 0, 1)
+    field = bgars.estimate_normals(images, directions, method="specular-filter", keep_sets=True)
+    assert field.kept_sets is not None
+    kept = field.kept_sets.astype(np.float64)
+    assert (field.lights_kept < lights).any(), "no pixel loses a light"
+    gram = np.einsum("hwk,ki,kj->hwij", kept, directions, directions)[field.mask]
+    right = np.einsum("hwk,khw,ki->hwi", kept, images.astype(np.float64), directions)[field.mask]
+    exact = np.linalg.solve(gram, right[..., None])[..., 0]
+    found = field.normals[field.mask].astype(np.float64)
+    angles = np.arctan2(np.linalg.norm(np.cross(exact, found), axis=-1), (exact * found).sum(axis=-1))
+    assert np.degrees(angles).max() < 2e-4

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 __all__ = ["FIG4", "FIG6", "shape_residuals_px"]
 
-SHOWN = (0.05, 0.1, 0.5, 1.0)
 TITLE = 0.9
 """Height of a title in its panel: 3-D axes leave room there."""
 CORE = 0.8
@@ -133,13 +132,13 @@ def run(how: Run, *, stem: str, methods: Sequence[Method]) -> Outcome:
 
 def draw(measurements: list[Measurement], methods: Sequence[Method], true_height_px: FloatArray) -> Any:  # noqa: ANN401
     """A line of surfaces a method, the truth first."""
-    heights = Normalize(0.0, max(one.rise_px for one in measurements if one.setting.i_d in SHOWN))
+    heights = Normalize(0.0, max(one.rise_px for one in measurements))
     figure = new_figure(12.5, 2.6 * len(methods) + 0.2)
-    grid = figure.subplots(len(methods), len(SHOWN) + 1, squeeze=False, subplot_kw={"projection": "3d"})
+    grid = figure.subplots(len(methods), len(DIFFUSE) + 1, squeeze=False, subplot_kw={"projection": "3d"})
     for line, method in zip(grid, methods, strict=True):
         draw_surface(line[0], true_height_px, heights)
         line[0].set_title(f"truth\nrise {np.nanmax(true_height_px):.0f} px", y=TITLE)
-        shown = [one for one in measurements if one.method == method and one.setting.i_d in SHOWN]
+        shown = [one for one in measurements if one.method == method]
         for axes, one in zip(line[1:], shown, strict=True):
             draw_surface(axes, one.height_px, heights)
             axes.set_title(f"{method}, I_d = {one.setting.i_d:g}\nrise {one.rise_px:.0f} px", y=TITLE)

@@ -22,7 +22,7 @@ pub enum MeshFormat {
 ///
 /// # Method
 /// Room for a PLY file, whose size is known, is asked for at once: a full disk is noticed before the work, and the file system
-/// has less to keep account of (three times as fast on ext4).
+/// has less to keep account of.
 ///
 /// # Errors
 /// [`Error::Io`], naming the file.

@@ -12,7 +12,8 @@ use crate::{Lights, Pixel};
 /// Subsets of lights below this [`conditioning`] are solved in `f64`: one refinement in `f32` no longer makes up for rounding.
 const MIN_LANE_CONDITIONING: f64 = 1e-3;
 
-/// Below this one, they are refined; above, rounding turns a normal by less than 2e-4 degrees.
+/// Below this one, they are refined; above, rounding turns a normal by less than 2e-4 degrees (held by
+/// `tests/property/test_normals_twin.py`).
 const MIN_ROUGH_CONDITIONING: f32 = 0.1;
 
 /// What a block of pixels leaves undone: bit k is set where pixel k wants the careful solver.
