@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
 __all__ = ["FIG4", "FIG6", "shape_residuals_px"]
 
-TITLE = 0.9
-"""Height of a title in its panel: 3-D axes leave room there."""
+TITLE = 1.0
+"""Height of a title in its panel: above the tip of the steepest cone."""
 CORE = 0.8
 """Part of the radius over which a surface is compared with a cone: nearer the rim a hemisphere is steeper than both."""
 SHAPE_COLUMNS = ("rise_px", "cone_residual_px", "spheroid_residual_px")
