@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
 from bgars import _bgars
 from bgars.errors import InputError
+from bgars.kernel_capture import kernel_capture
 from bgars.records import Capture, NormalField, float_full_scale, integer_full_scale
 from bgars.rig import LightRig
 
@@ -119,13 +120,7 @@ def estimate_normals(
     use = _combined_mask(capture, mask)
     field = _result(capture, method, keep_sets, out)
     _bgars.estimate_normals(
-        capture.images,
-        **_light_arguments(capture),
-        response=capture.response,
-        dark=capture.dark,
-        black_level=capture.black_level,
-        saturation=capture.saturation,
-        full_scale=capture.full_scale,
+        kernel_capture(capture),
         mask=use,
         method=method,
         threshold=threshold,
@@ -224,24 +219,3 @@ def _combined_mask(capture: Capture, mask: ArrayLike | None) -> NDArray[np.bool_
         msg = "mask: no pixel to use (all False)"
         raise InputError(msg)
     return combined
-
-
-def _light_arguments(capture: Capture) -> dict[str, Any]:
-    """The rig in the units of the kernel: unit vectors, or positions in pixels."""
-    rig = capture.rig
-    if rig.positions_um is None or rig.intensity_distance_um is None:
-        return {
-            "lights": rig.directions,
-            "lights_are_positions": False,
-            "reference_px": [],
-            "intensities": rig.intensities.tolist(),
-        }
-    if capture.pixel_pitch_um is None:
-        msg = "pixel_pitch_um: needed with near lights, to place pixels and lights together"
-        raise InputError(msg)
-    return {
-        "lights": rig.positions_um / capture.pixel_pitch_um,
-        "lights_are_positions": True,
-        "reference_px": (rig.intensity_distance_um / capture.pixel_pitch_um).tolist(),
-        "intensities": rig.intensities.tolist(),
-    }

@@ -16,6 +16,7 @@ pub mod mesh;
 pub mod normals;
 pub mod pixel;
 pub mod radiometry;
+pub mod reflectance;
 pub mod stack;
 mod stream;
 pub mod vertex_normals;

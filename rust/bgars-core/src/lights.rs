@@ -101,10 +101,17 @@ impl Lights {
     #[must_use]
     #[inline]
     pub fn at(&self, light: usize, x_px: f64, y_px: f64) -> (Vector3<f64>, f64) {
+        self.at_point(light, &Vector3::new(x_px, y_px, 0.0))
+    }
+
+    /// Unit direction to light `light` and its relative irradiance at a point in space, in pixels above the board plane.
+    #[must_use]
+    #[inline]
+    pub fn at_point(&self, light: usize, point_px: &Vector3<f64>) -> (Vector3<f64>, f64) {
         match self {
             Self::Directional(directions) => (directions[light], 1.0),
             Self::Near { positions_px, reference_px } => {
-                let to_light = positions_px[light] - Vector3::new(x_px, y_px, 0.0);
+                let to_light = positions_px[light] - point_px;
                 let distance = to_light.norm();
                 let ratio = reference_px[light] / distance;
                 (to_light / distance, ratio * ratio)

@@ -1,6 +1,7 @@
 //! The compiled half of the Python package `bgars`: a list of functions. Every one of them releases the GIL once, around
 //! the whole of its work; `python/bgars/_bgars.pyi` documents them.
 
+mod capture;
 mod convert;
 mod errors;
 mod files;
@@ -8,6 +9,7 @@ mod integrate;
 mod mesh;
 mod normals;
 mod progress;
+mod reflectance;
 
 #[pyo3::pymodule]
 mod _bgars {
@@ -33,6 +35,8 @@ mod _bgars {
     use crate::normals::estimate_normals;
     #[pymodule_export]
     use crate::normals::normal_arrays;
+    #[pymodule_export]
+    use crate::reflectance::reflectance_balls;
 
     #[pymodule_export]
     const DEBUG_BUILD: bool = cfg!(debug_assertions);

@@ -4,15 +4,12 @@ use std::ops::ControlFlow;
 
 use bgars_core::normals::{Method, NormalMap, NormalMapMut, RobustParams, estimate_into};
 use bgars_core::{ImageStack, Lights, Pixel, Radiometry};
-use numpy::{
-    PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadwriteArray2, PyReadwriteArray3,
-    PyUntypedArrayMethods,
-};
+use numpy::{PyArray2, PyArray3, PyReadonlyArray2, PyReadwriteArray2, PyReadwriteArray3};
 use pyo3::prelude::*;
 
-use crate::convert::{Stack, array2, array3, slice_mut, slice2, slice3, triples};
-use crate::errors::{InputError, to_python};
-use crate::progress::watched;
+use crate::capture::{Capture, Work};
+use crate::convert::{array2, array3, slice_mut, slice2};
+use crate::errors::InputError;
 
 /// normals (H, W, 3), albedo, mask, confidence, measured, lights_kept (H, W), kept sets (H, W, L).
 type Arrays<'py> = (
@@ -70,58 +67,33 @@ impl Outputs<'_> {
     }
 }
 
-/// Everything but the images, borrowed from Python.
-struct Request<'a> {
-    lights: Lights,
-    intensities: Vec<f64>,
-    response: Option<&'a [f32]>,
-    black_level: f32,
-    saturation: f32,
-    full_scale: f32,
+/// The estimate of every pixel by one of the least-squares methods.
+struct Estimate<'a> {
     mask: Option<&'a [bool]>,
     method: Method,
-    shape: [usize; 3],
+    out: NormalMapMut<'a>,
 }
 
-impl Request<'_> {
+impl Work for Estimate<'_> {
+    type Output = ();
+
     fn run<P: Pixel>(
-        &self,
-        images: &[P],
-        dark: Option<&[P]>,
-        report: &mut dyn FnMut((f64,)) -> ControlFlow<()>,
-        out: NormalMapMut<'_>,
+        self,
+        stack: &ImageStack<'_, P>,
+        lights: &Lights,
+        radiometry: &Radiometry<'_, P>,
+        report: &mut dyn FnMut(f64) -> ControlFlow<()>,
     ) -> bgars_core::Result<()> {
-        let [lights, height, width] = self.shape;
-        let stack = ImageStack::new(images, lights, height, width)?;
-        let radiometry = Radiometry {
-            response: self.response,
-            dark,
-            black_level: self.black_level,
-            saturation: self.saturation,
-            full_scale: self.full_scale,
-            intensities: self.intensities.clone(),
-        };
-        let progress = &mut |done| report((done,));
-        estimate_into(&stack, &self.lights, &radiometry, self.mask, self.method, progress, out)
+        estimate_into(stack, lights, radiometry, self.mask, self.method, report, self.out)
     }
 }
 
 #[pyfunction]
-#[pyo3(signature = (images, *, lights, lights_are_positions, reference_px, intensities, response, dark, black_level,
-                    saturation, full_scale, mask, method, threshold, threads, progress, out))]
+#[pyo3(signature = (capture, *, mask, method, threshold, threads, progress, out))]
 #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)]
 pub fn estimate_normals<'py>(
     py: Python<'py>,
-    images: Stack<'py>,
-    lights: PyReadonlyArray2<'py, f64>,
-    lights_are_positions: bool,
-    reference_px: Vec<f64>,
-    intensities: Vec<f64>,
-    response: Option<PyReadonlyArray1<'py, f32>>,
-    dark: Option<Bound<'py, PyAny>>,
-    black_level: f32,
-    saturation: f32,
-    full_scale: f32,
+    capture: Capture<'py>,
     mask: Option<PyReadonlyArray2<'py, bool>>,
     method: &str,
     threshold: f32,
@@ -129,50 +101,13 @@ pub fn estimate_normals<'py>(
     progress: Option<Py<PyAny>>,
     mut out: Outputs<'py>,
 ) -> PyResult<()> {
-    let vectors = triples(&lights, "lights")?;
-    let lights = if lights_are_positions { Lights::near(vectors, &reference_px) } else { Lights::directional(vectors) };
-    let shape = match &images {
-        Stack::U8(images) => images.shape(),
-        Stack::U16(images) => images.shape(),
-        Stack::F32(images) => images.shape(),
+    let method = match method {
+        "lambertian" => Method::Lambertian,
+        "specular-filter" => Method::SpecularFilter { threshold },
+        "robust-filter" => Method::RobustFilter(RobustParams::default()),
+        _ => return Err(InputError::new_err(format!("method: unknown method {method:?}"))),
     };
-    let request = Request {
-        lights: lights.map_err(to_python)?,
-        intensities,
-        response: response.as_ref().map(|table| table.as_slice()).transpose()?,
-        black_level,
-        saturation,
-        full_scale,
-        mask: mask.as_ref().map(|mask| slice2(mask, "mask")).transpose()?,
-        method: match method {
-            "lambertian" => Method::Lambertian,
-            "specular-filter" => Method::SpecularFilter { threshold },
-            "robust-filter" => Method::RobustFilter(RobustParams::default()),
-            _ => return Err(InputError::new_err(format!("method: unknown method {method:?}"))),
-        },
-        shape: [shape[0], shape[1], shape[2]],
-    };
+    let mask = mask.as_ref().map(|mask| slice2(mask, "mask")).transpose()?;
     let out = out.as_map()?;
-    let (dark, progress) = (dark.as_ref(), progress.as_ref());
-    match &images {
-        Stack::U8(images) => run(py, &request, images, dark, threads, progress, out),
-        Stack::U16(images) => run(py, &request, images, dark, threads, progress, out),
-        Stack::F32(images) => run(py, &request, images, dark, threads, progress, out),
-    }
-}
-
-/// Borrows images and dark frame of one dtype and runs without the GIL.
-fn run<P: Pixel + numpy::Element>(
-    py: Python<'_>,
-    request: &Request<'_>,
-    images: &PyReadonlyArray3<'_, P>,
-    dark: Option<&Bound<'_, PyAny>>,
-    threads: Option<i64>,
-    progress: Option<&Py<PyAny>>,
-    out: NormalMapMut<'_>,
-) -> PyResult<()> {
-    let dark: Option<PyReadonlyArray2<'_, P>> = dark.map(PyAnyMethods::extract).transpose()?;
-    let dark = dark.as_ref().map(|dark| slice2(dark, "dark")).transpose()?;
-    let images = slice3(images, "images")?;
-    watched(py, threads, progress, |report| request.run(images, dark, report, out))
+    capture.work(py, threads, progress.as_ref(), Estimate { mask, method, out })
 }

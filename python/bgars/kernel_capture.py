@@ -1,0 +1,75 @@
+"""A capture in the units of the Rust kernels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from bgars.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from bgars.records import Capture, FloatArray, PixelArray
+
+__all__ = ["KernelCapture", "kernel_capture"]
+
+
+@dataclass(frozen=True, eq=False)
+class KernelCapture:
+    """What the kernels read of a capture; attributes as in :class:`bgars.Capture` unless said.
+
+    Attributes
+    ----------
+    lights : (L, 3) float64
+        Unit vectors to the lights, or their positions in pixels.
+    lights_are_positions : bool
+        Which of the two.
+    reference_px : list of float
+        For positions, the distances at which the intensities hold; else empty.
+    intensities : list of float
+        Relative intensities.
+    """
+
+    images: PixelArray
+    lights: NDArray[np.float64]
+    lights_are_positions: bool
+    reference_px: list[float]
+    intensities: list[float]
+    response: FloatArray | None
+    dark: PixelArray | None
+    black_level: float
+    saturation: float
+    full_scale: float
+
+
+def kernel_capture(capture: Capture) -> KernelCapture:
+    """Return the capture as the kernels read it; nothing is copied but the rig.
+
+    Raises
+    ------
+    InputError
+        Near lights without a pixel pitch.
+    """
+    rig = capture.rig
+    lights, reference_px = rig.directions, []
+    near = rig.positions_um is not None and rig.intensity_distance_um is not None
+    if rig.positions_um is not None and rig.intensity_distance_um is not None:
+        if capture.pixel_pitch_um is None:
+            msg = "pixel_pitch_um: needed with near lights, to place pixels and lights together"
+            raise InputError(msg)
+        lights = rig.positions_um / capture.pixel_pitch_um
+        reference_px = (rig.intensity_distance_um / capture.pixel_pitch_um).tolist()
+    return KernelCapture(
+        images=capture.images,
+        lights=lights,
+        lights_are_positions=near,
+        reference_px=reference_px,
+        intensities=rig.intensities.tolist(),
+        response=capture.response,
+        dark=capture.dark,
+        black_level=capture.black_level,
+        saturation=capture.saturation,
+        full_scale=capture.full_scale,
+    )

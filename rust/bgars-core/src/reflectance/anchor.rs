@@ -1,0 +1,56 @@
+//! Calibration spheres that a part brings along: circles of balls in the image.
+
+use std::ops::Range;
+
+use nalgebra::Vector3;
+
+/// Height of a soldered ball's centre over the board, in radii; only the nearness of near lights depends on it.
+const CENTRE_HEIGHT: f64 = 0.7;
+
+/// The silhouette of a ball. x right, y up, origin at the image centre, pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Circle {
+    /// Centre to the right of the image centre.
+    pub x_px: f64,
+    /// Centre above the image centre.
+    pub y_px: f64,
+    /// Radius.
+    pub radius_px: f64,
+}
+
+impl Circle {
+    /// Normal of the sphere at a point of the image: `n_xy = (p - c) / R`; `None` outside.
+    #[must_use]
+    #[inline]
+    pub fn normal(&self, x_px: f64, y_px: f64) -> Option<Vector3<f64>> {
+        let (x, y) = ((x_px - self.x_px) / self.radius_px, (y_px - self.y_px) / self.radius_px);
+        let z2 = 1.0 - x * x - y * y;
+        (z2 > 0.0).then(|| Vector3::new(x, y, z2.sqrt()))
+    }
+
+    /// Rows and columns of an image that the circle can touch.
+    #[must_use]
+    pub fn window(&self, height: usize, width: usize) -> (Range<usize>, Range<usize>) {
+        let clamp = |value: f64, size: usize| value.clamp(0.0, size as f64) as usize;
+        let (x, y) = (self.x_px + width as f64 / 2.0, height as f64 / 2.0 - self.y_px);
+        let reach = self.radius_px + 1.0;
+        (
+            clamp(y - reach, height)..clamp(y + reach + 1.0, height),
+            clamp(x - reach, width)..clamp(x + reach + 1.0, width),
+        )
+    }
+
+    /// The point in space where the sphere has this normal; the ball sits on the board, a little flattened at its foot.
+    #[must_use]
+    #[inline]
+    pub fn point(&self, normal: &Vector3<f64>) -> Vector3<f64> {
+        Vector3::new(self.x_px, self.y_px, CENTRE_HEIGHT * self.radius_px) + self.radius_px * normal
+    }
+}
+
+/// Centre of a pixel: x right, y up, origin at the image centre.
+#[must_use]
+#[inline]
+pub fn pixel_centre(row: usize, col: usize, height: usize, width: usize) -> (f64, f64) {
+    (col as f64 + 0.5 - width as f64 / 2.0, height as f64 / 2.0 - row as f64 - 0.5)
+}

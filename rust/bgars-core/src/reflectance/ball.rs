@@ -1,0 +1,204 @@
+//! The pixels of one ball: its signatures, and the normal of each pixel from them.
+
+use nalgebra::{Matrix2, Vector3};
+
+use super::anchor::{Circle, pixel_centre};
+use super::disc::{from_disc, metric, to_disc};
+use super::material::Material;
+use super::observe::Reader;
+use super::refine::{Minimum, Observation, Prior, deepest};
+use super::residuals::Correction;
+use super::scale::bend;
+use super::spread::Spread;
+use super::table::{GROUP, Signatures};
+use crate::{Lights, Pixel};
+
+/// Components of a direction.
+const COMPONENTS: f32 = 2.0;
+
+/// Radian for one unit of the disc, near its centre.
+const DISC_RADIAN: f32 = std::f32::consts::SQRT_2;
+
+/// Information that keeps a direction without data finite: a standard deviation of a radian.
+const MIN_INFORMATION: f64 = 1.0;
+
+/// Leverages above this leave a residual that says nothing.
+const MAX_LEVERAGE: f32 = 0.9;
+
+/// Everything known about one ball before its pixels are looked at.
+#[derive(Debug)]
+pub struct Ball {
+    /// Its silhouette.
+    pub circle: Circle,
+    /// Its material.
+    pub material: Material,
+    /// What the other balls show beyond their materials.
+    pub correction: Option<Correction>,
+    /// Root mean square angle between its normals and its circle's that the estimate allows for, in radian; infinite for
+    /// no expectation.
+    pub prior_rad: f32,
+    /// The same as it was measured, which the stated error rests on.
+    pub deviation_rad: f32,
+}
+
+/// A normal of a ball.
+#[derive(Clone, Copy, Debug)]
+pub struct BallPixel {
+    /// Index into the image.
+    pub pixel: usize,
+    /// Unit normal.
+    pub normal: [f32; 3],
+    /// Standard error of the direction, in radian: data and expectation together.
+    pub error_rad: f32,
+    /// The same by the data alone.
+    pub data_error_rad: f32,
+    /// Angle to the normal of the circle, in radian.
+    pub off_circle_rad: f32,
+    /// Mean loss of a light.
+    pub cost: f32,
+}
+
+/// One ball's pixels, ready to be estimated.
+pub struct BallWork<'a, 'b, 'c, P> {
+    reader: &'a Reader<'b, 'c, P>,
+    ball: &'a Ball,
+    table: Signatures,
+    spread: &'a Spread,
+    clip: &'a [f32],
+}
+
+impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
+    /// Tabulates the ball's signatures.
+    pub fn new(
+        reader: &'a Reader<'b, 'c, P>,
+        lights: &Lights,
+        ball: &'a Ball,
+        spread: &'a Spread,
+        clip: &'a [f32],
+    ) -> Self {
+        let table = Signatures::tabulate(reader.lights(), |normal: &Vector3<f64>, levels: &mut [f32]| {
+            let point = ball.circle.point(normal);
+            for (light, level) in levels.iter_mut().enumerate() {
+                let (direction, irradiance) = lights.at_point(light, &point);
+                *level = bend(ball.material.radiance(light, normal, &direction, irradiance)) as f32;
+                if let Some(correction) = &ball.correction {
+                    *level += correction.at(to_disc(normal), light).0;
+                }
+            }
+        });
+        Self { reader, ball, table, spread, clip }
+    }
+
+    /// The normal of a pixel, and why it may be trusted.
+    pub fn estimate(&self, pixel: usize, scratch: &mut Scratch) -> BallPixel {
+        let best = self.minimum(pixel, scratch);
+        let normal = from_disc(best.point.map(f64::from));
+        let deviation = self.ball.deviation_rad / DISC_RADIAN;
+        let off = scratch.anchor.map_or(0.0, |anchor| angle(&from_disc(anchor.map(f64::from)), &normal));
+        BallPixel {
+            pixel,
+            normal: [normal.x as f32, normal.y as f32, normal.z as f32],
+            error_rad: direction_error(&best, best.prior_information, deviation * deviation / COMPONENTS),
+            data_error_rad: direction_error(&best, 0.0, 0.0),
+            off_circle_rad: off as f32,
+            cost: best.data_cost / self.reader.lights() as f32,
+        }
+    }
+
+    fn minimum(&self, pixel: usize, scratch: &mut Scratch) -> Minimum {
+        let (height, width) = self.reader.size();
+        let (x, y) = pixel_centre(pixel / width, pixel % width, height, width);
+        scratch.anchor = self.ball.circle.normal(x, y).map(|normal| to_disc(&normal).map(|v| v as f32));
+        self.observe(pixel, scratch);
+        let prior = match scratch.anchor {
+            Some(point) => Prior { point, weight: COMPONENTS.sqrt() * DISC_RADIAN / self.ball.prior_rad },
+            None => Prior { point: [0.0; 2], weight: 0.0 },
+        };
+        let lights = self.reader.lights();
+        deepest(&self.table, &scratch.seen, lights, prior, scratch.anchor, &mut scratch.distances)
+    }
+
+    fn observe(&self, pixel: usize, scratch: &mut Scratch) {
+        let lights = self.reader.lights();
+        let seen = &mut scratch.seen;
+        self.reader.read(pixel, &mut seen.bent.as_flattened_mut()[..lights]);
+        for light in 0..lights {
+            let (group, lane) = (light / GROUP, light % GROUP);
+            let clip = self.clip[light];
+            let bent = seen.bent[group][lane].min(clip);
+            let mut variance = self.spread.at(bent).powi(2);
+            if let (Some(correction), Some(anchor)) = (&self.ball.correction, scratch.anchor) {
+                variance += correction.at(anchor.map(f64::from), light).1.powi(2);
+            }
+            seen.bent[group][lane] = bent;
+            seen.weight[group][lane] = variance.sqrt().recip();
+            seen.clip[group][lane] = clip;
+        }
+    }
+
+    /// Bent levels and residuals at the minimum of a pixel, each divided by what the fit leaves of it: sqrt(1 - leverage).
+    pub fn residuals(&self, pixel: usize, scratch: &mut Scratch, pairs: &mut Vec<(f32, f32)>) {
+        let best = self.minimum(pixel, scratch);
+        let [haa, hab, hbb] = best.information;
+        let (haa, hbb) = (haa + best.prior_information, hbb + best.prior_information);
+        let determinant = (haa * hbb - hab * hab).max(1e-12);
+        for group in 0..self.table.groups() {
+            let signature = self.table.at(best.point, group);
+            for lane in 0..GROUP.min(self.reader.lights() - group * GROUP) {
+                let (bent, clip) = (scratch.seen.bent[group][lane], scratch.seen.clip[group][lane]);
+                if bent >= clip || signature.value[lane] >= clip {
+                    continue;
+                }
+                let weight = scratch.seen.weight[group][lane];
+                let (ja, jb) = (signature.along_a[lane] * weight, signature.along_b[lane] * weight);
+                let leverage = (hbb * ja * ja - 2.0 * hab * ja * jb + haa * jb * jb) / determinant;
+                if leverage < MAX_LEVERAGE {
+                    pairs.push((bent, (bent - signature.value[lane]) / (1.0 - leverage.max(0.0)).sqrt()));
+                }
+            }
+        }
+    }
+}
+
+/// Memory of one thread, reused from pixel to pixel.
+#[derive(Debug)]
+pub struct Scratch {
+    seen: Observation,
+    distances: Vec<f32>,
+    anchor: Option<[f32; 2]>,
+}
+
+impl Scratch {
+    /// For so many lights.
+    pub fn new(lights: usize) -> Self {
+        let groups = lights.div_ceil(GROUP);
+        Self {
+            seen: Observation {
+                bent: vec![[0.0; GROUP]; groups],
+                weight: vec![[0.0; GROUP]; groups],
+                clip: vec![[f32::INFINITY; GROUP]; groups],
+            },
+            distances: Vec::new(),
+            anchor: None,
+        }
+    }
+}
+
+/// Root mean square angle in radian between the estimate and the truth.
+///
+/// With information H of the data and P of the expectation, the estimate moves by `(H + P)^-1 H` of an error of the data
+/// and by `(H + P)^-1 P` of the true normal's deviation from the expected one.
+fn direction_error(minimum: &Minimum, pull: f32, deviation_variance: f32) -> f32 {
+    let [haa, hab, hbb] = minimum.information.map(f64::from);
+    let (pull, deviation_variance) = (f64::from(pull), f64::from(deviation_variance));
+    let data = Matrix2::new(haa, hab, hab, hbb);
+    let floor = Matrix2::identity() * MIN_INFORMATION;
+    let Some(inverse) = (data + Matrix2::identity() * pull + floor).try_inverse() else { return f32::INFINITY };
+    let covariance = inverse * (data + floor + Matrix2::identity() * (pull * pull * deviation_variance)) * inverse;
+    let [g0, g1, g2] = metric(minimum.point.map(f64::from));
+    (g0 * covariance[(0, 0)] + 2.0 * g1 * covariance[(0, 1)] + g2 * covariance[(1, 1)]).max(0.0).sqrt() as f32
+}
+
+fn angle(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
+    a.cross(b).norm().atan2(a.dot(b))
+}

@@ -1,0 +1,293 @@
+//! The material of balls of known shape, by robust least squares.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::material::{Lobe, Material};
+use super::samples::Samples;
+use super::scale::bend_slope;
+
+/// Scale of the Cauchy loss in bent grey levels.
+pub const LOSS_SCALE: f64 = 3.0;
+
+/// Pixels of one parallel task: sums are made in this order whatever the number of threads.
+const CHUNK: usize = 128;
+
+/// A step that lowers the cost by less than this share is the last.
+const TOLERANCE: f64 = 1e-6;
+
+/// Standard deviation of a light's brightness against the rig's.
+const GAIN_SPREAD: f64 = 0.05;
+
+/// Weight of the priors, in observations.
+const PRIOR_WEIGHT: f64 = 1.0;
+
+/// Relative step of the numerical derivatives of a lobe's shape.
+const SHAPE_STEP: f64 = 1e-4;
+
+/// A fitted material.
+#[derive(Clone, Debug)]
+pub struct MaterialFit {
+    /// The material.
+    pub material: Material,
+    /// Mean loss an observation, `log(1 + (r / 3)^2)` with `r` in bent grey levels.
+    pub cost: f64,
+    /// Standard errors in the order of [`parameter_names`].
+    pub standard_errors: Vec<f64>,
+    /// Steps made.
+    pub steps: usize,
+}
+
+/// Which parameters are free, beside diffuse light, ambient level, strengths and roughness.
+#[derive(Clone, Copy, Debug)]
+pub struct Free {
+    /// The loss of diffuse light at grazing angles.
+    pub grazing: bool,
+    /// The tails of the lobes.
+    pub tails: bool,
+    /// The gains of the lights.
+    pub gains: bool,
+}
+
+/// Names of the parameters of a material with so many lobes, in the order of [`MaterialFit::standard_errors`].
+#[must_use]
+pub fn parameter_names(lobes: usize, lights: usize) -> Vec<String> {
+    let mut names = vec!["diffuse".into(), "grazing".into(), "ambient".into()];
+    for lobe in 1..=lobes {
+        names.extend([format!("strength_{lobe}"), format!("roughness_{lobe}"), format!("tail_{lobe}")]);
+    }
+    names.extend((0..lights).map(|light| format!("gain_{light}")));
+    names
+}
+
+/// Positions of the parameters in the vector that is fitted; strengths, roughness and diffuse light by their logarithms.
+const DIFFUSE: usize = 0;
+const GRAZING: usize = 1;
+const AMBIENT: usize = 2;
+const FIRST_LOBE: usize = 3;
+
+/// Parameters of a lobe.
+const PER_LOBE: usize = 3;
+
+/// `J^T W J`, `J^T W r` and the loss.
+struct Normal {
+    matrix: DMatrix<f64>,
+    vector: DVector<f64>,
+    loss: f64,
+}
+
+/// Fits a material from a start.
+///
+/// # Method
+/// Levenberg-Marquardt on `sum log(1 + (r / 3)^2)`, `r` the difference of observed and predicted level, both bent by
+/// `asinh(0.03 I) / 0.03` and both clipped, weights renewed at every step.
+#[must_use]
+pub fn fit_from(samples: &Samples, start: &Material, free: Free, max_steps: usize) -> MaterialFit {
+    let mut material = start.clone();
+    let mut normal = normal_equations(samples, &material);
+    let mut damping = 1e-3;
+    let mut steps = 0;
+    while steps < max_steps {
+        steps += 1;
+        let Some(step) = damped_step(&normal, &material, free, damping) else { break };
+        let candidate = moved(&material, &step);
+        let next = normal_equations(samples, &candidate);
+        let (before, after) = (total(&normal, &material), total(&next, &candidate));
+        if after < before {
+            material = candidate;
+            normal = next;
+            damping = (damping * 0.3).max(1e-9);
+            if before - after < TOLERANCE * before {
+                break;
+            }
+        } else {
+            damping *= 8.0;
+            if damping > 1e6 {
+                break;
+            }
+        }
+    }
+    let observations = (samples.values.len() as f64).max(1.0);
+    MaterialFit {
+        cost: normal.loss / observations,
+        standard_errors: standard_errors(&normal, &material, free, observations),
+        material,
+        steps,
+    }
+}
+
+fn total(normal: &Normal, material: &Material) -> f64 {
+    normal.loss + PRIOR_WEIGHT * material.gains.iter().map(|gain| ((gain - 1.0) / GAIN_SPREAD).powi(2)).sum::<f64>()
+}
+
+fn normal_equations(samples: &Samples, material: &Material) -> Normal {
+    let size = FIRST_LOBE + PER_LOBE * material.lobes.len() + samples.lights;
+    let chunks: Vec<Normal> = (0..samples.len().div_ceil(CHUNK))
+        .into_par_iter()
+        .map(|chunk| {
+            let mut sum =
+                Normal { matrix: DMatrix::zeros(size, size), vector: DVector::zeros(size), loss: 0.0 };
+            let mut row = vec![0.0; size - samples.lights];
+            for pixel in chunk * CHUNK..((chunk + 1) * CHUNK).min(samples.len()) {
+                for light in 0..samples.lights {
+                    add_observation(samples, material, pixel * samples.lights + light, light, &mut row, &mut sum);
+                }
+            }
+            sum
+        })
+        .collect();
+    let mut sum = Normal { matrix: DMatrix::zeros(size, size), vector: DVector::zeros(size), loss: 0.0 };
+    for chunk in chunks {
+        sum.matrix += chunk.matrix;
+        sum.vector += chunk.vector;
+        sum.loss += chunk.loss;
+    }
+    sum
+}
+
+fn add_observation(
+    samples: &Samples,
+    material: &Material,
+    index: usize,
+    light: usize,
+    row: &mut [f64],
+    sum: &mut Normal,
+) {
+    let facet = &samples.facets[index];
+    let scale = material.gains[light] * samples.irradiance[index];
+    let lambert = material.diffuse * facet.n_dot_l.max(0.0);
+    let grazing = facet.grazing() - 1.0;
+    let diffuse = lambert * (1.0 + material.grazing * grazing);
+    row[DIFFUSE] = scale * diffuse;
+    row[GRAZING] = scale * lambert * grazing;
+    row[AMBIENT] = 1.0;
+    let mut sum_of_parts = diffuse;
+    for (lobe, row) in material.lobes.iter().zip(row[FIRST_LOBE..].chunks_exact_mut(PER_LOBE)) {
+        let light = scale * lobe.strength;
+        let at = |lobe: &Lobe| light * facet.specular(lobe, material.masking);
+        let value = at(lobe);
+        row[0] = value;
+        row[1] = (at(&Lobe { roughness: lobe.roughness * (1.0 + SHAPE_STEP), ..*lobe }) - value) / SHAPE_STEP;
+        let tail_step = if lobe.tail > 0.5 { -SHAPE_STEP } else { SHAPE_STEP };
+        row[2] = (at(&Lobe { tail: lobe.tail + tail_step, ..*lobe }) - value) / tail_step;
+        sum_of_parts += value / scale;
+    }
+    let level = scale * sum_of_parts + material.ambient;
+    let bent = super::scale::bend(level);
+    let clipped = bent >= samples.clip[light];
+    let residual = samples.values[index] - bent.min(samples.clip[light]);
+    let ratio = (residual / LOSS_SCALE).powi(2);
+    sum.loss += ratio.ln_1p();
+    if clipped {
+        return;
+    }
+    let weight = 1.0 / (LOSS_SCALE * LOSS_SCALE * (1.0 + ratio));
+    let slope = bend_slope(level);
+    let gain = row.len() + light;
+    let gain_slope = slope * (level - material.ambient);
+    for (i, &left) in row.iter().enumerate() {
+        let left = slope * left * weight;
+        sum.vector[i] += left * residual;
+        for (j, &right) in row.iter().enumerate().take(i + 1) {
+            sum.matrix[(i, j)] += left * slope * right;
+        }
+        sum.matrix[(gain, i)] += left * gain_slope;
+    }
+    sum.vector[gain] += weight * gain_slope * residual;
+    sum.matrix[(gain, gain)] += weight * gain_slope * gain_slope;
+}
+
+/// True for the parameters that are fitted, in their order.
+fn is_free(material: &Material, free: Free, index: usize) -> bool {
+    let gains = FIRST_LOBE + PER_LOBE * material.lobes.len();
+    match index {
+        DIFFUSE | AMBIENT => true,
+        GRAZING => free.grazing,
+        _ if index >= gains => free.gains,
+        _ => (index - FIRST_LOBE) % PER_LOBE < 2 || free.tails,
+    }
+}
+
+/// The normal equations with the priors and without the fixed parameters.
+fn reduced(normal: &Normal, material: &Material, free: Free) -> (Vec<usize>, DMatrix<f64>, DVector<f64>) {
+    let gains = FIRST_LOBE + PER_LOBE * material.lobes.len();
+    let kept: Vec<usize> = (0..normal.vector.len()).filter(|&index| is_free(material, free, index)).collect();
+    let mut matrix = DMatrix::from_fn(kept.len(), kept.len(), |i, j| {
+        let (i, j) = (kept[i].max(kept[j]), kept[i].min(kept[j]));
+        normal.matrix[(i, j)]
+    });
+    let mut vector = DVector::from_fn(kept.len(), |i, _| normal.vector[kept[i]]);
+    for (i, &index) in kept.iter().enumerate().filter(|(_, index)| **index >= gains) {
+        let weight = PRIOR_WEIGHT / (GAIN_SPREAD * GAIN_SPREAD);
+        // Gains move by their logarithm.
+        let gain = material.gains[index - gains];
+        matrix[(i, i)] += weight * gain * gain;
+        vector[i] += weight * (1.0 - gain) * gain;
+    }
+    (kept, matrix, vector)
+}
+
+fn damped_step(normal: &Normal, material: &Material, free: Free, damping: f64) -> Option<Vec<f64>> {
+    let (kept, mut matrix, vector) = reduced(normal, material, free);
+    let largest = (0..kept.len()).map(|i| matrix[(i, i)]).fold(0.0, f64::max);
+    for i in 0..kept.len() {
+        matrix[(i, i)] += damping * matrix[(i, i)] + 1e-12 * largest;
+    }
+    let solution = matrix.cholesky()?.solve(&vector);
+    let mut step = vec![0.0; normal.vector.len()];
+    for (&index, &value) in kept.iter().zip(solution.iter()) {
+        step[index] = value;
+    }
+    step.iter().all(|value| value.is_finite()).then_some(step)
+}
+
+/// A material moved by a step, within what is possible.
+fn moved(material: &Material, step: &[f64]) -> Material {
+    let by = |value: f64, step: f64| value * step.clamp(-1.0, 1.0).exp();
+    let lobes: Vec<Lobe> = material
+        .lobes
+        .iter()
+        .zip(step[FIRST_LOBE..].chunks_exact(PER_LOBE))
+        .map(|(lobe, step)| Lobe {
+            strength: by(lobe.strength, step[0]).clamp(1e-3, 1e6),
+            roughness: by(lobe.roughness, step[1]).clamp(0.02, 1.0),
+            tail: (lobe.tail + step[2].clamp(-0.3, 0.3)).clamp(0.0, 1.0),
+        })
+        .collect();
+    let gains = FIRST_LOBE + PER_LOBE * lobes.len();
+    Material {
+        diffuse: by(material.diffuse, step[DIFFUSE]).clamp(1e-3, 1e5),
+        grazing: (material.grazing + step[GRAZING].clamp(-0.3, 0.3)).clamp(-1.0, 2.0),
+        ambient: material.ambient + step[AMBIENT].clamp(-10.0, 10.0),
+        lobes,
+        masking: material.masking,
+        gains: material.gains.iter().zip(&step[gains..]).map(|(&gain, &step)| by(gain, step)).collect(),
+    }
+}
+
+fn standard_errors(normal: &Normal, material: &Material, free: Free, observations: f64) -> Vec<f64> {
+    let (kept, matrix, _) = reduced(normal, material, free);
+    let mut errors = vec![0.0; normal.vector.len()];
+    // The loss of an observation near zero is r^2 / 9: twice the mean loss estimates the variance of r / 3.
+    let variance = (normal.loss / observations).max(1e-12);
+    if let Some(covariance) = matrix.cholesky().map(|cholesky| cholesky.inverse()) {
+        for (i, &index) in kept.iter().enumerate() {
+            errors[index] = (variance * covariance[(i, i)]).max(0.0).sqrt() * parameter_scale(material, index);
+        }
+    }
+    errors
+}
+
+/// From the unit in which a parameter is fitted to its own: logarithms become relative.
+fn parameter_scale(material: &Material, index: usize) -> f64 {
+    let gains = FIRST_LOBE + PER_LOBE * material.lobes.len();
+    match index {
+        DIFFUSE => material.diffuse,
+        GRAZING | AMBIENT => 1.0,
+        _ if index >= gains => material.gains[index - gains],
+        _ => {
+            let lobe = &material.lobes[(index - FIRST_LOBE) / PER_LOBE];
+            [lobe.strength, lobe.roughness, 1.0][(index - FIRST_LOBE) % PER_LOBE]
+        }
+    }
+}

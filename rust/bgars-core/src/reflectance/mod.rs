@@ -1,0 +1,22 @@
+//! Normals of shiny balls by their reflectance: the highlights are information, once the material is known.
+
+mod anchor;
+mod ball;
+mod choose;
+mod disc;
+mod estimate;
+mod fit;
+mod material;
+mod observe;
+mod refine;
+mod residuals;
+mod samples;
+mod scale;
+mod spread;
+mod table;
+mod variation;
+
+pub use anchor::Circle;
+pub use estimate::{Outcome, estimate_balls};
+pub use fit::{MaterialFit, parameter_names};
+pub use material::{Facet, Lobe, Masking, Material};

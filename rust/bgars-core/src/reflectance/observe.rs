@@ -1,0 +1,62 @@
+//! Pixels as the reflectance estimator sees them: linear, at unit light intensity, in grey levels of 255, bent.
+
+use super::scale::bend;
+use crate::{ImageStack, Pixel, Radiometry};
+
+/// Reads pixels of a stack on the scale of [`bend`].
+#[derive(Debug)]
+pub struct Reader<'a, 'b, P> {
+    stack: &'a ImageStack<'b, P>,
+    radiometry: &'a Radiometry<'b, P>,
+    /// Grey levels of 255 for one linear grey level of each light.
+    scales: Vec<f32>,
+    /// Linear grey level at which the camera clips, by its response.
+    clip_level: f32,
+}
+
+impl<'a, 'b, P: Pixel> Reader<'a, 'b, P> {
+    /// A reader for a stack and its radiometry.
+    pub fn new(stack: &'a ImageStack<'b, P>, radiometry: &'a Radiometry<'b, P>) -> Self {
+        let scales =
+            radiometry.intensities.iter().map(|&i| (255.0 / (f64::from(radiometry.full_scale) * i)) as f32).collect();
+        let clip_level = match radiometry.response {
+            Some(table) if radiometry.saturation.is_finite() => {
+                table[(radiometry.saturation as usize).min(table.len() - 1)]
+            }
+            _ => radiometry.saturation,
+        };
+        Self { stack, radiometry, scales, clip_level }
+    }
+
+    /// Rows and columns of an image.
+    pub fn size(&self) -> (usize, usize) {
+        (self.stack.height(), self.stack.width())
+    }
+
+    /// Number of lights.
+    pub fn lights(&self) -> usize {
+        self.stack.lights()
+    }
+
+    /// Linear grey level of 255 at which each light clips at a pixel.
+    pub fn clip_levels(&self, pixel: usize) -> Vec<f64> {
+        let offset = self.radiometry.offset(pixel);
+        self.scales.iter().map(|&scale| f64::from((self.clip_level - offset) * scale).min(1e6)).collect()
+    }
+
+    /// Writes the bent level of every light at a pixel.
+    #[inline]
+    pub fn read(&self, pixel: usize, bent: &mut [f32]) {
+        let offset = self.radiometry.offset(pixel);
+        for (light, (bent, &scale)) in bent.iter_mut().zip(&self.scales).enumerate() {
+            let level = (self.radiometry.linearise(self.stack.plane(light)[pixel]) - offset) * scale;
+            *bent = bend(f64::from(level)) as f32;
+        }
+    }
+
+    /// True where any light is clipped at a pixel.
+    #[inline]
+    pub fn clipped(&self, pixel: usize, light: usize) -> bool {
+        self.stack.plane(light)[pixel].to_f32() >= self.radiometry.saturation
+    }
+}

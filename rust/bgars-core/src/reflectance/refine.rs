@@ -1,0 +1,225 @@
+//! The normal of one pixel from its signature.
+
+use multiversion::multiversion;
+
+use super::table::{GROUP, Group, Signatures};
+
+/// Steps of the minimisation at most.
+const MAX_STEPS: usize = 12;
+
+/// A step shorter than this (units of the disc, about radian / 1.4) is the last.
+const SMALL_STEP: f32 = 1e-4;
+
+/// Residuals of so many standard deviations have half their weight.
+pub const LOSS_SCALE: f32 = 3.0;
+
+/// A minimum whose mean cost a light is below this is believed without a search.
+const GOOD_COST: f32 = 2.0;
+
+/// Coarse nodes closer than this to the best are the same valley.
+const VALLEY: f32 = 0.15;
+
+/// Bent grey levels at which a light counts no more in the search: coarse nodes are some levels apart.
+const SEARCH_CLIP: f32 = 30.0;
+
+/// Largest radius on the disc: n_z = 0.03.
+const MAX_RADIUS: f32 = 0.985;
+
+/// One pixel's observations in groups of lights; lanes without a light have weight 0.
+#[derive(Clone, Debug)]
+pub struct Observation {
+    /// Bent grey levels.
+    pub bent: Vec<Group>,
+    /// One over the standard deviation, 0 for lanes without a light.
+    pub weight: Vec<Group>,
+    /// Bent level at which a light clips.
+    pub clip: Vec<Group>,
+}
+
+/// Where a normal is expected, and how firmly.
+#[derive(Clone, Copy, Debug)]
+pub struct Prior {
+    /// On the disc.
+    pub point: [f32; 2],
+    /// One over the standard deviation on the disc; 0 for none.
+    pub weight: f32,
+}
+
+/// A minimum.
+#[derive(Clone, Copy, Debug)]
+pub struct Minimum {
+    /// On the disc.
+    pub point: [f32; 2],
+    /// `sum 9 log(1 + (r / 3)^2)`, the prior's part in it.
+    pub cost: f32,
+    /// The data's part of the cost.
+    pub data_cost: f32,
+    /// `J^T W J` of the data: aa, ab, bb.
+    pub information: [f32; 3],
+    /// The same of the prior: aa and bb.
+    pub prior_information: f32,
+}
+
+/// Cost and its derivatives at one place.
+#[derive(Clone, Copy)]
+struct State {
+    data_cost: f32,
+    prior_cost: f32,
+    gradient: [f32; 2],
+    information: [f32; 3],
+    prior_information: f32,
+}
+
+impl State {
+    fn cost(&self) -> f32 {
+        self.data_cost + self.prior_cost
+    }
+}
+
+#[inline(always)]
+fn evaluate(table: &Signatures, pixel: &Observation, prior: Prior, point: [f32; 2]) -> State {
+    let scale2 = LOSS_SCALE * LOSS_SCALE;
+    let mut sums = [[0.0f32; GROUP]; 5];
+    let mut log_sum = 0.0f64;
+    for group in 0..table.groups() {
+        let signature = table.at(point, group);
+        let (bent, weight, clip) = (&pixel.bent[group], &pixel.weight[group], &pixel.clip[group]);
+        let mut factors = [0.0f32; GROUP];
+        for k in 0..GROUP {
+            let inside = if signature.value[k] < clip[k] { 1.0 } else { 0.0 };
+            let predicted = signature.value[k].min(clip[k]);
+            let r = (bent[k] - predicted) * weight[k];
+            let factor = 1.0 + r * r / scale2;
+            factors[k] = factor;
+            let u = inside * weight[k] / factor;
+            let (ja, jb) = (signature.along_a[k] * weight[k], signature.along_b[k] * weight[k]);
+            sums[0][k] += u * signature.along_a[k] * r;
+            sums[1][k] += u * signature.along_b[k] * r;
+            sums[2][k] += u * signature.along_a[k] * ja;
+            sums[3][k] += u * signature.along_a[k] * jb;
+            sums[4][k] += u * signature.along_b[k] * jb;
+        }
+        log_sum += factors.iter().map(|&factor| f64::from(factor)).product::<f64>().ln();
+    }
+    let total = sums.map(|lanes| lanes.iter().sum::<f32>());
+    let (da, db) = (prior.point[0] - point[0], prior.point[1] - point[1]);
+    let ratio = 1.0 + (da * da + db * db) * prior.weight * prior.weight / scale2;
+    let pull = prior.weight * prior.weight / ratio;
+    State {
+        data_cost: scale2 * log_sum as f32,
+        prior_cost: scale2 * ratio.ln(),
+        gradient: [total[0] + pull * da, total[1] + pull * db],
+        information: [total[2], total[3], total[4]],
+        prior_information: pull,
+    }
+}
+
+/// The deepest minimum that is found from the expected normal, and, where that explains the pixel badly, from the
+/// signatures nearest to it.
+#[multiversion(targets("x86_64+avx2+fma"))]
+pub fn deepest(
+    table: &Signatures,
+    pixel: &Observation,
+    lights: usize,
+    prior: Prior,
+    expected: Option<[f32; 2]>,
+    distances: &mut Vec<f32>,
+) -> Minimum {
+    let mut best = expected.map(|start| minimise(table, pixel, prior, start));
+    if let Some(best) = best
+        && best.cost < GOOD_COST * lights as f32
+    {
+        return best;
+    }
+    for start in candidates(table, pixel, lights, distances) {
+        let other = minimise(table, pixel, prior, start);
+        if best.is_none_or(|best| other.cost < best.cost) {
+            best = Some(other);
+        }
+    }
+    best.unwrap_or(Minimum {
+        point: [0.0; 2],
+        cost: f32::INFINITY,
+        data_cost: f32::INFINITY,
+        information: [0.0; 3],
+        prior_information: 0.0,
+    })
+}
+
+/// Levenberg-Marquardt from one start.
+#[inline(always)]
+fn minimise(table: &Signatures, pixel: &Observation, prior: Prior, start: [f32; 2]) -> Minimum {
+    let mut point = into_disc(start);
+    let mut state = evaluate(table, pixel, prior, point);
+    let mut damping = 1e-2f32;
+    for _ in 0..MAX_STEPS {
+        let [haa, hab, hbb] = state.information;
+        let (haa, hbb) = (haa + state.prior_information, hbb + state.prior_information);
+        let extra = damping * (haa + hbb) * 0.5 + 1e-6;
+        let (haa, hbb) = (haa + extra, hbb + extra);
+        let determinant = haa * hbb - hab * hab;
+        let [ga, gb] = state.gradient;
+        let step = [(hbb * ga - hab * gb) / determinant, (haa * gb - hab * ga) / determinant];
+        let length = (step[0] * step[0] + step[1] * step[1]).sqrt();
+        let shorten = (0.2 / length.max(1e-12)).min(1.0);
+        let next = into_disc([point[0] + shorten * step[0], point[1] + shorten * step[1]]);
+        let next_state = evaluate(table, pixel, prior, next);
+        if next_state.cost() < state.cost() {
+            point = next;
+            state = next_state;
+            damping *= 0.2;
+            if length < SMALL_STEP {
+                break;
+            }
+        } else {
+            if length < SMALL_STEP {
+                break;
+            }
+            damping = (damping * 6.0).max(1e-3);
+        }
+    }
+    Minimum {
+        point,
+        cost: state.cost(),
+        data_cost: state.data_cost,
+        information: state.information,
+        prior_information: state.prior_information,
+    }
+}
+
+#[inline(always)]
+fn into_disc([a, b]: [f32; 2]) -> [f32; 2] {
+    let radius = (a * a + b * b).sqrt();
+    if radius > MAX_RADIUS { [a * MAX_RADIUS / radius, b * MAX_RADIUS / radius] } else { [a, b] }
+}
+
+/// The coarse nodes nearest to a pixel: the best, and the best outside its valley.
+#[inline(always)]
+fn candidates(table: &Signatures, pixel: &Observation, lights: usize, distances: &mut Vec<f32>) -> [[f32; 2]; 2] {
+    let (points, values) = table.coarse();
+    distances.clear();
+    distances.resize(points.len(), 0.0);
+    for light in 0..lights {
+        let (group, lane) = (light / GROUP, light % GROUP);
+        let (bent, clip) = (pixel.bent[group][lane], pixel.clip[group][lane]);
+        let nodes = &values[light * points.len()..(light + 1) * points.len()];
+        for (distance, &value) in distances.iter_mut().zip(nodes) {
+            *distance += (bent - value.min(clip)).abs().min(SEARCH_CLIP);
+        }
+    }
+    let mut best = (f32::INFINITY, 0);
+    for (index, &distance) in distances.iter().enumerate() {
+        if distance < best.0 {
+            best = (distance, index);
+        }
+    }
+    let first = points[best.1];
+    let mut second = (f32::INFINITY, best.1);
+    for (index, (&distance, point)) in distances.iter().zip(points).enumerate() {
+        let (da, db) = (point[0] - first[0], point[1] - first[1]);
+        if distance < second.0 && da * da + db * db > VALLEY * VALLEY {
+            second = (distance, index);
+        }
+    }
+    [first, points[second.1]]
+}

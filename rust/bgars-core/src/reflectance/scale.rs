@@ -1,0 +1,25 @@
+//! The scale on which grey levels are compared: close to linear where it is dark, logarithmic where it is bright.
+
+/// Grey levels of 255 are bent above about `1 / BEND`.
+pub const BEND: f64 = 0.03;
+
+/// `asinh(BEND I) / BEND` of a linear grey level of 255.
+#[must_use]
+#[inline]
+pub fn bend(level: f64) -> f64 {
+    (BEND * level).asinh() / BEND
+}
+
+/// Inverse of [`bend`].
+#[must_use]
+#[inline]
+pub fn unbend(bent: f64) -> f64 {
+    (BEND * bent).sinh() / BEND
+}
+
+/// Derivative of [`bend`].
+#[must_use]
+#[inline]
+pub fn bend_slope(level: f64) -> f64 {
+    (1.0 + (BEND * level).powi(2)).sqrt().recip()
+}
