@@ -3,13 +3,14 @@
 use nalgebra::{Matrix2, Vector3};
 
 use super::anchor::{Circle, pixel_centre};
+use super::cells::CellTable;
+use super::flat_top::FlatTop;
 use super::disc::{from_disc, metric, to_disc};
 use super::material::Material;
 use super::observe::Reader;
 use super::refine::{Minimum, Observation, Prior, deepest};
-use super::residuals::Correction;
 use super::scale::bend;
-use super::spread::Spread;
+use super::spread::{Residual, Spread};
 use super::table::{GROUP, Signatures};
 use crate::{Lights, Pixel};
 
@@ -18,6 +19,9 @@ const COMPONENTS: f32 = 2.0;
 
 /// Radian for one unit of the disc, near its centre.
 const DISC_RADIAN: f32 = std::f32::consts::SQRT_2;
+
+/// Uncertainty of the edge of a flat top, in pixels.
+const FLAT_EDGE_PX: f64 = 1.0;
 
 /// Information that keeps a direction without data finite: a standard deviation of a radian.
 const MIN_INFORMATION: f64 = 1.0;
@@ -33,7 +37,11 @@ pub struct Ball {
     /// Its material.
     pub material: Material,
     /// What the other balls show beyond their materials.
-    pub correction: Option<Correction>,
+    pub correction: Option<CellTable>,
+    /// Where it is no sphere, what to add to the normals of its circle.
+    pub odd: Option<CellTable>,
+    /// Its flat top.
+    pub flat: Option<FlatTop>,
     /// Root mean square angle between its normals and its circle's that the estimate allows for, in radian; infinite for
     /// no expectation.
     pub prior_rad: f32,
@@ -48,6 +56,10 @@ pub struct BallPixel {
     pub pixel: usize,
     /// Unit normal.
     pub normal: [f32; 3],
+    /// Its place on the disc.
+    pub point: [f32; 2],
+    /// The place of its circle's normal.
+    pub circle_point: [f32; 2],
     /// Standard error of the direction, in radian: data and expectation together.
     pub error_rad: f32,
     /// The same by the data alone.
@@ -98,6 +110,8 @@ impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
         BallPixel {
             pixel,
             normal: [normal.x as f32, normal.y as f32, normal.z as f32],
+            point: best.point,
+            circle_point: scratch.anchor.unwrap_or([f32::NAN; 2]),
             error_rad: direction_error(&best, best.prior_information, deviation * deviation / COMPONENTS),
             data_error_rad: direction_error(&best, 0.0, 0.0),
             off_circle_rad: off as f32,
@@ -110,12 +124,38 @@ impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
         let (x, y) = pixel_centre(pixel / width, pixel % width, height, width);
         scratch.anchor = self.ball.circle.normal(x, y).map(|normal| to_disc(&normal).map(|v| v as f32));
         self.observe(pixel, scratch);
-        let prior = match scratch.anchor {
-            Some(point) => Prior { point, weight: COMPONENTS.sqrt() * DISC_RADIAN / self.ball.prior_rad },
-            None => Prior { point: [0.0; 2], weight: 0.0 },
-        };
         let lights = self.reader.lights();
-        deepest(&self.table, &scratch.seen, lights, prior, scratch.anchor, &mut scratch.distances)
+        // The disc is 1 / sqrt 2 of a radian at its centre.
+        let weight = COMPONENTS.sqrt() * DISC_RADIAN / self.ball.prior_rad;
+        let mut best: Option<Minimum> = None;
+        for point in scratch.anchor.map(|point| self.expected(point)).into_iter().flatten().flatten() {
+            let prior = Prior { point, weight };
+            let found = deepest(&self.table, &scratch.seen, lights, prior, &mut scratch.distances);
+            if best.is_none_or(|best| found.cost < best.cost) {
+                best = Some(found);
+            }
+        }
+        best.unwrap_or_else(|| {
+            let prior = Prior { point: [0.0; 2], weight: 0.0 };
+            deepest(&self.table, &scratch.seen, lights, prior, &mut scratch.distances)
+        })
+    }
+
+    /// Where a normal may be expected: on the sphere of the circle, on a flat top, or where many pixels of an odd ball
+    /// agree; near the edge of a flat both are possible.
+    fn expected(&self, circle_point: [f32; 2]) -> [Option<[f32; 2]>; 2] {
+        if let Some(flat) = self.ball.flat {
+            let normal = from_disc(circle_point.map(f64::from));
+            let inside = flat.radius - normal.x.hypot(normal.y) as f32;
+            let edge = (FLAT_EDGE_PX / self.ball.circle.radius_px) as f32;
+            if inside > -edge {
+                return [Some(flat.point), (inside < edge).then_some(circle_point)];
+            }
+        }
+        let moved = self.ball.odd.as_ref().map(|odd| {
+            std::array::from_fn(|axis| circle_point[axis] + odd.at(circle_point.map(f64::from), axis).0)
+        });
+        [Some(circle_point), moved.filter(|moved| *moved != circle_point)]
     }
 
     fn observe(&self, pixel: usize, scratch: &mut Scratch) {
@@ -126,18 +166,23 @@ impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
             let (group, lane) = (light / GROUP, light % GROUP);
             let clip = self.clip[light];
             let bent = seen.bent[group][lane].min(clip);
-            let mut variance = self.spread.at(bent).powi(2);
-            if let (Some(correction), Some(anchor)) = (&self.ball.correction, scratch.anchor) {
-                variance += correction.at(anchor.map(f64::from), light).1.powi(2);
-            }
+            let variance = self.spread.at(bent).powi(2) + self.known_variance(scratch.anchor, light);
             seen.bent[group][lane] = bent;
             seen.weight[group][lane] = variance.sqrt().recip();
             seen.clip[group][lane] = clip;
         }
     }
 
-    /// Bent levels and residuals at the minimum of a pixel, each divided by what the fit leaves of it: sqrt(1 - leverage).
-    pub fn residuals(&self, pixel: usize, scratch: &mut Scratch, pairs: &mut Vec<(f32, f32)>) {
+    /// Variance of a bent level from ball to ball, where it was learnt.
+    fn known_variance(&self, expected: Option<[f32; 2]>, light: usize) -> f32 {
+        match (&self.ball.correction, expected) {
+            (Some(correction), Some(point)) => correction.at(point.map(f64::from), light).1.powi(2),
+            _ => 0.0,
+        }
+    }
+
+    /// Residuals at the minimum of a pixel, each divided by what the fit leaves of it: sqrt(1 - leverage).
+    pub fn residuals(&self, pixel: usize, scratch: &mut Scratch, residuals: &mut Vec<Residual>) {
         let best = self.minimum(pixel, scratch);
         let [haa, hab, hbb] = best.information;
         let (haa, hbb) = (haa + best.prior_information, hbb + best.prior_information);
@@ -153,7 +198,10 @@ impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
                 let (ja, jb) = (signature.along_a[lane] * weight, signature.along_b[lane] * weight);
                 let leverage = (hbb * ja * ja - 2.0 * hab * ja * jb + haa * jb * jb) / determinant;
                 if leverage < MAX_LEVERAGE {
-                    pairs.push((bent, (bent - signature.value[lane]) / (1.0 - leverage.max(0.0)).sqrt()));
+                    residuals.push(Residual {
+                        level: bent,
+                        size: (bent - signature.value[lane]) / (1.0 - leverage.max(0.0)).sqrt(),
+                    });
                 }
             }
         }

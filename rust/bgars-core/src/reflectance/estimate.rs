@@ -6,12 +6,14 @@ use super::anchor::{Circle, pixel_centre};
 use super::ball::{Ball, BallPixel, BallWork, Scratch};
 use super::choose::best_material;
 use super::fit::MaterialFit;
+use super::flat_top::flat_top;
 use super::material::Material;
 use super::observe::Reader;
-use super::residuals::BallResiduals;
+use super::odd::odd_places;
+use super::residuals::learnt_corrections;
 use super::samples::Samples;
 use super::scale::bend;
-use super::spread::Spread;
+use super::spread::{Residual, Spread};
 use super::variation::ball_materials;
 use crate::{ImageStack, Lights, Pixel, Radiometry, Result};
 
@@ -21,11 +23,15 @@ const FIT_PIXELS: usize = 3000;
 /// Pixels of a ball that the residuals are learnt on, at most.
 const RESIDUAL_PIXELS: usize = 1200;
 
+/// Pixels of a ball that tell where it is no sphere.
+const ODD_PIXELS: usize = 600;
+
 /// Pixels that spread and expectation are learnt on, in all.
 const LEARNING_PIXELS: usize = 4000;
 
 /// Smallest n_z of pixels that a material is fitted on.
 const FIT_MIN_N_Z: f64 = 0.2;
+fn fmn() -> f64 { std::env::var("FMN").map_or(FIT_MIN_N_Z, |v| v.parse().unwrap()) }
 
 /// Standard deviation of a bent level before anything is known.
 const FIRST_SIGMA: f32 = 2.0;
@@ -48,9 +54,6 @@ const CALIBRATION_LIMITS: (f32, f32) = (0.5, 4.0);
 
 /// Pixels whose data fix the normal as well as this tell how far a ball is from its sphere.
 const TELLING_DEG: f32 = 1.0;
-
-/// Learning the residuals must lower the left-out cost by this share.
-const EVIDENCE: f64 = 0.15;
 
 /// What was found.
 #[derive(Clone, Debug)]
@@ -82,7 +85,7 @@ pub fn estimate_balls<P: Pixel>(
     let few = samples(&reader, lights, circles, &inside, &clip, (FIT_PIXELS / balls).max(100));
     let fit = best_material(&few);
     let many = samples(&reader, lights, circles, &inside, &clip, RESIDUAL_PIXELS);
-    let materials = ball_materials(&many, &fit.material, balls);
+    let materials = if std::env::var_os("SAME").is_some() { vec![fit.material.clone(); balls] } else { ball_materials(&many, &fit.material, balls) };
     let varied = materials.iter().any(|material| *material != fit.material);
     let mut known: Vec<Ball> = circles
         .iter()
@@ -91,11 +94,17 @@ pub fn estimate_balls<P: Pixel>(
             circle,
             material: material.clone(),
             correction: None,
+            odd: None,
+            flat: None,
             prior_rad: FIRST_PRIOR_DEG.to_radians(),
             deviation_rad: FIRST_PRIOR_DEG.to_radians(),
         })
         .collect();
-    let corrected = learn_residuals(&many, &materials, &mut known);
+    let corrections = learnt_corrections(&many, &materials);
+    let corrected = corrections.is_some();
+    for (ball, correction) in known.iter_mut().zip(corrections.into_iter().flatten()) {
+        ball.correction = Some(correction);
+    }
     let bent_clip: Vec<f32> = clip.iter().map(|&level| bend(level) as f32).collect();
     let job = Job { reader: &reader, lights, clip: &bent_clip, inside: &inside };
     let mut spread = Spread::constant(FIRST_SIGMA);
@@ -104,6 +113,7 @@ pub fn estimate_balls<P: Pixel>(
     }
     spread = job.learn_deviations(&mut known, &spread);
     if std::env::var_os("BGARS_DEBUG").is_some() {
+        for (i, b) in known.iter().enumerate() { if b.flat.is_some() { eprintln!("flat {i} {:?}", b.flat); } if let Some(o) = &b.odd { eprintln!("odd {i} {} {:?}", o.middle.iter().filter(|v| **v != 0.0).count()/2, o.middle.iter().copied().fold(0.0, f32::max)); } }
         eprintln!("{spread:?} varied {varied} corrected {corrected}");
     }
     let balls = job.run(&known, &spread, 1);
@@ -143,7 +153,7 @@ fn samples<P: Pixel>(
     for (ball, (circle, pixels)) in circles.iter().zip(inside).enumerate() {
         for &pixel in spaced(pixels, of_each) {
             let (x, y) = pixel_centre(pixel / width, pixel % width, height, width);
-            if let Some(normal) = circle.normal(x, y).filter(|normal| normal.z > FIT_MIN_N_Z) {
+            if let Some(normal) = circle.normal(x, y).filter(|normal| normal.z > if of_each < RESIDUAL_PIXELS { fmn() } else { 0.1 }) {
                 reader.read(pixel, &mut bent);
                 samples.push(ball, circle, normal, &bent, lights);
             }
@@ -157,36 +167,6 @@ fn spaced(values: &[usize], count: usize) -> impl Iterator<Item = &usize> {
     let step = (values.len() as f64 / count as f64).max(1.0);
     let taken = (values.len() as f64 / step) as usize;
     (0..taken).map(move |index| &values[(index as f64 * step) as usize])
-}
-
-/// Gives each ball what the others show beyond their materials, where that helps balls that had no part in it.
-fn learn_residuals(samples: &Samples, materials: &[Material], known: &mut [Ball]) -> bool {
-    let residuals = BallResiduals::new(samples, materials);
-    let corrections: Vec<_> = (0..known.len()).into_par_iter().map(|ball| residuals.without(ball)).collect();
-    let (mut without, mut with) = (0.0, 0.0);
-    for pixel in (0..samples.len()).step_by((samples.len() / LEARNING_PIXELS).max(1)) {
-        let ball = samples.balls[pixel];
-        for light in 0..samples.lights {
-            let index = pixel * samples.lights + light;
-            let predicted = bend(samples.brightness(index, light, &materials[ball]));
-            let shift = f64::from(corrections[ball].at(super::disc::to_disc(&samples.normals[pixel]), light).0);
-            let loss = |predicted: f64| {
-                ((samples.values[index] - predicted.min(samples.clip[light])) / super::fit::LOSS_SCALE).powi(2).ln_1p()
-            };
-            without += loss(predicted);
-            with += loss(predicted + shift);
-        }
-    }
-    if std::env::var_os("BGARS_DEBUG").is_some() {
-        eprintln!("residuals {without} -> {with}");
-    }
-    if with > (1.0 - EVIDENCE) * without {
-        return false;
-    }
-    for (ball, correction) in known.iter_mut().zip(corrections) {
-        ball.correction = Some(correction);
-    }
-    true
 }
 
 /// What all balls share while they are estimated.
@@ -203,20 +183,20 @@ impl<P: Pixel> Job<'_, '_, '_, P> {
     }
 
     fn learn_spread(&self, known: &[Ball], spread: &Spread) -> Spread {
-        let pairs: Vec<Vec<(f32, f32)>> = known
+        let residuals: Vec<Vec<Residual>> = known
             .par_iter()
             .enumerate()
             .map(|(index, ball)| {
                 let work = BallWork::new(self.reader, self.lights, ball, spread, self.clip);
                 let mut scratch = Scratch::new(self.reader.lights());
-                let mut pairs = Vec::new();
+                let mut residuals = Vec::new();
                 for &pixel in self.learning_pixels(index) {
-                    work.residuals(pixel, &mut scratch, &mut pairs);
+                    work.residuals(pixel, &mut scratch, &mut residuals);
                 }
-                pairs
+                residuals
             })
             .collect();
-        Spread::from_residuals(&pairs.concat(), MIN_SIGMA)
+        Spread::from_residuals(&residuals.concat(), MIN_SIGMA)
     }
 
     /// How far the balls are from their spheres where the data tell, and how much larger than stated the errors are.
@@ -230,17 +210,24 @@ impl<P: Pixel> Job<'_, '_, '_, P> {
             .map(|(index, ball)| {
                 let work = BallWork::new(self.reader, self.lights, ball, spread, self.clip);
                 let mut scratch = Scratch::new(self.reader.lights());
-                let pixels = self.learning_pixels(index).map(|&pixel| work.estimate(pixel, &mut scratch));
-                pixels.filter(|p| p.data_error_rad.to_degrees() < TELLING_DEG && p.normal[2] > FIT_MIN_N_Z as f32).collect()
+                spaced(&self.inside[index], ODD_PIXELS).map(|&pixel| work.estimate(pixel, &mut scratch)).collect()
             })
             .collect();
+        for ((ball, found), odd) in known.iter_mut().zip(&found).zip(odd_places(&found)) {
+            ball.flat = flat_top(found);
+            ball.odd = odd.filter(|_| ball.flat.is_none());
+        }
+        let tells =
+            |p: &&BallPixel| p.data_error_rad.to_degrees() < TELLING_DEG && p.normal[2] > FIT_MIN_N_Z as f32;
+        let found: Vec<Vec<BallPixel>> =
+            found.iter().map(|pixels| pixels.iter().filter(tells).copied().collect()).collect();
         let factor = calibration(&found);
         let (all, all_error) = deviation(&found.concat(), factor).unwrap_or((FIRST_PRIOR_DEG.to_radians(), 0.0));
         for (ball, found) in known.iter_mut().zip(&found) {
             let (own, error) = deviation(found, factor).unwrap_or((all, all_error));
             let (least, most) = PRIOR_LIMITS_DEG;
             ball.deviation_rad = own;
-            ball.prior_rad = own.max(error).clamp(least.to_radians(), most.to_radians());
+            ball.prior_rad = if std::env::var_os("DATAONLY").is_some() { 100.0 } else { own.max(error).clamp(least.to_radians(), most.to_radians()) };
         }
         spread.scaled(factor)
     }

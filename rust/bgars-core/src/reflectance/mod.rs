@@ -2,12 +2,15 @@
 
 mod anchor;
 mod ball;
+mod cells;
 mod choose;
 mod disc;
 mod estimate;
 mod fit;
+mod flat_top;
 mod material;
 mod observe;
+mod odd;
 mod refine;
 mod residuals;
 mod samples;

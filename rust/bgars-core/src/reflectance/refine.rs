@@ -122,28 +122,19 @@ pub fn deepest(
     pixel: &Observation,
     lights: usize,
     prior: Prior,
-    expected: Option<[f32; 2]>,
     distances: &mut Vec<f32>,
 ) -> Minimum {
-    let mut best = expected.map(|start| minimise(table, pixel, prior, start));
-    if let Some(best) = best
-        && best.cost < GOOD_COST * lights as f32
-    {
+    let mut best = minimise(table, pixel, prior, prior.point);
+    if best.cost < GOOD_COST * lights as f32 {
         return best;
     }
     for start in candidates(table, pixel, lights, distances) {
         let other = minimise(table, pixel, prior, start);
-        if best.is_none_or(|best| other.cost < best.cost) {
-            best = Some(other);
+        if other.cost < best.cost {
+            best = other;
         }
     }
-    best.unwrap_or(Minimum {
-        point: [0.0; 2],
-        cost: f32::INFINITY,
-        data_cost: f32::INFINITY,
-        information: [0.0; 3],
-        prior_information: 0.0,
-    })
+    best
 }
 
 /// Levenberg-Marquardt from one start.

@@ -6,6 +6,15 @@ const BINS: usize = 16;
 /// Observations that a bin needs to speak for itself.
 const ENOUGH: usize = 40;
 
+/// One light at one pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct Residual {
+    /// Bent level.
+    pub level: f32,
+    /// Observed minus predicted.
+    pub size: f32,
+}
+
 /// Standard deviation of the bent levels as a function of the level.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spread {
@@ -20,19 +29,18 @@ impl Spread {
         Self { top: 1.0, sigma: [sigma; BINS] }
     }
 
-    /// From (bent level, residual) pairs: 1.4826 times the median of |residual| in each bin, at least `floor`.
+    /// From residuals: 1.4826 times the median of their sizes in each bin of levels, at least `floor`.
     #[must_use]
-    pub fn from_residuals(pairs: &[(f32, f32)], floor: f32) -> Self {
-        let top = pairs.iter().fold(1.0f32, |top, pair| top.max(pair.0));
+    pub fn from_residuals(residuals: &[Residual], floor: f32) -> Self {
+        let top = residuals.iter().fold(1.0f32, |top, residual| top.max(residual.level));
         let mut bins: Vec<Vec<f32>> = vec![Vec::new(); BINS];
-        for &(level, residual) in pairs {
-            bins[bin(level, top)].push(residual.abs());
+        for residual in residuals {
+            bins[bin(residual.level, top)].push(residual.size.abs());
         }
-        let all: Vec<f32> = pairs.iter().map(|pair| pair.1.abs()).collect();
-        let overall = median(all);
+        let overall = median(residuals.iter().map(|residual| residual.size.abs()).collect());
         let mut sigma = [0.0; BINS];
-        for (sigma, values) in sigma.iter_mut().zip(bins) {
-            let middle = if values.len() >= ENOUGH { median(values) } else { overall };
+        for (sigma, sizes) in sigma.iter_mut().zip(bins) {
+            let middle = if sizes.len() >= ENOUGH { median(sizes) } else { overall };
             *sigma = (1.4826 * middle).max(floor);
         }
         Self { top, sigma }

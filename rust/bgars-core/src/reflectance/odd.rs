@@ -1,0 +1,104 @@
+//! Places where a ball is not the sphere of its circle: many pixels agree on another normal, and the other balls do not.
+
+use super::ball::BallPixel;
+use super::cells::{CellSums, CellTable, Population, SIDE};
+
+/// A place is odd where the ball differs from the others by this angle in radian (1.5 degrees) ...
+const MIN_ANGLE_RAD: f32 = 0.026;
+
+/// ... and by so many standard deviations of a ball among the others.
+const MIN_SIGMAS: f32 = 4.0;
+
+/// Pixels that the data fix no better than this do not vote.
+const VOTER_DEG: f32 = 4.0;
+
+/// An odd place has at least so many cells of the disc, side by side: 2 % of what is seen of a ball.
+const MIN_CELLS: usize = 25;
+
+/// Normals that explain their pixels no better than this (mean loss of a light) prove nothing: a cast shadow, a reflection.
+const MAX_COST: f32 = 2.0;
+
+/// Channels of the tables: difference to the circle's normal along a and b, loss.
+const CHANNELS: usize = 3;
+const LOSS: usize = 2;
+
+/// For each ball how its normals differ from its circle's, on the disc; zero where nothing is odd, `None` where nothing is
+/// anywhere.
+pub fn odd_places(found: &[Vec<BallPixel>]) -> Vec<Option<CellTable>> {
+    let own: Vec<Vec<f32>> = found.iter().map(|pixels| ball_deviation(pixels)).collect();
+    let population = Population::new(CHANNELS, &own);
+    own.iter()
+        .enumerate()
+        .map(|(ball, own)| {
+            let mut table = population.without(ball);
+            let differences: Vec<[f32; 2]> = own
+                .chunks_exact(CHANNELS)
+                .enumerate()
+                .map(|(cell, own)| {
+                    let first = CHANNELS * cell;
+                    let difference = std::array::from_fn(|axis| own[axis] - table.middle[first + axis]);
+                    let [da, db] = difference;
+                    let sigma = table.sigma[first].hypot(table.sigma[first + 1]);
+                    let odd = own[LOSS] < MAX_COST && da.hypot(db) > MIN_ANGLE_RAD.max(MIN_SIGMAS * sigma);
+                    if odd { difference } else { [0.0; 2] }
+                })
+                .collect();
+            let large = large_groups(&differences.iter().map(|d| *d != [0.0; 2]).collect::<Vec<_>>());
+            for (cell, middle) in table.middle.chunks_exact_mut(CHANNELS).enumerate() {
+                let kept = if large[cell] { differences[cell] } else { [0.0; 2] };
+                middle[..2].copy_from_slice(&kept);
+            }
+            large.contains(&true).then_some(table)
+        })
+        .collect()
+}
+
+/// The cells of groups of neighbours that are large enough.
+fn large_groups(marked: &[bool]) -> Vec<bool> {
+    let mut large = vec![false; marked.len()];
+    let mut seen = vec![false; marked.len()];
+    for start in 0..marked.len() {
+        if !marked[start] || seen[start] {
+            continue;
+        }
+        seen[start] = true;
+        let mut group = vec![start];
+        let mut next = 0;
+        while next < group.len() {
+            let cell = group[next];
+            next += 1;
+            let (row, col) = (cell / SIDE, cell % SIDE);
+            let neighbours = [
+                (row > 0).then(|| cell - SIDE),
+                (row + 1 < SIDE).then(|| cell + SIDE),
+                (col > 0).then(|| cell - 1),
+                (col + 1 < SIDE).then(|| cell + 1),
+            ];
+            for neighbour in neighbours.into_iter().flatten() {
+                if marked[neighbour] && !seen[neighbour] {
+                    seen[neighbour] = true;
+                    group.push(neighbour);
+                }
+            }
+        }
+        if group.len() >= MIN_CELLS {
+            for cell in group {
+                large[cell] = true;
+            }
+        }
+    }
+    large
+}
+
+/// Smoothed means of one ball.
+fn ball_deviation(pixels: &[BallPixel]) -> Vec<f32> {
+    let mut sums = CellSums::new(CHANNELS);
+    for pixel in pixels.iter().filter(|pixel| pixel.data_error_rad < VOTER_DEG.to_radians()) {
+        let expected = pixel.circle_point.map(f64::from);
+        for axis in 0..2 {
+            sums.add(expected, axis, pixel.point[axis] - pixel.circle_point[axis]);
+        }
+        sums.add(expected, LOSS, pixel.cost);
+    }
+    sums.means()
+}
