@@ -8,9 +8,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["BallMeasurement", "FoundBall", "FoundBalls", "MeasuredBall"]
+__all__ = ["BallLayout", "BallMeasurement", "FoundBall", "FoundBalls", "MeasuredBall"]
 
 BallKind = Literal["ball", "extra", "bridged"]
+
+
+@dataclass(frozen=True)
+class BallLayout:
+    rows: int = 0
 
 
 @dataclass(frozen=True)

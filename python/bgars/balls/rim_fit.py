@@ -1,0 +1,226 @@
+"""The silhouette of each ball to a hundredth of a pixel: a rim model fitted to all lights and all directions."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bgars.balls.rim_model import SHAPES, RimTable
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bgars.balls.levels import Levels
+    from bgars.records import FloatArray
+
+__all__ = ["Circles", "RimPixels", "fit_rims"]
+
+SECTORS = 24
+BASIS = 7
+"""Board, step, root, ramp inside, ramp outside, board along the rim, step along the rim."""
+FIT_ROUNDS = 5
+REWEIGHTINGS = 12
+MODEL_ERROR_PX = 0.03
+LARGEST_STEP_PX = 1.5
+NOISE_FLOOR = 0.15
+"""Grey levels of 255 below which residuals are quantisation."""
+
+
+@dataclass
+class Circles:
+    """Circles in array coordinates (row, column of pixel centres are integers), N each.
+
+    Attributes
+    ----------
+    row, col, radius_px : (N,) float64
+        The circles.
+    u_centre_px, u_radius_px : (N,) float64
+        Standard uncertainties.
+    support : (N,) float64
+        Fraction of the sectors whose rim was seen on the circle.
+    offsets_px : (N, SECTORS) float64
+        Where each sector's rim lies, outward from the circle; NaN where it was not seen.
+    """
+
+    row: NDArray[np.float64]
+    col: NDArray[np.float64]
+    radius_px: NDArray[np.float64]
+    u_centre_px: NDArray[np.float64]
+    u_radius_px: NDArray[np.float64]
+    support: NDArray[np.float64]
+    offsets_px: NDArray[np.float64]
+
+
+class RimPixels:
+    """Pixels around the rims, sorted into sectors of equal angle and padded to equal number.
+
+    Attributes
+    ----------
+    row, col : (N, SECTORS, P) float32
+        Pixels relative to the anchor of the ball.
+    weight : (N, SECTORS, P) float32
+        0 for padding and for pixels outside the image or the mask.
+    levels : (L, N, SECTORS, P) float32
+        Grey levels.
+    """
+
+    def __init__(self, levels: Levels, row: NDArray[np.float64], col: NDArray[np.float64],
+                 radius_px: NDArray[np.float64], in_px: NDArray[np.float64], out_px: NDArray[np.float64]) -> None:
+        height, width = levels.height, levels.width
+        self.anchor_row = np.rint(row).astype(np.int64)
+        self.anchor_col = np.rint(col).astype(np.int64)
+        parts = []
+        for ball in range(len(row)):
+            reach = math.ceil(radius_px[ball] + out_px[ball]) + 1
+            span = np.arange(-reach, reach + 1)
+            y = (self.anchor_row[ball] + span - row[ball])[:, None]
+            x = (self.anchor_col[ball] + span - col[ball])[None, :]
+            distance = np.sqrt(x * x + y * y)
+            near = np.flatnonzero((distance > radius_px[ball] - in_px[ball]) & (distance < radius_px[ball] + out_px[ball]))
+            r, c = np.divmod(near, len(span))
+            angle = np.arctan2(-y[r, 0], x[0, c])
+            sector = np.floor((angle / (2 * math.pi) % 1.0) * SECTORS).astype(np.int64) % SECTORS
+            order = np.argsort(sector, kind="stable")
+            counts = np.bincount(sector, minlength=SECTORS)
+            parts.append((r[order] - reach, c[order] - reach, sector[order], counts))
+        most = max(int(part[3].max()) for part in parts)
+        shape = (len(row), SECTORS, most)
+        self.row = np.zeros(shape, np.float32)
+        self.col = np.zeros(shape, np.float32)
+        self.weight = np.zeros(shape, np.float32)
+        for ball, (r, c, sector, counts) in enumerate(parts):
+            place = np.arange(len(r)) - np.repeat(np.cumsum(counts) - counts, counts)
+            self.row[ball, sector, place] = r
+            self.col[ball, sector, place] = c
+            self.weight[ball, sector, place] = 1.0
+        image_row = self.row.astype(np.int64) + self.anchor_row[:, None, None]
+        image_col = self.col.astype(np.int64) + self.anchor_col[:, None, None]
+        inside = (image_row >= 0) & (image_row < height) & (image_col >= 0) & (image_col < width)
+        self.weight *= inside
+        pixels = np.where(inside, image_row * width + image_col, 0)
+        self.levels = levels.at(pixels) * self.weight
+        self.clipped = (levels.clipped_at(pixels) & (self.weight > 0)).any(axis=3)
+
+
+def fit_rims(levels: Levels, row: NDArray[np.float64], col: NDArray[np.float64], radius_px: NDArray[np.float64],
+             *, blur_px: float | None = None) -> tuple[Circles, float]:
+    """Fit the circle of each ball to the rim in all lights."""
+    in_px = np.clip(0.2 * radius_px, 3.0, 8.0)
+    out_px = np.clip(0.14 * radius_px, 2.5, 5.0)
+    pixels = RimPixels(levels, row, col, radius_px, in_px, out_px)
+    table = RimTable(0.3 if blur_px is None else blur_px, 12.0)
+    circles = Circles(row.astype(float), col.astype(float), radius_px.astype(float), *(np.zeros(len(row)) for _ in range(3)),
+                      np.zeros((len(row), SECTORS)))
+    for round_ in range(FIT_ROUNDS):
+        if round_ == FIT_ROUNDS - 2 and blur_px is None:
+            sigmas = (0.0, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)
+            tables = [RimTable(s, 12.0) for s in sigmas]
+            costs = [_cost(pixels, circles, t) for t in tables]
+            table = tables[int(np.argmin(costs))]
+        offset, variance = _sector_offsets(pixels, circles, table)
+        _update(circles, offset, variance, radius_px, in_px)
+    return circles, table.blur_px
+
+
+def _columns(pixels: RimPixels, circles: Circles, table: RimTable) -> FloatArray:
+    """(N, S, P, BASIS + 5 + L) basis, derivatives of the basis by radius, levels."""
+    y = (circles.row - pixels.anchor_row).astype(np.float32)[:, None, None] - pixels.row
+    x = pixels.col - (circles.col - pixels.anchor_col).astype(np.float32)[:, None, None]
+    distance = np.sqrt(x * x + y * y)
+    # The mean distance of the points of a pixel is a little more than that of its centre, across the direction.
+    spread = np.float32(1.0 / 24.0 + 0.5 * table.blur_px**2)
+    radius = circles.radius_px.astype(np.float32)[:, None, None]
+    depth = radius - distance - spread / distance
+    shapes = table.look_up(depth, table.fold(x, y))
+    mid = ((np.arange(SECTORS) + 0.5) * (2 * math.pi / SECTORS)).astype(np.float32)
+    along = (y * np.cos(mid)[:, None] - x * np.sin(mid)[:, None]) / (radius * np.float32(2 * math.pi / SECTORS / 2))
+    columns = np.zeros((*depth.shape, BASIS + 5 + len(pixels.levels)), np.float32)
+    columns[..., 0] = 1.0
+    columns[..., 1:5] = shapes[..., :SHAPES]
+    columns[..., 5] = along
+    columns[..., 6] = along * shapes[..., 0]
+    columns[..., 7:11] = shapes[..., SHAPES:]
+    columns[..., 11] = along * shapes[..., SHAPES]
+    columns *= pixels.weight[..., None]
+    columns[..., 12:] = np.moveaxis(pixels.levels, 0, -1)
+    return columns
+
+
+def _solve(pixels: RimPixels, circles: Circles, table: RimTable):
+    columns = _columns(pixels, circles, table)
+    gram = (np.swapaxes(columns, 2, 3) @ columns).astype(np.float64)
+    lights = len(pixels.levels)
+    basis = gram[..., :BASIS, :BASIS] + 0.0
+    trace = np.trace(basis, axis1=-2, axis2=-1)[..., None]
+    diagonal = np.arange(BASIS)
+    basis[..., diagonal, diagonal] += 1e-6 * trace + 1e-9
+    right = gram[..., :BASIS, BASIS:]
+    solved = np.linalg.solve(basis, right)
+    # what the basis leaves of derivatives and levels: Gram matrix of residuals
+    rest = gram[..., BASIS:, BASIS:] - np.swapaxes(right, -1, -2) @ solved
+    coefficients = solved[..., 5:]  # (N, S, BASIS, L)
+    count = pixels.weight.sum(axis=2)
+    return gram, rest, coefficients, count, lights
+
+
+def _sector_offsets(pixels: RimPixels, circles: Circles, table: RimTable):
+    """(N, S, L) outward offset of the rim in each sector and light, and its variance."""
+    _, rest, coefficients, count, _ = _solve(pixels, circles, table)
+    slope = coefficients[..., [1, 2, 3, 4, 6], :]  # (N,S,5,L)
+    dd = np.einsum("nskl,nskm,nsml->nsl", slope, rest[..., :5, :5], slope)
+    de = np.einsum("nskl,nskl->nsl", slope, rest[..., :5, 5:])
+    ee = np.einsum("nsll->nsl", rest[..., 5:, 5:])
+    dd = np.maximum(dd, 1e-9)
+    offset = de / dd
+    left = np.maximum(ee - de * offset, 0.0) / np.maximum(count - BASIS - 1, 1)[..., None]
+    variance = (left + NOISE_FLOOR**2) / dd
+    bad = (count < 2 * BASIS)[..., None] | (np.moveaxis(pixels.clipped, 0, -1))
+    variance = np.where(bad, np.inf, variance)
+    return np.clip(offset, -3.0, 3.0), variance
+
+
+def _cost(pixels: RimPixels, circles: Circles, table: RimTable) -> float:
+    _, rest, coefficients, count, _ = _solve(pixels, circles, table)
+    ee = np.einsum("nsll->nsl", rest[..., 5:, 5:])
+    return float(np.median(np.sqrt(np.maximum(ee, 0))))
+
+
+def _update(circles: Circles, offset, variance, radius0, in_px) -> None:
+    """One step of the three parameters of each circle, all sectors and lights together, outliers down-weighted."""
+    mid = (np.arange(SECTORS) + 0.5) * (2 * math.pi / SECTORS)
+    design = np.stack([np.cos(mid), np.sin(mid), np.ones(SECTORS)], axis=1)  # x right, y up, radius
+    base = 1.0 / (variance + MODEL_ERROR_PX**2)
+    base[~np.isfinite(base)] = 0.0
+    base[variance > 0.5**2] = 0.0
+    spread = np.sqrt(variance + MODEL_ERROR_PX**2)
+    step = np.zeros((len(offset), 3))
+    weight = base
+    for turn in range(REWEIGHTINGS):
+        per_sector = weight.sum(axis=2)
+        total = (weight * offset).sum(axis=2)
+        normal = np.einsum("ns,si,sj->nij", per_sector, design, design) + 1e-6 * np.eye(3)
+        step = np.linalg.solve(normal, np.einsum("ns,si->ni", total, design)[..., None])[..., 0]
+        residual = offset - (step @ design.T)[..., None]
+        scale = 0.6 if turn < 3 else 0.1 if turn < 6 else 0.05
+        weight = base / (1.0 + (residual / np.maximum(spread, scale)) ** 2) ** (1 if turn < 5 else 2)
+    length = np.maximum(np.abs(step).max(axis=1), 1e-12)
+    step *= np.minimum(1.0, LARGEST_STEP_PX / length)[:, None]
+    circles.col += step[:, 0]
+    circles.row -= step[:, 1]
+    circles.radius_px += step[:, 2]
+    # what remains, sector by sector: lights of one sector share texture and shadows, so they count once
+    per_sector = weight.sum(axis=2)
+    seen = per_sector > 0
+    mean = np.divide((weight * residual).sum(axis=2), per_sector, out=np.zeros_like(per_sector), where=seen)
+    circles.offsets_px = np.where(seen, mean, np.nan)
+    used = per_sector / np.maximum(per_sector.max(axis=1, keepdims=True), 1e-12)
+    normal = np.einsum("ns,si,sj->nij", per_sector, design, design) + 1e-9 * np.eye(3)
+    inverse = np.linalg.inv(normal)
+    sigma2 = (per_sector * mean**2).sum(axis=1) / max(SECTORS - 3, 1)
+    covariance = inverse * np.maximum(sigma2, 1.0)[:, None, None]
+    circles.u_centre_px = np.sqrt((covariance[:, 0, 0] + covariance[:, 1, 1]) / 2)
+    circles.u_radius_px = np.sqrt(covariance[:, 2, 2])
+    circles.support = (seen & (np.abs(mean) < 0.3)).mean(axis=1)
