@@ -1,4 +1,4 @@
-"""All circles of balls in a capture, with or without a mask."""
+"""All circles of balls in a capture: candidates, tests, silhouettes."""
 
 from __future__ import annotations
 
@@ -14,54 +14,139 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bgars.balls.levels import Levels
+    from bgars.records import FloatArray
 
 __all__ = ["find_circles"]
 
 WORKING_SIZE_PX = 512
 FLOOR_LEVELS = 2.0
+SMALLEST_RADIUS_PX = 3.5
+"""In the reduced images: fewer pixels show no rim."""
 MIN_SHARE = 0.7
-MIN_SUPPORT = 0.6
+MIN_SHARE_LIKE_OTHERS = 0.45
+MIN_STRENGTH = 0.2
+MIN_OUTWARD = 0.3
+MIN_ALIGNMENT = 0.6
+OUTER_STRENGTH = 0.8
+OUTER_STRENGTH_OF_HIGHLIGHTS = 0.35
+HIGHLIGHT_RATIO = 2.5
+"""A rim around another one wins from such a fraction of its strength on: highlights make strong rims inside balls, the
+smaller the more likely."""
+MIN_SUPPORT = 0.5
+MAX_U_RADIUS = 0.1
+LIKE_OTHERS = (0.8, 1.25)
+ODD_SIZE = 1.35
+USUAL_STRENGTH = 0.5
 
 
 def find_circles(levels: Levels) -> Circles:
+    """Find the silhouettes of all balls.
+
+    Parameters
+    ----------
+    levels : Levels
+        The capture.
+    """
     factor = max(1, max(levels.height, levels.width) // WORKING_SIZE_PX)
     capture = levels.capture
     reduced = levels.reduced(factor)
     pixel_um = None if capture.pixel_pitch_um is None else capture.pixel_pitch_um * factor
-    slope_x, slope_y = slope_field(reduced, capture.rig, pixel_um, FLOOR_LEVELS)
-    centres = np.array(outward_centres(slope_x, slope_y)).reshape(-1, 4)
+    slopes = slope_field(reduced, capture.rig, pixel_um, FLOOR_LEVELS)
+    centres = np.array(outward_centres(*slopes)).reshape(-1, 4)
     centres = centres[_best_of_place(centres)]
-    row, col = ((centres[:, i] + 0.5) * factor - 0.5 for i in (0, 1))
-    coarse = scan_rims(levels, row, col, centres[:, 2] * factor)
-    keep = _without_overlaps(coarse)
-    if not len(keep):
-        return Circles(*(np.zeros(0) for _ in range(6)), np.zeros((0, 24)))
-    circles, _ = fit_rims(levels, *(column[keep] for column in coarse[:3]))
-    return circles
+    coarse = _accepted(scan_rims(reduced, *centres[:, :3].T), slopes, MIN_SHARE)
+    if len(coarse.row) > 1:
+        usual_px = float(np.median(coarse.radius_px))
+        rest = centres[_outside(centres, coarse)]
+        scale_px = np.full(len(rest), usual_px)
+        more = scan_rims(reduced, rest[:, 0], rest[:, 1], scale_px, span=LIKE_OTHERS, rims=1)
+        more = _take(more, np.abs(np.log(more.radius_px / usual_px)) < np.log(LIKE_OTHERS[1]))
+        more = _accepted(more, slopes, MIN_SHARE_LIKE_OTHERS)
+        coarse = _merged(coarse, more, usual_px)
+    row, col = ((column + 0.5) * factor - 0.5 for column in coarse[:2])
+    circles = fit_rims(levels, row, col, coarse.radius_px * factor)
+    good = (circles.support >= MIN_SUPPORT) & (circles.u_radius_px < MAX_U_RADIUS * circles.radius_px)
+    return circles.take(np.flatnonzero(good))
+
+
+def _accepted(coarse: CoarseCircles, slopes: tuple[FloatArray, FloatArray], share: float) -> CoarseCircles:
+    """Circles with a rim all around, whose inside slopes outward, one a place."""
+    coarse = _take(
+        coarse,
+        (coarse.share >= share) & (coarse.strength >= MIN_STRENGTH) & (coarse.radius_px >= SMALLEST_RADIUS_PX),
+    )
+    outward, alignment = _inside(coarse, slopes)
+    coarse = _take(coarse, (outward >= MIN_OUTWARD) & (alignment >= MIN_ALIGNMENT))
+    return _without_overlaps(coarse)
+
+
+def _inside(
+    coarse: CoarseCircles, slopes: tuple[FloatArray, FloatArray]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean outward slope inside each circle, and its fraction of the mean slope: 2/3 and 1 for a sphere."""
+    radii = np.sqrt((np.arange(12) + 0.5) / 12)
+    angles = np.arange(24) * (2 * np.pi / 24)
+    x, y = (np.outer(radii, side(angles)).ravel() for side in (np.cos, np.sin))
+    row = np.rint(coarse.row[:, None] - coarse.radius_px[:, None] * y).astype(np.intp)
+    col = np.rint(coarse.col[:, None] + coarse.radius_px[:, None] * x).astype(np.intp)
+    height, width = slopes[0].shape
+    seen = (row >= 0) & (row < height) & (col >= 0) & (col < width)
+    slope_x, slope_y = (slope[row.clip(0, height - 1), col.clip(0, width - 1)] * seen for slope in slopes)
+    distance = np.hypot(x, y)
+    outward = ((slope_x * x + slope_y * y) / distance).sum(axis=1)
+    size = np.hypot(slope_x, slope_y).sum(axis=1)
+    return outward / np.maximum(seen.sum(axis=1), 1), outward / np.maximum(size, 1e-9)
+
+
+def _take(coarse: CoarseCircles, index: NDArray[np.generic]) -> CoarseCircles:
+    return CoarseCircles(*(column[index] for column in coarse))
 
 
 def _best_of_place(centres: NDArray[np.float64]) -> NDArray[np.intp]:
     """Indices of centres (best first) that no better one of about the same scale is next to."""
     keep: list[int] = []
     for index, (row, col, scale_px, _) in enumerate(centres):
-        if keep:
-            other = centres[keep]
-            distance = np.hypot(other[:, 0] - row, other[:, 1] - col)
-            ratio = scale_px / other[:, 2]
-            if ((distance < 0.3 * np.minimum(scale_px, other[:, 2]) + 1) & (ratio < 2.0) & (ratio > 0.5)).any():
-                continue
-        keep.append(index)
+        other = centres[keep]
+        distance = np.hypot(other[:, 0] - row, other[:, 1] - col)
+        ratio = scale_px / other[:, 2]
+        if not ((distance < 0.3 * np.minimum(scale_px, other[:, 2]) + 1) & (ratio < 2.0) & (ratio > 0.5)).any():
+            keep.append(index)
     return np.array(keep, np.intp)
 
 
-def _without_overlaps(coarse: CoarseCircles) -> NDArray[np.intp]:
-    """Indices of circles with rims all around, strongest first, that do not run far into a stronger one."""
+def _outside(centres: NDArray[np.float64], coarse: CoarseCircles) -> NDArray[np.intp]:
+    """Indices of centres outside all circles, and of a scale that one like the others would have."""
+    distance = np.hypot(centres[:, :1] - coarse.row, centres[:, 1:2] - coarse.col)
+    ratio = centres[:, 2] / np.median(coarse.radius_px)
+    odd = np.abs(np.log(coarse.radius_px / np.median(coarse.radius_px))) > np.log(ODD_SIZE)
+    free = ((distance > coarse.radius_px) | odd).all(axis=1)
+    return np.flatnonzero(free & (ratio > 0.6) & (ratio < 3.0))
+
+
+def _merged(coarse: CoarseCircles, more: CoarseCircles, usual_px: float) -> CoarseCircles:
+    """Both sets; a circle of the usual size takes the place of an odd one that it meets, if its rim is not much weaker."""
+    distance = np.hypot(coarse.row[:, None] - more.row, coarse.col[:, None] - more.col)
+    odd = np.abs(np.log(coarse.radius_px / usual_px)) > np.log(ODD_SIZE)
+    meets = distance < 0.85 * np.minimum(coarse.radius_px[:, None] + more.radius_px, 1.3 * usual_px)
+    better = more.strength >= USUAL_STRENGTH * coarse.strength[:, None]
+    replaced = (meets & better & odd[:, None]).any(axis=1)
+    kept = _take(coarse, ~replaced)
+    distance, radius_px = distance[~replaced], kept.radius_px
+    free = (distance >= 0.85 * (radius_px[:, None] + more.radius_px)).all(axis=0)
+    return CoarseCircles(*(np.concatenate(pair) for pair in zip(kept, _take(more, free), strict=True)))
+
+
+def _without_overlaps(coarse: CoarseCircles) -> CoarseCircles:
+    """Keep the outer one of nested circles, and of those that run into each other the one with the stronger rim."""
+    distance = np.hypot(coarse.row[:, None] - coarse.row, coarse.col[:, None] - coarse.col)
+    radius = coarse.radius_px
+    nested = (radius > 1.15 * radius[:, None]) & (distance < 0.35 * radius)
+    needed = np.where(radius > HIGHLIGHT_RATIO * radius[:, None], OUTER_STRENGTH_OF_HIGHLIGHTS, OUTER_STRENGTH)
+    nested &= coarse.strength >= needed * coarse.strength[:, None]
+    coarse = _take(coarse, ~nested.any(axis=1))
     keep: list[int] = []
     for index in np.argsort(-coarse.strength * coarse.share):
-        if coarse.share[index] < MIN_SHARE:
-            continue
-        distance = np.hypot(coarse.row[keep] - coarse.row[index], coarse.col[keep] - coarse.col[index])
-        if (distance < 0.85 * (coarse.radius_px[keep] + coarse.radius_px[index])).any():
-            continue
-        keep.append(int(index))
-    return np.array(keep, np.intp)
+        apart = np.hypot(coarse.row[keep] - coarse.row[index], coarse.col[keep] - coarse.col[index])
+        if not (apart < 0.85 * (coarse.radius_px[keep] + coarse.radius_px[index])).any():
+            keep.append(int(index))
+    return _take(coarse, np.array(keep, np.intp))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,13 +19,21 @@ if TYPE_CHECKING:
 
 __all__ = ["Circles", "RimPixels", "fit_rims"]
 
+import os
+DEBUG=os.environ.get('DBG')
 SECTORS = 24
 BASIS = 7
 """Board, step, root, ramp inside, ramp outside, board along the rim, step along the rim."""
-FIT_ROUNDS = 5
+WIDE_ROUNDS = 3
+NARROW_ROUNDS = 3
+FIRST_BLUR_PX = 0.3
+REACH_PX = 14.0
 REWEIGHTINGS = 12
 MODEL_ERROR_PX = 0.03
 LARGEST_STEP_PX = 1.5
+POOL_BALLS = 6
+BLUR_BALLS = 12
+BLURS_PX = (0.0, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)
 NOISE_FLOOR = 0.15
 """Grey levels of 255 below which residuals are quantisation."""
 
@@ -53,6 +62,10 @@ class Circles:
     support: NDArray[np.float64]
     offsets_px: NDArray[np.float64]
 
+    def take(self, index) -> Circles:
+        """Some of the circles."""
+        return Circles(*(getattr(self, field.name)[index] for field in fields(self)))
+
 
 class RimPixels:
     """Pixels around the rims, sorted into sectors of equal angle and padded to equal number.
@@ -67,9 +80,18 @@ class RimPixels:
         Grey levels.
     """
 
-    def __init__(self, levels: Levels, row: NDArray[np.float64], col: NDArray[np.float64],
-                 radius_px: NDArray[np.float64], in_px: NDArray[np.float64], out_px: NDArray[np.float64]) -> None:
+    def __init__(
+        self,
+        levels: Levels,
+        circles: Circles,
+        in_px: NDArray[np.float64],
+        out_px: NDArray[np.float64],
+        every: int,
+    ) -> None:
+        row, col, radius_px = circles.row, circles.col, circles.radius_px
         height, width = levels.height, levels.width
+        directions = levels.capture.rig.directions
+        self.azimuths_rad = np.arctan2(directions[:, 1], directions[:, 0])
         self.anchor_row = np.rint(row).astype(np.int64)
         self.anchor_col = np.rint(col).astype(np.int64)
         parts = []
@@ -79,7 +101,8 @@ class RimPixels:
             y = (self.anchor_row[ball] + span - row[ball])[:, None]
             x = (self.anchor_col[ball] + span - col[ball])[None, :]
             distance = np.sqrt(x * x + y * y)
-            near = np.flatnonzero((distance > radius_px[ball] - in_px[ball]) & (distance < radius_px[ball] + out_px[ball]))
+            depth = radius_px[ball] - distance
+            near = np.flatnonzero((depth < in_px[ball]) & (depth > -out_px[ball]))[::every]
             r, c = np.divmod(near, len(span))
             angle = np.arctan2(-y[r, 0], x[0, c])
             sector = np.floor((angle / (2 * math.pi) % 1.0) * SECTORS).astype(np.int64) % SECTORS
@@ -104,25 +127,72 @@ class RimPixels:
         self.levels = levels.at(pixels) * self.weight
         self.clipped = (levels.clipped_at(pixels) & (self.weight > 0)).any(axis=3)
 
+    def take(self, index) -> RimPixels:
+        """The pixels of some of the balls."""
+        part = copy.copy(self)
+        for name in ("anchor_row", "anchor_col", "row", "col", "weight"):
+            setattr(part, name, getattr(self, name)[index])
+        part.levels, part.clipped = self.levels[:, index], self.clipped[:, index]
+        return part
 
-def fit_rims(levels: Levels, row: NDArray[np.float64], col: NDArray[np.float64], radius_px: NDArray[np.float64],
-             *, blur_px: float | None = None) -> tuple[Circles, float]:
-    """Fit the circle of each ball to the rim in all lights."""
-    in_px = np.clip(0.2 * radius_px, 3.0, 8.0)
-    out_px = np.clip(0.14 * radius_px, 2.5, 5.0)
-    pixels = RimPixels(levels, row, col, radius_px, in_px, out_px)
-    table = RimTable(0.3 if blur_px is None else blur_px, 12.0)
-    circles = Circles(row.astype(float), col.astype(float), radius_px.astype(float), *(np.zeros(len(row)) for _ in range(3)),
-                      np.zeros((len(row), SECTORS)))
-    for round_ in range(FIT_ROUNDS):
-        if round_ == FIT_ROUNDS - 2 and blur_px is None:
-            sigmas = (0.0, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)
-            tables = [RimTable(s, 12.0) for s in sigmas]
-            costs = [_cost(pixels, circles, t) for t in tables]
-            table = tables[int(np.argmin(costs))]
-        offset, variance = _sector_offsets(pixels, circles, table)
-        _update(circles, offset, variance, radius_px, in_px)
-    return circles, table.blur_px
+
+def fit_rims(
+    levels: Levels,
+    row: NDArray[np.float64],
+    col: NDArray[np.float64],
+    radius_px: NDArray[np.float64],
+    *,
+    blur_px: float | None = None,
+) -> Circles:
+    """Fit the circle of each ball to its rim in all lights.
+
+    First on every few pixels of a wide band, then on all pixels of a narrow one.
+
+    Parameters
+    ----------
+    levels : Levels
+        The capture.
+    row, col, radius_px : (N,) float64
+        Circles to start from, good to a tenth of the radius.
+    blur_px : float, optional
+        Standard deviation of the lens blur; found from the images by default.
+    """
+    circles = Circles(
+        row + 0.0, col + 0.0, radius_px + 0.0, *(np.zeros(len(row)) for _ in range(3)), np.zeros((len(row), SECTORS))
+    )
+    if not len(row):
+        return circles
+    table = RimTable(FIRST_BLUR_PX if blur_px is None else blur_px, REACH_PX)
+    pixels = RimPixels(levels, circles, np.clip(0.2 * radius_px, 4.0, 9.0), np.clip(0.2 * radius_px, 4.0, 9.0), 3)
+    for _ in range(WIDE_ROUNDS):
+        _update(circles, *_sector_offsets(pixels, circles, table))
+    radius_px = circles.radius_px.clip(0.5 * radius_px, 2.0 * radius_px)
+    pixels = RimPixels(levels, circles, np.clip(0.15 * radius_px, 3.0, 6.0), np.clip(0.14 * radius_px, 2.5, 5.0), 1)
+    for turn in range(NARROW_ROUNDS):
+        if turn == 1 and blur_px is None:
+            table = RimTable(_estimated_blur(pixels, circles), REACH_PX)
+        _update(circles, *_sector_offsets(pixels, circles, table))
+    return circles
+
+
+def _estimated_blur(pixels: RimPixels, circles: Circles) -> float:
+    """The lens blur that leaves the least, over the best-fitting third of sectors and lights, parabola through three."""
+    some = slice(None, None, max(1, len(circles.row) // BLUR_BALLS))
+    costs = []
+    for blur_px in BLURS_PX:
+        left, contrast = _left_over(pixels.take(some), circles.take(some), RimTable(blur_px, REACH_PX))
+        if not costs:
+            best = contrast >= np.quantile(contrast, 2 / 3)
+            best &= left <= np.median(left[best])
+            if DEBUG:
+                print('n best', best.sum())
+        costs.append(float(np.mean(np.log(left[best] + 0.02))))
+    if DEBUG: print(np.round(costs,3))
+    at = int(np.argmin(costs))
+    if not 0 < at < len(BLURS_PX) - 1:
+        return BLURS_PX[at]
+    curve = np.polyfit(BLURS_PX[at - 1 : at + 2], costs[at - 1 : at + 2], 2)
+    return float(-curve[1] / (2 * curve[0]))
 
 
 def _columns(pixels: RimPixels, circles: Circles, table: RimTable) -> FloatArray:
@@ -169,7 +239,7 @@ def _solve(pixels: RimPixels, circles: Circles, table: RimTable):
 def _sector_offsets(pixels: RimPixels, circles: Circles, table: RimTable):
     """(N, S, L) outward offset of the rim in each sector and light, and its variance."""
     _, rest, coefficients, count, _ = _solve(pixels, circles, table)
-    slope = coefficients[..., [1, 2, 3, 4, 6], :]  # (N,S,5,L)
+    slope = _pooled(coefficients[..., [1, 2, 3, 4, 6], :], pixels.azimuths_rad)
     dd = np.einsum("nskl,nskm,nsml->nsl", slope, rest[..., :5, :5], slope)
     de = np.einsum("nskl,nskl->nsl", slope, rest[..., :5, 5:])
     ee = np.einsum("nsll->nsl", rest[..., 5:, 5:])
@@ -182,13 +252,38 @@ def _sector_offsets(pixels: RimPixels, circles: Circles, table: RimTable):
     return np.clip(offset, -3.0, 3.0), variance
 
 
-def _cost(pixels: RimPixels, circles: Circles, table: RimTable) -> float:
+def _pooled(slope, azimuths_rad):
+    """(N, S, 5, L) medians of the coefficients over all balls.
+
+    The derivative must not come from the pixels that it is applied to: noise would enter twice and pull rims inward.
+    """
+    balls, _, terms, lights = slope.shape
+    if balls >= POOL_BALLS:
+        return np.broadcast_to(np.median(slope, axis=0), slope.shape)
+    pooled = np.zeros((1, *slope.shape[1:]))
+    mid = (np.arange(SECTORS) + 0.5) * (2 * math.pi / SECTORS)
+    turn = np.rint((mid[:, None] - azimuths_rad) / (2 * math.pi / SECTORS)).astype(int) % SECTORS
+    by_turn = np.zeros((SECTORS, terms))
+    flat = np.moveaxis(slope, 2, 3)  # (N, S, L, 5)
+    for index in range(SECTORS):
+        here = flat[:, turn == index]
+        if here.size:
+            by_turn[index] = np.median(here.reshape(-1, terms), axis=0)
+    pooled[0] = np.moveaxis(by_turn[turn], 2, 1)
+    return np.broadcast_to(pooled, slope.shape)
+
+
+def _left_over(pixels: RimPixels, circles: Circles, table: RimTable):
+    """(N, S, L) mean squared residual, each sector and light with the rim where it likes it best."""
     _, rest, coefficients, count, _ = _solve(pixels, circles, table)
-    ee = np.einsum("nsll->nsl", rest[..., 5:, 5:])
-    return float(np.median(np.sqrt(np.maximum(ee, 0))))
+    slope = coefficients[..., [1, 2, 3, 4, 6], :]
+    dd = np.einsum("nskl,nskm,nsml->nsl", slope, rest[..., :5, :5], slope)
+    de = np.einsum("nskl,nskl->nsl", slope, rest[..., :5, 5:])
+    left = np.einsum("nsll->nsl", rest[..., 5:, 5:]) - de**2 / np.maximum(dd, 1e-9)
+    return np.maximum(left, 0.0) / np.maximum(count - BASIS - 1, 1.0)[..., None], dd
 
 
-def _update(circles: Circles, offset, variance, radius0, in_px) -> None:
+def _update(circles: Circles, offset, variance) -> None:
     """One step of the three parameters of each circle, all sectors and lights together, outliers down-weighted."""
     mid = (np.arange(SECTORS) + 0.5) * (2 * math.pi / SECTORS)
     design = np.stack([np.cos(mid), np.sin(mid), np.ones(SECTORS)], axis=1)  # x right, y up, radius

@@ -26,7 +26,7 @@ class RimTable:
 
     Near the rim of a sphere n_z = sqrt(2 t / R) with t the depth inside the silhouette, so radiance is a series in
     sqrt(t) there. A pixel averages it over a box; along a direction the box is two boxes of widths |cos| and |sin|,
-    one after the other; a third box with the variance of the blur stands for the Gaussian. Averages over boxes are
+    one after the other; two more with the variance of the blur stand for the Gaussian. Averages over boxes are
     differences of repeated integrals, in closed form for powers of t.
 
     Parameters
@@ -46,8 +46,9 @@ class RimTable:
         depth_px = self.first_px + np.arange(count) / STEPS_PER_PX
         angles_rad = np.linspace(0.0, math.pi / 4, ANGLES)
         table = np.zeros((ANGLES, count, 2 * SHAPES))
+        soft = math.sqrt(6.0) * blur_px
         for index, angle in enumerate(angles_rad):
-            widths = [max(w, THINNEST_PX) for w in (math.cos(angle), math.sin(angle), math.sqrt(12.0) * blur_px)]
+            widths = [max(w, THINNEST_PX) for w in (math.cos(angle), math.sin(angle), soft, soft)]
             table[index] = _profiles(depth_px, widths)
         self.table: FloatArray = table.reshape(-1, 2 * SHAPES).astype(np.float32)
 
@@ -67,22 +68,22 @@ class RimTable:
 
 
 def _profiles(depth_px: NDArray[np.float64], widths_px: list[float]) -> NDArray[np.float64]:
-    """(T, 2 SHAPES): averages over three boxes of the step, root and ramps, then their derivatives."""
+    """(T, 2 SHAPES): averages over four boxes of the step, root and ramps, then their derivatives."""
     profiles = np.zeros((len(depth_px), 2 * SHAPES))
     volume = math.prod(widths_px)
-    for corner in range(8):
-        signs = [1 if corner >> bit & 1 else -1 for bit in range(3)]
+    for corner in range(16):
+        signs = [1 if corner >> bit & 1 else -1 for bit in range(4)]
         shift = sum(sign * width / 2 for sign, width in zip(signs, widths_px, strict=True))
         weight = math.prod(signs) / volume
         inside = np.maximum(depth_px + shift, 0.0)
         outside = np.maximum(-depth_px - shift, 0.0)
         root = np.sqrt(inside)
-        profiles[:, 0] += weight * inside**3 / 6
-        profiles[:, 1] += weight * inside**3 * root * (8 / 105)
-        profiles[:, 2] += weight * inside**4 / 24
-        profiles[:, 3] -= weight * outside**4 / 24
-        profiles[:, 4] += weight * inside**2 / 2
-        profiles[:, 5] += weight * inside**2 * root * (4 / 15)
-        profiles[:, 6] += weight * inside**3 / 6
-        profiles[:, 7] += weight * outside**3 / 6
+        profiles[:, 0] += weight * inside**4 / 24
+        profiles[:, 1] += weight * inside**4 * root * (16 / 945)
+        profiles[:, 2] += weight * inside**5 / 120
+        profiles[:, 3] += weight * outside**5 / 120
+        profiles[:, 4] += weight * inside**3 / 6
+        profiles[:, 5] += weight * inside**3 * root * (8 / 105)
+        profiles[:, 6] += weight * inside**4 / 24
+        profiles[:, 7] -= weight * outside**4 / 24
     return profiles

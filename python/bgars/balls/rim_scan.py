@@ -10,15 +10,18 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bgars.balls.levels import Levels
+    from bgars.records import FloatArray
 
 __all__ = ["CoarseCircles", "scan_rims"]
 
-DIRECTIONS = 32
-RADII = 56
-SMALLEST, LARGEST = 0.3, 1.5
-"""Radii to try, in scales of the centre."""
+DIRECTIONS = 24
+RADII = 48
+PEAK_ADVANTAGE = 100.0
 CHUNK = 256
+SIDE = 4
+"""Radii between a rim and what must be smoother than it."""
+DARK_LEVELS = 0.3
+"""Grey levels added before the square root, which evens out the noise."""
 
 
 class CoarseCircles(NamedTuple):
@@ -32,66 +35,90 @@ class CoarseCircles(NamedTuple):
 
 
 def scan_rims(
-    levels: Levels, row: NDArray[np.float64], col: NDArray[np.float64], scale_px: NDArray[np.float64]
+    image: FloatArray,
+    row: NDArray[np.float64],
+    col: NDArray[np.float64],
+    scale_px: NDArray[np.float64],
+    *,
+    span: tuple[float, float] = (0.3, 1.5),
+    rims: int = 2,
 ) -> CoarseCircles:
     """Find the circle of the strongest rim around each centre.
 
     An edge of a highlight, a shadow or a texture shows in one or two lights or on one side; the rim of a ball shows at
     the same radius in every direction, each time in about half of the lights. So: the third largest edge over lights,
-    its lower quartile over directions, its maximum over radii.
+    its lower quartile over directions, its maximum over radii, less the edges farther in and out, because shading is
+    smooth and a rim is sharp.
+
+    Parameters
+    ----------
+    image : (L, H, W) float32
+        Linear grey levels of 255.
+    row, col, scale_px : (N,) float64
+        Centres and scales, in pixels of `image`.
+    span : (float, float)
+        Radii to try, in scales.
+    rims : int
+        Radii to follow up for each centre.
     """
+    if not len(row):
+        return CoarseCircles(*(np.zeros(0) for _ in range(5)))
+    roots = np.sqrt(np.maximum(image, 0.0) + np.float32(DARK_LEVELS))
     parts = [
-        _scan(levels, row[at : at + CHUNK], col[at : at + CHUNK], scale_px[at : at + CHUNK])
+        _scan(roots, row[at : at + CHUNK], col[at : at + CHUNK], scale_px[at : at + CHUNK], span, rims)
         for at in range(0, len(row), CHUNK)
     ]
     return CoarseCircles(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-def _scan(levels: Levels, row, col, scale_px) -> CoarseCircles:
+def _scan(roots: FloatArray, row, col, scale_px, span, rims) -> CoarseCircles:
     angle = (np.arange(DIRECTIONS) + 0.5) * (2 * math.pi / DIRECTIONS)
-    ratio = np.geomspace(SMALLEST, LARGEST, RADII)
-    row, col = row.copy(), col.copy()
-    radius_px = scale_px.copy()
-    wide = True
-    for turn in range(3):
-        radii = radius_px[:, None] * (ratio if wide else np.geomspace(0.75, 1.33, 33))
-        edge = _edges(levels, row, col, radii, angle)  # (N, A, radii)
-        if wide:
-            blurred = np.maximum(edge, np.maximum(np.roll(edge, 1, axis=2), np.roll(edge, -1, axis=2)))
-            quartile = np.quantile(blurred, 0.25, axis=1) + 0.25 * np.median(edge, axis=1)
-            best = np.argmax(quartile[:, 1:-1], axis=1) + 1
-            radius_px = np.take_along_axis(radii, best[:, None], axis=1)[:, 0]
-            wide = False
-        else:
-            tent = np.maximum(0.02, 1.0 - np.abs(np.log(np.geomspace(0.75, 1.33, 33))) / (0.3 if turn == 1 else 0.15))
-            pick = np.argmax(edge * tent, axis=2)
-            weight = np.take_along_axis(edge, pick[..., None], axis=2)[..., 0]
-            found = np.take_along_axis(radii[:, None, :] + 0 * edge, pick[..., None], axis=2)[..., 0]
-            step = _circle_step(found - radius_px[:, None], weight, angle, radius_px)
-            col += step[:, 0]
-            row -= step[:, 1]
-            radius_px = radius_px + step[:, 2]
-    radii = radius_px[:, None] * np.geomspace(0.6, 1.5, 37)
-    edge = _edges(levels, row, col, radii, angle)
-    middle = int(np.argmin(np.abs(np.geomspace(0.6, 1.5, 37) - 1.0)))
+    radii = scale_px[:, None] * np.geomspace(*span, RADII)
+    edge = _edges(roots, row, col, radii, angle)
+    wide = np.maximum(edge, np.maximum(np.roll(edge, 1, axis=2), np.roll(edge, -1, axis=2)))
+    profile = np.quantile(wide, 0.25, axis=1) + 0.25 * np.median(edge, axis=1)
+    around = np.pad(profile, ((0, 0), (SIDE, SIDE)), mode="edge")
+    sharp = profile - 0.5 * (around[:, : -2 * SIDE] + around[:, 2 * SIDE :])
+    around = np.pad(sharp, ((0, 0), (2, 2)), constant_values=-np.inf)
+    neighbours = np.max([around[:, shift : shift + RADII] for shift in (0, 1, 3, 4)], axis=0)
+    sharp = np.where(sharp >= neighbours, sharp, sharp - PEAK_ADVANTAGE)
+    best = np.argsort(-sharp[:, 1:-1], axis=1)[:, :rims] + 1
+    radius_px = np.take_along_axis(radii, best, axis=1).ravel()
+    row, col = np.repeat(row, rims), np.repeat(col, rims)
+    near = np.geomspace(0.75, 1.33, 33)
+    for reach in (0.3, 0.15):
+        radii = radius_px[:, None] * near
+        edge = _edges(roots, row, col, radii, angle)
+        pick = np.argmax(edge * np.maximum(0.02, 1.0 - np.abs(np.log(near)) / reach), axis=2)
+        weight = np.take_along_axis(edge, pick[..., None], axis=2)[..., 0]
+        found = np.take_along_axis(radii, pick, axis=1)
+        step = _circle_step(found - radius_px[:, None], weight, angle, radius_px)
+        col += step[:, 0]
+        row -= step[:, 1]
+        radius_px = radius_px + step[:, 2]
+    around_rim = np.geomspace(0.6, 1.5, 37)
+    edge = _edges(roots, row, col, radius_px[:, None] * around_rim, angle)
+    middle = int(np.argmin(np.abs(around_rim - 1.0)))
     rim = edge[:, :, middle - 2 : middle + 3].max(axis=2)
-    typical = np.median(edge, axis=2)
-    share = (rim > 2.0 * typical + 0.15).mean(axis=1)
+    share = (rim > 2.0 * np.median(edge, axis=2) + 0.1).mean(axis=1)
     return CoarseCircles(row, col, radius_px, np.quantile(rim, 0.25, axis=1), share)
 
 
-def _edges(levels: Levels, row, col, radii, angle):
+def _edges(roots: FloatArray, row, col, radii, angle):
     """(N, A, radii) third largest over lights of the change of sqrt(level) from ring to ring."""
-    r = np.rint(row[:, None, None] - np.sin(angle)[:, None] * radii[:, None, :]).astype(np.int64)
-    c = np.rint(col[:, None, None] + np.cos(angle)[:, None] * radii[:, None, :]).astype(np.int64)
-    inside = (r >= 0) & (r < levels.height) & (c >= 0) & (c < levels.width)
-    pixels = np.where(inside, r * levels.width + c, 0)
-    value = np.sqrt(np.maximum(levels.at(pixels), 0.0) + 1.0)
+    lights, height, width = roots.shape
+    r = np.rint(row[:, None, None] - np.sin(angle)[:, None] * radii[:, None, :]).astype(np.int32)
+    c = np.rint(col[:, None, None] + np.cos(angle)[:, None] * radii[:, None, :]).astype(np.int32)
+    inside = (r >= 0) & (r < height) & (c >= 0) & (c < width)
+    pixels = np.where(inside, r * width + c, 0)
+    value = roots.reshape(lights, -1).take(pixels, axis=1)
+    # Over three neighbouring directions: along a rim nothing changes, and noise falls.
+    value = value + np.roll(value, 1, axis=2) + np.roll(value, -1, axis=2)
     edge = np.zeros_like(value)
-    edge[..., 1:-1] = np.abs(value[..., 2:] - value[..., :-2])
-    edge[..., 1:-1] *= inside[:, :, 2:] & inside[:, :, :-2]
-    rank = max(1, round(len(value) * 3 / 8))
-    return np.partition(edge, len(value) - rank, axis=0)[len(value) - rank]
+    np.abs(value[..., 2:] - value[..., :-2], out=edge[..., 1:-1])
+    edge[..., 1:-1] *= (inside[:, :, 2:] & inside[:, :, :-2]) * np.float32(1.0 / 3.0)
+    rank = max(1, round(lights * 3 / 8))
+    return np.partition(edge, lights - rank, axis=0)[lights - rank]
 
 
 def _circle_step(residual, weight, angle, radius_px):
