@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from bgars.balls.mask_blobs import round_blobs
 from bgars.balls.outward import outward_centres, slope_field
-from bgars.balls.rim_fit import Circles, fit_rims
+from bgars.balls.rim_fit import SECTORS, Circles, fit_rims
 from bgars.balls.rim_scan import CoarseCircles, scan_rims
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from bgars.balls.levels import Levels
-    from bgars.records import FloatArray
+    from bgars.records import BoolArray, FloatArray
 
-__all__ = ["find_circles"]
+__all__ = ["Detection", "find_circles"]
 
 WORKING_SIZE_PX = 512
 FLOOR_LEVELS = 2.0
@@ -37,21 +40,88 @@ MAX_U_RADIUS = 0.1
 LIKE_OTHERS = (0.8, 1.25)
 ODD_SIZE = 1.35
 USUAL_STRENGTH = 0.5
+ENOUGH_TO_JUDGE_SIZE = 3
+SMALLEST_OF_USUAL = 0.35
+MIN_COVERED = 0.97
 
 
-def find_circles(levels: Levels) -> Circles:
+class Detection(NamedTuple):
+    """Circles, and the reduced images they were found in.
+
+    Attributes
+    ----------
+    circles : Circles
+        In array coordinates of the full images.
+    slopes : two (H', W') float32
+        Slope along x and y (:func:`bgars.balls.outward.slope_field`).
+    brightest : (H', W') float32
+        Highest level over the lights.
+    factor : int
+        Pixels of the full images a reduced pixel is wide.
+    """
+
+    circles: Circles
+    slopes: tuple[FloatArray, FloatArray]
+    brightest: FloatArray
+    factor: int
+
+
+def find_circles(levels: Levels, progress: Callable[[float], object] | None) -> Detection:
     """Find the silhouettes of all balls.
 
     Parameters
     ----------
     levels : Levels
         The capture.
+    progress : callable or None
+        Called with the fraction done.
     """
-    factor = max(1, max(levels.height, levels.width) // WORKING_SIZE_PX)
+    report = progress or (lambda _: None)
     capture = levels.capture
+    factor = max(1, max(levels.height, levels.width) // WORKING_SIZE_PX)
     reduced = levels.reduced(factor)
+    report(0.15)
     pixel_um = None if capture.pixel_pitch_um is None else capture.pixel_pitch_um * factor
     slopes = slope_field(reduced, capture.rig, pixel_um, FLOOR_LEVELS)
+    height, width = slopes[0].shape
+    mask = None if capture.mask.all() else capture.mask[: height * factor : factor, : width * factor : factor]
+    if mask is not None:
+        slopes = (slopes[0] * mask, slopes[1] * mask)
+    brightest = reduced.max(axis=0)
+    blobs = None if mask is None else _blobs_that_are_balls(capture.mask, slopes, factor)
+    if blobs is not None and len(blobs.row):
+        return Detection(blobs, slopes, brightest, factor)
+    coarse = _coarse_circles(reduced, slopes, mask)
+    report(0.4)
+    row, col = ((column + 0.5) * factor - 0.5 for column in coarse[:2])
+    circles = fit_rims(levels, row, col, coarse.radius_px * factor)
+    good = (circles.support >= MIN_SUPPORT) & (circles.u_radius_px < MAX_U_RADIUS * circles.radius_px)
+    good &= np.abs(np.log(circles.radius_px / (coarse.radius_px * factor))) < np.log(LIKE_OTHERS[1])
+    report(0.95)
+    return Detection(circles.take(np.flatnonzero(good)), slopes, brightest, factor)
+
+
+def _blobs_that_are_balls(mask: BoolArray, slopes: tuple[FloatArray, FloatArray], factor: int) -> Circles:
+    """Round blobs of the mask whose inside slopes outward everywhere, as circles."""
+    blobs = round_blobs(mask)
+    row, col = ((column + 0.5) / factor - 0.5 for column in blobs[:2])
+    seen = CoarseCircles(row, col, blobs.radius_px / factor, blobs.rms_px, blobs.rms_px)
+    outward, alignment = _inside(seen, slopes)
+    good = (outward >= MIN_OUTWARD) & (alignment >= MIN_ALIGNMENT)
+    row, col, radius_px, rms_px = (column[good] for column in blobs)
+    # Someone drew the mask: its outline may be off as a whole by as much as it is uneven.
+    outline = np.sqrt(2.0 * np.pi * radius_px)
+    return Circles(row, col, radius_px, rms_px * 2.0 / outline + 0.1, rms_px, np.ones(len(row)), _no_offsets(len(row)))
+
+
+def _no_offsets(count: int) -> NDArray[np.float64]:
+    return np.full((count, SECTORS), np.nan)
+
+
+def _coarse_circles(
+    reduced: FloatArray, slopes: tuple[FloatArray, FloatArray], mask: BoolArray | None
+) -> CoarseCircles:
+    """Circles to a pixel or two, in reduced pixels."""
     centres = np.array(outward_centres(*slopes)).reshape(-1, 4)
     centres = centres[_best_of_place(centres)]
     coarse = _accepted(scan_rims(reduced, *centres[:, :3].T), slopes, MIN_SHARE)
@@ -61,12 +131,23 @@ def find_circles(levels: Levels) -> Circles:
         scale_px = np.full(len(rest), usual_px)
         more = scan_rims(reduced, rest[:, 0], rest[:, 1], scale_px, span=LIKE_OTHERS, rims=1)
         more = _take(more, np.abs(np.log(more.radius_px / usual_px)) < np.log(LIKE_OTHERS[1]))
-        more = _accepted(more, slopes, MIN_SHARE_LIKE_OTHERS)
-        coarse = _merged(coarse, more, usual_px)
-    row, col = ((column + 0.5) * factor - 0.5 for column in coarse[:2])
-    circles = fit_rims(levels, row, col, coarse.radius_px * factor)
-    good = (circles.support >= MIN_SUPPORT) & (circles.u_radius_px < MAX_U_RADIUS * circles.radius_px)
-    return circles.take(np.flatnonzero(good))
+        coarse = _merged(coarse, _accepted(more, slopes, MIN_SHARE_LIKE_OTHERS), usual_px)
+    if mask is not None:
+        coarse = _take(coarse, _covered(coarse, mask) > MIN_COVERED)
+    if len(coarse.row) > ENOUGH_TO_JUDGE_SIZE:
+        coarse = _take(coarse, coarse.radius_px > SMALLEST_OF_USUAL * np.median(coarse.radius_px))
+    return coarse
+
+
+def _covered(coarse: CoarseCircles, mask: BoolArray) -> NDArray[np.float64]:
+    """Fraction of each disc, and a little around it, that the mask leaves."""
+    angles = np.arange(48) * (2 * np.pi / 48)
+    radii = np.array([0.3, 0.6, 0.9, 1.05])
+    y, x = (np.outer(radii, side(angles)).ravel() for side in (np.sin, np.cos))
+    row = np.rint(coarse.row[:, None] - coarse.radius_px[:, None] * y).astype(np.intp).clip(0, mask.shape[0] - 1)
+    col = np.rint(coarse.col[:, None] + coarse.radius_px[:, None] * x).astype(np.intp).clip(0, mask.shape[1] - 1)
+    covered: NDArray[np.float64] = mask[row, col].mean(axis=1)
+    return covered
 
 
 def _accepted(coarse: CoarseCircles, slopes: tuple[FloatArray, FloatArray], share: float) -> CoarseCircles:

@@ -1,4 +1,4 @@
-"""The square lattice that most balls stand on, and the names of its places."""
+"""The square lattice that most balls stand on."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["Lattice", "fit_lattice", "place_name"]
+__all__ = ["Lattice", "fit_lattice"]
 
-ROW_LETTERS = "ABCDEFGHJKLMNPRTUVWY"
 ON_LATTICE = 0.3
 """Farthest from its place, in pitches, that a ball still belongs to it."""
 GROWTH = 2.0
@@ -53,22 +52,6 @@ class Lattice(NamedTuple):
         )
 
 
-def place_name(row: int, col: int) -> str:
-    """JEDEC name of a place counted from 0: letters without I, O, Q, S, X, Z; AA after Y.
-
-    Examples
-    --------
-    >>> place_name(0, 0), place_name(8, 11), place_name(20, 0)
-    ('A1', 'J12', 'AA1')
-    """
-    count = len(ROW_LETTERS)
-    letters = ROW_LETTERS[row % count]
-    while row >= count:
-        row = row // count - 1
-        letters = ROW_LETTERS[row % count] + letters
-    return f"{letters}{col + 1}"
-
-
 def fit_lattice(
     x_px: NDArray[np.float64], y_px: NDArray[np.float64], *, pitch_px: float | None = None
 ) -> Lattice | None:
@@ -100,7 +83,11 @@ def fit_lattice(
         close = distance == distance.min()
     turn = np.sum((apart[close] / distance[close]) ** 4)
     basis = pitch_px * np.exp(0.25j * np.angle(turn))
-    seed = int(np.argmax(close.sum(axis=1) - 1e-3 * np.abs(points - np.median(points.real) - 1j * np.median(points.imag)) / pitch_px))
+    seed = int(
+        np.argmax(
+            close.sum(axis=1) - 1e-3 * np.abs(points - np.median(points.real) - 1j * np.median(points.imag)) / pitch_px
+        )
+    )
     origin = points[seed]
     reach = GROWTH * pitch_px
     step = np.zeros(count, np.complex128)

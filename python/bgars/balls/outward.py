@@ -102,8 +102,9 @@ def _outward_mean(slope_x: FloatArray, slope_y: FloatArray, scale_px: float, ste
     """Mean over a disc of the slope along the direction from its centre, on every step-th pixel, interpolated."""
     full_shape = slope_x.shape
     if step > 1:
-        slope_x, slope_y = (ndimage.uniform_filter(slope, step)[step // 2 :: step, step // 2 :: step]
-                            for slope in (slope_x, slope_y))
+        slope_x, slope_y = (
+            ndimage.uniform_filter(slope, step)[step // 2 :: step, step // 2 :: step] for slope in (slope_x, slope_y)
+        )
     radius = scale_px / step
     reach = int(np.ceil(radius))
     x, y = np.meshgrid(np.arange(-reach, reach + 1), np.arange(reach, -reach - 1, -1))

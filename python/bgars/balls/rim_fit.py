@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Circles", "RimPixels", "fit_rims"]
 
-import os
-DEBUG=os.environ.get('DBG')
 SECTORS = 24
 BASIS = 7
 """Board, step, root, ramp inside, ramp outside, board along the rim, step along the rim."""
@@ -184,10 +182,7 @@ def _estimated_blur(pixels: RimPixels, circles: Circles) -> float:
         if not costs:
             best = contrast >= np.quantile(contrast, 2 / 3)
             best &= left <= np.median(left[best])
-            if DEBUG:
-                print('n best', best.sum())
         costs.append(float(np.mean(np.log(left[best] + 0.02))))
-    if DEBUG: print(np.round(costs,3))
     at = int(np.argmin(costs))
     if not 0 < at < len(BLURS_PX) - 1:
         return BLURS_PX[at]
