@@ -27,7 +27,8 @@ SMALLEST_RADIUS_PX = 3.5
 """In the reduced images: fewer pixels show no rim."""
 MIN_SHARE = 0.7
 MIN_SHARE_LIKE_OTHERS = 0.45
-MIN_STRENGTH = 0.2
+MIN_STRENGTH = 0.15
+MIN_STRENGTH_LIKE_OTHERS = 0.08
 MIN_OUTWARD = 0.3
 MIN_ALIGNMENT = 0.6
 OUTER_STRENGTH = 0.8
@@ -39,7 +40,7 @@ MIN_SUPPORT = 0.5
 MAX_U_RADIUS = 0.1
 LIKE_OTHERS = (0.8, 1.25)
 ODD_SIZE = 1.35
-USUAL_STRENGTH = 0.5
+USUAL_STRENGTH = 0.3
 ENOUGH_TO_JUDGE_SIZE = 3
 SMALLEST_OF_USUAL = 0.35
 MIN_COVERED = 0.97
@@ -124,14 +125,14 @@ def _coarse_circles(
     """Circles to a pixel or two, in reduced pixels."""
     centres = np.array(outward_centres(*slopes)).reshape(-1, 4)
     centres = centres[_best_of_place(centres)]
-    coarse = _accepted(scan_rims(reduced, *centres[:, :3].T), slopes, MIN_SHARE)
+    coarse = _accepted(scan_rims(reduced, *centres[:, :3].T), slopes, MIN_SHARE, MIN_STRENGTH)
     if len(coarse.row) > 1:
         usual_px = float(np.median(coarse.radius_px))
         rest = centres[_outside(centres, coarse)]
         scale_px = np.full(len(rest), usual_px)
         more = scan_rims(reduced, rest[:, 0], rest[:, 1], scale_px, span=LIKE_OTHERS, rims=1)
         more = _take(more, np.abs(np.log(more.radius_px / usual_px)) < np.log(LIKE_OTHERS[1]))
-        coarse = _merged(coarse, _accepted(more, slopes, MIN_SHARE_LIKE_OTHERS), usual_px)
+        coarse = _merged(coarse, _accepted(more, slopes, MIN_SHARE_LIKE_OTHERS, MIN_STRENGTH_LIKE_OTHERS), usual_px)
     if mask is not None:
         coarse = _take(coarse, _covered(coarse, mask) > MIN_COVERED)
     if len(coarse.row) > ENOUGH_TO_JUDGE_SIZE:
@@ -150,11 +151,11 @@ def _covered(coarse: CoarseCircles, mask: BoolArray) -> NDArray[np.float64]:
     return covered
 
 
-def _accepted(coarse: CoarseCircles, slopes: tuple[FloatArray, FloatArray], share: float) -> CoarseCircles:
+def _accepted(coarse: CoarseCircles, slopes: tuple[FloatArray, FloatArray], share: float, strength: float) -> CoarseCircles:
     """Circles with a rim all around, whose inside slopes outward, one a place."""
     coarse = _take(
         coarse,
-        (coarse.share >= share) & (coarse.strength >= MIN_STRENGTH) & (coarse.radius_px >= SMALLEST_RADIUS_PX),
+        (coarse.share >= share) & (coarse.strength >= strength) & (coarse.radius_px >= SMALLEST_RADIUS_PX),
     )
     outward, alignment = _inside(coarse, slopes)
     coarse = _take(coarse, (outward >= MIN_OUTWARD) & (alignment >= MIN_ALIGNMENT))

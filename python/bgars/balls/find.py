@@ -240,6 +240,7 @@ def _record(
     on = sorted((index for index in range(len(x_px)) if grid.row[index] >= 0), key=lambda i: (grid.row[i], grid.col[i]))
     names = dict(zip(off, (f"X{number}" for number in range(1, len(off) + 1)), strict=True))
     names |= {index: grid.names[index] for index in on}
+    order = {index: number for number, index in enumerate(on + off)}
     balls = tuple(
         FoundBall(
             name=names[index],
@@ -261,7 +262,7 @@ def _record(
     return FoundBalls(
         balls=balls,
         missing=tuple(grid.missing),
-        bridges=tuple((names[i], names[j]) for i, j in joined),
+        bridges=tuple(sorted((names[i], names[j]) if order[i] < order[j] else (names[j], names[i]) for i, j in joined)),
         rows=grid.rows,
         cols=grid.cols,
         pitch_px=grid.pitch_px,

@@ -18,6 +18,9 @@ DIRECTIONS = 24
 RADII = 48
 PEAK_ADVANTAGE = 100.0
 CHUNK = 256
+AROUND_RIM = np.geomspace(0.78, 1.28, 21)
+RIM_BINS = np.flatnonzero(np.abs(np.log(AROUND_RIM)) < 0.06)
+BESIDE_BINS = np.flatnonzero(np.abs(np.log(AROUND_RIM)) > 0.09)
 SIDE = 4
 """Radii between a rim and what must be smoother than it."""
 DARK_LEVELS = 0.3
@@ -96,12 +99,11 @@ def _scan(roots: FloatArray, row, col, scale_px, span, rims) -> CoarseCircles:
         col += step[:, 0]
         row -= step[:, 1]
         radius_px = radius_px + step[:, 2]
-    around_rim = np.geomspace(0.6, 1.5, 37)
-    edge = _edges(roots, row, col, radius_px[:, None] * around_rim, angle)
-    middle = int(np.argmin(np.abs(around_rim - 1.0)))
-    rim = edge[:, :, middle - 2 : middle + 3].max(axis=2)
-    share = (rim > 2.0 * np.median(edge, axis=2) + 0.1).mean(axis=1)
-    return CoarseCircles(row, col, radius_px, np.quantile(rim, 0.25, axis=1), share)
+    edge = _edges(roots, row, col, radius_px[:, None] * AROUND_RIM, angle)
+    rim = edge[:, :, RIM_BINS].max(axis=2)
+    beside = np.median(edge[:, :, BESIDE_BINS], axis=2)
+    share = (rim > 1.5 * beside + 0.08).mean(axis=1)
+    return CoarseCircles(row, col, radius_px, np.quantile(rim - beside, 0.25, axis=1), share)
 
 
 def _edges(roots: FloatArray, row, col, radii, angle):
