@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -116,7 +117,7 @@ def _ranks(values: list[float]) -> list[int]:
     tolerance = max(1e-3 * (max(values) - min(values)), 1e-9)
     ranks = [0] * len(values)
     order = sorted(range(len(values)), key=values.__getitem__)
-    for before, index in zip(order, order[1:], strict=False):
+    for before, index in pairwise(order):
         ranks[index] = ranks[before] + (values[index] - values[before] > tolerance)
     return ranks
 

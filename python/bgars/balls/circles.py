@@ -39,6 +39,7 @@ smaller the more likely."""
 MIN_SUPPORT = 0.5
 MAX_U_RADIUS = 0.1
 LIKE_OTHERS = (0.8, 1.25)
+SCALES_LIKE_OTHERS = (0.6, 3.0)
 ODD_SIZE = 1.35
 USUAL_STRENGTH = 0.3
 ENOUGH_TO_JUDGE_SIZE = 3
@@ -151,7 +152,9 @@ def _covered(coarse: CoarseCircles, mask: BoolArray) -> NDArray[np.float64]:
     return covered
 
 
-def _accepted(coarse: CoarseCircles, slopes: tuple[FloatArray, FloatArray], share: float, strength: float) -> CoarseCircles:
+def _accepted(
+    coarse: CoarseCircles, slopes: tuple[FloatArray, FloatArray], share: float, strength: float
+) -> CoarseCircles:
     """Circles with a rim all around, whose inside slopes outward, one a place."""
     coarse = _take(
         coarse,
@@ -191,7 +194,7 @@ def _best_of_place(centres: NDArray[np.float64]) -> NDArray[np.intp]:
         other = centres[keep]
         distance = np.hypot(other[:, 0] - row, other[:, 1] - col)
         ratio = scale_px / other[:, 2]
-        if not ((distance < 0.3 * np.minimum(scale_px, other[:, 2]) + 1) & (ratio < 2.0) & (ratio > 0.5)).any():
+        if not ((distance < 0.3 * np.minimum(scale_px, other[:, 2]) + 1) & (np.abs(np.log2(ratio)) < 1)).any():
             keep.append(index)
     return np.array(keep, np.intp)
 
@@ -202,11 +205,11 @@ def _outside(centres: NDArray[np.float64], coarse: CoarseCircles) -> NDArray[np.
     ratio = centres[:, 2] / np.median(coarse.radius_px)
     odd = np.abs(np.log(coarse.radius_px / np.median(coarse.radius_px))) > np.log(ODD_SIZE)
     free = ((distance > coarse.radius_px) | odd).all(axis=1)
-    return np.flatnonzero(free & (ratio > 0.6) & (ratio < 3.0))
+    return np.flatnonzero(free & (ratio > SCALES_LIKE_OTHERS[0]) & (ratio < SCALES_LIKE_OTHERS[1]))
 
 
 def _merged(coarse: CoarseCircles, more: CoarseCircles, usual_px: float) -> CoarseCircles:
-    """Both sets; a circle of the usual size takes the place of an odd one that it meets, if its rim is not much weaker."""
+    """Both sets; one of the usual size takes the place of an odd one that it meets, if its rim is not much weaker."""
     distance = np.hypot(coarse.row[:, None] - more.row, coarse.col[:, None] - more.col)
     odd = np.abs(np.log(coarse.radius_px / usual_px)) > np.log(ODD_SIZE)
     meets = distance < 0.85 * np.minimum(coarse.radius_px[:, None] + more.radius_px, 1.3 * usual_px)
@@ -225,7 +228,7 @@ def _without_overlaps(coarse: CoarseCircles) -> CoarseCircles:
     nested = (radius > 1.15 * radius[:, None]) & (distance < 0.35 * radius)
     needed = np.where(radius > HIGHLIGHT_RATIO * radius[:, None], OUTER_STRENGTH_OF_HIGHLIGHTS, OUTER_STRENGTH)
     nested &= coarse.strength >= needed * coarse.strength[:, None]
-    coarse = _take(coarse, ~nested.any(axis=1))
+    coarse = _take(coarse, ~np.any(nested, axis=1))
     keep: list[int] = []
     for index in np.argsort(-coarse.strength * coarse.share):
         apart = np.hypot(coarse.row[keep] - coarse.row[index], coarse.col[keep] - coarse.col[index])

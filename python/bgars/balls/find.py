@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from bgars.ball_records import BallLayout, FoundBall, FoundBalls, place_name
+from bgars.ball_records import FoundBall, FoundBalls, place_name
 from bgars.balls.bridges import joined_pairs
 from bgars.balls.circles import Detection, find_circles
 from bgars.balls.lattice import fit_lattice
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from bgars.ball_records import BallLayout
     from bgars.records import Capture
 
 __all__ = ["find_balls"]
@@ -91,9 +92,6 @@ def find_balls(
     >>> found.balls[0].name, len(found.balls), len(found.missing)
     ('A1', 1, 0)
     """
-    if layout is not None and not isinstance(layout, BallLayout):
-        msg = f"layout: must be a BallLayout, got {type(layout).__name__}"
-        raise InputError(msg)
     if layout is not None and capture.pixel_pitch_um is None:
         msg = "layout: needs capture.pixel_pitch_um, which is None, to lay micrometres over pixels"
         raise InputError(msg)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -90,7 +90,7 @@ class Levels:
         self.map_lights(one)
         return levels
 
-    def _linear(self, codes: NDArray[np.generic]) -> FloatArray:
+    def _linear(self, codes: NDArray[Any]) -> FloatArray:
         response = self.capture.response
         return codes.astype(np.float32) if response is None else response.take(codes.astype(np.intp))
 
@@ -103,16 +103,16 @@ class Levels:
         return np.float32(self.black) if dark is None else self._linear(dark.reshape(-1).take(pixels))
 
 
-def _blocks(image: NDArray[np.generic], factor: int) -> FloatArray:
+def _blocks(image: NDArray[Any], factor: int) -> FloatArray:
     """Means over blocks of factor x factor pixels: rows first, because they lie together in memory."""
     if factor == 1:
         return image.astype(np.float32)
     height, width = image.shape[0] // factor * factor, image.shape[1] // factor * factor
-    wide = np.float32 if image.dtype.kind == "f" else np.uint32
-    total = image[:height:factor, :width].astype(wide)
+    wide: type[Any] = np.float32 if image.dtype.kind == "f" else np.uint32
+    total: NDArray[Any] = image[:height:factor, :width].astype(wide)
     for row in range(1, factor):
         total += image[row:height:factor, :width]
-    mean = total[:, ::factor].astype(np.float32)
+    mean: FloatArray = total[:, ::factor].astype(np.float32)
     for col in range(1, factor):
         mean += total[:, col::factor]
     mean *= np.float32(1.0 / factor**2)

@@ -33,7 +33,7 @@ class Centre(NamedTuple):
 def slope_field(
     levels: FloatArray, rig: LightRig, pixel_um: float | None, floor: float
 ) -> tuple[FloatArray, FloatArray]:
-    """x and y of the unit normal that least squares over all lights gives, (H, W) float32 each; 0 where all is black.
+    """Components x and y of the unit normal of least squares over all lights, (H, W) float32; 0 where all is black.
 
     It is no accurate normal: highlights, attached and cast shadows all pull it away from the centre of a ball, and so
     it is outward whatever the ball is made of (Woodham 1980, eq. 10, taken beyond its range).

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from bgars.balls.levels import Levels
     from bgars.records import FloatArray
 
+    Array = NDArray[np.float64]
+
 __all__ = ["Circles", "RimPixels", "fit_rims"]
 
 SECTORS = 24
@@ -26,10 +28,16 @@ WIDE_ROUNDS = 3
 NARROW_ROUNDS = 3
 FIRST_BLUR_PX = 0.3
 REACH_PX = 14.0
-REWEIGHTINGS = 12
+TOLERANCES = ((0.6, 1),) * 3 + ((0.1, 1),) * 2 + ((0.1, 2),) + ((0.05, 2),) * 6
+"""Offset in pixels that halves a weight, and the power of the weight: Cauchy first, then closer."""
 MODEL_ERROR_PX = 0.03
 LARGEST_STEP_PX = 1.5
 POOL_BALLS = 6
+SEEN_WITHIN_PX = 0.3
+CENTRE_SHARE, RADIUS_SHARE = 0.6, 1.0
+"""Error that all sectors share, as a fraction of their scatter."""
+U_MODEL_PX = 0.012
+"""What the model of the rim is off by on clean images."""
 BLUR_BALLS = 12
 BLURS_PX = (0.0, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)
 NOISE_FLOOR = 0.15
@@ -60,7 +68,7 @@ class Circles:
     support: NDArray[np.float64]
     offsets_px: NDArray[np.float64]
 
-    def take(self, index) -> Circles:
+    def take(self, index: slice | NDArray[np.intp]) -> Circles:
         """Some of the circles."""
         return Circles(*(getattr(self, field.name)[index] for field in fields(self)))
 
@@ -123,9 +131,9 @@ class RimPixels:
         self.weight *= inside
         pixels = np.where(inside, image_row * width + image_col, 0)
         self.levels = levels.at(pixels) * self.weight
-        self.clipped = (levels.clipped_at(pixels) & (self.weight > 0)).any(axis=3)
+        self.clipped: NDArray[np.bool_] = np.any(levels.clipped_at(pixels) & (self.weight > 0), axis=3)
 
-    def take(self, index) -> RimPixels:
+    def take(self, index: slice | NDArray[np.intp]) -> RimPixels:
         """The pixels of some of the balls."""
         part = copy.copy(self)
         for name in ("anchor_row", "anchor_col", "row", "col", "weight"):
@@ -156,7 +164,7 @@ def fit_rims(
         Standard deviation of the lens blur; found from the images by default.
     """
     circles = Circles(
-        row + 0.0, col + 0.0, radius_px + 0.0, *(np.zeros(len(row)) for _ in range(3)), np.zeros((len(row), SECTORS))
+        row + 0.0, col + 0.0, radius_px + 0.0, 0.0 * row, 0.0 * row, 0.0 * row, np.zeros((len(row), SECTORS))
     )
     if not len(row):
         return circles
@@ -176,12 +184,13 @@ def fit_rims(
 def _estimated_blur(pixels: RimPixels, circles: Circles) -> float:
     """The lens blur that leaves the least, over the best-fitting third of sectors and lights, parabola through three."""
     some = slice(None, None, max(1, len(circles.row) // BLUR_BALLS))
-    costs = []
+    costs: list[float] = []
+    best = np.zeros(0, np.bool_)
     for blur_px in BLURS_PX:
         left, contrast = _left_over(pixels.take(some), circles.take(some), RimTable(blur_px, REACH_PX))
         if not costs:
             best = contrast >= np.quantile(contrast, 2 / 3)
-            best &= left <= np.median(left[best])
+            best = best & (left <= np.median(left[best]))
         costs.append(float(np.mean(np.log(left[best] + 0.02))))
     at = int(np.argmin(costs))
     if not 0 < at < len(BLURS_PX) - 1:
@@ -198,7 +207,7 @@ def _columns(pixels: RimPixels, circles: Circles, table: RimTable) -> FloatArray
     # The mean distance of the points of a pixel is a little more than that of its centre, across the direction.
     spread = np.float32(1.0 / 24.0 + 0.5 * table.blur_px**2)
     radius = circles.radius_px.astype(np.float32)[:, None, None]
-    depth = radius - distance - spread / distance
+    depth = radius - distance - spread / np.maximum(distance, np.float32(0.5))
     shapes = table.look_up(depth, table.fold(x, y))
     mid = ((np.arange(SECTORS) + 0.5) * (2 * math.pi / SECTORS)).astype(np.float32)
     along = (y * np.cos(mid)[:, None] - x * np.sin(mid)[:, None]) / (radius * np.float32(2 * math.pi / SECTORS / 2))
@@ -214,26 +223,25 @@ def _columns(pixels: RimPixels, circles: Circles, table: RimTable) -> FloatArray
     return columns
 
 
-def _solve(pixels: RimPixels, circles: Circles, table: RimTable):
+def _solve(pixels: RimPixels, circles: Circles, table: RimTable) -> tuple[Array, Array, Array]:
+    """Gram matrices (N, S, 5 + L, ..) of what the basis leaves, coefficients (N, S, BASIS, L), pixel counts."""
     columns = _columns(pixels, circles, table)
     gram = (np.swapaxes(columns, 2, 3) @ columns).astype(np.float64)
-    lights = len(pixels.levels)
     basis = gram[..., :BASIS, :BASIS] + 0.0
     trace = np.trace(basis, axis1=-2, axis2=-1)[..., None]
     diagonal = np.arange(BASIS)
     basis[..., diagonal, diagonal] += 1e-6 * trace + 1e-9
     right = gram[..., :BASIS, BASIS:]
     solved = np.linalg.solve(basis, right)
-    # what the basis leaves of derivatives and levels: Gram matrix of residuals
     rest = gram[..., BASIS:, BASIS:] - np.swapaxes(right, -1, -2) @ solved
     coefficients = solved[..., 5:]  # (N, S, BASIS, L)
-    count = pixels.weight.sum(axis=2)
-    return gram, rest, coefficients, count, lights
+    count = pixels.weight.sum(axis=2).astype(np.float64)
+    return rest, coefficients, count
 
 
-def _sector_offsets(pixels: RimPixels, circles: Circles, table: RimTable):
+def _sector_offsets(pixels: RimPixels, circles: Circles, table: RimTable) -> tuple[Array, Array]:
     """(N, S, L) outward offset of the rim in each sector and light, and its variance."""
-    _, rest, coefficients, count, _ = _solve(pixels, circles, table)
+    rest, coefficients, count = _solve(pixels, circles, table)
     slope = _pooled(coefficients[..., [1, 2, 3, 4, 6], :], pixels.azimuths_rad)
     dd = np.einsum("nskl,nskm,nsml->nsl", slope, rest[..., :5, :5], slope)
     de = np.einsum("nskl,nskl->nsl", slope, rest[..., :5, 5:])
@@ -247,12 +255,12 @@ def _sector_offsets(pixels: RimPixels, circles: Circles, table: RimTable):
     return np.clip(offset, -3.0, 3.0), variance
 
 
-def _pooled(slope, azimuths_rad):
+def _pooled(slope: Array, azimuths_rad: Array) -> Array:
     """(N, S, 5, L) medians of the coefficients over all balls.
 
     The derivative must not come from the pixels that it is applied to: noise would enter twice and pull rims inward.
     """
-    balls, _, terms, lights = slope.shape
+    balls, _, terms, _ = slope.shape
     if balls >= POOL_BALLS:
         return np.broadcast_to(np.median(slope, axis=0), slope.shape)
     pooled = np.zeros((1, *slope.shape[1:]))
@@ -268,9 +276,9 @@ def _pooled(slope, azimuths_rad):
     return np.broadcast_to(pooled, slope.shape)
 
 
-def _left_over(pixels: RimPixels, circles: Circles, table: RimTable):
-    """(N, S, L) mean squared residual, each sector and light with the rim where it likes it best."""
-    _, rest, coefficients, count, _ = _solve(pixels, circles, table)
+def _left_over(pixels: RimPixels, circles: Circles, table: RimTable) -> tuple[Array, Array]:
+    """(N, S, L) mean squared residual, each sector and light with its rim where it fits best; and the contrast."""
+    rest, coefficients, count = _solve(pixels, circles, table)
     slope = coefficients[..., [1, 2, 3, 4, 6], :]
     dd = np.einsum("nskl,nskm,nsml->nsl", slope, rest[..., :5, :5], slope)
     de = np.einsum("nskl,nskl->nsl", slope, rest[..., :5, 5:])
@@ -278,7 +286,7 @@ def _left_over(pixels: RimPixels, circles: Circles, table: RimTable):
     return np.maximum(left, 0.0) / np.maximum(count - BASIS - 1, 1.0)[..., None], dd
 
 
-def _update(circles: Circles, offset, variance) -> None:
+def _update(circles: Circles, offset: Array, variance: Array) -> None:
     """One step of the three parameters of each circle, all sectors and lights together, outliers down-weighted."""
     mid = (np.arange(SECTORS) + 0.5) * (2 * math.pi / SECTORS)
     design = np.stack([np.cos(mid), np.sin(mid), np.ones(SECTORS)], axis=1)  # x right, y up, radius
@@ -288,29 +296,33 @@ def _update(circles: Circles, offset, variance) -> None:
     spread = np.sqrt(variance + MODEL_ERROR_PX**2)
     step = np.zeros((len(offset), 3))
     weight = base
-    for turn in range(REWEIGHTINGS):
+    for turn in range(len(TOLERANCES)):
         per_sector = weight.sum(axis=2)
         total = (weight * offset).sum(axis=2)
         normal = np.einsum("ns,si,sj->nij", per_sector, design, design) + 1e-6 * np.eye(3)
         step = np.linalg.solve(normal, np.einsum("ns,si->ni", total, design)[..., None])[..., 0]
         residual = offset - (step @ design.T)[..., None]
-        scale = 0.6 if turn < 3 else 0.1 if turn < 6 else 0.05
-        weight = base / (1.0 + (residual / np.maximum(spread, scale)) ** 2) ** (1 if turn < 5 else 2)
+        scale_px, power = TOLERANCES[turn]
+        weight = base / (1.0 + (residual / np.maximum(spread, scale_px)) ** 2) ** power
     length = np.maximum(np.abs(step).max(axis=1), 1e-12)
     step *= np.minimum(1.0, LARGEST_STEP_PX / length)[:, None]
     circles.col += step[:, 0]
     circles.row -= step[:, 1]
     circles.radius_px += step[:, 2]
-    # what remains, sector by sector: lights of one sector share texture and shadows, so they count once
+    # What remains, sector by sector: lights of one sector share texture and shadows, so they count once.
     per_sector = weight.sum(axis=2)
     seen = per_sector > 0
     mean = np.divide((weight * residual).sum(axis=2), per_sector, out=np.zeros_like(per_sector), where=seen)
     circles.offsets_px = np.where(seen, mean, np.nan)
-    used = per_sector / np.maximum(per_sector.max(axis=1, keepdims=True), 1e-12)
+    circles.support = np.mean(seen & (np.abs(mean) < SEEN_WITHIN_PX), axis=1)
+    trusted = base.sum(axis=2)
+    scatter = np.sqrt((trusted * mean**2).sum(axis=1) / np.maximum(trusted.sum(axis=1), 1e-12))
     normal = np.einsum("ns,si,sj->nij", per_sector, design, design) + 1e-9 * np.eye(3)
-    inverse = np.linalg.inv(normal)
-    sigma2 = (per_sector * mean**2).sum(axis=1) / max(SECTORS - 3, 1)
-    covariance = inverse * np.maximum(sigma2, 1.0)[:, None, None]
-    circles.u_centre_px = np.sqrt((covariance[:, 0, 0] + covariance[:, 1, 1]) / 2)
-    circles.u_radius_px = np.sqrt(covariance[:, 2, 2])
-    circles.support = (seen & (np.abs(mean) < 0.3)).mean(axis=1)
+    noise = np.linalg.inv(normal)
+    number = np.maximum(seen.sum(axis=1), 1)
+    circles.u_centre_px = np.sqrt(
+        np.maximum((noise[:, 0, 0] + noise[:, 1, 1]) / 2, 2.0 * scatter**2 / number) + (CENTRE_SHARE * scatter) ** 2
+    )
+    circles.u_radius_px = np.sqrt(
+        np.maximum(noise[:, 2, 2], scatter**2 / number) + (RADIUS_SHARE * scatter) ** 2 + U_MODEL_PX**2
+    )

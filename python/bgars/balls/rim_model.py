@@ -52,19 +52,20 @@ class RimTable:
             table[index] = _profiles(depth_px, widths)
         self.table: FloatArray = table.reshape(-1, 2 * SHAPES).astype(np.float32)
 
-    def look_up(self, depth_px: NDArray[np.floating], fold: NDArray[np.intp]) -> FloatArray:
+    def look_up(self, depth_px: NDArray[np.floating], fold: NDArray[np.int32]) -> FloatArray:
         """(..., 2 SHAPES) profiles and their derivatives by depth, at depths and folded directions (:meth:`fold`)."""
-        place = np.rint((depth_px - self.first_px) * STEPS_PER_PX).astype(np.int32)
-        np.clip(place, 0, self.count - 1, out=place)
+        inside = np.clip(depth_px, self.first_px, -self.first_px)
+        place = np.rint((inside - self.first_px) * STEPS_PER_PX).astype(np.int32)
         found: FloatArray = self.table.take(place + fold * self.count, axis=0)
         return found
 
     @staticmethod
-    def fold(x: NDArray[np.floating], y: NDArray[np.floating]) -> NDArray[np.intp]:
+    def fold(x: NDArray[np.floating], y: NDArray[np.floating]) -> NDArray[np.int32]:
         """Index of directions (x, y), folded into an eighth of the circle."""
         ax, ay = np.abs(x), np.abs(y)
         angle = np.arctan2(np.minimum(ax, ay), np.maximum(ax, ay))
-        return np.rint(angle * ((ANGLES - 1) / (math.pi / 4))).astype(np.int32)  # type: ignore[return-value]
+        folded: NDArray[np.int32] = np.rint(angle * ((ANGLES - 1) / (math.pi / 4))).astype(np.int32)
+        return folded
 
 
 def _profiles(depth_px: NDArray[np.float64], widths_px: list[float]) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""Coarse circles: at which radius around a centre do most directions see an edge in several lights?"""
+"""Coarse circles: the radius around a centre where most directions see an edge in several lights."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
     from bgars.records import FloatArray
 
+    Array = NDArray[np.floating]
+
 __all__ = ["CoarseCircles", "scan_rims"]
 
 DIRECTIONS = 24
@@ -19,8 +21,8 @@ RADII = 48
 PEAK_ADVANTAGE = 100.0
 CHUNK = 256
 AROUND_RIM = np.geomspace(0.78, 1.28, 21)
-RIM_BINS = np.flatnonzero(np.abs(np.log(AROUND_RIM)) < 0.06)
-BESIDE_BINS = np.flatnonzero(np.abs(np.log(AROUND_RIM)) > 0.09)
+RIM_BINS = np.flatnonzero(np.abs(np.log(AROUND_RIM)) < 0.06)  # noqa: PLR2004 - of the radius
+BESIDE_BINS = np.flatnonzero(np.abs(np.log(AROUND_RIM)) > 0.09)  # noqa: PLR2004 - of the radius
 SIDE = 4
 """Radii between a rim and what must be smoother than it."""
 DARK_LEVELS = 0.3
@@ -74,9 +76,11 @@ def scan_rims(
     return CoarseCircles(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-def _scan(roots: FloatArray, row, col, scale_px, span, rims) -> CoarseCircles:
+def _scan(
+    roots: FloatArray, row: Array, col: Array, scale_px: Array, span: tuple[float, float], rims: int
+) -> CoarseCircles:
     angle = (np.arange(DIRECTIONS) + 0.5) * (2 * math.pi / DIRECTIONS)
-    radii = scale_px[:, None] * np.geomspace(*span, RADII)
+    radii = scale_px[:, None] * np.geomspace(span[0], span[1], RADII)
     edge = _edges(roots, row, col, radii, angle)
     wide = np.maximum(edge, np.maximum(np.roll(edge, 1, axis=2), np.roll(edge, -1, axis=2)))
     profile = np.quantile(wide, 0.25, axis=1) + 0.25 * np.median(edge, axis=1)
@@ -106,7 +110,7 @@ def _scan(roots: FloatArray, row, col, scale_px, span, rims) -> CoarseCircles:
     return CoarseCircles(row, col, radius_px, np.quantile(rim - beside, 0.25, axis=1), share)
 
 
-def _edges(roots: FloatArray, row, col, radii, angle):
+def _edges(roots: FloatArray, row: Array, col: Array, radii: Array, angle: Array) -> FloatArray:
     """(N, A, radii) third largest over lights of the change of sqrt(level) from ring to ring."""
     lights, height, width = roots.shape
     r = np.rint(row[:, None, None] - np.sin(angle)[:, None] * radii[:, None, :]).astype(np.int32)
@@ -120,10 +124,12 @@ def _edges(roots: FloatArray, row, col, radii, angle):
     np.abs(value[..., 2:] - value[..., :-2], out=edge[..., 1:-1])
     edge[..., 1:-1] *= (inside[:, :, 2:] & inside[:, :, :-2]) * np.float32(1.0 / 3.0)
     rank = max(1, round(lights * 3 / 8))
-    return np.partition(edge, lights - rank, axis=0)[lights - rank]
+    ranked: FloatArray = np.partition(edge, lights - rank, axis=0)[lights - rank]
+    return ranked
 
 
-def _circle_step(residual, weight, angle, radius_px):
+def _circle_step(residual: Array, weight: FloatArray, angle: Array, radius_px: Array) -> Array:
+    """Shift right, shift up and growth that bring a circle onto rims found by direction, robustly."""
     design = np.stack([np.cos(angle), np.sin(angle), np.ones(len(angle))], axis=1)
     step = np.zeros((len(residual), 3))
     use = weight
@@ -133,4 +139,5 @@ def _circle_step(residual, weight, angle, radius_px):
         left = (residual - step @ design.T) / (0.05 * radius_px[:, None])
         use = weight / (1.0 + left**2) ** 2
     limit = 0.3 * radius_px[:, None]
-    return np.clip(step, -limit, limit)
+    clipped: Array = np.clip(step, -limit, limit)
+    return clipped
