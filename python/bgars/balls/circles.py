@@ -37,6 +37,8 @@ HIGHLIGHT_RATIO = 2.5
 """A rim around another one wins from such a fraction of its strength on: highlights make strong rims inside balls, the
 smaller the more likely."""
 MIN_SUPPORT = 0.5
+MIN_SUPPORT_IN_MASK = 0.85
+"""A mask says that there is an object: round parts of it are no balls."""
 MAX_U_RADIUS = 0.1
 LIKE_OTHERS = (0.8, 1.25)
 SCALES_LIKE_OTHERS = (0.6, 3.0)
@@ -97,7 +99,8 @@ def find_circles(levels: Levels, progress: Callable[[float], object] | None) -> 
     report(0.4)
     row, col = ((column + 0.5) * factor - 0.5 for column in coarse[:2])
     circles = fit_rims(levels, row, col, coarse.radius_px * factor)
-    good = (circles.support >= MIN_SUPPORT) & (circles.u_radius_px < MAX_U_RADIUS * circles.radius_px)
+    good = circles.support >= (MIN_SUPPORT if mask is None else MIN_SUPPORT_IN_MASK)
+    good &= circles.u_radius_px < MAX_U_RADIUS * circles.radius_px
     good &= np.abs(np.log(circles.radius_px / (coarse.radius_px * factor))) < np.log(LIKE_OTHERS[1])
     report(0.95)
     return Detection(circles.take(np.flatnonzero(good)), slopes, brightest, factor)
@@ -226,11 +229,17 @@ def _without_overlaps(coarse: CoarseCircles) -> CoarseCircles:
     distance = np.hypot(coarse.row[:, None] - coarse.row, coarse.col[:, None] - coarse.col)
     radius = coarse.radius_px
     nested = (radius > 1.15 * radius[:, None]) & (distance < 0.35 * radius)
+    # Rims of neighbours do not cross, ends of their shadows do.
+    crossing = (distance > 0.7 * radius[:, None]) & (distance < radius[:, None] + 0.9 * radius)
+    crossing &= (radius > 0.5 * radius[:, None]) & (coarse.strength > 0.5 * coarse.strength[:, None])
+    nested &= ~np.any(crossing, axis=1)
     needed = np.where(radius > HIGHLIGHT_RATIO * radius[:, None], OUTER_STRENGTH_OF_HIGHLIGHTS, OUTER_STRENGTH)
     nested &= coarse.strength >= needed * coarse.strength[:, None]
-    coarse = _take(coarse, ~np.any(nested, axis=1))
+    inner = np.any(nested, axis=1)
+    coarse = _take(coarse, ~inner)
     keep: list[int] = []
-    for index in np.argsort(-coarse.strength * coarse.share):
+    crossed = np.any(crossing, axis=1)[~inner]
+    for index in np.argsort(-coarse.strength * coarse.share * np.where(crossed, 0.3, 1.0)):
         apart = np.hypot(coarse.row[keep] - coarse.row[index], coarse.col[keep] - coarse.col[index])
         if not (apart < 0.85 * (coarse.radius_px[keep] + coarse.radius_px[index])).any():
             keep.append(int(index))

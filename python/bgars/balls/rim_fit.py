@@ -182,7 +182,7 @@ def fit_rims(
 
 
 def _estimated_blur(pixels: RimPixels, circles: Circles) -> float:
-    """The lens blur that leaves the least, over the best-fitting third of sectors and lights, parabola through three."""
+    """The lens blur that leaves the least, over the sectors and lights of most contrast, parabola through three."""
     some = slice(None, None, max(1, len(circles.row) // BLUR_BALLS))
     costs: list[float] = []
     best = np.zeros(0, np.bool_)
@@ -235,8 +235,8 @@ def _solve(pixels: RimPixels, circles: Circles, table: RimTable) -> tuple[Array,
     solved = np.linalg.solve(basis, right)
     rest = gram[..., BASIS:, BASIS:] - np.swapaxes(right, -1, -2) @ solved
     coefficients = solved[..., 5:]  # (N, S, BASIS, L)
-    count = pixels.weight.sum(axis=2).astype(np.float64)
-    return rest, coefficients, count
+    count: Array = pixels.weight.sum(axis=2).astype(np.float64)
+    return np.asarray(rest), np.asarray(coefficients), count
 
 
 def _sector_offsets(pixels: RimPixels, circles: Circles, table: RimTable) -> tuple[Array, Array]:

@@ -91,7 +91,7 @@ def _scan(
     sharp = np.where(sharp >= neighbours, sharp, sharp - PEAK_ADVANTAGE)
     best = np.argsort(-sharp[:, 1:-1], axis=1)[:, :rims] + 1
     radius_px = np.take_along_axis(radii, best, axis=1).ravel()
-    row, col = np.repeat(row, rims), np.repeat(col, rims)
+    row, col = np.repeat(row, rims).astype(np.float64), np.repeat(col, rims).astype(np.float64)
     near = np.geomspace(0.75, 1.33, 33)
     for reach in (0.3, 0.15):
         radii = radius_px[:, None] * near
@@ -107,7 +107,13 @@ def _scan(
     rim = edge[:, :, RIM_BINS].max(axis=2)
     beside = np.median(edge[:, :, BESIDE_BINS], axis=2)
     share = (rim > 1.5 * beside + 0.08).mean(axis=1)
-    return CoarseCircles(row, col, radius_px, np.quantile(rim - beside, 0.25, axis=1), share)
+    return CoarseCircles(
+        np.asarray(row, np.float64),
+        np.asarray(col, np.float64),
+        radius_px,
+        np.quantile(rim - beside, 0.25, axis=1),
+        share,
+    )
 
 
 def _edges(roots: FloatArray, row: Array, col: Array, radii: Array, angle: Array) -> FloatArray:
