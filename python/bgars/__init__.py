@@ -11,6 +11,8 @@ The data flows one way: a capture becomes normals, normals become a height map, 
 
 from importlib.metadata import version
 
+from bgars.ball_records import BallLayout, FoundBall, FoundBalls
+from bgars.balls import find_balls
 from bgars.errors import (
     BgarsError,
     CalibrationError,
@@ -56,6 +58,7 @@ __version__ = version("bgars")
 
 __all__ = [
     "Ball",
+    "BallLayout",
     "BallTruth",
     "BgarsError",
     "Board",
@@ -68,6 +71,8 @@ __all__ = [
     "Defect",
     "Evaluation",
     "FileFormatError",
+    "FoundBall",
+    "FoundBalls",
     "HeightMap",
     "InputError",
     "Jitter",
@@ -87,6 +92,7 @@ __all__ = [
     "angular_error_deg",
     "estimate_normals",
     "evaluate",
+    "find_balls",
     "integrate_normals",
     "mesh_from_height",
     "named_recipes",
