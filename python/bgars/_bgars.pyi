@@ -7,12 +7,15 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars.kernel_capture import KernelCapture
+from bgars.material_records import SurfaceMaterial
 from bgars.records import NormalField
 
 __all__ = [
     "DEBUG_BUILD",
     "decode_stack",
     "estimate_normals",
+    "estimate_reflectance",
     "integrate_normals",
     "normal_arrays",
     "read_rgb16",
@@ -36,17 +39,8 @@ def decode_stack(
     threads: int | None,
 ) -> tuple[Any, bool, int]: ...
 def estimate_normals(
-    images: NDArray[Any],
+    capture: KernelCapture,
     *,
-    lights: NDArray[np.float64],
-    lights_are_positions: bool,
-    reference_px: Sequence[float],
-    intensities: Sequence[float],
-    response: NDArray[np.float32] | None,
-    dark: NDArray[Any] | None,
-    black_level: float,
-    saturation: float,
-    full_scale: float,
     mask: NDArray[np.bool_] | None,
     method: str,
     threshold: float,
@@ -54,6 +48,17 @@ def estimate_normals(
     progress: Callable[[float], object] | None,
     out: NormalField,
 ) -> None: ...
+def estimate_reflectance(
+    capture: KernelCapture,
+    *,
+    mask: NDArray[np.bool_] | None,
+    circles: NDArray[np.float64],
+    free: NDArray[np.bool_] | None,
+    material: SurfaceMaterial | None,
+    threads: int | None,
+    progress: Callable[[float], object] | None,
+    out: NormalField,
+) -> dict[str, Any]: ...
 def normal_arrays(
     height: int, width: int, set_lights: int
 ) -> tuple[

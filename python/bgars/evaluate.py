@@ -56,8 +56,14 @@ class Evaluation:
         Capture and estimator.
     region : str
         What was judged: "balls, n_z > 0.3" of a scene, "mask" of a photograph.
+    choice : str
+        What the estimator used, and why.
     normals : AngularErrors
         Over that region.
+    measured : AngularErrors or None
+        Over the measured pixels of that region: those whose own light fixes the normal; None where there are none.
+    coverage : float or None
+        Share of the measured pixels whose error is within the stated standard error; 0.68 where that is right.
     board : AngularErrors or None
         Over the board of a scene.
     ball_height_rmse_um : float or None
@@ -68,7 +74,10 @@ class Evaluation:
     name: str
     method: str
     region: str
+    choice: str
     normals: AngularErrors
+    measured: AngularErrors | None
+    coverage: float | None
     board: AngularErrors | None
     ball_height_rmse_um: float | None
 
@@ -133,7 +142,10 @@ def evaluate(
         name=capture.name,
         method=method,
         region=f"balls, n_z > {MIN_N_Z}" if truth.ball_ids is not None else "mask",
+        choice=field.choice,
         normals=errors,
+        measured=_errors(field, truth.normals, judged & field.measured),
+        coverage=_coverage(field, truth.normals, judged & field.measured),
         board=board,
         ball_height_rmse_um=_ball_height_rmse_um(field, truth, judged),
     )
@@ -169,6 +181,14 @@ def _errors(field: NormalField, truth: FloatArray, judged: BoolArray) -> Angular
         pixels=int(judged.sum()),
         invalid=int((~field.mask[judged]).sum()),
     )
+
+
+def _coverage(field: NormalField, truth: FloatArray, judged: BoolArray) -> float | None:
+    """Share of errors within the stated standard error."""
+    if not judged.any():
+        return None
+    within = angular_error_deg(field.normals[judged], truth[judged]) <= field.standard_error_deg[judged]
+    return float(within.mean())
 
 
 def _ball_height_rmse_um(field: NormalField, truth: Truth, judged: BoolArray) -> float | None:

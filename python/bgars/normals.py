@@ -1,4 +1,4 @@
-"""Normals from a light stack (the Rust kernels, with plain arguments)."""
+"""Normals from a light stack: the public function, which joins least squares, the ball finder and reflectance."""
 
 from __future__ import annotations
 
@@ -7,26 +7,35 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from bgars import _bgars
+from bgars.ball_records import FoundBalls
+from bgars.balls import find_balls
 from bgars.errors import InputError
-from bgars.kernel_capture import kernel_capture
-from bgars.records import Capture, NormalField, float_full_scale, integer_full_scale
-from bgars.rig import LightRig
+from bgars.least_squares import (
+    DEFAULT_THRESHOLD,
+    LEAST_SQUARES_METHODS,
+    capture_of,
+    combined_mask,
+    least_squares_normals,
+)
+from bgars.reflectance import MIN_LIGHTS, add_reflectance
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import ArrayLike, NDArray
 
-    from bgars.records import PixelArray
+    from bgars.material_records import SurfaceMaterial
+    from bgars.records import Capture, NormalField
 
 __all__ = ["DEFAULT_METHOD", "METHODS", "Method", "estimate_normals"]
 
-Method = Literal["lambertian", "specular-filter", "robust-filter"]
+Method = Literal["lambertian", "specular-filter", "robust-filter", "reflectance"]
 METHODS: tuple[Method, ...] = get_args(Method)
-DEFAULT_METHOD: Method = "robust-filter"
-DEFAULT_THRESHOLD = 50.0
-STACK_NDIM = 3
+DEFAULT_METHOD: Method = "reflectance"
+
+CIRCLE_VALUES = 3
+BRIDGE_WIDTH = 0.8
+"""Half width of the strip between two joined balls that is looked at, in radii of the smaller."""
 
 
 def estimate_normals(
@@ -38,15 +47,14 @@ def estimate_normals(
     light_intensities: ArrayLike | None = None,
     saturation: float | None = None,
     threshold: float = DEFAULT_THRESHOLD,
+    anchors: FoundBalls | ArrayLike | None = None,
+    material: SurfaceMaterial | None = None,
     keep_sets: bool = False,
     out: NormalField | None = None,
     threads: int | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> NormalField:
     """Estimate the surface normal of every pixel.
-
-    Every method solves ``I_k = rho l_k . n`` by least squares over the lights it keeps at a pixel (Woodham 1980); the
-    methods differ in which lights they keep.
 
     Parameters
     ----------
@@ -55,10 +63,14 @@ def estimate_normals(
         Fortran-ordered ones (a crop, a transposed stack) and float64 are copied once.
     light_directions : (L, 3) array_like
         Unit vectors from the surface to the light; only with plain arrays.
-    method : {"lambertian", "specular-filter", "robust-filter"}
-        ``lambertian`` keeps every light. ``specular-filter`` is the published filter: sort the values, cut at the
-        first gap over `threshold` with at least 3 values kept. ``robust-filter`` keeps the window of sorted values
-        that a Lambertian facet explains best, shadows and highlights left out (docs/method.md).
+    method : {"reflectance", "robust-filter", "specular-filter", "lambertian"}
+        ``reflectance``: on balls, the normal whose brightness under all lights, highlights included, fits the material
+        best; the material is fitted on the balls themselves. Other pixels, and captures with fewer than 6 lights or
+        with neither balls nor a material, are left to ``robust-filter``; `NormalField.choice` says what was done.
+        The others solve ``I_k = rho l_k . n`` by least squares (Woodham 1980) over the lights they keep at a pixel:
+        ``lambertian`` all; ``specular-filter``, as published: sort the values, cut at the first gap over `threshold`
+        with at least 3 values kept; ``robust-filter`` the window of sorted values that a Lambertian facet explains
+        best (docs/method.md).
     mask : (H, W) array_like of bool, optional
         True = use; combined with the capture's own mask.
     light_intensities : (L,) array_like, optional
@@ -68,6 +80,12 @@ def estimate_normals(
         floats.
     threshold : float
         Gap of ``specular-filter`` in grey levels of 255; scaled with the bit depth.
+    anchors : FoundBalls, (N, 3) array_like, or (H, W) array_like of bool, optional
+        Balls for ``reflectance``: from :func:`bgars.find_balls`, or circles (x right and y up from the image centre,
+        radius, in pixels), or the mask of one ball. By default they are looked for.
+    material : SurfaceMaterial, optional
+        Material for ``reflectance`` that was fitted before, with the same rig and exposure
+        (:func:`bgars.read_material`). Without balls every pixel is then taken to be of it.
     keep_sets : bool
         Also return which lights were kept: `NormalField.kept_sets`, (H, W, L) bool.
     out : NormalField, optional
@@ -83,16 +101,19 @@ def estimate_normals(
     -------
     NormalField
         A pixel whose kept lights are coplanar or nearly so (27 det / tr^3 of ``L^T L`` below 1e-6), whose solution is
-        zero or faces away from the camera is invalid: NaN, mask False.
+        zero or faces away from the camera is invalid: NaN, mask False. A ball's pixel whose light alone does not fix the
+        normal to 2 degrees is drawn to the sphere of its circle: `measured` is False there.
 
     Raises
     ------
     InputError
-        Counts or shapes that do not fit, fewer than 3 or coplanar lights, an empty mask, NaN inside the mask.
+        Counts or shapes that do not fit, fewer than 3 or coplanar lights, an empty mask, NaN inside the mask; anchors
+        or a material with a method that uses none.
 
     References
     ----------
     R. J. Woodham, "Photometric method for determining surface orientation from multiple images", Opt. Eng. 19 (1980).
+    R. L. Cook, K. E. Torrance, "A reflectance model for computer graphics", ACM Trans. Graph. 1 (1982).
 
     Examples
     --------
@@ -105,117 +126,111 @@ def estimate_normals(
     if method not in METHODS:
         msg = f"method: must be one of {', '.join(METHODS)}; got {method!r}"
         raise InputError(msg)
-    if isinstance(images, Capture):
-        for name, value in (
-            ("light_directions", light_directions),
-            ("light_intensities", light_intensities),
-            ("saturation", saturation),
-        ):
+    if method in LEAST_SQUARES_METHODS:
+        for name, value in (("anchors", anchors), ("material", material)):
             if value is not None:
-                msg = f"{name}: the capture brings its own; leave it out, or give plain arrays"
+                msg = f"{name}: only the method reflectance uses it, got method {method!r}"
                 raise InputError(msg)
-        capture = images
-    else:
-        capture = _capture_from_arrays(images, light_directions, light_intensities, saturation)
-    use = _combined_mask(capture, mask)
-    field = _result(capture, method, keep_sets, out)
-    _bgars.estimate_normals(
-        kernel_capture(capture),
+    capture = capture_of(images, light_directions, light_intensities, saturation)
+    use = combined_mask(capture, mask)
+    base = "robust-filter" if method == "reflectance" else method
+    part = _part_of(progress, method == "reflectance")
+    field = least_squares_normals(
+        capture,
+        method=base,
         mask=use,
-        method=method,
         threshold=threshold,
+        keep_sets=keep_sets,
+        out=out,
         threads=threads,
-        progress=progress,
-        out=field,
+        progress=part(0.0, 0.2),
     )
-    return field
-
-
-def _result(capture: Capture, method: Method, keep_sets: bool, out: NormalField | None) -> NormalField:
-    """The arrays to be written: fresh ones, or those of an earlier result."""
-    lights, height, width = capture.images.shape
-    sets_shape = (height, width, lights) if keep_sets else None
-    if out is None:
-        normals, albedo, valid, confidence, measured, lights_kept, kept_sets = _bgars.normal_arrays(
-            height, width, lights if keep_sets else 0
-        )
-        return NormalField(
-            normals=normals,
-            albedo=albedo,
-            mask=valid,
-            confidence=confidence,
-            measured=measured,
-            lights_kept=lights_kept,
-            method=method,
-            pixel_pitch_um=capture.pixel_pitch_um,
-            kept_sets=kept_sets,
-        )
-    shape = out.normals.shape
-    if shape != (height, width, 3):
-        msg = f"out: must be the result for images of {width} x {height} pixels, got one for {shape[1]} x {shape[0]}"
-        raise InputError(msg)
-    if (None if out.kept_sets is None else out.kept_sets.shape) != sets_shape:
-        msg = "out: must have kept sets, for the same number of lights, exactly when keep_sets is asked for"
-        raise InputError(msg)
-    return replace(out, method=method, pixel_pitch_um=capture.pixel_pitch_um)
-
-
-def _capture_from_arrays(
-    images: ArrayLike,
-    light_directions: ArrayLike | None,
-    light_intensities: ArrayLike | None,
-    saturation: float | None,
-) -> Capture:
-    if light_directions is None:
-        msg = "light_directions: needed with plain image arrays, shape (L, 3)"
-        raise InputError(msg)
-    stack = pixel_stack(images)
-    rig = LightRig.from_directions(light_directions, intensities=light_intensities)
-    if len(rig) != len(stack):
-        msg = f"images and light_directions: {len(stack)} images but {len(rig)} lights; they must be equal in number"
-        raise InputError(msg)
-    full_scale = integer_full_scale(stack)
-    if full_scale is not None:
-        clip = full_scale if saturation is None else saturation
-    else:
-        full_scale = saturation or float_full_scale(stack)
-        clip = float("inf") if saturation is None else saturation
-    return Capture(
-        images=stack,
-        rig=rig,
-        mask=np.broadcast_to(np.True_, stack.shape[1:]),
-        saturation=clip,
-        full_scale=full_scale,
+    if method in LEAST_SQUARES_METHODS:
+        return replace(field, choice=f"{method}, as asked")
+    lights = len(capture.rig)
+    if lights < MIN_LIGHTS:
+        return replace(field, choice=f"{base}: reflectance needs {MIN_LIGHTS} lights, the capture has {lights}")
+    given = "found" if anchors is None else "given"
+    found = anchors if anchors is not None else find_balls(capture, threads=threads, progress=part(0.2, 0.5))
+    circles_px = _circles(found, field.mask.shape)
+    if not len(circles_px) and material is None:
+        return replace(field, choice=f"{base}: no balls {given} to fit a material on, and no material given")
+    free = _free_pixels(found, field.mask.shape) if len(circles_px) else np.ones(field.mask.shape, np.bool_)
+    field = add_reflectance(
+        field,
+        capture,
+        circles_px,
+        mask=use,
+        free=free,
+        material=material,
+        threads=threads,
+        progress=part(0.5, 1.0),
     )
+    return replace(field, choice=_choice(field, len(circles_px), given, material is not None, base))
 
 
-def pixel_stack(images: ArrayLike) -> PixelArray:
-    """Return a C-contiguous (L, H, W) stack of a supported dtype, without a copy where possible."""
-    stack = np.asarray(images)
-    if stack.ndim != STACK_NDIM:
-        msg = f"images: must have shape (L, H, W), got {stack.shape}"
-        raise InputError(msg)
-    if stack.dtype == np.float64:
-        stack = stack.astype(np.float32)
-    if stack.dtype not in (np.uint8, np.uint16, np.float32):
-        msg = f"images: must be uint8, uint16 or float32, got {stack.dtype}"
-        raise InputError(msg)
-    return np.ascontiguousarray(stack)
+def _choice(field: NormalField, balls: int, given: str, has_material: bool, base: str) -> str:
+    """One line: what was used, and why."""
+    source = "given" if has_material else f"fitted on {balls} ball{'s' if balls != 1 else ''} {given}"
+    loss = 0.0 if field.reflectance is None else field.reflectance.loss
+    if field.reflectance is not None and not field.reflectance.accepted:
+        return f"{base}: the material {source} does not explain the balls (loss {loss:.2f}, at most 2 is accepted)"
+    where = f"on balls; {base} elsewhere" if balls else "everywhere it explains the pixel"
+    return f"reflectance {where}: material {source} (loss {loss:.3f})"
 
 
-def _combined_mask(capture: Capture, mask: ArrayLike | None) -> NDArray[np.bool_] | None:
-    """The pixels to use; None for all of them."""
-    if mask is None:
-        if capture.mask.strides == (0, 0) and capture.mask[:1, :1].all():
-            return None  # one True for all pixels, as captures without a mask have it
-        return np.ascontiguousarray(capture.mask)
-    given = np.asarray(mask)
-    if given.dtype != np.bool_ or given.shape != capture.images.shape[1:]:
-        expected = tuple(capture.images.shape[1:])
-        msg = f"mask: must be bool of shape {expected}, got {given.dtype} of shape {given.shape}"
+def _part_of(
+    progress: Callable[[float], object] | None, divided: bool
+) -> Callable[[float, float], Callable[[float], object] | None]:
+    """Progress callbacks of the steps of a longer work."""
+
+    def part(start: float, end: float) -> Callable[[float], object] | None:
+        if progress is None or not divided:
+            return progress
+        return lambda fraction: progress(start + (end - start) * fraction)
+
+    return part
+
+
+def _circles(anchors: FoundBalls | ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """(N, 3): x right, y up, radius of each anchor, in pixels."""
+    if isinstance(anchors, FoundBalls):
+        circles = [(ball.x_px, ball.y_px, ball.radius_px) for ball in anchors.balls]
+        return np.array(circles, np.float64).reshape(-1, CIRCLE_VALUES)
+    given = np.asarray(anchors)
+    if given.dtype == np.bool_:
+        if given.shape != shape or not given.any():
+            msg = (
+                f"anchors: a mask of one ball must have shape {shape} and pixels, got {given.shape}, {given.sum()} True"
+            )
+            raise InputError(msg)
+        rows, cols = np.nonzero(given)
+        centre = (cols.mean() + 0.5 - shape[1] / 2, shape[0] / 2 - rows.mean() - 0.5)
+        return np.array([[*centre, np.sqrt(given.sum() / np.pi)]])
+    if given.shape[1:] != (CIRCLE_VALUES,) or given.dtype.kind not in "fiu":
+        msg = f"anchors: must be balls, circles of shape (N, 3) or a mask of one ball, got {given.dtype} {given.shape}"
         raise InputError(msg)
-    combined: NDArray[np.bool_] = np.ascontiguousarray(given & capture.mask)
-    if not combined.any():
-        msg = "mask: no pixel to use (all False)"
+    if not (np.isfinite(given).all() and (given[:, 2] > 0).all()):
+        msg = "anchors: circles must be finite, with radii above 0 px"
         raise InputError(msg)
-    return combined
+    return given.astype(np.float64)
+
+
+def _free_pixels(anchors: FoundBalls | ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
+    """Strips between joined balls; None without any."""
+    if not isinstance(anchors, FoundBalls) or not anchors.bridges:
+        return None
+    balls = {ball.name: ball for ball in anchors.balls}
+    height, width = shape
+    x_px = np.arange(width) + 0.5 - width / 2
+    y_px = (height / 2 - np.arange(height) - 0.5)[:, None]
+    free = np.zeros(shape, np.bool_)
+    for first, second in anchors.bridges:
+        one, other = balls[first], balls[second]
+        dx, dy = other.x_px - one.x_px, other.y_px - one.y_px
+        length = max(np.hypot(dx, dy), 1e-9)
+        along = ((x_px - one.x_px) * dx + (y_px - one.y_px) * dy) / length
+        across = ((x_px - one.x_px) * dy - (y_px - one.y_px) * dx) / length
+        half_width = BRIDGE_WIDTH * min(one.radius_px, other.radius_px)
+        free |= (along > 0) & (along < length) & (np.abs(across) < half_width)
+    return free

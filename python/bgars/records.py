@@ -17,6 +17,7 @@ from bgars.errors import InputError
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from bgars.material_records import ReflectanceFit
     from bgars.rig import LightRig
 
 __all__ = [
@@ -96,6 +97,9 @@ class Capture:
         return "capture" if self.folder is None else self.folder.resolve().name
 
 
+HALF_CONFIDENCE_DEG = 5.0
+"""Standard error of the direction at which the confidence is one half."""
+
 PERCENTILE_PIXELS = 1 << 16
 """Pixels that a percentile for display is taken from, about."""
 
@@ -122,6 +126,12 @@ class NormalField:
         Estimator that was used.
     pixel_pitch_um : float or None
         Size of a pixel on the board.
+    kept_sets : (H, W, L) bool or None
+        The lights themselves, where asked for.
+    choice : str
+        What was used, and why, in one line.
+    reflectance : ReflectanceFit or None
+        What the reflectance estimator learnt, where it ran.
     """
 
     normals: FloatArray
@@ -133,6 +143,15 @@ class NormalField:
     method: str
     pixel_pitch_um: float | None = None
     kept_sets: BoolArray | None = field(default=None, repr=False)
+    choice: str = ""
+    reflectance: ReflectanceFit | None = field(default=None, repr=False)
+
+    @property
+    def standard_error_deg(self) -> FloatArray:
+        """(H, W) float32 standard error of the direction in degrees, by `confidence`; infinite where invalid."""
+        with np.errstate(divide="ignore"):
+            error_deg: FloatArray = (HALF_CONFIDENCE_DEG * np.sqrt(1.0 / self.confidence - 1.0)).astype(np.float32)
+        return error_deg
 
     def grey_levels(self) -> NDArray[np.uint8]:
         """Albedo as (H, W) grey for pictures: 255 at its 99th percentile (of a sample of pixels), 128 where invalid."""

@@ -20,12 +20,11 @@ from bgars.cli.simulate import register as register_simulate
 from bgars.errors import BgarsError
 from bgars.io.mesh_files import MESH_SUFFIXES
 from bgars.light_files import read_filenames
-from bgars.normals import DEFAULT_METHOD, METHODS
+from bgars.normals import DEFAULT_METHOD, METHODS, Method
 from bgars.pipeline import solver_fraction
 
 __all__ = ["main"]
 
-MethodName = Literal["lambertian", "specular-filter", "robust-filter"]
 ChannelOption = Literal["luminance", "mean", "red", "green", "blue"]
 
 app = typer.Typer(
@@ -52,12 +51,13 @@ OutOption = Annotated[
     typer.Option("--output", "-o", metavar="OUT", help="Folder for the results; made if missing.", show_default=False),
 ]
 MethodOption = Annotated[
-    MethodName,
+    Method,
     typer.Option(
         "--method",
         "-m",
-        help="lambertian: all lights. specular-filter: the published sorted-gap filter. "
-        "robust-filter: the window of sorted values that a matt facet explains best, shadows and highlights left out.",
+        help="reflectance: on balls, highlights included, by the material that is fitted on them; elsewhere, and without "
+        "balls, robust-filter. robust-filter: the window of sorted values that a matt facet explains best, shadows and "
+        "highlights left out. specular-filter: the published sorted-gap filter. lambertian: all lights.",
     ),
 ]
 ThresholdOption = Annotated[
@@ -228,7 +228,7 @@ def info(folder: FolderArgument, channel: ChannelChoice = None, as_json: JsonOpt
 def evaluate(
     folder: FolderArgument,
     method: Annotated[
-        MethodName | None, typer.Option("--method", "-m", help="Estimator; every one by default.", show_default=False)
+        Method | None, typer.Option("--method", "-m", help="Estimator; every one by default.", show_default=False)
     ] = None,
     images: Annotated[
         Path | None,
@@ -282,7 +282,7 @@ def main() -> None:
 def _reconstruct_to(
     folder: Path,
     output: Path,
-    method: MethodName,
+    method: Method,
     threshold: float,
     channel: ChannelOption | None,
     mesh_format: str,

@@ -9,7 +9,8 @@ import numpy as np
 
 from bgars.evaluate import angular_error_deg
 from bgars.integrate import integrate_normals
-from bgars.normals import DEFAULT_THRESHOLD, METHODS, estimate_normals
+from bgars.least_squares import DEFAULT_THRESHOLD
+from bgars.normals import METHODS, estimate_normals
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,6 +8,9 @@ pub type Result<T> = std::result::Result<T, Error>;
 /// One variant a rule; each carries the argument, the rule and the offending value.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
+    /// Reflectance needs something to learn the material from.
+    #[error("reflectance: needs circles of balls to fit the material on, or a material that was fitted before")]
+    NoMaterial,
     /// Photometric stereo needs three equations a pixel.
     #[error("light_directions: at least 3 lights are needed, got {count}")]
     TooFewLights {

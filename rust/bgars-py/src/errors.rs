@@ -25,7 +25,8 @@ pub fn to_python(error: Error) -> PyErr {
         Error::Io { .. } | Error::Decode { .. } | Error::ImageTooLarge { .. } | Error::StackMismatch { .. } => {
             classes::FileFormatError::new_err(message)
         }
-        Error::TooFewLights { .. }
+        Error::NoMaterial
+        | Error::TooFewLights { .. }
         | Error::LightCountMismatch { .. }
         | Error::RankDeficientLights { .. }
         | Error::NotUnitDirection { .. }

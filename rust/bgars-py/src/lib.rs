@@ -36,7 +36,7 @@ mod _bgars {
     #[pymodule_export]
     use crate::normals::normal_arrays;
     #[pymodule_export]
-    use crate::reflectance::reflectance_balls;
+    use crate::reflectance::estimate_reflectance;
 
     #[pymodule_export]
     const DEBUG_BUILD: bool = cfg!(debug_assertions);

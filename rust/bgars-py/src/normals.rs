@@ -51,7 +51,8 @@ pub struct Outputs<'py> {
 }
 
 impl Outputs<'_> {
-    fn as_map(&mut self) -> PyResult<NormalMapMut<'_>> {
+    /// The arrays as the core writes them.
+    pub fn as_map(&mut self) -> PyResult<NormalMapMut<'_>> {
         Ok(NormalMapMut {
             normals: slice_mut(&mut self.normals, "normals")?,
             albedo: slice_mut(&mut self.albedo, "albedo")?,

@@ -26,6 +26,12 @@ pub(super) fn confidence(
     let variance = (squared_residuals + prior * prior) / (lights_kept as f64 - 2.0);
     let turning = inverse.trace() - normal.dot(&(inverse * normal));
     let standard_error_deg = (variance * turning.max(0.0)).sqrt().to_degrees() / albedo;
+    confidence_of(standard_error_deg)
+}
+
+/// `1 / (1 + (s / 5 deg)^2)` of a standard error in degrees.
+#[inline]
+pub(crate) fn confidence_of(standard_error_deg: f64) -> f32 {
     let ratio = standard_error_deg / HALF_DEG;
     (1.0 / (1.0 + ratio * ratio)) as f32
 }

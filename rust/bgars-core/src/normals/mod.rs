@@ -17,6 +17,7 @@ mod specular;
 use crate::memory::zeros;
 use crate::{Error, Result};
 
+pub(crate) use confidence::confidence_of;
 pub use kernel::{estimate, estimate_into};
 pub use robust::{RobustParams, robust_filter};
 pub use specular::specular_filter;
@@ -103,7 +104,7 @@ impl NormalMap {
 }
 
 impl NormalMapMut<'_> {
-    fn check(&self, pixels: usize, lights: usize) -> Result<()> {
+    pub(crate) fn check(&self, pixels: usize, lights: usize) -> Result<()> {
         let kept_sets = if self.kept_sets.is_empty() { 0 } else { pixels * lights };
         for (argument, expected, actual) in [
             ("normals", pixels * 3, self.normals.len()),

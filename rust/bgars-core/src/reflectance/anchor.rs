@@ -19,12 +19,16 @@ pub struct Circle {
 }
 
 impl Circle {
+    /// No ball: every pixel is outside, and near lights are taken as the image centre sees them.
+    pub const NOWHERE: Self = Self { x_px: 0.0, y_px: 0.0, radius_px: 0.0 };
+
     /// Normal of the sphere at a point of the image: `n_xy = (p - c) / R`; `None` outside.
     #[must_use]
     #[inline]
     pub fn normal(&self, x_px: f64, y_px: f64) -> Option<Vector3<f64>> {
         let (x, y) = ((x_px - self.x_px) / self.radius_px, (y_px - self.y_px) / self.radius_px);
         let z2 = 1.0 - x * x - y * y;
+        // False for a circle without a radius, where z2 is not a number.
         (z2 > 0.0).then(|| Vector3::new(x, y, z2.sqrt()))
     }
 

@@ -14,6 +14,9 @@ use super::spread::{Residual, Spread};
 use super::table::{GROUP, Signatures};
 use crate::{Lights, Pixel};
 
+/// Angle between a ball's normals and its circle's before anything is known: 1 degree.
+const FIRST_RAD: f32 = 0.0175;
+
 /// Components of a direction.
 const COMPONENTS: f32 = 2.0;
 
@@ -21,7 +24,7 @@ const COMPONENTS: f32 = 2.0;
 const DISC_RADIAN: f32 = std::f32::consts::SQRT_2;
 
 /// Uncertainty of the edge of a flat top, in pixels.
-const FLAT_EDGE_PX: f64 = 1.0;
+const FLAT_EDGE_PX: f64 = 0.5;
 
 /// Information that keeps a direction without data finite: a standard deviation of a radian.
 const MIN_INFORMATION: f64 = 1.0;
@@ -49,6 +52,24 @@ pub struct Ball {
     pub deviation_rad: f32,
 }
 
+impl Ball {
+    /// A sphere as far as is known.
+    pub fn new(circle: Circle, material: Material, correction: Option<CellTable>) -> Self {
+        Self { circle, material, correction, odd: None, flat: None, prior_rad: FIRST_RAD, deviation_rad: FIRST_RAD }
+    }
+
+    /// Tabulates what every normal of the ball looks like, without its correction.
+    pub fn signatures(&self, lights: &Lights) -> Signatures {
+        Signatures::tabulate(lights.len(), |normal: &Vector3<f64>, levels: &mut [f32]| {
+            let point = self.circle.point(normal);
+            for (light, level) in levels.iter_mut().enumerate() {
+                let (direction, irradiance) = lights.at_point(light, &point);
+                *level = bend(self.material.radiance(light, normal, &direction, irradiance)) as f32;
+            }
+        })
+    }
+}
+
 /// A normal of a ball.
 #[derive(Clone, Copy, Debug)]
 pub struct BallPixel {
@@ -74,30 +95,20 @@ pub struct BallPixel {
 pub struct BallWork<'a, 'b, 'c, P> {
     reader: &'a Reader<'b, 'c, P>,
     ball: &'a Ball,
-    table: Signatures,
+    table: &'a Signatures,
     spread: &'a Spread,
     clip: &'a [f32],
 }
 
 impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
-    /// Tabulates the ball's signatures.
+    /// What is needed to look at the ball's pixels; `table` from [`Ball::signatures`].
     pub fn new(
         reader: &'a Reader<'b, 'c, P>,
-        lights: &Lights,
         ball: &'a Ball,
+        table: &'a Signatures,
         spread: &'a Spread,
         clip: &'a [f32],
     ) -> Self {
-        let table = Signatures::tabulate(reader.lights(), |normal: &Vector3<f64>, levels: &mut [f32]| {
-            let point = ball.circle.point(normal);
-            for (light, level) in levels.iter_mut().enumerate() {
-                let (direction, irradiance) = lights.at_point(light, &point);
-                *level = bend(ball.material.radiance(light, normal, &direction, irradiance)) as f32;
-                if let Some(correction) = &ball.correction {
-                    *level += correction.at(to_disc(normal), light).0;
-                }
-            }
-        });
         Self { reader, ball, table, spread, clip }
     }
 
@@ -130,14 +141,14 @@ impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
         let mut best: Option<Minimum> = None;
         for point in scratch.anchor.map(|point| self.expected(point)).into_iter().flatten().flatten() {
             let prior = Prior { point, weight };
-            let found = deepest(&self.table, &scratch.seen, lights, prior, &mut scratch.distances);
+            let found = deepest(self.table, &scratch.seen, lights, prior, &mut scratch.distances);
             if best.is_none_or(|best| found.cost < best.cost) {
                 best = Some(found);
             }
         }
         best.unwrap_or_else(|| {
             let prior = Prior { point: [0.0; 2], weight: 0.0 };
-            deepest(&self.table, &scratch.seen, lights, prior, &mut scratch.distances)
+            deepest(self.table, &scratch.seen, lights, prior, &mut scratch.distances)
         })
     }
 

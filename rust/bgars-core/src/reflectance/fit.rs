@@ -25,6 +25,11 @@ const PRIOR_WEIGHT: f64 = 1.0;
 /// Relative step of the numerical derivatives of a lobe's shape.
 const SHAPE_STEP: f64 = 1e-4;
 
+impl Free {
+    /// Only what is always free.
+    pub const NOTHING: Self = Self { grazing: false, tails: false, gains: false };
+}
+
 /// A fitted material.
 #[derive(Clone, Debug)]
 pub struct MaterialFit {

@@ -12,6 +12,7 @@ mod material;
 mod observe;
 mod odd;
 mod refine;
+mod regions;
 mod residuals;
 mod samples;
 mod scale;
@@ -20,6 +21,7 @@ mod table;
 mod variation;
 
 pub use anchor::Circle;
-pub use estimate::{Outcome, estimate_balls};
+pub use estimate::{Findings, MIN_LIGHTS, Request, estimate_into};
 pub use fit::{MaterialFit, parameter_names};
+pub use flat_top::FlatTop;
 pub use material::{Facet, Lobe, Masking, Material};

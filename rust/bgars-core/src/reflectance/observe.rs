@@ -3,6 +3,9 @@
 use super::scale::bend;
 use crate::{ImageStack, Pixel, Radiometry};
 
+/// Grey level of a camera that never clips.
+const NO_CLIP: f64 = 1e6;
+
 /// Reads pixels of a stack on the scale of [`bend`].
 #[derive(Debug)]
 pub struct Reader<'a, 'b, P> {
@@ -38,10 +41,10 @@ impl<'a, 'b, P: Pixel> Reader<'a, 'b, P> {
         self.stack.lights()
     }
 
-    /// Linear grey level of 255 at which each light clips at a pixel.
-    pub fn clip_levels(&self, pixel: usize) -> Vec<f64> {
-        let offset = self.radiometry.offset(pixel);
-        self.scales.iter().map(|&scale| f64::from((self.clip_level - offset) * scale).min(1e6)).collect()
+    /// Linear grey level of 255 at which each light clips, the offset of the first pixel taken off.
+    pub fn clip_levels(&self) -> Vec<f64> {
+        let offset = self.radiometry.offset(0);
+        self.scales.iter().map(|&scale| f64::from((self.clip_level - offset) * scale).min(NO_CLIP)).collect()
     }
 
     /// Writes the bent level of every light at a pixel.
@@ -52,11 +55,5 @@ impl<'a, 'b, P: Pixel> Reader<'a, 'b, P> {
             let level = (self.radiometry.linearise(self.stack.plane(light)[pixel]) - offset) * scale;
             *bent = bend(f64::from(level)) as f32;
         }
-    }
-
-    /// True where any light is clipped at a pixel.
-    #[inline]
-    pub fn clipped(&self, pixel: usize, light: usize) -> bool {
-        self.stack.plane(light)[pixel].to_f32() >= self.radiometry.saturation
     }
 }

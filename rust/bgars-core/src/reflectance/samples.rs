@@ -7,6 +7,16 @@ use super::material::{Facet, Material};
 use super::scale::bend;
 use crate::Lights;
 
+/// Smallest n_z of pixels that a material is fitted on: nearer the rim the neighbours' light is strong.
+pub const FIT_MIN_N_Z: f64 = 0.2;
+
+/// About `count` of the values, evenly spaced.
+pub fn spaced(values: &[usize], count: usize) -> impl Iterator<Item = &usize> {
+    let step = (values.len() as f64 / count as f64).max(1.0);
+    let taken = (values.len() as f64 / step) as usize;
+    (0..taken).map(move |index| &values[(index as f64 * step) as usize])
+}
+
 /// Observations of some pixels under every light, on the scale of [`bend`].
 #[derive(Clone, Debug, Default)]
 pub struct Samples {
@@ -86,11 +96,5 @@ impl Samples {
     #[inline]
     pub fn brightness(&self, index: usize, light: usize, material: &Material) -> f64 {
         material.brightness(&self.facets[index]) * material.gains[light] * self.irradiance[index] + material.ambient
-    }
-
-    /// True without pixels.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.normals.is_empty()
     }
 }

@@ -67,12 +67,12 @@ fn node_point(row: usize, col: usize) -> [f64; 2] {
     [at(col), at(row)]
 }
 
-/// The normal of a node; nodes at and beyond the edge get the flattest normal that is evaluated.
-fn node_normal(point: [f64; 2]) -> Vector3<f64> {
+/// Nodes at and beyond the edge stand for the flattest normal that is evaluated.
+fn node_place(point: [f64; 2]) -> [f64; 2] {
     let radius = (point[0] * point[0] + point[1] * point[1]).sqrt();
     let largest = (1.0 - MIN_N_Z).sqrt();
     let shrink = if radius > largest { largest / radius } else { 1.0 };
-    from_disc([point[0] * shrink, point[1] * shrink])
+    [point[0] * shrink, point[1] * shrink]
 }
 
 impl Signatures {
@@ -82,7 +82,25 @@ impl Signatures {
         let mut nodes = vec![[0.0; GROUP]; FULL_SIDE * FULL_SIDE * groups];
         nodes.par_chunks_mut(FULL_SIDE * groups).enumerate().for_each(|(row, nodes)| {
             for (col, node) in nodes.chunks_exact_mut(groups).enumerate() {
-                signature(&node_normal(node_point(row, col)), &mut node.as_flattened_mut()[..lights]);
+                signature(&from_disc(node_place(node_point(row, col))), &mut node.as_flattened_mut()[..lights]);
+            }
+        });
+        let mut table = Self { groups, nodes, coarse: Coarse::default() };
+        table.coarse = table.coarse_nodes(lights);
+        table
+    }
+
+    /// The same with a correction added: `correction(place, light)` in bent levels.
+    #[must_use]
+    pub fn corrected(&self, lights: usize, correction: impl Fn([f64; 2], usize) -> f32 + Sync) -> Self {
+        let groups = self.groups;
+        let mut nodes = self.nodes.clone();
+        nodes.par_chunks_mut(FULL_SIDE * groups).enumerate().for_each(|(row, nodes)| {
+            for (col, node) in nodes.chunks_exact_mut(groups).enumerate() {
+                let place = node_place(node_point(row, col));
+                for (light, level) in node.as_flattened_mut()[..lights].iter_mut().enumerate() {
+                    *level += correction(place, light);
+                }
             }
         });
         let mut table = Self { groups, nodes, coarse: Coarse::default() };

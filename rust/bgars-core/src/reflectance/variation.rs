@@ -28,7 +28,7 @@ pub fn ball_materials(samples: &Samples, common: &Material, balls: usize) -> Vec
     if balls < 3 {
         return alike();
     }
-    let free = Free { grazing: false, tails: false, gains: false };
+    let free = Free::NOTHING;
     let mut counts = vec![0usize; balls];
     for &ball in &samples.balls {
         counts[ball] += 1;

@@ -1,0 +1,157 @@
+"""Normals by least squares over the lights that each pixel keeps (the Rust kernels, with plain arguments)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+
+from bgars import _bgars
+from bgars.errors import InputError
+from bgars.kernel_capture import kernel_capture
+from bgars.records import Capture, NormalField, float_full_scale, integer_full_scale
+from bgars.rig import LightRig
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from bgars.records import PixelArray
+
+__all__ = ["LEAST_SQUARES_METHODS", "LeastSquaresMethod", "capture_of", "combined_mask", "least_squares_normals"]
+
+LeastSquaresMethod = Literal["lambertian", "specular-filter", "robust-filter"]
+LEAST_SQUARES_METHODS: tuple[LeastSquaresMethod, ...] = get_args(LeastSquaresMethod)
+DEFAULT_THRESHOLD = 50.0
+STACK_NDIM = 3
+
+
+def least_squares_normals(
+    capture: Capture,
+    *,
+    method: LeastSquaresMethod,
+    mask: NDArray[np.bool_] | None,
+    threshold: float = DEFAULT_THRESHOLD,
+    keep_sets: bool = False,
+    out: NormalField | None = None,
+    threads: int | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> NormalField:
+    """Estimate every pixel by one of the least-squares methods; arguments as of :func:`bgars.estimate_normals`.
+
+    `mask` comes from :func:`combined_mask`.
+    """
+    field = _result(capture, method, keep_sets, out)
+    _bgars.estimate_normals(
+        kernel_capture(capture),
+        mask=mask,
+        method=method,
+        threshold=threshold,
+        threads=threads,
+        progress=progress,
+        out=field,
+    )
+    return field
+
+
+def _result(capture: Capture, method: LeastSquaresMethod, keep_sets: bool, out: NormalField | None) -> NormalField:
+    """The arrays to be written: fresh ones, or those of an earlier result."""
+    lights, height, width = capture.images.shape
+    sets_shape = (height, width, lights) if keep_sets else None
+    if out is None:
+        normals, albedo, valid, confidence, measured, lights_kept, kept_sets = _bgars.normal_arrays(
+            height, width, lights if keep_sets else 0
+        )
+        return NormalField(
+            normals=normals,
+            albedo=albedo,
+            mask=valid,
+            confidence=confidence,
+            measured=measured,
+            lights_kept=lights_kept,
+            method=method,
+            pixel_pitch_um=capture.pixel_pitch_um,
+            kept_sets=kept_sets,
+        )
+    shape = out.normals.shape
+    if shape != (height, width, 3):
+        msg = f"out: must be the result for images of {width} x {height} pixels, got one for {shape[1]} x {shape[0]}"
+        raise InputError(msg)
+    if (None if out.kept_sets is None else out.kept_sets.shape) != sets_shape:
+        msg = "out: must have kept sets, for the same number of lights, exactly when keep_sets is asked for"
+        raise InputError(msg)
+    return replace(out, method=method, choice="", reflectance=None, pixel_pitch_um=capture.pixel_pitch_um)
+
+
+def capture_of(
+    images: Capture | ArrayLike,
+    light_directions: ArrayLike | None,
+    light_intensities: ArrayLike | None,
+    saturation: float | None,
+) -> Capture:
+    """Return the capture, or one made of plain arrays; arguments as of :func:`bgars.estimate_normals`."""
+    if isinstance(images, Capture):
+        for name, value in (
+            ("light_directions", light_directions),
+            ("light_intensities", light_intensities),
+            ("saturation", saturation),
+        ):
+            if value is not None:
+                msg = f"{name}: the capture brings its own; leave it out, or give plain arrays"
+                raise InputError(msg)
+        return images
+    if light_directions is None:
+        msg = "light_directions: needed with plain image arrays, shape (L, 3)"
+        raise InputError(msg)
+    stack = pixel_stack(images)
+    rig = LightRig.from_directions(light_directions, intensities=light_intensities)
+    if len(rig) != len(stack):
+        msg = f"images and light_directions: {len(stack)} images but {len(rig)} lights; they must be equal in number"
+        raise InputError(msg)
+    full_scale = integer_full_scale(stack)
+    if full_scale is not None:
+        clip = full_scale if saturation is None else saturation
+    else:
+        full_scale = saturation or float_full_scale(stack)
+        clip = float("inf") if saturation is None else saturation
+    return Capture(
+        images=stack,
+        rig=rig,
+        mask=np.broadcast_to(np.True_, stack.shape[1:]),
+        saturation=clip,
+        full_scale=full_scale,
+    )
+
+
+def pixel_stack(images: ArrayLike) -> PixelArray:
+    """Return a C-contiguous (L, H, W) stack of a supported dtype, without a copy where possible."""
+    stack = np.asarray(images)
+    if stack.ndim != STACK_NDIM:
+        msg = f"images: must have shape (L, H, W), got {stack.shape}"
+        raise InputError(msg)
+    if stack.dtype == np.float64:
+        stack = stack.astype(np.float32)
+    if stack.dtype not in (np.uint8, np.uint16, np.float32):
+        msg = f"images: must be uint8, uint16 or float32, got {stack.dtype}"
+        raise InputError(msg)
+    return np.ascontiguousarray(stack)
+
+
+def combined_mask(capture: Capture, mask: ArrayLike | None) -> NDArray[np.bool_] | None:
+    """The pixels to use; None for all of them."""
+    if mask is None:
+        if capture.mask.strides == (0, 0) and capture.mask[:1, :1].all():
+            return None  # one True for all pixels, as captures without a mask have it
+        return np.ascontiguousarray(capture.mask)
+    given = np.asarray(mask)
+    if given.dtype != np.bool_ or given.shape != capture.images.shape[1:]:
+        expected = tuple(capture.images.shape[1:])
+        msg = f"mask: must be bool of shape {expected}, got {given.dtype} of shape {given.shape}"
+        raise InputError(msg)
+    combined: NDArray[np.bool_] = np.ascontiguousarray(given & capture.mask)
+    if not combined.any():
+        msg = "mask: no pixel to use (all False)"
+        raise InputError(msg)
+    return combined

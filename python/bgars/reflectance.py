@@ -1,0 +1,91 @@
+"""Normals by reflectance: the highlights are information, once the material is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bgars import _bgars
+from bgars.kernel_capture import kernel_capture
+from bgars.material_records import ReflectanceFit, SurfaceLobe, SurfaceMaterial
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from bgars.records import Capture, NormalField
+
+__all__ = ["MIN_LIGHTS", "add_reflectance"]
+
+MIN_LIGHTS = 6
+"""Two unknowns a pixel, and enough lights beyond them to see that one is wrong."""
+
+
+def add_reflectance(
+    field: NormalField,
+    capture: Capture,
+    circles_px: NDArray[np.float64],
+    *,
+    mask: NDArray[np.bool_] | None,
+    free: NDArray[np.bool_] | None = None,
+    material: SurfaceMaterial | None = None,
+    threads: int | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> NormalField:
+    """Replace the normals of balls in a field by those of the reflectance estimator; the arrays are overwritten.
+
+    Parameters
+    ----------
+    field : NormalField
+        Another method's estimate; its other pixels stay.
+    capture : Capture
+        At least 6 lights.
+    circles_px : (N, 3) float64
+        Silhouettes of balls: x right, y up (origin at the image centre), radius.
+    mask : (H, W) bool or None
+        Pixels to use.
+    free : (H, W) bool, optional
+        Pixels that may be of the same material without a known shape, such as a bridge; kept where it explains them.
+    material : SurfaceMaterial, optional
+        A material that was fitted before; by default it is fitted to the balls.
+    threads, progress
+        See :func:`bgars.estimate_normals`.
+
+    Returns
+    -------
+    NormalField
+        With `reflectance`; unchanged but for that where the fit was not accepted.
+    """
+    found = _bgars.estimate_reflectance(
+        kernel_capture(capture),
+        mask=mask,
+        circles=np.ascontiguousarray(circles_px, np.float64),
+        free=None if free is None else np.ascontiguousarray(free),
+        material=material,
+        threads=threads,
+        progress=progress,
+        out=field,
+    )
+    fitted = SurfaceMaterial(
+        diffuse_level=found["diffuse_level"],
+        grazing=found["grazing"],
+        ambient_level=found["ambient_level"],
+        lobes=tuple(SurfaceLobe(*lobe) for lobe in found["lobes"]),
+        masking=found["masking"],
+        gains=tuple(found["gains"]),
+        standard_errors=dict(found["standard_errors"] or {}),
+    )
+    fit = ReflectanceFit(
+        material=fitted,
+        loss=found["loss"],
+        accepted=found["accepted"],
+        circles_px=tuple((float(x), float(y), float(radius)) for x, y, radius in circles_px),
+        own_material=tuple(found["own_material"]),
+        residuals_learnt=found["residuals_learnt"],
+        deviation_deg=tuple(found["deviation_deg"]),
+        flat_radius=tuple(found["flat_radius"]),
+    )
+    return replace(field, method="reflectance" if fit.accepted else field.method, reflectance=fit)
