@@ -101,8 +101,8 @@ def estimate_normals(
     -------
     NormalField
         A pixel whose kept lights are coplanar or nearly so (27 det / tr^3 of ``L^T L`` below 1e-6), whose solution is
-        zero or faces away from the camera is invalid: NaN, mask False. A ball's pixel whose light alone does not fix the
-        normal to 2 degrees is drawn to the sphere of its circle: `measured` is False there.
+        zero or faces away from the camera is invalid: NaN, mask False. A ball's pixel whose light alone does not fix
+        the normal to 2 degrees is drawn to the sphere of its circle: `measured` is False there.
 
     Raises
     ------
