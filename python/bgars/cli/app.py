@@ -56,8 +56,8 @@ MethodOption = Annotated[
         "--method",
         "-m",
         help="reflectance: on balls, highlights included, by the material that is fitted on them; elsewhere, and "
-        "without balls, robust-filter. robust-filter: the window of sorted values that a matt facet explains best, shadows and "
-        "highlights left out. specular-filter: the published sorted-gap filter. lambertian: all lights.",
+        "without balls, robust-filter. robust-filter: the window of sorted values that a matt facet explains best, "
+        "shadows and highlights left out. specular-filter: the published sorted-gap filter. lambertian: all lights.",
     ),
 ]
 ThresholdOption = Annotated[
