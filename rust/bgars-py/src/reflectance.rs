@@ -89,10 +89,8 @@ pub fn estimate_reflectance<'py>(
     progress: Option<Py<PyAny>>,
     mut out: Outputs<'py>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let circles: Vec<Circle> = triples(&circles, "circles")?
-        .iter()
-        .map(|&[x_px, y_px, radius_px]| Circle { x_px, y_px, radius_px })
-        .collect();
+    let circles: Vec<Circle> =
+        triples(&circles, "circles")?.iter().map(|&[x_px, y_px, radius_px]| Circle { x_px, y_px, radius_px }).collect();
     let material = material.map(|given| given.material()).transpose()?;
     let request = Request {
         mask: mask.as_ref().map(|mask| slice2(mask, "mask")).transpose()?,

@@ -4,8 +4,8 @@ use nalgebra::{Matrix2, Vector3};
 
 use super::anchor::{Circle, pixel_centre};
 use super::cells::CellTable;
-use super::flat_top::FlatTop;
 use super::disc::{from_disc, metric, to_disc};
+use super::flat_top::FlatTop;
 use super::material::Material;
 use super::observe::Reader;
 use super::refine::{Minimum, Observation, Prior, deepest};
@@ -163,10 +163,10 @@ impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
                 return [Some(flat.point), (inside < edge).then_some(circle_point)];
             }
         }
-        let moved = self.ball.odd.as_ref().map(|odd| {
-            std::array::from_fn(|axis| circle_point[axis] + odd.at(circle_point.map(f64::from), axis).0)
-        });
-        [Some(circle_point), moved.filter(|moved| *moved != circle_point)]
+        let shift: Option<[f32; 2]> = (self.ball.odd.as_ref())
+            .map(|odd| std::array::from_fn(|axis| odd.at(circle_point.map(f64::from), axis).0))
+            .filter(|[a, b]| a.hypot(*b) > 0.0);
+        [Some(circle_point), shift.map(|shift| std::array::from_fn(|axis| circle_point[axis] + shift[axis]))]
     }
 
     fn observe(&self, pixel: usize, scratch: &mut Scratch) {

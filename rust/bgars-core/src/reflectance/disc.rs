@@ -51,7 +51,11 @@ mod tests {
             let [g0, g1, g2] = metric(point);
             for (da, db) in [(1e-5, 0.0), (0.0, 1e-5), (1e-5, -1e-5)] {
                 let angle2 = (from_disc([point[0] + da, point[1] + db]) - normal).norm_squared();
-                approx::assert_relative_eq!(angle2, g0 * da * da + 2.0 * g1 * da * db + g2 * db * db, max_relative = 1e-3);
+                approx::assert_relative_eq!(
+                    angle2,
+                    g0 * da * da + 2.0 * g1 * da * db + g2 * db * db,
+                    max_relative = 1e-3
+                );
             }
         }
     }

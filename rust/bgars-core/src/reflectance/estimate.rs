@@ -25,8 +25,9 @@ pub const MIN_LIGHTS: usize = 6;
 const FIT_PIXELS: usize = 3000;
 const FIT_PIXELS_OF_BALL: usize = 60;
 
-/// Pixels of a ball that the residuals are learnt on, at most.
-const RESIDUAL_PIXELS: usize = 1200;
+/// Pixels that the residuals are learnt on: in all, and of each ball at least and at most.
+const RESIDUAL_PIXELS: usize = 40_000;
+const RESIDUAL_PIXELS_OF_BALL: (usize, usize) = (300, 1200);
 
 /// Smallest n_z of these.
 const RESIDUAL_MIN_N_Z: f64 = 0.1;
@@ -111,14 +112,15 @@ pub fn estimate_into<P: Pixel>(
         .collect();
     let balls = request.circles.len();
     let of_each = (FIT_PIXELS / balls.max(1)).max(FIT_PIXELS_OF_BALL);
-    let sampled = |count: usize, min_n_z: f64| samples(&reader, lights, request.circles, &inside, &clip, count, min_n_z);
+    let sampled =
+        |count: usize, min_n_z: f64| samples(&reader, lights, request.circles, &inside, &clip, count, min_n_z);
     let some = sampled(of_each, FIT_MIN_N_Z);
-    let fit = request.material.is_none().then(|| best_material(&some));
+    let fit = (request.material.is_none() && balls > 0).then(|| best_material(&some));
     let material = request.material.or(fit.as_ref().map(|fit| &fit.material)).cloned().ok_or(Error::NoMaterial)?;
     report(0.2)?;
-    let many = sampled(RESIDUAL_PIXELS, RESIDUAL_MIN_N_Z);
-    let materials =
-        if fit.is_some() { ball_materials(&many, &material, balls) } else { vec![material.clone(); balls] };
+    let (least, most) = RESIDUAL_PIXELS_OF_BALL;
+    let many = sampled((RESIDUAL_PIXELS / balls.max(1)).clamp(least, most), RESIDUAL_MIN_N_Z);
+    let materials = if fit.is_some() { ball_materials(&many, &material, balls) } else { vec![material.clone(); balls] };
     let corrections = learnt_corrections(&many, &materials);
     let residuals_learnt = corrections.is_some();
     report(0.3)?;
@@ -147,7 +149,7 @@ pub fn estimate_into<P: Pixel>(
     if accepted {
         regions.estimate(&spread, &mut out, &mut |done| report(0.5 + 0.5 * done))?;
     }
-    let known = &regions.regions[..balls];
+    let known = &regions.all[..balls];
     Ok(Findings {
         loss,
         accepted,

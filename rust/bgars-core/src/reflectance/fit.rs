@@ -130,8 +130,7 @@ fn normal_equations(samples: &Samples, material: &Material) -> Normal {
     let chunks: Vec<Normal> = (0..samples.len().div_ceil(CHUNK))
         .into_par_iter()
         .map(|chunk| {
-            let mut sum =
-                Normal { matrix: DMatrix::zeros(size, size), vector: DVector::zeros(size), loss: 0.0 };
+            let mut sum = Normal { matrix: DMatrix::zeros(size, size), vector: DVector::zeros(size), loss: 0.0 };
             let mut row = vec![0.0; size - samples.lights];
             for pixel in chunk * CHUNK..((chunk + 1) * CHUNK).min(samples.len()) {
                 for light in 0..samples.lights {

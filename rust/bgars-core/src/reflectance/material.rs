@@ -51,8 +51,7 @@ impl Lobe {
         let slope = self.roughness * tan;
         let ggx = 2.0 / (1.0 + (1.0 + slope * slope).sqrt());
         let c = 1.0 / slope.max(1e-9);
-        let beckmann =
-            if c < 1.6 { (3.535 * c + 2.181 * c * c) / (1.0 + 2.276 * c + 2.577 * c * c) } else { 1.0 };
+        let beckmann = if c < 1.6 { (3.535 * c + 2.181 * c * c) / (1.0 + 2.276 * c + 2.577 * c * c) } else { 1.0 };
         beckmann + self.tail * (ggx - beckmann)
     }
 }

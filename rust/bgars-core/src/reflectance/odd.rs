@@ -43,7 +43,7 @@ pub fn odd_places(found: &[Vec<BallPixel>]) -> Vec<Option<CellTable>> {
                     if odd { difference } else { [0.0; 2] }
                 })
                 .collect();
-            let large = large_groups(&differences.iter().map(|d| *d != [0.0; 2]).collect::<Vec<_>>());
+            let large = large_groups(&differences.iter().map(|[a, b]| a.hypot(*b) > 0.0).collect::<Vec<_>>());
             for (cell, middle) in table.middle.chunks_exact_mut(CHANNELS).enumerate() {
                 let kept = if large[cell] { differences[cell] } else { [0.0; 2] };
                 middle[..2].copy_from_slice(&kept);

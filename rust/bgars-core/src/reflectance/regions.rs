@@ -65,7 +65,7 @@ pub struct Regions<'a, 'b, 'c, P> {
     reader: &'a Reader<'b, 'c, P>,
     clip: &'a [f32],
     /// The balls in their order, then the free pixels.
-    pub regions: Vec<Region>,
+    pub all: Vec<Region>,
     tables: Vec<Signatures>,
     /// Table of each region.
     table_of: Vec<usize>,
@@ -85,10 +85,9 @@ impl<'a, 'b, 'c, P: Pixel> Regions<'a, 'b, 'c, P> {
             }
             base_of.push(base);
         }
-        let bases: Vec<Signatures> =
-            firsts.par_iter().map(|&first| regions[first].ball.signatures(lights)).collect();
+        let bases: Vec<Signatures> = firsts.par_iter().map(|&first| regions[first].ball.signatures(lights)).collect();
         if regions.iter().all(|region| region.ball.correction.is_none()) {
-            return Self { reader, clip, regions, tables: bases, table_of: base_of };
+            return Self { reader, clip, all: regions, tables: bases, table_of: base_of };
         }
         let tables = regions
             .par_iter()
@@ -99,12 +98,12 @@ impl<'a, 'b, 'c, P: Pixel> Regions<'a, 'b, 'c, P> {
             })
             .collect();
         let table_of = (0..regions.len()).collect();
-        Self { reader, clip, regions, tables, table_of }
+        Self { reader, clip, all: regions, tables, table_of }
     }
 
     fn work<'s>(&'s self, region: usize, spread: &'s Spread) -> BallWork<'s, 'b, 'c, P> {
         let table = &self.tables[self.table_of[region]];
-        BallWork::new(self.reader, &self.regions[region].ball, table, spread, self.clip)
+        BallWork::new(self.reader, &self.all[region].ball, table, spread, self.clip)
     }
 
     fn scratch(&self) -> Scratch {
@@ -113,14 +112,14 @@ impl<'a, 'b, 'c, P: Pixel> Regions<'a, 'b, 'c, P> {
 
     /// The spread of observations by their level, at normals found with the spread so far.
     pub fn learn_spread(&self, spread: &Spread) -> Spread {
-        let count = (SPREAD_PIXELS / self.regions.len().max(1)).max(SPREAD_PIXELS_OF_REGION);
-        let residuals: Vec<Vec<Residual>> = (0..self.regions.len())
+        let count = (SPREAD_PIXELS / self.all.len().max(1)).max(SPREAD_PIXELS_OF_REGION);
+        let residuals: Vec<Vec<Residual>> = (0..self.all.len())
             .into_par_iter()
             .map(|index| {
                 let work = self.work(index, spread);
                 let mut scratch = self.scratch();
                 let mut residuals = Vec::new();
-                for &pixel in spaced(&self.regions[index].pixels, count) {
+                for &pixel in spaced(&self.all[index].pixels, count) {
                     work.residuals(pixel, &mut scratch, &mut residuals);
                 }
                 residuals
@@ -132,16 +131,16 @@ impl<'a, 'b, 'c, P: Pixel> Regions<'a, 'b, 'c, P> {
     /// Learns how far the balls are from their spheres where the data tell, and returns the spread with which stated errors
     /// are true ones.
     pub fn learn_deviations(&mut self, spread: &Spread) -> Spread {
-        for region in &mut self.regions {
+        for region in &mut self.all {
             region.ball.prior_rad = f32::INFINITY;
         }
-        let balls = self.regions.iter().filter(|region| !region.free).count();
+        let balls = self.all.iter().filter(|region| !region.free).count();
         let found: Vec<Vec<BallPixel>> = (0..balls)
             .into_par_iter()
             .map(|index| {
                 let work = self.work(index, spread);
                 let mut scratch = self.scratch();
-                spaced(&self.regions[index].pixels, SHAPE_PIXELS).map(|&p| work.estimate(p, &mut scratch)).collect()
+                spaced(&self.all[index].pixels, SHAPE_PIXELS).map(|&p| work.estimate(p, &mut scratch)).collect()
             })
             .collect();
         let telling: Vec<Vec<BallPixel>> =
@@ -149,9 +148,7 @@ impl<'a, 'b, 'c, P: Pixel> Regions<'a, 'b, 'c, P> {
         let factor = calibration(&telling);
         let common = deviation(&telling.concat(), factor).unwrap_or((FIRST_PRIOR_DEG.to_radians(), 0.0));
         let (least, most) = PRIOR_LIMITS_DEG;
-        for (((region, found), odd), telling) in
-            self.regions.iter_mut().zip(&found).zip(odd_places(&found)).zip(&telling)
-        {
+        for (((region, found), odd), telling) in self.all.iter_mut().zip(&found).zip(odd_places(&found)).zip(&telling) {
             let ball = &mut region.ball;
             let (own, error) = deviation(telling, factor).unwrap_or(common);
             ball.flat = flat_top(found);
@@ -169,18 +166,18 @@ impl<'a, 'b, 'c, P: Pixel> Regions<'a, 'b, 'c, P> {
         out: &mut NormalMapMut<'_>,
         report: &mut dyn FnMut(f64) -> Result<()>,
     ) -> Result<()> {
-        let indices: Vec<usize> = (0..self.regions.len()).collect();
+        let indices: Vec<usize> = (0..self.all.len()).collect();
         for batch in indices.chunks(BATCH) {
             let found: Vec<Vec<BallPixel>> = batch
                 .par_iter()
                 .map(|&index| {
                     let work = self.work(index, spread);
-                    let pixels = self.regions[index].pixels.par_iter();
+                    let pixels = self.all[index].pixels.par_iter();
                     pixels.map_init(|| self.scratch(), |scratch, &pixel| work.estimate(pixel, scratch)).collect()
                 })
                 .collect();
             for (&index, found) in batch.iter().zip(&found) {
-                let region = &self.regions[index];
+                let region = &self.all[index];
                 let albedo = (region.ball.material.diffuse / 255.0) as f32;
                 for pixel in found.iter().filter(|pixel| !region.free || pixel.cost < FREE_LOSS) {
                     write(pixel, albedo, self.reader.lights(), out);

@@ -118,9 +118,11 @@ impl Signatures {
             axis().flat_map(|row| axis().map(move |col| (row, col))).filter(|&(row, col)| inside(row, col)).collect();
         let mut values = Vec::with_capacity(places.len() * lights);
         for light in 0..lights {
-            values.extend(places.iter().map(|&(row, col)| {
-                self.nodes[(row * FULL_SIDE + col) * self.groups + light / GROUP][light % GROUP]
-            }));
+            values.extend(
+                places.iter().map(|&(row, col)| {
+                    self.nodes[(row * FULL_SIDE + col) * self.groups + light / GROUP][light % GROUP]
+                }),
+            );
         }
         let points = places.iter().map(|&(row, col)| node_point(row, col).map(|v| v as f32)).collect();
         Coarse { points, values }

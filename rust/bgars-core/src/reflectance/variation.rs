@@ -63,10 +63,7 @@ pub fn ball_materials(samples: &Samples, common: &Material, balls: usize) -> Vec
             })
         })
         .collect();
-    fits.into_iter()
-        .zip(believed)
-        .map(|((own, _, _), believed)| if believed { own } else { common.clone() })
-        .collect()
+    fits.into_iter().zip(believed).map(|((own, _, _), believed)| if believed { own } else { common.clone() }).collect()
 }
 
 /// What is free of a ball's material, as it is compared between balls.
