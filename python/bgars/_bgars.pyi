@@ -53,7 +53,7 @@ def estimate_normals(
     threads: int | None,
     progress: Callable[[float], object] | None,
     out: NormalField,
-) -> None: ...
+) -> str | None: ...
 def normal_arrays(
     height: int, width: int, set_lights: int
 ) -> tuple[

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["DEFAULT_METHOD", "METHODS", "Method", "estimate_normals"]
 
-Method = Literal["lambertian", "specular-filter", "robust-filter"]
+Method = Literal["lambertian", "specular-filter", "robust-filter", "blind"]
 METHODS: tuple[Method, ...] = get_args(Method)
 DEFAULT_METHOD: Method = "robust-filter"
 DEFAULT_THRESHOLD = 50.0
@@ -44,8 +44,8 @@ def estimate_normals(
 ) -> NormalField:
     """Estimate the surface normal of every pixel.
 
-    Every method solves ``I_k = rho l_k . n`` by least squares over the lights it keeps at a pixel (Woodham 1980); the
-    methods differ in which lights they keep.
+    Every method but ``blind`` solves ``I_k = rho l_k . n`` by least squares over the lights it keeps at a pixel
+    (Woodham 1980); they differ in which lights they keep.
 
     Parameters
     ----------
@@ -54,10 +54,13 @@ def estimate_normals(
         Fortran-ordered ones (a crop, a transposed stack) and float64 are copied once.
     light_directions : (L, 3) array_like
         Unit vectors from the surface to the light; only with plain arrays.
-    method : {"lambertian", "specular-filter", "robust-filter"}
+    method : {"lambertian", "specular-filter", "robust-filter", "blind"}
         ``lambertian`` keeps every light. ``specular-filter`` is the published filter: sort the values, cut at the
         first gap over `threshold` with at least 3 values kept. ``robust-filter`` keeps the window of sorted values
-        that a Lambertian facet explains best, shadows and highlights left out (docs/method.md).
+        that a Lambertian facet explains best, shadows and highlights left out (docs/method.md). ``blind`` fits a
+        diffuse part with one specular lobe to the whole capture, together with normals and albedo of every pixel, and
+        takes it where it predicts left-out lights better than ``lambertian`` and ``robust-filter``, one of these
+        elsewhere; `NormalField.choice` says which and why. It needs 5 lights.
     mask : (H, W) array_like of bool, optional
         True = use; combined with the capture's own mask.
     light_intensities : (L,) array_like, optional
@@ -118,7 +121,7 @@ def estimate_normals(
         capture = _capture_from_arrays(images, light_directions, light_intensities, saturation)
     use = _combined_mask(capture, mask)
     field = _result(capture, method, keep_sets, out)
-    _bgars.estimate_normals(
+    choice = _bgars.estimate_normals(
         capture.images,
         **_light_arguments(capture),
         response=capture.response,
@@ -133,7 +136,7 @@ def estimate_normals(
         progress=progress,
         out=field,
     )
-    return field
+    return replace(field, choice=choice or "")
 
 
 def _result(capture: Capture, method: Method, keep_sets: bool, out: NormalField | None) -> NormalField:

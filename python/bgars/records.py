@@ -122,6 +122,10 @@ class NormalField:
         Estimator that was used.
     pixel_pitch_um : float or None
         Size of a pixel on the board.
+    kept_sets : (H, W, L) bool or None
+        The lights that entered, where they were asked for.
+    choice : str
+        What a method that chooses decided for this capture, and why; empty for the others.
     """
 
     normals: FloatArray
@@ -133,6 +137,7 @@ class NormalField:
     method: str
     pixel_pitch_um: float | None = None
     kept_sets: BoolArray | None = field(default=None, repr=False)
+    choice: str = ""
 
     def grey_levels(self) -> NDArray[np.uint8]:
         """Albedo as (H, W) grey for pictures: 255 at its 99th percentile (of a sample of pixels), 128 where invalid."""

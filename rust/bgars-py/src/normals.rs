@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use bgars_core::normals::{Method, NormalMap, NormalMapMut, RobustParams, estimate_into};
-use bgars_core::{ImageStack, Lights, Pixel, Radiometry};
+use bgars_core::{ImageStack, Lights, Pixel, Radiometry, blind};
 use numpy::{
     PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadwriteArray2, PyReadwriteArray3,
     PyUntypedArrayMethods,
@@ -70,6 +70,12 @@ impl Outputs<'_> {
     }
 }
 
+/// An estimator by its name in Python.
+enum Estimator {
+    Filtered(Method),
+    Blind,
+}
+
 /// Everything but the images, borrowed from Python.
 struct Request<'a> {
     lights: Lights,
@@ -79,7 +85,7 @@ struct Request<'a> {
     saturation: f32,
     full_scale: f32,
     mask: Option<&'a [bool]>,
-    method: Method,
+    method: Estimator,
     shape: [usize; 3],
 }
 
@@ -90,7 +96,7 @@ impl Request<'_> {
         dark: Option<&[P]>,
         report: &mut dyn FnMut((f64,)) -> ControlFlow<()>,
         out: NormalMapMut<'_>,
-    ) -> bgars_core::Result<()> {
+    ) -> bgars_core::Result<Option<String>> {
         let [lights, height, width] = self.shape;
         let stack = ImageStack::new(images, lights, height, width)?;
         let radiometry = Radiometry {
@@ -102,10 +108,19 @@ impl Request<'_> {
             intensities: self.intensities.clone(),
         };
         let progress = &mut |done| report((done,));
-        estimate_into(&stack, &self.lights, &radiometry, self.mask, self.method, progress, out)
+        match self.method {
+            Estimator::Filtered(method) => {
+                estimate_into(&stack, &self.lights, &radiometry, self.mask, method, progress, out).map(|()| None)
+            }
+            Estimator::Blind => {
+                let report = blind::estimate_into(&stack, &self.lights, &radiometry, self.mask, progress, out)?;
+                Ok(Some(report.to_string()))
+            }
+        }
     }
 }
 
+/// What the method decided and why, where it decides anything.
 #[pyfunction]
 #[pyo3(signature = (images, *, lights, lights_are_positions, reference_px, intensities, response, dark, black_level,
                     saturation, full_scale, mask, method, threshold, threads, progress, out))]
@@ -128,7 +143,7 @@ pub fn estimate_normals<'py>(
     threads: Option<i64>,
     progress: Option<Py<PyAny>>,
     mut out: Outputs<'py>,
-) -> PyResult<()> {
+) -> PyResult<Option<String>> {
     let vectors = triples(&lights, "lights")?;
     let lights = if lights_are_positions { Lights::near(vectors, &reference_px) } else { Lights::directional(vectors) };
     let shape = match &images {
@@ -145,9 +160,10 @@ pub fn estimate_normals<'py>(
         full_scale,
         mask: mask.as_ref().map(|mask| slice2(mask, "mask")).transpose()?,
         method: match method {
-            "lambertian" => Method::Lambertian,
-            "specular-filter" => Method::SpecularFilter { threshold },
-            "robust-filter" => Method::RobustFilter(RobustParams::default()),
+            "lambertian" => Estimator::Filtered(Method::Lambertian),
+            "specular-filter" => Estimator::Filtered(Method::SpecularFilter { threshold }),
+            "robust-filter" => Estimator::Filtered(Method::RobustFilter(RobustParams::default())),
+            "blind" => Estimator::Blind,
             _ => return Err(InputError::new_err(format!("method: unknown method {method:?}"))),
         },
         shape: [shape[0], shape[1], shape[2]],
@@ -170,7 +186,7 @@ fn run<P: Pixel + numpy::Element>(
     threads: Option<i64>,
     progress: Option<&Py<PyAny>>,
     out: NormalMapMut<'_>,
-) -> PyResult<()> {
+) -> PyResult<Option<String>> {
     let dark: Option<PyReadonlyArray2<'_, P>> = dark.map(PyAnyMethods::extract).transpose()?;
     let dark = dark.as_ref().map(|dark| slice2(dark, "dark")).transpose()?;
     let images = slice3(images, "images")?;
