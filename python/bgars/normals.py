@@ -19,10 +19,12 @@ if TYPE_CHECKING:
 
     from bgars.records import PixelArray
 
-__all__ = ["DEFAULT_METHOD", "METHODS", "Method", "estimate_normals"]
+__all__ = ["DEFAULT_METHOD", "FILTERS", "METHODS", "Method", "estimate_normals"]
 
 Method = Literal["lambertian", "specular-filter", "robust-filter", "blind"]
 METHODS: tuple[Method, ...] = get_args(Method)
+FILTERS: tuple[Method, ...] = ("lambertian", "specular-filter", "robust-filter")
+"""The methods that are least squares on chosen lights: those of the published experiments."""
 DEFAULT_METHOD: Method = "robust-filter"
 DEFAULT_THRESHOLD = 50.0
 STACK_NDIM = 3

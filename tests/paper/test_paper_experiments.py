@@ -10,7 +10,7 @@ from bgars.experiments.measure import COLUMNS, measure_all
 from bgars.experiments.reference import RADIUS_PX, STUDY, TOLERANCE_PERCENT, StudyValue
 from bgars.experiments.registry import EXPERIMENTS
 from bgars.experiments.setting import Setting
-from bgars.normals import METHODS
+from bgars.normals import FILTERS
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -40,8 +40,8 @@ def test_the_page_is_up_to_date(i_d: float) -> None:
     """Methods that the page does not show yet are for `make experiments` to add."""
     with (DOCS / "images" / "experiments" / "fig10.csv").open(encoding="utf-8", newline="") as file:
         shown = {row["method"]: row for row in csv.DictReader(file) if float(row["i_d"]) == i_d}
-    assert set(shown) <= set(METHODS)
-    for result in measure_all(Setting(i_d=i_d), RADIUS_PX, [name for name in METHODS if name in shown]):
+    assert set(shown) <= set(FILTERS)
+    for result in measure_all(Setting(i_d=i_d), RADIUS_PX, [name for name in FILTERS if name in shown]):
         for column in COLUMNS[5:]:
             assert float(shown[result.method][column]) == pytest.approx(getattr(result, column), rel=0.01, abs=0.01)
 

@@ -20,7 +20,7 @@ from bgars.experiments.kept import solved
 from bgars.experiments.measure import measure
 from bgars.experiments.meshes import shape_residuals_px
 from bgars.experiments.setting import DIFFUSE, HARDNESS, SPECULAR, Setting
-from bgars.normals import METHODS
+from bgars.normals import FILTERS
 
 RADIUS_PX = 20
 ERROR_COLUMNS = (
@@ -110,13 +110,13 @@ def test_sweeps_hold_every_method_at_every_value(
     results: tuple[Path, dict[str, Any]], name: str, column: str, values: Iterable[float]
 ) -> None:
     found = {(row["method"], float(row[column])) for row in rows_of(results[0], name)}
-    assert found == {(method, float(value)) for method in METHODS for value in values}
+    assert found == {(method, float(value)) for method in FILTERS for value in values}
 
 
 def test_the_same_setting_has_the_same_errors_in_every_table(results: tuple[Path, dict[str, Any]]) -> None:
     folder, _ = results
     base = {"i_d": "0.5", "i_s": "1", "hardness": "40", "elevation_deg": "45"}
-    for method in METHODS:
+    for method in FILTERS:
         seen = set()
         for name in ("fig6", "fig10", "fig11", "fig12", "elevation", "lights", "noise"):
             for row in rows_of(folder, name):

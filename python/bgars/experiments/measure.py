@@ -9,7 +9,7 @@ import numpy as np
 
 from bgars.evaluate import angular_error_deg
 from bgars.integrate import integrate_normals
-from bgars.normals import DEFAULT_THRESHOLD, METHODS, estimate_normals
+from bgars.normals import DEFAULT_THRESHOLD, FILTERS, estimate_normals
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -122,7 +122,7 @@ def measure(
     )
 
 
-def measure_all(setting: Setting, radius_px: int, methods: Sequence[Method] = METHODS) -> list[Measurement]:
+def measure_all(setting: Setting, radius_px: int, methods: Sequence[Method] = FILTERS) -> list[Measurement]:
     """Every method on one capture."""
     capture, truth = setting.photograph(radius_px)
     return [measure(capture, truth, setting, method=method) for method in methods]

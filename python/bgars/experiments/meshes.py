@@ -15,7 +15,7 @@ from bgars.experiments.setting import DIFFUSE, Setting
 from bgars.experiments.style import new_figure
 from bgars.experiments.surface import COLORS, draw_surface
 from bgars.experiments.words import listed, row_table
-from bgars.normals import METHODS
+from bgars.normals import FILTERS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -192,5 +192,5 @@ FIG6 = Experiment(
     "fig6",
     "Fig. 6: the filtered mesh against the naive one",
     "the mesh of every method in 3-D over I_d, against the naive one",
-    partial(run, stem="fig6", methods=METHODS),
+    partial(run, stem="fig6", methods=FILTERS),
 )

@@ -13,7 +13,7 @@ from bgars.experiments.outcome import Experiment, Outcome, Picture
 from bgars.experiments.setting import DIFFUSE, HARDNESS, SPECULAR, Setting
 from bgars.experiments.style import TRUTH_STYLE, new_figure, panels, tidy, value_colors
 from bgars.experiments.words import change, method_table, of_method, ranges, span, split_by_gain
-from bgars.normals import METHODS
+from bgars.normals import FILTERS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -61,7 +61,7 @@ def run(how: Run, *, name: str, field: str, symbol: str, values: tuple[float, ..
         about=(
             "One row of the height map through the centre, brought to a common minimum; between its last pixel centres "
             f"the true one rises {np.nanmax(true_px):.0f} px. "
-            + " ".join(_facts(measurements, method) for method in METHODS)
+            + " ".join(_facts(measurements, method) for method in FILTERS)
         ),
         agrees=(f"the filter lowers the mean error at {gains}.",) if better else (),
         differs=((f"it raises it at {losses}.",) if worse else ())

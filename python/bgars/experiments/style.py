@@ -9,7 +9,7 @@ from matplotlib import colormaps
 from matplotlib import style as matplotlib_style
 from matplotlib.figure import Figure
 
-from bgars.normals import METHODS
+from bgars.normals import FILTERS
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
@@ -51,8 +51,8 @@ def panels(figure: Any, rows: int, cols: int, **options: Any) -> list[list[Axes]
 
 
 def method_style(method: str) -> dict[str, Any]:
-    """Colour, marker and line of a method, by its place in METHODS."""
-    place = [str(name) for name in METHODS].index(method)
+    """Colour, marker and line of a method, by its place in FILTERS."""
+    place = [str(name) for name in FILTERS].index(method)
     return {
         "color": OKABE_ITO[place % len(OKABE_ITO)],
         "marker": MARKERS[place % len(MARKERS)],

@@ -12,7 +12,7 @@ from bgars.experiments.outcome import Experiment, Outcome, Picture
 from bgars.experiments.setting import Setting
 from bgars.experiments.style import new_figure
 from bgars.experiments.words import method_table, of_method, ranges, split_by_gain
-from bgars.normals import METHODS
+from bgars.normals import FILTERS
 
 if TYPE_CHECKING:
     from bgars.experiments.outcome import Run
@@ -66,7 +66,7 @@ def run(how: Run, *, sweep: Sweep) -> Outcome:
         f"{method} {own[0].mean_deg_nz03:.1f} deg at {sweep.values[0]:g}{sweep.unit}, "
         f"{own[-1].mean_deg_nz03:.1f} at {sweep.values[-1]:g}{sweep.unit}, "
         f"least {best.mean_deg_nz03:.1f} at {value_of(best):g}{sweep.unit}"
-        for method in METHODS
+        for method in FILTERS
         for own in [of_method(measurements, method)]
         for best in [min(own, key=lambda one: one.mean_deg_nz03)]
     )

@@ -3,13 +3,13 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::lobe::Material;
-use super::observation::{Kind, Observation, SCALE};
+use super::observation::{BLACK_WEIGHT, Kind, Observation, SCALE};
 
 /// Longest turn of the normal in a step, radians.
 const MAX_TURN: f64 = 0.3;
 
 /// Turn and change of ln(albedo) below which the fit has converged.
-const TOLERANCE: f64 = 3e-4;
+const TOLERANCE: f64 = 1e-3;
 
 /// Tries of a step with growing damping.
 const MAX_TRIES: usize = 5;
@@ -19,6 +19,9 @@ const MIN_N_Z: f64 = 0.01;
 
 /// Smallest albedo, of full scale.
 const MIN_ALBEDO: f64 = 1e-6;
+
+/// A product is taken to its logarithm before it overflows.
+const HUGE: f64 = 1e200;
 
 /// A facet with its cost.
 #[derive(Clone, Copy, Debug)]
@@ -96,12 +99,22 @@ pub(super) fn cost(
     pull: Option<&Pull>,
 ) -> f64 {
     let albedo = log_albedo.exp();
-    let mut sum = 0.0;
+    // The logarithm of a product instead of a sum of logarithms.
+    let (mut sum, mut lit, mut black) = (0.0, 1.0, 1.0);
     for light in 0..observation.values.len() {
-        let ratio =
-            observation.residual(light, albedo * material.shade(normal, &observation.lights[light])) / SCALE;
-        sum += observation.share(light) * (ratio * ratio).ln_1p();
+        let ratio = observation.residual(light, albedo * material.shade(normal, &observation.lights[light])) / SCALE;
+        let factor = 1.0 + ratio * ratio;
+        if observation.kinds[light] == Kind::Black {
+            black *= factor;
+        } else {
+            lit *= factor;
+        }
+        if lit > HUGE || black > HUGE {
+            sum += lit.ln() + BLACK_WEIGHT * black.ln();
+            (lit, black) = (1.0, 1.0);
+        }
     }
+    sum += lit.ln() + BLACK_WEIGHT * black.ln();
     if let Some(pull) = pull {
         let ratio = (normal - pull.toward).norm_squared() / (pull.width * pull.width);
         sum += pull.strength * ratio.ln_1p();

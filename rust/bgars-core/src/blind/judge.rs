@@ -15,9 +15,6 @@ const MAX_LEFT_OUT: usize = 8;
 /// Fewest lights for a prediction: four remain.
 pub(super) const MIN_LIGHTS: usize = 5;
 
-/// A left-out value is judged on a scale this many times that of the fits: a prediction errs more than a fit.
-const LENIENCE: f64 = 2.0;
-
 /// Mean cost of a left-out light under each method; lower is better.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Predictions {
@@ -84,15 +81,14 @@ fn of_pixel(specimen: &Specimen, material: &Material) -> ([f64; 3], f64) {
 }
 
 fn cost_of(observation: &Observation, light: usize, predicted: f64) -> f64 {
-    let ratio = observation.residual(light, predicted) / (SCALE * LENIENCE);
+    let ratio = observation.residual(light, predicted) / (SCALE);
     observation.share(light) * (ratio * ratio).ln_1p()
 }
 
 /// `rho n` of the kept lights; zero where they do not fix it.
 fn least_squares(observation: &Observation, kept: &[bool]) -> Vector3<f64> {
     let (mut gram, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    for ((light, &value), _) in
-        observation.lights.iter().zip(&observation.values).zip(kept).filter(|(_, kept)| **kept)
+    for ((light, &value), _) in observation.lights.iter().zip(&observation.values).zip(kept).filter(|(_, kept)| **kept)
     {
         gram += light.direction * light.direction.transpose();
         right += light.direction * value;

@@ -13,6 +13,9 @@ const MAX_STEPS: usize = 30;
 /// Tries of a step with growing damping.
 const MAX_TRIES: usize = 6;
 
+/// About so many pixels of the sample tell which start is best.
+const SCREENED_PIXELS: usize = 600;
+
 /// Steps between two looks whether a pixel's first start has become the better one.
 const RESTART_EVERY: usize = 5;
 
@@ -25,9 +28,12 @@ const MAX_CHANGE: f64 = 0.4;
 /// Step of the derivatives over the parameters.
 const DIFFERENCE: f64 = 1e-3;
 
+/// Lower bound of the roughness: a narrower lobe is seen by too few pixels to be told from noise on free normals.
+const LEAST_ROUGHNESS: f64 = 0.1;
+
 /// Bounds of strength, roughness and shape. A lobe of more than ten times the diffuse part is not told from a missing
 /// diffuse part on free normals: the fit would fall into that hole (a metal explains everything by mirrors).
-const BOUNDS: [(f64, f64); 3] = [(0.007, 10.0), (0.04, 1.0), (0.0, 2.5)];
+const BOUNDS: [(f64, f64); 3] = [(0.007, 10.0), (LEAST_ROUGHNESS, 1.0), (0.0, 1.0)];
 
 /// Starts: strength and roughness.
 const STARTS: [(f64, f64); 4] = [(0.3, 0.3), (2.0, 0.25), (0.3, 0.12), (8.0, 0.3)];
@@ -40,7 +46,7 @@ pub(super) struct Specimen {
 }
 
 /// The better of the fits from both starts.
-pub(super) fn fit_from_starts(specimen: &Specimen, material: &Material, max_iters: usize) -> Facet {
+fn fit_from_starts(specimen: &Specimen, material: &Material, max_iters: usize) -> Facet {
     let [first, second] =
         specimen.starts.map(|start| facet::fit(&specimen.observation, material, &start, None, None, max_iters));
     if second.cost < first.cost { second } else { first }
@@ -48,29 +54,32 @@ pub(super) fn fit_from_starts(specimen: &Specimen, material: &Material, max_iter
 
 /// Mean cost of the fitted sample under a material.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Fitted {
-    pub material: Material,
-    pub mean_cost: f64,
+struct Fitted {
+    material: Material,
+    mean_cost: f64,
 }
 
-/// Fits the material to a sample, from several starts; the one of least cost.
+/// Fits the material to a sample: to a part of it from several starts, to all of it from the one of least cost.
 ///
 /// Gauss-Newton over (ln strength, ln roughness, shape) with the three unknowns of each pixel eliminated (Schur complement,
 /// as in bundle adjustment: Triggs et al. 2000, section 6.1), robustly weighted; after each step the pixels are fitted anew.
-pub(super) fn fit(sample: &[Specimen]) -> Fitted {
+pub(super) fn fit(sample: &[Specimen]) -> Material {
+    let step = sample.len().div_ceil(SCREENED_PIXELS).max(1);
+    let screened: Vec<Specimen> = sample.iter().step_by(step).cloned().collect();
     let mut best: Option<Fitted> = None;
     for (strength, roughness) in STARTS {
-        let fitted = fit_from(sample, Material { strength, roughness, shape: 0.5 });
+        let fitted = fit_from(&screened, Material { strength, roughness, shape: 0.5 });
         if best.is_none_or(|best| fitted.mean_cost < best.mean_cost) {
             best = Some(fitted);
         }
     }
-    best.unwrap_or(Fitted { material: Material::MATTE, mean_cost: f64::INFINITY })
+    best.map_or(Material::MATTE, |best| fit_from(sample, best.material).material)
 }
 
 /// The fit from one start.
-pub(super) fn fit_from(sample: &[Specimen], start: Material) -> Fitted {
-    let mut parameters = to_parameters(start);
+fn fit_from(sample: &[Specimen], start: Material) -> Fitted {
+    let mut parameters = bounded(to_parameters(start));
+    let start = to_material(&parameters);
     let mut facets = restarted(sample, &start);
     let mut total = sum_of_costs(&facets);
     let mut damping = 1e-3;
@@ -182,7 +191,13 @@ fn reduced_system(sample: &[Specimen], facets: &[Facet], parameters: &Vector3<f6
     })
 }
 
-fn add_pixel(sum: &mut Reduced, observation: &Observation, facet: &Facet, material: &Material, changed: &[Material; 3]) {
+fn add_pixel(
+    sum: &mut Reduced,
+    observation: &Observation,
+    facet: &Facet,
+    material: &Material,
+    changed: &[Material; 3],
+) {
     let frame = tangents(&facet.normal);
     let mut own = equations(observation, material, facet, &frame);
     for axis in 0..3 {

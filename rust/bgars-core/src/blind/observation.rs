@@ -12,7 +12,7 @@ pub(super) const NOISE: f64 = 1.0 / 255.0;
 pub(super) const SCALE: f64 = 0.02;
 
 /// Weight of a black value where the model is brighter: a cast shadow is no surprise.
-const BLACK_WEIGHT: f64 = 0.1;
+pub(super) const BLACK_WEIGHT: f64 = 0.1;
 
 /// What a value can say.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -62,7 +62,7 @@ impl<P: Pixel> Passes<'_, P> {
         let mut found = self.banded(&mut |done| part(0, done), &|_, pixel| {
             let mut observation = self.reader.room();
             self.reader.read(pixel, &mut observation);
-            let starts = [pixel::start(self.lambertian, pixel), pixel::start(filtered, pixel)];
+            let starts = [(pixel::start(self.lambertian, pixel), None), (pixel::start(filtered, pixel), None)];
             let (facet, source) = best_facet(&observation, &self.material, &starts, None, MAX_ITERS[0]);
             Found { facet, source }
         })?;
@@ -76,10 +76,11 @@ impl<P: Pixel> Passes<'_, P> {
                 let mut observation = self.reader.room();
                 self.reader.read(pixel, &mut observation);
                 let before = found[index].facet.normal;
+                let starts = |toward| [(before, Some(found[index].source)), (toward, None)];
                 let toward = median_normal(&normals, self.shape, pixel).unwrap_or(before);
                 let pull = Pull { toward, strength: PULL.0, width: PULL.1 };
                 let (facet, source) =
-                    best_facet(&observation, &self.material, &[before, toward], Some(&pull), MAX_ITERS[1]);
+                    best_facet(&observation, &self.material, &starts(toward), Some(&pull), MAX_ITERS[1]);
                 Found { facet, source }
             })?;
             found = next;
@@ -123,8 +124,7 @@ impl<P: Pixel> Passes<'_, P> {
             let mut observation = self.reader.room();
             self.reader.read(pixel, &mut observation);
             let material = if source == Source::Matte { Material::MATTE } else { self.material };
-            let scaled =
-                pixel::start(filtered, pixel) * (f64::from(albedo[pixel]) / self.reader.albedo_scale);
+            let scaled = pixel::start(filtered, pixel) * (f64::from(albedo[pixel]) / self.reader.albedo_scale);
             if valid[pixel] && filter_knows_better(&observation, &scaled, &facet, &material) {
                 return None;
             }
@@ -140,8 +140,7 @@ impl<P: Pixel> Passes<'_, P> {
             };
             counts[found.source as usize] += 1;
             let normal = found.facet.normal;
-            out.normals[3 * pixel..3 * pixel + 3]
-                .copy_from_slice(&[normal.x as f32, normal.y as f32, normal.z as f32]);
+            out.normals[3 * pixel..3 * pixel + 3].copy_from_slice(&[normal.x as f32, normal.y as f32, normal.z as f32]);
             out.albedo[pixel] = (found.facet.log_albedo.exp() * self.reader.albedo_scale) as f32;
             out.mask[pixel] = true;
             out.confidence[pixel] = trust.confidence;

@@ -41,17 +41,20 @@ pub(super) fn start(normals: &[f32], pixel: usize) -> Vector3<f64> {
     if normal.x.is_nan() { Vector3::z() } else { normal.normalize() }
 }
 
-/// The facet of least cost over the starts and both materials.
+/// The facet of least cost over the starts, under both materials or only under the one that stands beside the start.
 pub(super) fn best_facet(
     observation: &Observation,
     material: &Material,
-    starts: &[Vector3<f64>],
+    starts: &[(Vector3<f64>, Option<Source>)],
     pull: Option<&Pull>,
     max_iters: usize,
 ) -> (Facet, Source) {
     let mut best: Option<(Facet, Source)> = None;
-    for start in starts {
+    for (start, only) in starts {
         for (candidate, source) in [(material, Source::Material), (&Material::MATTE, Source::Matte)] {
+            if only.is_some_and(|only| only != source) {
+                continue;
+            }
             let facet = facet::fit(observation, candidate, start, None, pull, max_iters);
             if best.is_none_or(|(least, _)| facet.cost < least.cost) {
                 best = Some((facet, source));
@@ -74,8 +77,7 @@ pub(super) fn filter_knows_better(
     for (index, light) in observation.lights.iter().enumerate() {
         let matches = |model: f64| {
             let difference = model - observation.values[index];
-            difference.abs() <= MATCH_LEVELS * NOISE
-                || observation.kinds[index] == Kind::Clipped && difference > 0.0
+            difference.abs() <= MATCH_LEVELS * NOISE || observation.kinds[index] == Kind::Clipped && difference > 0.0
         };
         let black = observation.kinds[index] == Kind::Black;
         by_filter += usize::from(!black && matches(scaled.dot(&light.direction)));
