@@ -25,7 +25,7 @@ from bgars.pipeline import solver_fraction
 
 __all__ = ["main"]
 
-MethodName = Literal["lambertian", "specular-filter", "robust-filter"]
+MethodName = Literal["lambertian", "specular-filter", "robust-filter", "blind"]
 ChannelOption = Literal["luminance", "mean", "red", "green", "blue"]
 
 app = typer.Typer(
