@@ -47,7 +47,7 @@ def estimate_normals(
     threads: int | None,
     progress: Callable[[float], object] | None,
     out: NormalField,
-) -> None: ...
+) -> str | None: ...
 def estimate_reflectance(
     capture: KernelCapture,
     *,

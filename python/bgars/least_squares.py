@@ -1,4 +1,4 @@
-"""Normals by least squares over the lights that each pixel keeps (the Rust kernels, with plain arguments)."""
+"""Normals from nothing but images and lights (the Rust kernels, with plain arguments)."""
 
 from __future__ import annotations
 
@@ -20,18 +20,27 @@ if TYPE_CHECKING:
 
     from bgars.records import PixelArray
 
-__all__ = ["LEAST_SQUARES_METHODS", "LeastSquaresMethod", "capture_of", "combined_mask", "least_squares_normals"]
+__all__ = [
+    "LEAST_SQUARES_METHODS",
+    "LeastSquaresMethod",
+    "PixelwiseMethod",
+    "capture_of",
+    "combined_mask",
+    "pixelwise_normals",
+]
 
 LeastSquaresMethod = Literal["lambertian", "specular-filter", "robust-filter"]
 LEAST_SQUARES_METHODS: tuple[LeastSquaresMethod, ...] = get_args(LeastSquaresMethod)
+PixelwiseMethod = Literal["lambertian", "specular-filter", "robust-filter", "blind"]
+"""What needs nothing but images and lights: ``blind`` fits a material of its own (docs/method.md)."""
 DEFAULT_THRESHOLD = 50.0
 STACK_NDIM = 3
 
 
-def least_squares_normals(
+def pixelwise_normals(
     capture: Capture,
     *,
-    method: LeastSquaresMethod,
+    method: PixelwiseMethod,
     mask: NDArray[np.bool_] | None,
     threshold: float = DEFAULT_THRESHOLD,
     keep_sets: bool = False,
@@ -39,12 +48,12 @@ def least_squares_normals(
     threads: int | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> NormalField:
-    """Estimate every pixel by one of the least-squares methods; arguments as of :func:`bgars.estimate_normals`.
+    """Estimate every pixel by one of the methods that need no balls; arguments as of :func:`bgars.estimate_normals`.
 
     `mask` comes from :func:`combined_mask`.
     """
     field = _result(capture, method, keep_sets, out)
-    _bgars.estimate_normals(
+    choice = _bgars.estimate_normals(
         kernel_capture(capture),
         mask=mask,
         method=method,
@@ -53,10 +62,10 @@ def least_squares_normals(
         progress=progress,
         out=field,
     )
-    return field
+    return replace(field, choice=choice or f"{method}, as asked")
 
 
-def _result(capture: Capture, method: LeastSquaresMethod, keep_sets: bool, out: NormalField | None) -> NormalField:
+def _result(capture: Capture, method: PixelwiseMethod, keep_sets: bool, out: NormalField | None) -> NormalField:
     """The arrays to be written: fresh ones, or those of an earlier result."""
     lights, height, width = capture.images.shape
     sets_shape = (height, width, lights) if keep_sets else None

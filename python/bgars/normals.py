@@ -12,10 +12,10 @@ from bgars.balls import find_balls
 from bgars.errors import InputError
 from bgars.least_squares import (
     DEFAULT_THRESHOLD,
-    LEAST_SQUARES_METHODS,
+    PixelwiseMethod,
     capture_of,
     combined_mask,
-    least_squares_normals,
+    pixelwise_normals,
 )
 from bgars.reflectance import MIN_LIGHTS, add_reflectance
 
@@ -29,10 +29,12 @@ if TYPE_CHECKING:
 
 __all__ = ["DEFAULT_METHOD", "METHODS", "Method", "estimate_normals"]
 
-Method = Literal["lambertian", "specular-filter", "robust-filter", "reflectance"]
-METHODS: tuple[Method, ...] = get_args(Method)
+Method = Literal["lambertian", "specular-filter", "robust-filter", "reflectance", "blind"]
+METHODS: tuple[Method, ...] = ("lambertian", "specular-filter", "robust-filter", "reflectance")
+"""The methods that are compared; ``blind`` is what ``reflectance`` does without balls."""
 DEFAULT_METHOD: Method = "reflectance"
 
+BLIND_LIGHTS = 5
 CIRCLE_VALUES = 3
 BRIDGE_WIDTH = 0.8
 """Half width of the strip between two joined balls that is looked at, in radii of the smaller."""
@@ -65,12 +67,14 @@ def estimate_normals(
         Unit vectors from the surface to the light; only with plain arrays.
     method : {"reflectance", "robust-filter", "specular-filter", "lambertian"}
         ``reflectance``: on balls, the normal whose brightness under all lights, highlights included, fits the material
-        best; the material is fitted on the balls themselves. Other pixels, and captures with fewer than 6 lights or
-        with neither balls nor a material, are left to ``robust-filter``; `NormalField.choice` says what was done.
-        The others solve ``I_k = rho l_k . n`` by least squares (Woodham 1980) over the lights they keep at a pixel:
-        ``lambertian`` all; ``specular-filter``, as published: sort the values, cut at the first gap over `threshold`
-        with at least 3 values kept; ``robust-filter`` the window of sorted values that a Lambertian facet explains
-        best (docs/method.md).
+        best; the material is fitted on the balls themselves; other pixels are left to ``robust-filter``. Captures
+        with fewer than 6 lights, or with neither balls nor a material, are left to ``blind``: one material is fitted
+        to the whole capture together with normals and albedo of every pixel, and taken where it predicts left-out
+        lights better than least squares does (some 20 us a pixel; at least 5 lights). `NormalField.choice` says what
+        was done. The others solve ``I_k = rho l_k . n`` by least squares (Woodham 1980) over the lights they keep at a
+        pixel: ``lambertian`` all; ``specular-filter``, as published: sort the values, cut at the first gap over
+        `threshold` with at least 3 values kept; ``robust-filter`` the window of sorted values that a Lambertian facet
+        explains best (docs/method.md).
     mask : (H, W) array_like of bool, optional
         True = use; combined with the capture's own mask.
     light_intensities : (L,) array_like, optional
@@ -123,41 +127,44 @@ def estimate_normals(
     >>> float(bgars.estimate_normals(images, rig.directions).normals[0, 0, 2])
     1.0
     """
-    if method not in METHODS:
-        msg = f"method: must be one of {', '.join(METHODS)}; got {method!r}"
+    if method not in get_args(Method):
+        msg = f"method: must be one of {', '.join(get_args(Method))}; got {method!r}"
         raise InputError(msg)
-    if method in LEAST_SQUARES_METHODS:
+    if method != "reflectance":
         for name, value in (("anchors", anchors), ("material", material)):
             if value is not None:
                 msg = f"{name}: only the method reflectance uses it, got method {method!r}"
                 raise InputError(msg)
     capture = capture_of(images, light_directions, light_intensities, saturation)
     use = combined_mask(capture, mask)
-    base = "robust-filter" if method == "reflectance" else method
     part = _part_of(progress, method == "reflectance")
-    field = least_squares_normals(
-        capture,
-        method=base,
-        mask=use,
-        threshold=threshold,
-        keep_sets=keep_sets,
-        out=out,
-        threads=threads,
-        progress=part(0.0, 0.2),
-    )
-    if method in LEAST_SQUARES_METHODS:
-        return replace(field, choice=f"{method}, as asked")
+
+    def pixelwise(name: PixelwiseMethod, share: tuple[float, float] = (0.0, 1.0)) -> NormalField:
+        return pixelwise_normals(
+            capture,
+            method=name,
+            mask=use,
+            threshold=threshold,
+            keep_sets=keep_sets,
+            out=out,
+            threads=threads,
+            progress=part(*share),
+        )
+
+    if method != "reflectance":
+        return pixelwise(method)
     lights = len(capture.rig)
+    fallback: PixelwiseMethod = "blind" if lights >= BLIND_LIGHTS else "robust-filter"
     if lights < MIN_LIGHTS:
-        return replace(field, choice=f"{base}: reflectance needs {MIN_LIGHTS} lights, the capture has {lights}")
+        return _because(pixelwise(fallback), f"reflectance needs {MIN_LIGHTS} lights, the capture has {lights}")
     given = "found" if anchors is None else "given"
-    found = anchors if anchors is not None else find_balls(capture, threads=threads, progress=part(0.2, 0.5))
-    circles_px = _circles(found, field.mask.shape)
+    found = anchors if anchors is not None else find_balls(capture, threads=threads, progress=part(0.0, 0.3))
+    circles_px = _circles(found, capture.mask.shape)
     if not len(circles_px) and material is None:
-        return replace(field, choice=f"{base}: no balls {given} to fit a material on, and no material given")
-    free = _free_pixels(found, field.mask.shape) if len(circles_px) else np.ones(field.mask.shape, np.bool_)
+        return _because(pixelwise(fallback, (0.3, 1.0)), f"no balls {given} to fit a material on, and none given")
+    free = _free_pixels(found, capture.mask.shape) if len(circles_px) else np.ones(capture.mask.shape, np.bool_)
     field = add_reflectance(
-        field,
+        pixelwise("robust-filter", (0.3, 0.5)),
         capture,
         circles_px,
         mask=use,
@@ -166,17 +173,20 @@ def estimate_normals(
         threads=threads,
         progress=part(0.5, 1.0),
     )
-    return replace(field, choice=_choice(field, len(circles_px), given, material is not None, base))
+    balls = len(circles_px)
+    source = "given" if material is not None else f"fitted on {balls} ball{'s' if balls != 1 else ''} {given}"
+    fit = field.reflectance
+    if fit is not None and not fit.accepted:
+        reason = f"the material {source} does not explain the balls: loss {fit.loss:.2f}, at most 2 is accepted"
+        return replace(_because(pixelwise(fallback, (0.5, 1.0)), reason), reflectance=fit)
+    where = "on balls, robust-filter elsewhere" if balls else "where it explains the pixel, robust-filter elsewhere"
+    loss = 0.0 if fit is None else fit.loss
+    return replace(field, choice=f"reflectance {where}: material {source}, loss {loss:.3f}")
 
 
-def _choice(field: NormalField, balls: int, given: str, has_material: bool, base: str) -> str:
-    """One line: what was used, and why."""
-    source = "given" if has_material else f"fitted on {balls} ball{'s' if balls != 1 else ''} {given}"
-    loss = 0.0 if field.reflectance is None else field.reflectance.loss
-    if field.reflectance is not None and not field.reflectance.accepted:
-        return f"{base}: the material {source} does not explain the balls (loss {loss:.2f}, at most 2 is accepted)"
-    where = f"on balls; {base} elsewhere" if balls else "everywhere it explains the pixel"
-    return f"reflectance {where}: material {source} (loss {loss:.3f})"
+def _because(field: NormalField, reason: str) -> NormalField:
+    """The field with the reason why its method stands in for reflectance."""
+    return replace(field, choice=f"{field.choice.removesuffix(', as asked')}; {reason}")
 
 
 def _part_of(

@@ -6,6 +6,7 @@
 //! Conventions: image arrays are row-major and indexed `[row, col]`; world axes are x right (+col), **y up (-row)**,
 //! z toward the camera; light directions point from the surface to the light; lengths are pixels unless a name says `_um`.
 
+pub mod blind;
 pub mod error;
 pub mod integrate;
 pub mod io;

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use bgars_core::normals::{Method, NormalMap, NormalMapMut, RobustParams, estimate_into};
-use bgars_core::{ImageStack, Lights, Pixel, Radiometry};
+use bgars_core::{ImageStack, Lights, Pixel, Radiometry, blind};
 use numpy::{PyArray2, PyArray3, PyReadonlyArray2, PyReadwriteArray2, PyReadwriteArray3};
 use pyo3::prelude::*;
 
@@ -68,15 +68,21 @@ impl Outputs<'_> {
     }
 }
 
-/// The estimate of every pixel by one of the least-squares methods.
+/// An estimator by its name in Python.
+enum Estimator {
+    LeastSquares(Method),
+    Blind,
+}
+
+/// The estimate of every pixel by one method; its output says what a method that chooses has decided, and why.
 struct Estimate<'a> {
     mask: Option<&'a [bool]>,
-    method: Method,
+    method: Estimator,
     out: NormalMapMut<'a>,
 }
 
 impl Work for Estimate<'_> {
-    type Output = ();
+    type Output = Option<String>;
 
     fn run<P: Pixel>(
         self,
@@ -84,8 +90,16 @@ impl Work for Estimate<'_> {
         lights: &Lights,
         radiometry: &Radiometry<'_, P>,
         report: &mut dyn FnMut(f64) -> ControlFlow<()>,
-    ) -> bgars_core::Result<()> {
-        estimate_into(stack, lights, radiometry, self.mask, self.method, report, self.out)
+    ) -> bgars_core::Result<Option<String>> {
+        match self.method {
+            Estimator::LeastSquares(method) => {
+                estimate_into(stack, lights, radiometry, self.mask, method, report, self.out).map(|()| None)
+            }
+            Estimator::Blind => {
+                let decided = blind::estimate_into(stack, lights, radiometry, self.mask, report, self.out)?;
+                Ok(Some(decided.to_string()))
+            }
+        }
     }
 }
 
@@ -101,11 +115,12 @@ pub fn estimate_normals<'py>(
     threads: Option<i64>,
     progress: Option<Py<PyAny>>,
     mut out: Outputs<'py>,
-) -> PyResult<()> {
+) -> PyResult<Option<String>> {
     let method = match method {
-        "lambertian" => Method::Lambertian,
-        "specular-filter" => Method::SpecularFilter { threshold },
-        "robust-filter" => Method::RobustFilter(RobustParams::default()),
+        "lambertian" => Estimator::LeastSquares(Method::Lambertian),
+        "specular-filter" => Estimator::LeastSquares(Method::SpecularFilter { threshold }),
+        "robust-filter" => Estimator::LeastSquares(Method::RobustFilter(RobustParams::default())),
+        "blind" => Estimator::Blind,
         _ => return Err(InputError::new_err(format!("method: unknown method {method:?}"))),
     };
     let mask = mask.as_ref().map(|mask| slice2(mask, "mask")).transpose()?;

@@ -104,6 +104,19 @@ impl NormalMap {
 }
 
 impl NormalMapMut<'_> {
+    /// The same arrays, borrowed for less long.
+    pub fn reborrow(&mut self) -> NormalMapMut<'_> {
+        NormalMapMut {
+            normals: self.normals,
+            albedo: self.albedo,
+            mask: self.mask,
+            confidence: self.confidence,
+            measured: self.measured,
+            lights_kept: self.lights_kept,
+            kept_sets: self.kept_sets,
+        }
+    }
+
     pub(crate) fn check(&self, pixels: usize, lights: usize) -> Result<()> {
         let kept_sets = if self.kept_sets.is_empty() { 0 } else { pixels * lights };
         for (argument, expected, actual) in [

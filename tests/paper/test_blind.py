@@ -1,0 +1,50 @@
+"""The blind method on photographs, and on rendered scenes as if no ball were known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bgars
+import numpy as np
+import pytest
+from bgars.light_files import read_filenames
+
+pytestmark = pytest.mark.data
+
+ALLOWED_DEG = 0.2
+LIMITS_DEG = {
+    ("dil_bear", "ring8.txt"): 5.5,
+    ("dil_bear", None): 5.0,
+    ("dil_cat", "ring8.txt"): 6.0,
+    ("dil_cat", None): 5.4,
+}
+SCENES = ["A_one_ball_diffuse", "B_one_ball_paper_id100", "C_grid_4x4_paper", "H_bridge", "K2_ball_variation"]
+
+
+def means_deg(capture: bgars.Capture, truth: bgars.Truth) -> dict[str, float]:
+    judged = truth.mask & capture.mask
+    if truth.ball_ids is not None:
+        judged &= truth.normals[..., 2] > 0.3
+    found = {}
+    for method in ("lambertian", "robust-filter", "blind"):
+        field = bgars.estimate_normals(capture, method=method)
+        normals = np.where(field.mask[..., None], field.normals, np.float32([0, 0, 1]))
+        cosines = np.clip((normals * truth.normals).sum(axis=-1)[judged], -1, 1)
+        found[method] = float(np.degrees(np.arccos(cosines)).mean())
+    return found
+
+
+@pytest.mark.parametrize(("name", "images"), LIMITS_DEG)
+def test_photographs(data_folder: Path, name: str, images: str | None) -> None:
+    folder = data_folder / "real" / name
+    capture = bgars.read_capture(folder, images=read_filenames(folder / images) if images else None)
+    found = means_deg(capture, bgars.read_truth(folder))
+    assert found["blind"] <= LIMITS_DEG[name, images], found
+    assert found["blind"] <= min(found["lambertian"], found["robust-filter"]) + ALLOWED_DEG, found
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_rendered_scenes_without_known_balls(data_folder: Path, scene: str) -> None:
+    folder = data_folder / "scenes" / scene
+    found = means_deg(bgars.read_capture(folder), bgars.read_truth(folder))
+    assert found["blind"] <= min(found["lambertian"], found["robust-filter"]) + ALLOWED_DEG, found
