@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from bgars.balls.alike import fit_alike
 from bgars.balls.mask_blobs import round_blobs
 from bgars.balls.outward import outward_centres, slope_field
-from bgars.balls.rim_fit import SECTORS, Circles, fit_rims
+from bgars.balls.rim_fit import SECTORS, Circles
 from bgars.balls.rim_scan import CoarseCircles, scan_rims
 
 if TYPE_CHECKING:
@@ -98,10 +99,9 @@ def find_circles(levels: Levels, progress: Callable[[float], object] | None) -> 
     coarse = _coarse_circles(reduced, slopes, mask)
     report(0.4)
     row, col = ((column + 0.5) * factor - 0.5 for column in coarse[:2])
-    circles = fit_rims(levels, row, col, coarse.radius_px * factor)
+    circles = fit_alike(levels, row, col, coarse.radius_px * factor)
     good = circles.support >= (MIN_SUPPORT if mask is None else MIN_SUPPORT_IN_MASK)
     good &= circles.u_radius_px < MAX_U_RADIUS * circles.radius_px
-    good &= np.abs(np.log(circles.radius_px / (coarse.radius_px * factor))) < np.log(LIKE_OTHERS[1])
     report(0.95)
     return Detection(circles.take(np.flatnonzero(good)), slopes, brightest, factor)
 

@@ -27,7 +27,8 @@ BASIS = 7
 WIDE_ROUNDS = 3
 NARROW_ROUNDS = 3
 FIRST_BLUR_PX = 0.3
-REACH_PX = 14.0
+WIDE_REACH_PX, NARROW_REACH_PX = 13.0, 9.0
+"""Depth of the bands, and how far circles move within them."""
 TOLERANCES = ((0.6, 1),) * 3 + ((0.1, 1),) * 2 + ((0.1, 2),) + ((0.05, 2),) * 6
 """Offset in pixels that halves a weight, and the power of the weight: Cauchy first, then closer."""
 MODEL_ERROR_PX = 0.03
@@ -58,6 +59,8 @@ class Circles:
         Fraction of the sectors whose rim was seen on the circle.
     offsets_px : (N, SECTORS) float64
         Where each sector's rim lies, outward from the circle; NaN where it was not seen.
+    blur_px : float
+        Standard deviation of the lens blur.
     """
 
     row: NDArray[np.float64]
@@ -67,10 +70,11 @@ class Circles:
     u_radius_px: NDArray[np.float64]
     support: NDArray[np.float64]
     offsets_px: NDArray[np.float64]
+    blur_px: float = 0.0
 
     def take(self, index: slice | NDArray[np.intp]) -> Circles:
         """Some of the circles."""
-        return Circles(*(getattr(self, field.name)[index] for field in fields(self)))
+        return Circles(*(getattr(self, field.name)[index] for field in fields(self)[:-1]), blur_px=self.blur_px)
 
 
 class RimPixels:
@@ -168,16 +172,18 @@ def fit_rims(
     )
     if not len(row):
         return circles
-    table = RimTable(FIRST_BLUR_PX if blur_px is None else blur_px, REACH_PX)
+    table = RimTable(FIRST_BLUR_PX if blur_px is None else blur_px, WIDE_REACH_PX)
     pixels = RimPixels(levels, circles, np.clip(0.2 * radius_px, 4.0, 9.0), np.clip(0.2 * radius_px, 4.0, 9.0), 3)
     for _ in range(WIDE_ROUNDS):
         _update(circles, *_sector_offsets(pixels, circles, table))
     radius_px = circles.radius_px.clip(0.5 * radius_px, 2.0 * radius_px)
     pixels = RimPixels(levels, circles, np.clip(0.15 * radius_px, 3.0, 6.0), np.clip(0.14 * radius_px, 2.5, 5.0), 1)
+    table = RimTable(table.blur_px, NARROW_REACH_PX)
     for turn in range(NARROW_ROUNDS):
         if turn == 1 and blur_px is None:
-            table = RimTable(_estimated_blur(pixels, circles), REACH_PX)
+            table = RimTable(_estimated_blur(pixels, circles), NARROW_REACH_PX)
         _update(circles, *_sector_offsets(pixels, circles, table))
+    circles.blur_px = table.blur_px
     return circles
 
 
@@ -187,7 +193,7 @@ def _estimated_blur(pixels: RimPixels, circles: Circles) -> float:
     costs: list[float] = []
     best = np.zeros(0, np.bool_)
     for blur_px in BLURS_PX:
-        left, contrast = _left_over(pixels.take(some), circles.take(some), RimTable(blur_px, REACH_PX))
+        left, contrast = _left_over(pixels.take(some), circles.take(some), RimTable(blur_px, NARROW_REACH_PX))
         if not costs:
             best = contrast >= np.quantile(contrast, 2 / 3)
             best = best & (left <= np.median(left[best]))

@@ -1,0 +1,176 @@
+"""Balls of one part judge each other: weak silhouettes against highlights, and against the usual radius."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bgars.balls.highlights import HighlightCircles, highlight_circles
+from bgars.balls.rim_fit import Circles, fit_rims
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bgars.balls.levels import Levels
+
+    Array = NDArray[np.float64]
+
+__all__ = ["fit_alike"]
+
+ENOUGH = 4
+"""Balls that make a population."""
+OTHER_START = 1.3
+MIN_SUPPORT = 0.5
+START_DIFFERS = 0.05
+HALF_VECTOR_BIAS = 0.06
+"""Largest usual difference of the highlights' radius, as a fraction: off-specular peaks and wide lobes."""
+DIFFERS = 0.012
+"""Of the radius: farther from the others, a circle is fitted once more from where they would have it."""
+DIFFERS_SIGMA = 3.0
+BETTER_SUPPORT = 0.1
+REPLACED_U = 2.0
+
+
+def fit_alike(levels: Levels, row: Array, col: Array, radius_px: Array) -> Circles:
+    """Silhouettes of all balls, checked against each other.
+
+    On metal the rim is a grey level or two, and the shoulder of a highlight passes for it. Highlights tell: their
+    centre is the ball's, and their radius is the silhouette's times a factor that all balls share.
+
+    Parameters
+    ----------
+    levels : Levels
+        The capture.
+    row, col, radius_px : (N,) float64
+        Circles to start from, good to a tenth of the radius, most of them.
+    """
+    shine = _highlights(levels, row, col, radius_px)
+    circles = fit_rims(levels, row, col, radius_px)
+    if not len(row):
+        return circles
+    shines = np.isfinite(shine.radius_px)
+    if shines.any():
+        far = shines & (np.abs(np.log(circles.radius_px / shine.radius_px)) > START_DIFFERS)
+        for factor in (1.0, 1.0 - HALF_VECTOR_BIAS):
+            index = np.flatnonzero(far)
+            again = fit_rims(
+                levels, shine.row[index], shine.col[index], factor * shine.radius_px[index], blur_px=circles.blur_px
+            )
+            # The silhouette is the outermost circle: shoulders of highlights lie inside it.
+            better = (again.support >= MIN_SUPPORT) & (again.radius_px > 1.02 * circles.radius_px[index])  # noqa: PLR2004
+            better |= circles.support[index] < MIN_SUPPORT
+            _put(circles, index[better], again.take(np.flatnonzero(better)))
+    if shines.sum() >= ENOUGH:
+        _agree_with_highlights(levels, circles, shine)
+    _agree_with_radius(levels, circles, shines if shines.sum() >= ENOUGH else np.zeros_like(shines))
+    return circles
+
+
+def _highlights(levels: Levels, row: Array, col: Array, radius_px: Array) -> HighlightCircles:
+    """Highlight circles from the radii as they are, and from larger ones where that shows nothing."""
+    shine = highlight_circles(levels, row, col, radius_px)
+    if not len(row) or np.isfinite(shine.radius_px).mean() > MIN_SUPPORT:
+        usual = float(np.nanmedian(shine.radius_px)) if len(row) else 0.0
+        start_px = np.full(len(row), usual)
+    else:
+        start_px = OTHER_START * radius_px
+    index = np.flatnonzero(~np.isfinite(shine.radius_px))
+    if len(index):
+        again = highlight_circles(levels, row[index], col[index], start_px[index])
+        for column, other in zip(shine, again, strict=True):
+            column[index] = other
+    return shine
+
+
+def _agree_with_highlights(levels: Levels, circles: Circles, shine: HighlightCircles) -> None:
+    """Fit circles once more, or replace them, that are elsewhere than the highlights have them; then take means."""
+    shines = np.isfinite(shine.radius_px)
+    for turn in range(2):
+        ratio, spread, shift, shift_px = _relation(circles, shine)
+        expected = HighlightCircles(
+            shine.row + shift[0], shine.col + shift[1], shine.radius_px * ratio, shine.u_centre_px, shine.u_radius_px
+        )
+        off_radius = np.abs(circles.radius_px - expected.radius_px)
+        off_centre = np.hypot(circles.row - expected.row, circles.col - expected.col)
+        u_radius = np.hypot(np.hypot(spread * shine.radius_px, circles.u_radius_px), shine.u_radius_px)
+        u_centre = np.hypot(np.hypot(shift_px, circles.u_centre_px), shine.u_centre_px)
+        far = shines & (
+            (off_radius > np.maximum(DIFFERS_SIGMA * u_radius, 0.1)) | (off_centre > np.maximum(3.0 * u_centre, 0.1))  # noqa: PLR2004
+        )
+        index = np.flatnonzero(far)
+        if turn == 0 and len(index):
+            again = fit_rims(
+                levels, expected.row[index], expected.col[index], expected.radius_px[index], blur_px=circles.blur_px
+            )
+            same = np.hypot(again.row - circles.row[index], again.col - circles.col[index]) < 0.1  # noqa: PLR2004
+            same &= np.abs(again.radius_px - circles.radius_px[index]) < 0.1  # noqa: PLR2004
+            better = ~same
+            _put(circles, index[better], again.take(np.flatnonzero(better)))
+    # Silhouettes that stay elsewhere: a complete rim is a fact (a flat or odd ball), an incomplete one is not.
+    sure = circles.support >= np.median(circles.support[shines])
+    sure &= circles.u_radius_px <= 1.5 * np.median(circles.u_radius_px[shines])  # noqa: PLR2004
+    replaced = far & ~sure
+    joined = shines & ~far
+    u_shine_radius = np.hypot(spread * shine.radius_px, shine.u_radius_px)
+    u_shine_centre = np.hypot(shift_px, shine.u_centre_px)
+    weight = np.where(replaced, 1.0, np.where(joined, 1.0 / (1.0 + (u_shine_radius / circles.u_radius_px) ** 2), 0.0))
+    circles.radius_px += np.nan_to_num(weight * (expected.radius_px - circles.radius_px))
+    common = ratio_uncertainty(spread, shine, circles, joined)
+    mean = 1.0 / np.sqrt(1.0 / u_shine_radius**2 + 1.0 / circles.u_radius_px**2)
+    circles.u_radius_px = np.where(joined, np.hypot(mean, common), circles.u_radius_px)
+    circles.u_radius_px = np.where(replaced, np.hypot(REPLACED_U * u_shine_radius, common), circles.u_radius_px)
+    weight = np.where(replaced, 1.0, np.where(joined, 1.0 / (1.0 + (u_shine_centre / circles.u_centre_px) ** 2), 0.0))
+    circles.row += np.nan_to_num(weight * (expected.row - circles.row))
+    circles.col += np.nan_to_num(weight * (expected.col - circles.col))
+    mean = 1.0 / np.sqrt(1.0 / u_shine_centre**2 + 1.0 / circles.u_centre_px**2)
+    circles.u_centre_px = np.where(joined, mean, circles.u_centre_px)
+    circles.u_centre_px = np.where(replaced, REPLACED_U * u_shine_centre, circles.u_centre_px)
+    circles.support = np.where(replaced, np.maximum(circles.support, MIN_SUPPORT), circles.support)
+
+
+def ratio_uncertainty(spread: float, shine: HighlightCircles, circles: Circles, joined: NDArray[np.bool_]) -> Array:
+    """What all radii share: the error of the ratio, and of the rim model."""
+    number = max(int(joined.sum()), 1)
+    shared = float(np.median(circles.u_radius_px[joined])) / 2.0 if joined.any() else 0.0
+    return np.hypot(spread * np.nan_to_num(shine.radius_px) / np.sqrt(number), shared)
+
+
+def _relation(circles: Circles, shine: HighlightCircles) -> tuple[float, float, Array, float]:
+    """Ratio of silhouette to highlight radius, its spread, shift (row, column) of centres, its spread; medians."""
+    good = np.isfinite(shine.radius_px) & (circles.support >= MIN_SUPPORT)
+    if good.sum() < ENOUGH:
+        good = np.isfinite(shine.radius_px)
+    ratio = circles.radius_px[good] / shine.radius_px[good]
+    # The half with the smaller uncertainties says more.
+    sharp = circles.u_radius_px[good] <= np.median(circles.u_radius_px[good])
+    middle = float(np.median(ratio[sharp]))
+    shifts = np.stack([circles.row[good] - shine.row[good], circles.col[good] - shine.col[good]])
+    shift = np.median(shifts[:, sharp], axis=1)
+    spread = 1.48 * float(np.median(np.abs(ratio - middle)))
+    shift_px = 1.48 * float(np.median(np.abs(shifts - shift[:, None])))
+    return middle, spread, shift, shift_px
+
+
+def _agree_with_radius(levels: Levels, circles: Circles, judged: NDArray[np.bool_]) -> None:
+    """Fit circles once more from the usual radius that are off it; odd ones stay where their rim is the clearer."""
+    if len(circles.row) < ENOUGH:
+        return
+    usual_px = float(np.median(circles.radius_px))
+    spread_px = 1.48 * float(np.median(np.abs(circles.radius_px - usual_px)))
+    off = np.abs(circles.radius_px - usual_px)
+    index = np.flatnonzero((off > np.maximum(4.0 * spread_px, 0.03 * usual_px)) & ~judged)  # noqa: PLR2004
+    index = index[circles.radius_px[index] < 1.35 * usual_px]  # noqa: PLR2004 - larger ones are no slips
+    if not len(index):
+        return
+    start_px = np.full(len(index), usual_px)
+    again = fit_rims(levels, circles.row[index], circles.col[index], start_px, blur_px=circles.blur_px)
+    better = np.abs(again.radius_px - usual_px) < np.maximum(4.0 * spread_px, 0.03 * usual_px)  # noqa: PLR2004
+    better &= again.support >= circles.support[index] + BETTER_SUPPORT * (again.radius_px < circles.radius_px[index])
+    _put(circles, index[better], again.take(np.flatnonzero(better)))
+
+
+def _put(circles: Circles, index: NDArray[np.intp], other: Circles) -> None:
+    """Set some of the circles."""
+    for name in ("row", "col", "radius_px", "u_centre_px", "u_radius_px", "support", "offsets_px"):
+        getattr(circles, name)[index] = getattr(other, name)
