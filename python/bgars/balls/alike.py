@@ -22,12 +22,16 @@ ENOUGH = 4
 """Balls that make a population."""
 OTHER_START = 1.3
 MIN_SUPPORT = 0.5
-START_DIFFERS = 0.05
+SHOULDER, SHOULDER_OF_USUAL, SHOULDER_OF_FEW = 0.8, 0.93, 0.75
+"""Of the highlights' radius: smaller circles are shoulders of highlights. Wide lobes make that radius 13 % too large;
+a ball flattened to 0.8 would look the same among few."""
+USUAL = 0.04
 HALF_VECTOR_BIAS = 0.06
 """Largest usual difference of the highlights' radius, as a fraction: off-specular peaks and wide lobes."""
-DIFFERS = 0.012
-"""Of the radius: farther from the others, a circle is fitted once more from where they would have it."""
 DIFFERS_SIGMA = 3.0
+SHAPE = 0.003
+"""Standard deviation of radius ratios of real balls, which are not quite spheres."""
+SURE = 0.9
 BETTER_SUPPORT = 0.1
 REPLACED_U = 2.0
 
@@ -49,22 +53,38 @@ def fit_alike(levels: Levels, row: Array, col: Array, radius_px: Array) -> Circl
     circles = fit_rims(levels, row, col, radius_px)
     if not len(row):
         return circles
+    shine = _of_usual_size(shine)
     shines = np.isfinite(shine.radius_px)
     if shines.any():
-        far = shines & (np.abs(np.log(circles.radius_px / shine.radius_px)) > START_DIFFERS)
+        ratio = circles.radius_px / shine.radius_px
+        usual = float(np.nanmedian(ratio))
+        few = shines.sum() < ENOUGH
+        far = shines & (ratio < (SHOULDER_OF_FEW if few else max(SHOULDER, SHOULDER_OF_USUAL * usual)))
         for factor in (1.0, 1.0 - HALF_VECTOR_BIAS):
             index = np.flatnonzero(far)
             again = fit_rims(
                 levels, shine.row[index], shine.col[index], factor * shine.radius_px[index], blur_px=circles.blur_px
             )
             # The silhouette is the outermost circle: shoulders of highlights lie inside it.
-            better = (again.support >= MIN_SUPPORT) & (again.radius_px > 1.02 * circles.radius_px[index])  # noqa: PLR2004
-            better |= circles.support[index] < MIN_SUPPORT
+            better = (
+                (again.support >= MIN_SUPPORT)
+                & (again.radius_px > 1.04 * circles.radius_px[index])
+                & (again.radius_px > SHOULDER * shine.radius_px[index])
+            )
+            better &= again.support >= circles.support[index] - BETTER_SUPPORT
             _put(circles, index[better], again.take(np.flatnonzero(better)))
     if shines.sum() >= ENOUGH:
         _agree_with_highlights(levels, circles, shine)
     _agree_with_radius(levels, circles, shines if shines.sum() >= ENOUGH else np.zeros_like(shines))
     return circles
+
+
+def _of_usual_size(shine: HighlightCircles) -> HighlightCircles:
+    """Without those of unusual radius: odd balls, and flattened ones, whose highlights lie at R / flattening."""
+    if np.isfinite(shine.radius_px).sum() < ENOUGH:
+        return shine
+    unusual = np.abs(np.log(shine.radius_px / np.nanmedian(shine.radius_px))) > USUAL
+    return HighlightCircles(*(np.where(unusual, np.nan, column) for column in shine))
 
 
 def _highlights(levels: Levels, row: Array, col: Array, radius_px: Array) -> HighlightCircles:
@@ -93,8 +113,9 @@ def _agree_with_highlights(levels: Levels, circles: Circles, shine: HighlightCir
         )
         off_radius = np.abs(circles.radius_px - expected.radius_px)
         off_centre = np.hypot(circles.row - expected.row, circles.col - expected.col)
-        u_radius = np.hypot(np.hypot(spread * shine.radius_px, circles.u_radius_px), shine.u_radius_px)
-        u_centre = np.hypot(np.hypot(shift_px, circles.u_centre_px), shine.u_centre_px)
+        u_shine_radius, u_shine_centre = _own_uncertainty(circles, shine, spread, shift_px)
+        u_radius = np.hypot(u_shine_radius, circles.u_radius_px)
+        u_centre = np.hypot(u_shine_centre, circles.u_centre_px)
         far = shines & (
             (off_radius > np.maximum(DIFFERS_SIGMA * u_radius, 0.1)) | (off_centre > np.maximum(3.0 * u_centre, 0.1))  # noqa: PLR2004
         )
@@ -105,18 +126,16 @@ def _agree_with_highlights(levels: Levels, circles: Circles, shine: HighlightCir
             )
             same = np.hypot(again.row - circles.row[index], again.col - circles.col[index]) < 0.1  # noqa: PLR2004
             same &= np.abs(again.radius_px - circles.radius_px[index]) < 0.1  # noqa: PLR2004
-            better = ~same
+            better = ~same & (again.support >= circles.support[index])
             _put(circles, index[better], again.take(np.flatnonzero(better)))
     # Silhouettes that stay elsewhere: a complete rim is a fact (a flat or odd ball), an incomplete one is not.
-    sure = circles.support >= np.median(circles.support[shines])
-    sure &= circles.u_radius_px <= 1.5 * np.median(circles.u_radius_px[shines])  # noqa: PLR2004
+    sure = circles.support >= SURE
+    sure &= circles.u_radius_px <= 2.0 * np.median(circles.u_radius_px[shines])  # noqa: PLR2004
     replaced = far & ~sure
     joined = shines & ~far
-    u_shine_radius = np.hypot(spread * shine.radius_px, shine.u_radius_px)
-    u_shine_centre = np.hypot(shift_px, shine.u_centre_px)
     weight = np.where(replaced, 1.0, np.where(joined, 1.0 / (1.0 + (u_shine_radius / circles.u_radius_px) ** 2), 0.0))
     circles.radius_px += np.nan_to_num(weight * (expected.radius_px - circles.radius_px))
-    common = ratio_uncertainty(spread, shine, circles, joined)
+    common = _common_uncertainty(spread, shine, circles, joined)
     mean = 1.0 / np.sqrt(1.0 / u_shine_radius**2 + 1.0 / circles.u_radius_px**2)
     circles.u_radius_px = np.where(joined, np.hypot(mean, common), circles.u_radius_px)
     circles.u_radius_px = np.where(replaced, np.hypot(REPLACED_U * u_shine_radius, common), circles.u_radius_px)
@@ -129,7 +148,20 @@ def _agree_with_highlights(levels: Levels, circles: Circles, shine: HighlightCir
     circles.support = np.where(replaced, np.maximum(circles.support, MIN_SUPPORT), circles.support)
 
 
-def ratio_uncertainty(spread: float, shine: HighlightCircles, circles: Circles, joined: NDArray[np.bool_]) -> Array:
+def _own_uncertainty(circles: Circles, shine: HighlightCircles, spread: float, shift_px: float) -> tuple[Array, Array]:
+    """Uncertainties of highlight radii and centres: their disorder, balls that are no spheres, and of the spread
+    against the silhouettes what these do not account for."""
+    good = np.isfinite(shine.radius_px)
+    usual = np.median(shine.radius_px[good])
+    more_radius = max((spread * usual) ** 2 - float(np.median(circles.u_radius_px[good])) ** 2, 0.0)
+    more_centre = max(shift_px**2 - float(np.median(circles.u_centre_px[good])) ** 2, 0.0)
+    return (
+        np.sqrt(shine.u_radius_px**2 + (SHAPE * shine.radius_px) ** 2 + more_radius),
+        np.sqrt(shine.u_centre_px**2 + more_centre),
+    )
+
+
+def _common_uncertainty(spread: float, shine: HighlightCircles, circles: Circles, joined: NDArray[np.bool_]) -> Array:
     """What all radii share: the error of the ratio, and of the rim model."""
     number = max(int(joined.sum()), 1)
     shared = float(np.median(circles.u_radius_px[joined])) / 2.0 if joined.any() else 0.0
@@ -149,6 +181,9 @@ def _relation(circles: Circles, shine: HighlightCircles) -> tuple[float, float, 
     shift = np.median(shifts[:, sharp], axis=1)
     spread = 1.48 * float(np.median(np.abs(ratio - middle)))
     shift_px = 1.48 * float(np.median(np.abs(shifts - shift[:, None])))
+    # Lights all around cancel what lobes shift; only a clear shift is believed.
+    doubt = shift_px**2 * 1.6 / max(int(sharp.sum()), 1)
+    shift *= max(0.0, 1.0 - 2.0 * doubt / max(float(shift @ shift), 1e-12))
     return middle, spread, shift, shift_px
 
 
@@ -160,13 +195,14 @@ def _agree_with_radius(levels: Levels, circles: Circles, judged: NDArray[np.bool
     spread_px = 1.48 * float(np.median(np.abs(circles.radius_px - usual_px)))
     off = np.abs(circles.radius_px - usual_px)
     index = np.flatnonzero((off > np.maximum(4.0 * spread_px, 0.03 * usual_px)) & ~judged)  # noqa: PLR2004
-    index = index[circles.radius_px[index] < 1.35 * usual_px]  # noqa: PLR2004 - larger ones are no slips
+    ratio = circles.radius_px[index] / usual_px
+    index = index[(ratio > 0.6) & (ratio < 1.35)]  # noqa: PLR2004 - others are no slips
     if not len(index):
         return
     start_px = np.full(len(index), usual_px)
     again = fit_rims(levels, circles.row[index], circles.col[index], start_px, blur_px=circles.blur_px)
     better = np.abs(again.radius_px - usual_px) < np.maximum(4.0 * spread_px, 0.03 * usual_px)  # noqa: PLR2004
-    better &= again.support >= circles.support[index] + BETTER_SUPPORT * (again.radius_px < circles.radius_px[index])
+    better &= again.support >= circles.support[index] + BETTER_SUPPORT
     _put(circles, index[better], again.take(np.flatnonzero(better)))
 
 

@@ -102,6 +102,9 @@ def find_circles(levels: Levels, progress: Callable[[float], object] | None) -> 
     circles = fit_alike(levels, row, col, coarse.radius_px * factor)
     good = circles.support >= (MIN_SUPPORT if mask is None else MIN_SUPPORT_IN_MASK)
     good &= circles.u_radius_px < MAX_U_RADIUS * circles.radius_px
+    usual_px = np.median(circles.radius_px) if len(circles.row) else 1.0
+    moved = np.abs(np.log(circles.radius_px / (coarse.radius_px * factor)))
+    good &= np.minimum(moved, np.abs(np.log(circles.radius_px / usual_px))) < np.log(LIKE_OTHERS[1])
     report(0.95)
     return Detection(circles.take(np.flatnonzero(good)), slopes, brightest, factor)
 

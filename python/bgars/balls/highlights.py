@@ -26,12 +26,12 @@ ROUNDS = 6
 MOST_PIXELS = 225
 MIN_CONTRAST = 4.0
 """Grey levels of 255 of the highlight above its surroundings."""
-MIN_RATIO = 0.15
+MIN_RATIO = 0.5
 """The same, of the surroundings."""
 MIN_HIGHLIGHTS = 3
 TOLERANCE = 0.015
 """Distance of a highlight from its place that halves its weight, in radii."""
-MAX_RMS = 0.06
+MAX_RMS = 0.03
 POOL_BALLS = 6
 NOISE = 0.001
 """Least standard deviation of a highlight's place, in radii: facets and pixels."""
@@ -149,9 +149,7 @@ def _peaks(
     return x, y, good & (total > 1e-6)  # noqa: PLR2004 - nothing
 
 
-def _fit(
-    x: Array, y: Array, good: NDArray[np.bool_], place: Array, radius_px: Array
-) -> tuple[Array, Array, Array]:
+def _fit(x: Array, y: Array, good: NDArray[np.bool_], place: Array, radius_px: Array) -> tuple[Array, Array, Array]:
     """(N, 3) shift right, shift up and radius, residual RMS in radii, (N, 3, 3) cofactors; robust."""
     count, lights = x.shape
     design = np.zeros((count, lights, 2, 3))
@@ -171,7 +169,9 @@ def _fit(
         weight = good / (1.0 + (distance / tolerance) ** 2) ** 2
     used = weight.sum(axis=1)
     rms = np.sqrt((weight * distance**2).sum(axis=1) / np.maximum(2.0 * used - 3.0, 0.5))
-    rms[~np.isfinite(rms) | (good.sum(axis=1) < MIN_HIGHLIGHTS) | (used < 0.6 * good.sum(axis=1)) | (used < 2.0)] = np.inf  # noqa: PLR2004
+    rms[~np.isfinite(rms) | (good.sum(axis=1) < MIN_HIGHLIGHTS) | (used < 0.6 * good.sum(axis=1)) | (used < 2.0)] = (
+        np.inf
+    )  # noqa: PLR2004
     return step, rms, np.linalg.inv(normal)
 
 
