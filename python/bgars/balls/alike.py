@@ -49,10 +49,10 @@ def fit_alike(levels: Levels, row: Array, col: Array, radius_px: Array) -> Circl
     row, col, radius_px : (N,) float64
         Circles to start from, good to a tenth of the radius, most of them.
     """
-    shine = _highlights(levels, row, col, radius_px)
     circles = fit_rims(levels, row, col, radius_px)
     if not len(row):
         return circles
+    shine = _highlights(levels, row, col, radius_px)
     shine = _of_usual_size(shine)
     shines = np.isfinite(shine.radius_px)
     if shines.any():
@@ -90,11 +90,9 @@ def _of_usual_size(shine: HighlightCircles) -> HighlightCircles:
 def _highlights(levels: Levels, row: Array, col: Array, radius_px: Array) -> HighlightCircles:
     """Highlight circles from the radii as they are, and from larger ones where that shows nothing."""
     shine = highlight_circles(levels, row, col, radius_px)
-    if not len(row) or np.isfinite(shine.radius_px).mean() > MIN_SUPPORT:
-        usual = float(np.nanmedian(shine.radius_px)) if len(row) else 0.0
-        start_px = np.full(len(row), usual)
-    else:
-        start_px = OTHER_START * radius_px
+    start_px = OTHER_START * radius_px
+    if np.isfinite(shine.radius_px).mean() > MIN_SUPPORT:
+        start_px = np.full(len(row), float(np.nanmedian(shine.radius_px)))
     index = np.flatnonzero(~np.isfinite(shine.radius_px))
     if len(index):
         again = highlight_circles(levels, row[index], col[index], start_px[index])
@@ -117,7 +115,7 @@ def _agree_with_highlights(levels: Levels, circles: Circles, shine: HighlightCir
         u_radius = np.hypot(u_shine_radius, circles.u_radius_px)
         u_centre = np.hypot(u_shine_centre, circles.u_centre_px)
         far = shines & (
-            (off_radius > np.maximum(DIFFERS_SIGMA * u_radius, 0.1)) | (off_centre > np.maximum(3.0 * u_centre, 0.1))  # noqa: PLR2004
+            (off_radius > np.maximum(DIFFERS_SIGMA * u_radius, 0.1)) | (off_centre > np.maximum(3.0 * u_centre, 0.1))
         )
         index = np.flatnonzero(far)
         if turn == 0 and len(index):
@@ -130,7 +128,7 @@ def _agree_with_highlights(levels: Levels, circles: Circles, shine: HighlightCir
             _put(circles, index[better], again.take(np.flatnonzero(better)))
     # Silhouettes that stay elsewhere: a complete rim is a fact (a flat or odd ball), an incomplete one is not.
     sure = circles.support >= SURE
-    sure &= circles.u_radius_px <= 2.0 * np.median(circles.u_radius_px[shines])  # noqa: PLR2004
+    sure &= circles.u_radius_px <= 2.0 * np.median(circles.u_radius_px[shines])
     replaced = far & ~sure
     joined = shines & ~far
     weight = np.where(replaced, 1.0, np.where(joined, 1.0 / (1.0 + (u_shine_radius / circles.u_radius_px) ** 2), 0.0))
@@ -149,8 +147,10 @@ def _agree_with_highlights(levels: Levels, circles: Circles, shine: HighlightCir
 
 
 def _own_uncertainty(circles: Circles, shine: HighlightCircles, spread: float, shift_px: float) -> tuple[Array, Array]:
-    """Uncertainties of highlight radii and centres: their disorder, balls that are no spheres, and of the spread
-    against the silhouettes what these do not account for."""
+    """Uncertainties of highlight radii and centres.
+
+    Disorder, balls that are no spheres, and of the spread against the silhouettes what these do not account for.
+    """
     good = np.isfinite(shine.radius_px)
     usual = np.median(shine.radius_px[good])
     more_radius = max((spread * usual) ** 2 - float(np.median(circles.u_radius_px[good])) ** 2, 0.0)
@@ -165,7 +165,8 @@ def _common_uncertainty(spread: float, shine: HighlightCircles, circles: Circles
     """What all radii share: the error of the ratio, and of the rim model."""
     number = max(int(joined.sum()), 1)
     shared = float(np.median(circles.u_radius_px[joined])) / 2.0 if joined.any() else 0.0
-    return np.hypot(spread * np.nan_to_num(shine.radius_px) / np.sqrt(number), shared)
+    common: Array = np.hypot(spread * np.nan_to_num(shine.radius_px) / np.sqrt(number), shared)
+    return common
 
 
 def _relation(circles: Circles, shine: HighlightCircles) -> tuple[float, float, Array, float]:
@@ -194,14 +195,14 @@ def _agree_with_radius(levels: Levels, circles: Circles, judged: NDArray[np.bool
     usual_px = float(np.median(circles.radius_px))
     spread_px = 1.48 * float(np.median(np.abs(circles.radius_px - usual_px)))
     off = np.abs(circles.radius_px - usual_px)
-    index = np.flatnonzero((off > np.maximum(4.0 * spread_px, 0.03 * usual_px)) & ~judged)  # noqa: PLR2004
+    index = np.flatnonzero((off > np.maximum(4.0 * spread_px, 0.03 * usual_px)) & ~judged)
     ratio = circles.radius_px[index] / usual_px
     index = index[(ratio > 0.6) & (ratio < 1.35)]  # noqa: PLR2004 - others are no slips
     if not len(index):
         return
     start_px = np.full(len(index), usual_px)
     again = fit_rims(levels, circles.row[index], circles.col[index], start_px, blur_px=circles.blur_px)
-    better = np.abs(again.radius_px - usual_px) < np.maximum(4.0 * spread_px, 0.03 * usual_px)  # noqa: PLR2004
+    better = np.abs(again.radius_px - usual_px) < np.maximum(4.0 * spread_px, 0.03 * usual_px)
     better &= again.support >= circles.support[index] + BETTER_SUPPORT
     _put(circles, index[better], again.take(np.flatnonzero(better)))
 

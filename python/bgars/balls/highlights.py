@@ -11,10 +11,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bgars.balls.levels import Levels
+    from bgars.records import FloatArray
 
     Array = NDArray[np.float64]
 
-__all__ = ["HighlightCircles", "highlight_circles"]
+__all__ = ["HighlightCircles", "highlight_circles", "mirrors_lights"]
 
 WINDOW = 0.25
 """Half width of the taper that a highlight is centred in, in radii."""
@@ -33,6 +34,9 @@ TOLERANCE = 0.015
 """Distance of a highlight from its place that halves its weight, in radii."""
 MAX_RMS = 0.03
 POOL_BALLS = 6
+MIN_DISC_PIXELS, MIRROR_SPOT = 30, 0.05
+MIRRORED = 0.12
+"""Largest distance, in radii, of a mirrored light from where a sphere would show it; of three lights in four."""
 NOISE = 0.001
 """Least standard deviation of a highlight's place, in radii: facets and pixels."""
 
@@ -95,6 +99,35 @@ def highlight_circles(levels: Levels, row: Array, col: Array, radius_px: Array) 
     )
 
 
+def mirrors_lights(reduced: FloatArray, directions: Array, row: float, col: float, radius_px: float) -> bool:
+    """Whether the brightest spot in a disc is where a sphere would mirror each light.
+
+    Parameters
+    ----------
+    reduced : (L, H, W) float32
+        Linear grey levels.
+    directions : (L, 3) float64
+        Unit vectors toward the lights.
+    row, col, radius_px : float
+        The disc, in pixels of `reduced`.
+    """
+    half = directions + np.array([0.0, 0.0, 1.0])
+    half = (half / np.linalg.norm(half, axis=1, keepdims=True))[:, :2]
+    rows, cols = np.indices(reduced.shape[1:])
+    x, y = (cols - col) / radius_px, (row - rows) / radius_px
+    inside = x * x + y * y < 0.9  # noqa: PLR2004 - off the rim
+    if inside.sum() < MIN_DISC_PIXELS:
+        return False
+    levels, x, y = reduced[:, inside], x[inside], y[inside]
+    peak = levels.max(axis=1)
+    bright = levels >= 0.7 * peak[:, None]
+    place = np.stack([(bright * axis).sum(axis=1) / bright.sum(axis=1) for axis in (x, y)], axis=1)
+    near = np.hypot(*(place - half).T) < MIRRORED
+    # A small spot on a dark ball: a matte ball is bright over a large part of it.
+    spot = (bright.mean(axis=1) < MIRROR_SPOT) & (peak > MIN_CONTRAST)
+    return bool((near & spot).mean() >= 0.75)  # noqa: PLR2004 - a highlight may be hidden or clipped
+
+
 def _half_vectors(levels: Levels, row: Array, col: Array) -> Array:
     """(N, L, 2) components x and y of the half vectors at each ball, view along z."""
     rig, pixel_um = levels.capture.rig, levels.capture.pixel_pitch_um
@@ -128,7 +161,7 @@ def _peaks(
     value = levels.of_lights(np.moveaxis(np.where(inside, r * levels.width + c, 0), 1, 0))
     value = np.moveaxis(value, 0, 1)
     distance = np.hypot(c - col[:, None, None], r - row[:, None, None])
-    inside &= distance < 0.92 * radius_px[:, None, None]  # noqa: PLR2004 - off the rim
+    inside &= distance < 0.92 * radius_px[:, None, None]
     enough = inside.sum(axis=2) >= 0.4 * inside.shape[2]
     # Sorted, brightest first, pixels off the ball last.
     ranked = -np.sort(np.where(inside, -value, np.float32(np.inf)), axis=2)
@@ -169,9 +202,8 @@ def _fit(x: Array, y: Array, good: NDArray[np.bool_], place: Array, radius_px: A
         weight = good / (1.0 + (distance / tolerance) ** 2) ** 2
     used = weight.sum(axis=1)
     rms = np.sqrt((weight * distance**2).sum(axis=1) / np.maximum(2.0 * used - 3.0, 0.5))
-    rms[~np.isfinite(rms) | (good.sum(axis=1) < MIN_HIGHLIGHTS) | (used < 0.6 * good.sum(axis=1)) | (used < 2.0)] = (
-        np.inf
-    )  # noqa: PLR2004
+    number = good.sum(axis=1)
+    rms[~np.isfinite(rms) | (number < MIN_HIGHLIGHTS) | (used < np.maximum(0.6 * number, 2.0))] = np.inf
     return step, rms, np.linalg.inv(normal)
 
 

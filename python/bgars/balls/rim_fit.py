@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -77,7 +77,8 @@ class Circles:
 
     def take(self, index: slice | NDArray[np.intp]) -> Circles:
         """Some of the circles."""
-        return Circles(*(getattr(self, field.name)[index] for field in fields(self)[:-1]), blur_px=self.blur_px)
+        columns = {field.name: getattr(self, field.name)[index] for field in fields(self) if field.name != "blur_px"}
+        return replace(self, **columns)
 
 
 class RimPixels:
