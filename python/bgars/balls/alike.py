@@ -25,6 +25,7 @@ MIN_SUPPORT = 0.5
 SHOULDER, SHOULDER_OF_USUAL, SHOULDER_OF_FEW = 0.8, 0.93, 0.75
 """Of the highlights' radius: smaller circles are shoulders of highlights. Wide lobes make that radius 13 % too large;
 a ball flattened to 0.8 would look the same among few."""
+FLATTENED = 0.7
 USUAL = 0.04
 HALF_VECTOR_BIAS = 0.06
 """Largest usual difference of the highlights' radius, as a fraction: off-specular peaks and wide lobes."""
@@ -32,6 +33,7 @@ DIFFERS_SIGMA = 3.0
 SHAPE = 0.003
 """Standard deviation of radius ratios of real balls, which are not quite spheres."""
 SURE = 0.9
+CENTRE_DIFFERS = 0.015
 BETTER_SUPPORT = 0.1
 REPLACED_U = 2.0
 
@@ -53,6 +55,7 @@ def fit_alike(levels: Levels, row: Array, col: Array, radius_px: Array) -> Circl
     if not len(row):
         return circles
     shine = _highlights(levels, row, col, radius_px)
+    every = shine
     shine = _of_usual_size(shine)
     shines = np.isfinite(shine.radius_px)
     if shines.any():
@@ -60,23 +63,42 @@ def fit_alike(levels: Levels, row: Array, col: Array, radius_px: Array) -> Circl
         usual = float(np.nanmedian(ratio))
         few = shines.sum() < ENOUGH
         far = shines & (ratio < (SHOULDER_OF_FEW if few else max(SHOULDER, SHOULDER_OF_USUAL * usual)))
-        for factor in (1.0, 1.0 - HALF_VECTOR_BIAS):
+        odd = np.isfinite(every.radius_px) & ~shines
+        far |= odd & (circles.radius_px < FLATTENED * usual * every.radius_px)
+        for factor in (1.0, 1.0 - HALF_VECTOR_BIAS, 0.8):
             index = np.flatnonzero(far)
             again = fit_rims(
-                levels, shine.row[index], shine.col[index], factor * shine.radius_px[index], blur_px=circles.blur_px
+                levels, every.row[index], every.col[index], factor * every.radius_px[index], blur_px=circles.blur_px
             )
             # The silhouette is the outermost circle: shoulders of highlights lie inside it.
             better = (
                 (again.support >= MIN_SUPPORT)
                 & (again.radius_px > 1.04 * circles.radius_px[index])
-                & (again.radius_px > SHOULDER * shine.radius_px[index])
+                & (again.radius_px > FLATTENED * every.radius_px[index])
             )
             better &= again.support >= circles.support[index] - BETTER_SUPPORT
             _put(circles, index[better], again.take(np.flatnonzero(better)))
     if shines.sum() >= ENOUGH:
         _agree_with_highlights(levels, circles, shine)
+    _agree_with_centres(levels, circles, every, np.isfinite(every.radius_px) & ~shines)
     _agree_with_radius(levels, circles, shines if shines.sum() >= ENOUGH else np.zeros_like(shines))
     return circles
+
+
+def _agree_with_centres(levels: Levels, circles: Circles, shine: HighlightCircles, odd: NDArray[np.bool_]) -> None:
+    """Fit odd circles once more that are not around their highlights; what stays elsewhere takes their centre."""
+    off = np.hypot(circles.row - shine.row, circles.col - shine.col)
+    index = np.flatnonzero(odd & (off > np.maximum(CENTRE_DIFFERS * circles.radius_px, 3.0 * circles.u_centre_px)))
+    if not len(index):
+        return
+    again = fit_rims(levels, shine.row[index], shine.col[index], shine.radius_px[index], blur_px=circles.blur_px)
+    closer = np.hypot(again.row - shine.row[index], again.col - shine.col[index]) < 0.5 * off[index]
+    closer &= (again.support >= circles.support[index] - BETTER_SUPPORT) & (again.support >= MIN_SUPPORT)
+    _put(circles, index[closer], again.take(np.flatnonzero(closer)))
+    index = index[~closer]
+    circles.row[index], circles.col[index] = shine.row[index], shine.col[index]
+    circles.u_radius_px[index] = np.hypot(circles.u_radius_px[index], off[index])
+    circles.u_centre_px[index] = np.hypot(shine.u_centre_px[index], SHAPE * shine.radius_px[index])
 
 
 def _of_usual_size(shine: HighlightCircles) -> HighlightCircles:

@@ -111,16 +111,17 @@ def mirrors_lights(reduced: FloatArray, directions: Array, row: float, col: floa
     row, col, radius_px : float
         The disc, in pixels of `reduced`.
     """
-    half = directions + np.array([0.0, 0.0, 1.0])
-    half = (half / np.linalg.norm(half, axis=1, keepdims=True))[:, :2]
+    middle: Array = directions + np.array([0.0, 0.0, 1.0])
+    half = middle[:, :2] / np.linalg.norm(middle, axis=1)[:, None]
     rows, cols = np.indices(reduced.shape[1:])
     x, y = (cols - col) / radius_px, (row - rows) / radius_px
     inside = x * x + y * y < 0.9  # noqa: PLR2004 - off the rim
     if inside.sum() < MIN_DISC_PIXELS:
         return False
-    levels, x, y = reduced[:, inside], x[inside], y[inside]
-    peak = levels.max(axis=1)
-    bright = levels >= 0.7 * peak[:, None]
+    shown: FloatArray = reduced[:, inside]
+    x, y = x[inside], y[inside]
+    peak = shown.max(axis=1)
+    bright = shown >= 0.7 * peak[:, None]
     place = np.stack([(bright * axis).sum(axis=1) / bright.sum(axis=1) for axis in (x, y)], axis=1)
     near = np.hypot(*(place - half).T) < MIRRORED
     # A small spot on a dark ball: a matte ball is bright over a large part of it.

@@ -40,8 +40,10 @@ CENTRE_SHARE, RADIUS_SHARE = 0.6, 1.0
 U_MODEL_PX = 0.012
 """What the model of the rim is off by on clean images."""
 DARK_RIM_PX, LARGEST_U_MODEL_PX = 0.0012, 0.3
-BLUR_SHARE = 0.1
-"""The lens blur is known to a tenth of a pixel or so, and a wider one makes the radius smaller."""
+"""Error of the radius where the rim is as bright as the ball, in inverse proportion to that."""
+BLUR_SHARE, CENTRE_BLUR_SHARE = 0.1, 0.08
+"""The lens blur is known to a tenth of a pixel or so, and a wider one makes the radius smaller; it mixes texture and
+shadows beside the rim into it, which moves the centre."""
 BLUR_BALLS = 12
 BLURS_PX = (0.0, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)
 NOISE_FLOOR = 0.15
@@ -190,6 +192,7 @@ def fit_rims(
         _update(circles, offset, variance)
     circles.blur_px = table.blur_px
     circles.u_radius_px = np.hypot(circles.u_radius_px, _u_model_px(levels, circles, variance, jump))
+    circles.u_centre_px = np.hypot(circles.u_centre_px, CENTRE_BLUR_SHARE * circles.blur_px)
     return circles
 
 
