@@ -123,7 +123,8 @@ def mirrors_lights(reduced: FloatArray, directions: Array, row: float, col: floa
     peak = shown.max(axis=1)
     bright = shown >= 0.7 * peak[:, None]
     place = np.stack([(bright * axis).sum(axis=1) / bright.sum(axis=1) for axis in (x, y)], axis=1)
-    near = np.hypot(*(place - half).T) < MIRRORED
+    away = place - half
+    near = np.hypot(away[:, 0], away[:, 1]) < MIRRORED
     # A small spot on a dark ball: a matte ball is bright over a large part of it.
     spot = (bright.mean(axis=1) < MIRROR_SPOT) & (peak > MIN_CONTRAST)
     return bool((near & spot).mean() >= 0.75)  # noqa: PLR2004 - a highlight may be hidden or clipped
