@@ -113,8 +113,9 @@ def mirrors_lights(reduced: FloatArray, directions: Array, row: float, col: floa
     """
     middle: Array = directions + np.array([0.0, 0.0, 1.0])
     half = middle[:, :2] / np.linalg.norm(middle, axis=1)[:, None]
-    rows, cols = np.indices(reduced.shape[1:])
-    x, y = (cols - col) / radius_px, (row - rows) / radius_px
+    rows, cols = np.mgrid[: reduced.shape[1], : reduced.shape[2]]
+    x: Array = (cols - col) / radius_px
+    y: Array = (row - rows) / radius_px
     inside = x * x + y * y < 0.9  # noqa: PLR2004 - off the rim
     if inside.sum() < MIN_DISC_PIXELS:
         return False
