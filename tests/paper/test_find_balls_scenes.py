@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.data
 
-# Largest errors of centre and radius in pixels; None: only found.
+# Largest errors of centre and radius in pixels. Metal shines by what it mirrors: its rim is off, and says so.
 LIMITS = {
     "A_one_ball_diffuse": (0.02, 0.03),
     "B_one_ball_paper_id005": (0.02, 0.03),
@@ -26,7 +26,7 @@ LIMITS = {
     "C2_grid_4x4_gamma": (0.02, 0.03),
     "D_grid_5x5_defects": (0.02, 0.035),
     "D2_grid_5x5_defects_bow": (0.02, 0.035),
-    "E_grid_5x5_metal": None,
+    "E_grid_5x5_metal": (0.05, 0.25),
     "F_grid_6x6_near": (0.02, 0.03),
     "G_grid_10x10_large": (0.02, 0.03),
     "H_bridge": (0.02, 0.03),
@@ -56,11 +56,14 @@ def test_every_ball_of_a_scene_is_found_and_nothing_else(data_folder: Path, name
     assert found.bridges == ((("B2", "B3"),) if scene == "H_bridge" else ())
     if scene == "H_bridge":
         assert dict(found.odd_sizes) == {"D1": pytest.approx(2.0, abs=0.01)}
-    if LIMITS[scene] is not None:
-        error = np.array([(ball.x_px, ball.y_px, ball.radius_px) for ball in found.balls]) - list(true.values())
-        centre_px, radius_px = LIMITS[scene]
-        assert np.hypot(error[:, 0], error[:, 1]).max() < centre_px
-        assert np.abs(error[:, 2]).max() < radius_px
+    error = np.array([(ball.x_px, ball.y_px, ball.radius_px) for ball in found.balls]) - list(true.values())
+    centre_px, radius_px = LIMITS[scene]
+    assert np.hypot(error[:, 0], error[:, 1]).max() < centre_px
+    assert np.abs(error[:, 2]).max() < radius_px
+    u_centre = np.array([ball.u_centre_px for ball in found.balls])
+    u_radius = np.array([ball.u_radius_px for ball in found.balls])
+    assert np.sqrt(np.mean((error[:, :2] / u_centre[:, None]) ** 2)) < 1.5
+    assert np.sqrt(np.mean((error[:, 2] / u_radius) ** 2)) < 1.5
 
 
 def test_a_photographed_sphere_is_one_ball(data_folder: Path) -> None:
@@ -72,6 +75,12 @@ def test_a_photographed_sphere_is_one_ball(data_folder: Path) -> None:
     assert ball.x_px == pytest.approx(col + 0.5 - width / 2, abs=0.5)
     assert ball.y_px == pytest.approx(height / 2 - row - 0.5, abs=0.5)
     assert ball.radius_px == pytest.approx(radius_px, abs=0.5)
+
+
+def test_a_mirror_sphere_with_a_mask_is_one_ball(data_folder: Path) -> None:
+    capture = bgars.read_capture(data_folder / "real" / "psm_chrome")
+    (ball,) = bgars.find_balls(capture).balls
+    assert ball.radius_px == pytest.approx(np.sqrt(capture.mask.sum() / np.pi), abs=0.5)
 
 
 @pytest.mark.parametrize("name", ["dil_cat", "dil_bear", "psm_cat", "psm_buddha", "psm_horse", "butterfly8"])

@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from bgars.balls.alike import fit_alike
+from bgars.balls.highlights import mirrors_lights
 from bgars.balls.mask_blobs import round_blobs
 from bgars.balls.outward import outward_centres, slope_field
-from bgars.balls.rim_fit import SECTORS, Circles, fit_rims
+from bgars.balls.rim_fit import SECTORS, Circles
 from bgars.balls.rim_scan import CoarseCircles, scan_rims
 
 if TYPE_CHECKING:
@@ -47,6 +49,7 @@ USUAL_STRENGTH = 0.3
 ENOUGH_TO_JUDGE_SIZE = 3
 SMALLEST_OF_USUAL = 0.35
 MIN_COVERED = 0.97
+MOST_MIRRORS = 50
 
 
 class Detection(NamedTuple):
@@ -92,27 +95,35 @@ def find_circles(levels: Levels, progress: Callable[[float], object] | None) -> 
     if mask is not None:
         slopes = (slopes[0] * mask, slopes[1] * mask)
     brightest = reduced.max(axis=0)
-    blobs = None if mask is None else _blobs_that_are_balls(capture.mask, slopes, factor)
+    blobs = None if mask is None else _blobs_that_are_balls(levels, slopes, reduced, factor)
     if blobs is not None and len(blobs.row):
         return Detection(blobs, slopes, brightest, factor)
     coarse = _coarse_circles(reduced, slopes, mask)
     report(0.4)
     row, col = ((column + 0.5) * factor - 0.5 for column in coarse[:2])
-    circles = fit_rims(levels, row, col, coarse.radius_px * factor)
+    circles = fit_alike(levels, row, col, coarse.radius_px * factor)
     good = circles.support >= (MIN_SUPPORT if mask is None else MIN_SUPPORT_IN_MASK)
     good &= circles.u_radius_px < MAX_U_RADIUS * circles.radius_px
-    good &= np.abs(np.log(circles.radius_px / (coarse.radius_px * factor))) < np.log(LIKE_OTHERS[1])
+    usual_px = np.median(circles.radius_px) if len(circles.row) else 1.0
+    moved = np.abs(np.log(circles.radius_px / (coarse.radius_px * factor)))
+    good &= np.minimum(moved, np.abs(np.log(circles.radius_px / usual_px))) < np.log(LIKE_OTHERS[1])
     report(0.95)
     return Detection(circles.take(np.flatnonzero(good)), slopes, brightest, factor)
 
 
-def _blobs_that_are_balls(mask: BoolArray, slopes: tuple[FloatArray, FloatArray], factor: int) -> Circles:
-    """Round blobs of the mask whose inside slopes outward everywhere, as circles."""
-    blobs = round_blobs(mask)
+def _blobs_that_are_balls(
+    levels: Levels, slopes: tuple[FloatArray, FloatArray], reduced: FloatArray, factor: int
+) -> Circles:
+    """Round blobs of the mask whose inside slopes outward everywhere or mirrors the lights, as circles."""
+    blobs = round_blobs(levels.capture.mask)
     row, col = ((column + 0.5) / factor - 0.5 for column in blobs[:2])
     seen = CoarseCircles(row, col, blobs.radius_px / factor, blobs.rms_px, blobs.rms_px)
     outward, alignment = _inside(seen, slopes)
     good = (outward >= MIN_OUTWARD) & (alignment >= MIN_ALIGNMENT)
+    directions = levels.capture.rig.directions
+    for index in np.flatnonzero(~good)[:MOST_MIRRORS]:
+        disc = float(seen.row[index]), float(seen.col[index]), float(seen.radius_px[index])
+        good[index] = mirrors_lights(reduced, directions, *disc)
     row, col, radius_px, rms_px = (column[good] for column in blobs)
     # Someone drew the mask: its outline may be off as a whole by as much as it is uneven.
     outline = np.sqrt(2.0 * np.pi * radius_px)

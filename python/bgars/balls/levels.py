@@ -63,6 +63,18 @@ class Levels:
         self.map_lights(one)
         return levels
 
+    def of_lights(self, pixels: NDArray[np.intp]) -> FloatArray:
+        """(L, ...) levels of pixels of their own for each light, flat indices (L, ...)."""
+        images = self.capture.images.reshape(self.lights, -1)
+        levels = np.zeros(pixels.shape, np.float32)
+
+        def one(light: int) -> None:
+            linear = self._linear(images[light].take(pixels[light]))
+            levels[light] = (linear - self._offset(pixels[light])) * self.gains[light]
+
+        self.map_lights(one)
+        return levels
+
     def clipped_at(self, pixels: NDArray[np.intp]) -> NDArray[np.bool_]:
         """(L, ...) True where the pixels with these flat indices are saturated."""
         images = self.capture.images.reshape(self.lights, -1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,7 +27,8 @@ BASIS = 7
 WIDE_ROUNDS = 3
 NARROW_ROUNDS = 3
 FIRST_BLUR_PX = 0.3
-REACH_PX = 14.0
+WIDE_REACH_PX, NARROW_REACH_PX = 13.0, 9.0
+"""Depth of the bands, and how far circles move within them."""
 TOLERANCES = ((0.6, 1),) * 3 + ((0.1, 1),) * 2 + ((0.1, 2),) + ((0.05, 2),) * 6
 """Offset in pixels that halves a weight, and the power of the weight: Cauchy first, then closer."""
 MODEL_ERROR_PX = 0.03
@@ -38,6 +39,11 @@ CENTRE_SHARE, RADIUS_SHARE = 0.6, 1.0
 """Error that all sectors share, as a fraction of their scatter."""
 U_MODEL_PX = 0.012
 """What the model of the rim is off by on clean images."""
+DARK_RIM_PX, LARGEST_U_MODEL_PX = 0.0012, 0.3
+"""Error of the radius where the rim is as bright as the ball, in inverse proportion to that."""
+BLUR_SHARE, CENTRE_BLUR_SHARE = 0.1, 0.08
+"""The lens blur is known to a tenth of a pixel or so, and a wider one makes the radius smaller; it mixes texture and
+shadows beside the rim into it, which moves the centre."""
 BLUR_BALLS = 12
 BLURS_PX = (0.0, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)
 NOISE_FLOOR = 0.15
@@ -58,6 +64,8 @@ class Circles:
         Fraction of the sectors whose rim was seen on the circle.
     offsets_px : (N, SECTORS) float64
         Where each sector's rim lies, outward from the circle; NaN where it was not seen.
+    blur_px : float
+        Standard deviation of the lens blur.
     """
 
     row: NDArray[np.float64]
@@ -67,10 +75,12 @@ class Circles:
     u_radius_px: NDArray[np.float64]
     support: NDArray[np.float64]
     offsets_px: NDArray[np.float64]
+    blur_px: float = 0.0
 
     def take(self, index: slice | NDArray[np.intp]) -> Circles:
         """Some of the circles."""
-        return Circles(*(getattr(self, field.name)[index] for field in fields(self)))
+        columns = {field.name: getattr(self, field.name)[index] for field in fields(self) if field.name != "blur_px"}
+        return replace(self, **columns)
 
 
 class RimPixels:
@@ -168,30 +178,52 @@ def fit_rims(
     )
     if not len(row):
         return circles
-    table = RimTable(FIRST_BLUR_PX if blur_px is None else blur_px, REACH_PX)
+    table = RimTable(FIRST_BLUR_PX if blur_px is None else blur_px, WIDE_REACH_PX)
     pixels = RimPixels(levels, circles, np.clip(0.2 * radius_px, 4.0, 9.0), np.clip(0.2 * radius_px, 4.0, 9.0), 3)
     for _ in range(WIDE_ROUNDS):
-        _update(circles, *_sector_offsets(pixels, circles, table))
+        _update(circles, *_sector_offsets(pixels, circles, table)[:2])
     radius_px = circles.radius_px.clip(0.5 * radius_px, 2.0 * radius_px)
     pixels = RimPixels(levels, circles, np.clip(0.15 * radius_px, 3.0, 6.0), np.clip(0.14 * radius_px, 2.5, 5.0), 1)
+    table = RimTable(table.blur_px, NARROW_REACH_PX)
     for turn in range(NARROW_ROUNDS):
         if turn == 1 and blur_px is None:
-            table = RimTable(_estimated_blur(pixels, circles), REACH_PX)
-        _update(circles, *_sector_offsets(pixels, circles, table))
+            table = RimTable(_estimated_blur(pixels, circles), NARROW_REACH_PX)
+        offset, variance, jump = _sector_offsets(pixels, circles, table)
+        _update(circles, offset, variance)
+    circles.blur_px = table.blur_px
+    circles.u_radius_px = np.hypot(circles.u_radius_px, _u_model_px(levels, circles, variance, jump))
+    circles.u_centre_px = np.hypot(circles.u_centre_px, CENTRE_BLUR_SHARE * circles.blur_px)
     return circles
+
+
+def _u_model_px(levels: Levels, circles: Circles, variance: Array, jump: Array) -> Array:
+    """(N,) what the radius may be off by because rims are not as modelled: blurred, or dark beside the highlights.
+
+    A rim much darker than the ball shines by what it mirrors, board and shadows, which end before the silhouette does.
+    """
+    weight = 1.0 / (variance + MODEL_ERROR_PX**2)
+    step = np.sqrt((weight * jump**2).sum(axis=(1, 2)) / np.maximum(weight.sum(axis=(1, 2)), 1e-12))
+    grid = np.linspace(-0.7, 0.7, 15)
+    y, x = (side.ravel() for side in np.meshgrid(grid, grid))
+    r = np.rint(circles.row[:, None] - circles.radius_px[:, None] * y).astype(np.intp).clip(0, levels.height - 1)
+    c = np.rint(circles.col[:, None] + circles.radius_px[:, None] * x).astype(np.intp).clip(0, levels.width - 1)
+    peak = np.quantile(levels.at(r * levels.width + c).max(axis=0), 0.9, axis=1)
+    dark = DARK_RIM_PX * np.median(peak) / np.maximum(np.median(step), NOISE_FLOOR)
+    return np.full(len(step), math.hypot(min(float(dark), LARGEST_U_MODEL_PX), BLUR_SHARE * circles.blur_px))
 
 
 def _estimated_blur(pixels: RimPixels, circles: Circles) -> float:
     """The lens blur that leaves the least, over the sectors and lights of most contrast, parabola through three."""
     some = slice(None, None, max(1, len(circles.row) // BLUR_BALLS))
-    costs: list[float] = []
-    best = np.zeros(0, np.bool_)
-    for blur_px in BLURS_PX:
-        left, contrast = _left_over(pixels.take(some), circles.take(some), RimTable(blur_px, REACH_PX))
-        if not costs:
-            best = contrast >= np.quantile(contrast, 2 / 3)
-            best = best & (left <= np.median(left[best]))
-        costs.append(float(np.mean(np.log(left[best] + 0.02))))
+    pixels, circles = pixels.take(some), circles.take(some)
+    tried = [_left_over(pixels, circles, RimTable(blur_px, NARROW_REACH_PX)) for blur_px in BLURS_PX]
+    logs = np.log(np.stack([left for left, _ in tried]) + 0.02)
+    contrast = np.mean([contrast for _, contrast in tried], axis=0)
+    # Textured and shadowed sectors say nothing; which these are must not depend on one blur.
+    least = logs.min(axis=0)
+    best = contrast >= np.quantile(contrast, 2 / 3)
+    best &= least <= np.median(least[best])
+    costs = logs[:, best].mean(axis=1)
     at = int(np.argmin(costs))
     if not 0 < at < len(BLURS_PX) - 1:
         return BLURS_PX[at]
@@ -239,8 +271,8 @@ def _solve(pixels: RimPixels, circles: Circles, table: RimTable) -> tuple[Array,
     return np.asarray(rest), np.asarray(coefficients), count
 
 
-def _sector_offsets(pixels: RimPixels, circles: Circles, table: RimTable) -> tuple[Array, Array]:
-    """(N, S, L) outward offset of the rim in each sector and light, and its variance."""
+def _sector_offsets(pixels: RimPixels, circles: Circles, table: RimTable) -> tuple[Array, Array, Array]:
+    """(N, S, L) outward offset of the rim in each sector and light, its variance, and the step in grey levels."""
     rest, coefficients, count = _solve(pixels, circles, table)
     slope = _pooled(coefficients[..., [1, 2, 3, 4, 6], :], pixels.azimuths_rad)
     dd = np.einsum("nskl,nskm,nsml->nsl", slope, rest[..., :5, :5], slope)
@@ -252,7 +284,8 @@ def _sector_offsets(pixels: RimPixels, circles: Circles, table: RimTable) -> tup
     variance = (left + NOISE_FLOOR**2) / dd
     bad = (count < 2 * BASIS)[..., None] | (np.moveaxis(pixels.clipped, 0, -1))
     variance = np.where(bad, np.inf, variance)
-    return np.clip(offset, -3.0, 3.0), variance
+    arc_px = (2 * math.pi / SECTORS) * circles.radius_px[:, None, None]
+    return np.clip(offset, -3.0, 3.0), variance, np.sqrt(dd / arc_px)
 
 
 def _pooled(slope: Array, azimuths_rad: Array) -> Array:
@@ -320,9 +353,23 @@ def _update(circles: Circles, offset: Array, variance: Array) -> None:
     normal = np.einsum("ns,si,sj->nij", per_sector, design, design) + 1e-9 * np.eye(3)
     noise = np.linalg.inv(normal)
     number = np.maximum(seen.sum(axis=1), 1)
+    by_light = _jackknife(weight, offset, design)
     circles.u_centre_px = np.sqrt(
         np.maximum((noise[:, 0, 0] + noise[:, 1, 1]) / 2, 2.0 * scatter**2 / number) + (CENTRE_SHARE * scatter) ** 2
     )
+    circles.u_centre_px = np.maximum(circles.u_centre_px, np.sqrt(by_light[:, :2].mean(axis=1)))
     circles.u_radius_px = np.sqrt(
         np.maximum(noise[:, 2, 2], scatter**2 / number) + (RADIUS_SHARE * scatter) ** 2 + U_MODEL_PX**2
     )
+
+
+def _jackknife(weight: Array, offset: Array, design: Array) -> Array:
+    """(N, 3) variances of shift and radius from fits that leave out one light each (Quenouille 1956)."""
+    lights = weight.shape[2]
+    normal = np.einsum("nsl,si,sj->nlij", weight, design, design)
+    right = np.einsum("nsl,si->nli", weight * offset, design)
+    normal = normal.sum(axis=1, keepdims=True) - normal + 1e-6 * np.eye(3)
+    right = right.sum(axis=1, keepdims=True) - right
+    each = np.linalg.solve(normal, right[..., None])[..., 0]
+    variance: Array = np.var(each, axis=1) * (lights - 1)
+    return variance

@@ -16,7 +16,7 @@ __all__ = ["SHAPES", "RimTable"]
 
 SHAPES = 4
 """Depth profiles: step, square root and ramp inside the rim, ramp outside."""
-ANGLES = 31
+ANGLES = 16
 STEPS_PER_PX = 64
 THINNEST_PX = 0.08
 
@@ -70,7 +70,7 @@ class RimTable:
 
 def _profiles(depth_px: NDArray[np.float64], widths_px: list[float]) -> NDArray[np.float64]:
     """(T, 2 SHAPES): averages over four boxes of the step, root and ramps, then their derivatives."""
-    profiles = np.zeros((len(depth_px), 2 * SHAPES))
+    profiles = np.zeros((2 * SHAPES, len(depth_px)))
     volume = math.prod(widths_px)
     for corner in range(16):
         signs = [1 if corner >> bit & 1 else -1 for bit in range(4)]
@@ -79,12 +79,14 @@ def _profiles(depth_px: NDArray[np.float64], widths_px: list[float]) -> NDArray[
         inside = np.maximum(depth_px + shift, 0.0)
         outside = np.maximum(-depth_px - shift, 0.0)
         root = np.sqrt(inside)
-        profiles[:, 0] += weight * inside**4 / 24
-        profiles[:, 1] += weight * inside**4 * root * (16 / 945)
-        profiles[:, 2] += weight * inside**5 / 120
-        profiles[:, 3] += weight * outside**5 / 120
-        profiles[:, 4] += weight * inside**3 / 6
-        profiles[:, 5] += weight * inside**3 * root * (8 / 105)
-        profiles[:, 6] += weight * inside**4 / 24
-        profiles[:, 7] -= weight * outside**4 / 24
-    return profiles
+        cube, outer = inside * inside * inside, outside * outside
+        fourth, outer = cube * inside, outer * outer
+        profiles[0] += weight / 24 * fourth
+        profiles[1] += weight * 16 / 945 * (fourth * root)
+        profiles[2] += weight / 120 * (fourth * inside)
+        profiles[3] += weight / 120 * (outer * outside)
+        profiles[4] += weight / 6 * cube
+        profiles[5] += weight * 8 / 105 * (cube * root)
+        profiles[6] += weight / 24 * fourth
+        profiles[7] -= weight / 24 * outer
+    return profiles.T

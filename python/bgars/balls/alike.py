@@ -1,0 +1,235 @@
+"""Balls of one part judge each other: weak silhouettes against highlights, and against the usual radius."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bgars.balls.highlights import HighlightCircles, highlight_circles
+from bgars.balls.rim_fit import Circles, fit_rims
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bgars.balls.levels import Levels
+
+    Array = NDArray[np.float64]
+
+__all__ = ["fit_alike"]
+
+ENOUGH = 4
+"""Balls that make a population."""
+OTHER_START = 1.3
+MIN_SUPPORT = 0.5
+SHOULDER, SHOULDER_OF_USUAL, SHOULDER_OF_FEW = 0.8, 0.93, 0.75
+"""Of the highlights' radius: smaller circles are shoulders of highlights. Wide lobes make that radius 13 % too large;
+a ball flattened to 0.8 would look the same among few."""
+FLATTENED = 0.7
+USUAL = 0.04
+HALF_VECTOR_BIAS = 0.06
+"""Largest usual difference of the highlights' radius, as a fraction: off-specular peaks and wide lobes."""
+DIFFERS_SIGMA = 3.0
+SHAPE = 0.003
+"""Standard deviation of radius ratios of real balls, which are not quite spheres."""
+SURE = 0.9
+CENTRE_DIFFERS = 0.015
+BETTER_SUPPORT = 0.1
+REPLACED_U = 2.0
+
+
+def fit_alike(levels: Levels, row: Array, col: Array, radius_px: Array) -> Circles:
+    """Silhouettes of all balls, checked against each other.
+
+    On metal the rim is a grey level or two, and the shoulder of a highlight passes for it. Highlights tell: their
+    centre is the ball's, and their radius is the silhouette's times a factor that all balls share.
+
+    Parameters
+    ----------
+    levels : Levels
+        The capture.
+    row, col, radius_px : (N,) float64
+        Circles to start from, good to a tenth of the radius, most of them.
+    """
+    circles = fit_rims(levels, row, col, radius_px)
+    if not len(row):
+        return circles
+    shine = _highlights(levels, row, col, radius_px)
+    every = shine
+    shine = _of_usual_size(shine)
+    shines = np.isfinite(shine.radius_px)
+    if shines.any():
+        ratio = circles.radius_px / shine.radius_px
+        usual = float(np.nanmedian(ratio))
+        few = shines.sum() < ENOUGH
+        far = shines & (ratio < (SHOULDER_OF_FEW if few else max(SHOULDER, SHOULDER_OF_USUAL * usual)))
+        odd = np.isfinite(every.radius_px) & ~shines
+        far |= odd & (circles.radius_px < FLATTENED * usual * every.radius_px)
+        for factor in (1.0, 1.0 - HALF_VECTOR_BIAS, 0.8):
+            index = np.flatnonzero(far)
+            again = fit_rims(
+                levels, every.row[index], every.col[index], factor * every.radius_px[index], blur_px=circles.blur_px
+            )
+            # The silhouette is the outermost circle: shoulders of highlights lie inside it.
+            better = (
+                (again.support >= MIN_SUPPORT)
+                & (again.radius_px > 1.04 * circles.radius_px[index])
+                & (again.radius_px > FLATTENED * every.radius_px[index])
+            )
+            better &= again.support >= circles.support[index] - BETTER_SUPPORT
+            _put(circles, index[better], again.take(np.flatnonzero(better)))
+    if shines.sum() >= ENOUGH:
+        _agree_with_highlights(levels, circles, shine)
+    _agree_with_centres(levels, circles, every, np.isfinite(every.radius_px) & ~shines)
+    _agree_with_radius(levels, circles, shines if shines.sum() >= ENOUGH else np.zeros_like(shines))
+    return circles
+
+
+def _agree_with_centres(levels: Levels, circles: Circles, shine: HighlightCircles, odd: NDArray[np.bool_]) -> None:
+    """Fit odd circles once more that are not around their highlights; what stays elsewhere takes their centre."""
+    off = np.hypot(circles.row - shine.row, circles.col - shine.col)
+    index = np.flatnonzero(odd & (off > np.maximum(CENTRE_DIFFERS * circles.radius_px, 3.0 * circles.u_centre_px)))
+    if not len(index):
+        return
+    again = fit_rims(levels, shine.row[index], shine.col[index], shine.radius_px[index], blur_px=circles.blur_px)
+    closer = np.hypot(again.row - shine.row[index], again.col - shine.col[index]) < 0.5 * off[index]
+    closer &= (again.support >= circles.support[index] - BETTER_SUPPORT) & (again.support >= MIN_SUPPORT)
+    _put(circles, index[closer], again.take(np.flatnonzero(closer)))
+    index = index[~closer]
+    circles.row[index], circles.col[index] = shine.row[index], shine.col[index]
+    circles.u_radius_px[index] = np.hypot(circles.u_radius_px[index], off[index])
+    circles.u_centre_px[index] = np.hypot(shine.u_centre_px[index], SHAPE * shine.radius_px[index])
+
+
+def _of_usual_size(shine: HighlightCircles) -> HighlightCircles:
+    """Without those of unusual radius: odd balls, and flattened ones, whose highlights lie at R / flattening."""
+    if np.isfinite(shine.radius_px).sum() < ENOUGH:
+        return shine
+    unusual = np.abs(np.log(shine.radius_px / np.nanmedian(shine.radius_px))) > USUAL
+    return HighlightCircles(*(np.where(unusual, np.nan, column) for column in shine))
+
+
+def _highlights(levels: Levels, row: Array, col: Array, radius_px: Array) -> HighlightCircles:
+    """Highlight circles from the radii as they are, and from larger ones where that shows nothing."""
+    shine = highlight_circles(levels, row, col, radius_px)
+    start_px = OTHER_START * radius_px
+    if np.isfinite(shine.radius_px).mean() > MIN_SUPPORT:
+        start_px = np.full(len(row), float(np.nanmedian(shine.radius_px)))
+    index = np.flatnonzero(~np.isfinite(shine.radius_px))
+    if len(index):
+        again = highlight_circles(levels, row[index], col[index], start_px[index])
+        for column, other in zip(shine, again, strict=True):
+            column[index] = other
+    return shine
+
+
+def _agree_with_highlights(levels: Levels, circles: Circles, shine: HighlightCircles) -> None:
+    """Fit circles once more, or replace them, that are elsewhere than the highlights have them; then take means."""
+    shines = np.isfinite(shine.radius_px)
+    for turn in range(2):
+        ratio, spread, shift, shift_px = _relation(circles, shine)
+        expected = HighlightCircles(
+            shine.row + shift[0], shine.col + shift[1], shine.radius_px * ratio, shine.u_centre_px, shine.u_radius_px
+        )
+        off_radius = np.abs(circles.radius_px - expected.radius_px)
+        off_centre = np.hypot(circles.row - expected.row, circles.col - expected.col)
+        u_shine_radius, u_shine_centre = _own_uncertainty(circles, shine, spread, shift_px)
+        u_radius = np.hypot(u_shine_radius, circles.u_radius_px)
+        u_centre = np.hypot(u_shine_centre, circles.u_centre_px)
+        far = shines & (
+            (off_radius > np.maximum(DIFFERS_SIGMA * u_radius, 0.1)) | (off_centre > np.maximum(3.0 * u_centre, 0.1))
+        )
+        index = np.flatnonzero(far)
+        if turn == 0 and len(index):
+            again = fit_rims(
+                levels, expected.row[index], expected.col[index], expected.radius_px[index], blur_px=circles.blur_px
+            )
+            same = np.hypot(again.row - circles.row[index], again.col - circles.col[index]) < 0.1  # noqa: PLR2004
+            same &= np.abs(again.radius_px - circles.radius_px[index]) < 0.1  # noqa: PLR2004
+            better = ~same & (again.support >= circles.support[index])
+            _put(circles, index[better], again.take(np.flatnonzero(better)))
+    # Silhouettes that stay elsewhere: a complete rim is a fact (a flat or odd ball), an incomplete one is not.
+    sure = circles.support >= SURE
+    sure &= circles.u_radius_px <= 2.0 * np.median(circles.u_radius_px[shines])
+    replaced = far & ~sure
+    joined = shines & ~far
+    weight = np.where(replaced, 1.0, np.where(joined, 1.0 / (1.0 + (u_shine_radius / circles.u_radius_px) ** 2), 0.0))
+    circles.radius_px += np.nan_to_num(weight * (expected.radius_px - circles.radius_px))
+    common = _common_uncertainty(spread, shine, circles, joined)
+    mean = 1.0 / np.sqrt(1.0 / u_shine_radius**2 + 1.0 / circles.u_radius_px**2)
+    circles.u_radius_px = np.where(joined, np.hypot(mean, common), circles.u_radius_px)
+    circles.u_radius_px = np.where(replaced, np.hypot(REPLACED_U * u_shine_radius, common), circles.u_radius_px)
+    weight = np.where(replaced, 1.0, np.where(joined, 1.0 / (1.0 + (u_shine_centre / circles.u_centre_px) ** 2), 0.0))
+    circles.row += np.nan_to_num(weight * (expected.row - circles.row))
+    circles.col += np.nan_to_num(weight * (expected.col - circles.col))
+    mean = 1.0 / np.sqrt(1.0 / u_shine_centre**2 + 1.0 / circles.u_centre_px**2)
+    circles.u_centre_px = np.where(joined, mean, circles.u_centre_px)
+    circles.u_centre_px = np.where(replaced, REPLACED_U * u_shine_centre, circles.u_centre_px)
+    circles.support = np.where(replaced, np.maximum(circles.support, MIN_SUPPORT), circles.support)
+
+
+def _own_uncertainty(circles: Circles, shine: HighlightCircles, spread: float, shift_px: float) -> tuple[Array, Array]:
+    """Uncertainties of highlight radii and centres.
+
+    Disorder, balls that are no spheres, and of the spread against the silhouettes what these do not account for.
+    """
+    good = np.isfinite(shine.radius_px)
+    usual = np.median(shine.radius_px[good])
+    more_radius = max((spread * usual) ** 2 - float(np.median(circles.u_radius_px[good])) ** 2, 0.0)
+    more_centre = max(shift_px**2 - float(np.median(circles.u_centre_px[good])) ** 2, 0.0)
+    return (
+        np.sqrt(shine.u_radius_px**2 + (SHAPE * shine.radius_px) ** 2 + more_radius),
+        np.sqrt(shine.u_centre_px**2 + more_centre),
+    )
+
+
+def _common_uncertainty(spread: float, shine: HighlightCircles, circles: Circles, joined: NDArray[np.bool_]) -> Array:
+    """What all radii share: the error of the ratio, and of the rim model."""
+    number = max(int(joined.sum()), 1)
+    shared = float(np.median(circles.u_radius_px[joined])) / 2.0 if joined.any() else 0.0
+    common: Array = np.hypot(spread * np.nan_to_num(shine.radius_px) / np.sqrt(number), shared)
+    return common
+
+
+def _relation(circles: Circles, shine: HighlightCircles) -> tuple[float, float, Array, float]:
+    """Ratio of silhouette to highlight radius, its spread, shift (row, column) of centres, its spread; medians."""
+    good = np.isfinite(shine.radius_px) & (circles.support >= MIN_SUPPORT)
+    if good.sum() < ENOUGH:
+        good = np.isfinite(shine.radius_px)
+    ratio = circles.radius_px[good] / shine.radius_px[good]
+    # The half with the smaller uncertainties says more.
+    sharp = circles.u_radius_px[good] <= np.median(circles.u_radius_px[good])
+    middle = float(np.median(ratio[sharp]))
+    shifts = np.stack([circles.row[good] - shine.row[good], circles.col[good] - shine.col[good]])
+    shift = np.median(shifts[:, sharp], axis=1)
+    spread = 1.48 * float(np.median(np.abs(ratio - middle)))
+    shift_px = 1.48 * float(np.median(np.abs(shifts - shift[:, None])))
+    # Lights all around cancel what lobes shift; only a clear shift is believed.
+    doubt = shift_px**2 * 1.6 / max(int(sharp.sum()), 1)
+    shift *= max(0.0, 1.0 - 2.0 * doubt / max(float(shift @ shift), 1e-12))
+    return middle, spread, shift, shift_px
+
+
+def _agree_with_radius(levels: Levels, circles: Circles, judged: NDArray[np.bool_]) -> None:
+    """Fit circles once more from the usual radius that are off it; odd ones stay where their rim is the clearer."""
+    if len(circles.row) < ENOUGH:
+        return
+    usual_px = float(np.median(circles.radius_px))
+    spread_px = 1.48 * float(np.median(np.abs(circles.radius_px - usual_px)))
+    off = np.abs(circles.radius_px - usual_px)
+    index = np.flatnonzero((off > np.maximum(4.0 * spread_px, 0.03 * usual_px)) & ~judged)
+    ratio = circles.radius_px[index] / usual_px
+    index = index[(ratio > 0.6) & (ratio < 1.35)]  # noqa: PLR2004 - others are no slips
+    if not len(index):
+        return
+    start_px = np.full(len(index), usual_px)
+    again = fit_rims(levels, circles.row[index], circles.col[index], start_px, blur_px=circles.blur_px)
+    better = np.abs(again.radius_px - usual_px) < np.maximum(4.0 * spread_px, 0.03 * usual_px)
+    better &= again.support >= circles.support[index] + BETTER_SUPPORT
+    _put(circles, index[better], again.take(np.flatnonzero(better)))
+
+
+def _put(circles: Circles, index: NDArray[np.intp], other: Circles) -> None:
+    """Set some of the circles."""
+    for name in ("row", "col", "radius_px", "u_centre_px", "u_radius_px", "support", "offsets_px"):
+        getattr(circles, name)[index] = getattr(other, name)
