@@ -54,7 +54,7 @@ def test_reconstruct_keeps_foreign_files_of_the_output_folder(tmp_path: Path) ->
 def test_normals_then_mesh(tmp_path: Path) -> None:
     run = bgars_command("normals", bgars.sample_capture(), "-o", tmp_path / "n", "--json")
     assert run.returncode == 0, run.stderr
-    assert json.loads(run.stdout)["method"] == "robust-filter"
+    assert json.loads(run.stdout)["method"] == "reflectance"
     mesh = tmp_path / "part.ply"
     run = bgars_command("mesh", tmp_path / "n" / "normals.png", "-o", mesh, "--pixel-pitch-um", 3.4, "--json")
     assert run.returncode == 0, run.stderr
