@@ -8,9 +8,32 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["BallMeasurement", "FoundBall", "FoundBalls", "MeasuredBall"]
+__all__ = ["BallLayout", "BallMeasurement", "FoundBall", "FoundBalls", "MeasuredBall"]
 
 BallKind = Literal["ball", "extra", "bridged"]
+
+
+@dataclass(frozen=True)
+class BallLayout:
+    """Where balls should be: a lattice, or a list of places.
+
+    Attributes
+    ----------
+    rows, cols : int or None
+        Size of the lattice; None for a list of places.
+    pitch_um : float or None
+        Distance of neighbours in the lattice.
+    depopulated : tuple of str
+        Names of places of the lattice that have no ball.
+    positions : tuple of (str, float, float)
+        Name, x and y in um of each place, as the image shows them but for a shift and a turn; empty for a lattice.
+    """
+
+    rows: int | None = None
+    cols: int | None = None
+    pitch_um: float | None = None
+    depopulated: tuple[str, ...] = ()
+    positions: tuple[tuple[str, float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -139,6 +162,8 @@ class BallMeasurement:
         How far each light was moved from the rig's.
     shadow_residual_rms : float
         RMS residual of the shadow fit over the contrast of lit and shadowed board.
+    board_covariance : (6, 6) float64 or None
+        Covariance of `board_coefficients_um`, in their units; None when unknown.
     """
 
     balls: tuple[MeasuredBall, ...]
@@ -147,3 +172,4 @@ class BallMeasurement:
     light_change_deg: NDArray[np.float64]
     shadow_residual_rms: float
     warnings: tuple[str, ...] = field(default=())
+    board_covariance: NDArray[np.float64] | None = None

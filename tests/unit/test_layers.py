@@ -9,9 +9,28 @@ import bgars
 import pytest
 
 PACKAGE = Path(bgars.__file__).parent
-BASE = {"errors": 0, "light_files": 1, "ball_records": 1, "rig": 2, "records": 3}
+BASE = {
+    "errors": 0,
+    "light_files": 1,
+    "ball_names": 1,
+    "ball_records": 1,
+    "part_recipe": 2,
+    "rig": 2,
+    "records": 3,
+    "part_result": 3,
+}
 STAGES = dict.fromkeys(("io", "calibrate", "normals", "integrate", "mesh", "balls", "inspection"), 4)
-LATER = {"pipeline": 5, "evaluate": 5, "recipes": 5, "batch": 6, "report": 6, "experiments": 6, "samples": 0, "cli": 7}
+LATER = {
+    "pipeline": 5,
+    "evaluate": 5,
+    "inspection_pipeline": 5,
+    "recipes": 5,
+    "batch": 6,
+    "report": 6,
+    "experiments": 6,
+    "samples": 0,
+    "cli": 7,
+}
 LEVEL = {**BASE, **STAGES, **LATER, "simulate": 4}
 
 

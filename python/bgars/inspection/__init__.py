@@ -1,0 +1,1 @@
+"""Inspection of a part's balls: measurement, reference planes, positions, limits, verdict."""
