@@ -13,6 +13,10 @@ COVERAGE_FACTOR = 2.0
 """Expanded over standard uncertainty: about 95 % coverage."""
 
 
+WORTH_TELLING = 0.1
+"""A bias below this many standard uncertainties is not mentioned."""
+
+
 class Decision(NamedTuple):
     """A verdict and why.
 
@@ -74,7 +78,9 @@ def decide(
     if not (math.isfinite(u) and u >= 0 and math.isfinite(bias)):
         return Decision("undecided", f"{reading} has no known uncertainty (limit: {text})")
     expanded = COVERAGE_FACTOR * u
-    note = f"U = {expanded:.2g}{space}" + (f", noise bias {bias:.2g}{space}" if bias > 0 else "")
+    note = f"U = {expanded:.2g}{space}"
+    if bias > WORTH_TELLING * u:
+        note += f", noise bias {bias:.2g}{space}"
     if (lowest is None or value >= lowest + expanded) and (highest is None or value <= highest - expanded):
         return Decision("pass", f"{reading} is within {text}, {note}")
     if (lowest is not None and value < lowest - expanded) or (

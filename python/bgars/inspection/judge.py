@@ -219,8 +219,8 @@ def _coplanarity(
         apexes_um[:, 2] += board_height_um(coefficients_um, table[:, 0], table[:, 1])
         u_um[:, 2] = np.hypot(u_um[:, 2], _u_board_um(measurement, table))
     gravity_um = _gravity_um(recipe, fit, nominal_um, slots)
-    if not np.isfinite(gravity_um).all():
-        rows, apexes_um, u_um, gravity_um = [], apexes_um[:0], u_um[:0], np.zeros(2)
+    if not np.isfinite(gravity_um).all():  # a single ball, or a single whole one
+        apexes_um, u_um, gravity_um = apexes_um[:0], u_um[:0], np.zeros(2)
     return measure_coplanarity(apexes_um, u_um, gravity_um), rows
 
 

@@ -16,7 +16,11 @@ if TYPE_CHECKING:
 __all__ = ["part_checks", "part_reasons"]
 
 MAX_NAMES = 8
+MAX_TOLD = 4
+"""Balls that are named with their reasons."""
 HOW_TO_LIMIT = f"{NO_LIMITS}: for a verdict, give a recipe with a [limits] table"
+FALLS = "the part does not stand: its centre of gravity is outside its balls"
+FEW = "it takes three balls that are not in one line"
 WORDS = {
     "pitch_um": "pitch",
     "seating_coplanarity_um": "seating coplanarity",
@@ -61,11 +65,12 @@ def part_checks(
             checks.append(PartCheck(name, value, u, bias, None, None, None, ""))
             continue
         verdict, reason = decide(WORDS[name], value, u, allowed, bias=bias)
-        if name == "seating_coplanarity_um" and math.isnan(value) and coplanarity.regression is not None:
-            reason += "; the part does not stand: its centre of gravity is outside its balls"
+        if "coplanarity" in name and math.isnan(value):
+            reason += f"; {FALLS if coplanarity.regression is not None else FEW}"
         if "coplanarity" in name and unmeasured:
             verdict = "undecided"
-            reason += f"; without {_listed(unmeasured)}, not measured, it proves nothing"
+            limit = f"{value:.1f} um (at most {allowed[1]:g} um) " if math.isfinite(value) else ""
+            reason = f"{WORDS[name]} {limit}proves nothing without the balls not measured: {_listed(unmeasured)}"
         checks.append(PartCheck(name, value, u, bias, *allowed, verdict, reason))
     return tuple(checks)
 
@@ -95,12 +100,12 @@ def part_reasons(
         reasons.append(f"bridged: {_listed(pairs)}")
     if failing:
         worst = [f"{ball.name} ({ball.reasons[0]})" for ball in failing]
-        reasons.append(f"{_count(len(failing), 'ball')} outside limits: {_listed(worst, ';')}")
+        reasons.append(f"{_count(len(failing), 'ball')} outside limits: {_listed(worst, ';', MAX_TOLD)}")
     reasons += [check.reason for check in checks if check.verdict == "fail"]
     open_ = [ball for ball in balls if ball.verdict == "undecided" and ball.reasons != (NO_LIMITS,)]
     if open_:
         why = [f"{ball.name} ({next(r for r in ball.reasons if r != NO_LIMITS)})" for ball in open_]
-        reasons.append(f"{_count(len(open_), 'ball')} undecided: {_listed(why, ';')}")
+        reasons.append(f"{_count(len(open_), 'ball')} undecided: {_listed(why, ';', MAX_TOLD)}")
     reasons += [check.reason for check in checks if check.verdict == "undecided"]
     if not has_limits:
         reasons.append(HOW_TO_LIMIT)
@@ -111,6 +116,6 @@ def _count(number: int, what: str) -> str:
     return f"{number} {what}{'' if number == 1 else 's'}"
 
 
-def _listed(names: list[str], separator: str = ",") -> str:
-    more = f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else ""
-    return f"{separator} ".join(names[:MAX_NAMES]) + more
+def _listed(names: list[str], separator: str = ",", most: int = MAX_NAMES) -> str:
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return f"{separator} ".join(names[:most]) + more

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,8 +38,8 @@ __all__ = ["part_figure"]
 
 SIDE_IN = 9.0
 FILL = 0.55
-MAX_REASONS = 5
-MAX_LETTERS = 130
+MAX_LINES = 8
+MAX_LETTERS = 118
 COLORS = "viridis"
 
 
@@ -49,7 +50,7 @@ def part_figure(result: PartResult, capture: Capture) -> Figure:
     figure.suptitle(part_title(result), fontsize=14, color=_title_color(result))
     axes.set_title("\n".join(_reasons(result)), fontsize=9, loc="left")
     axes.imshow(
-        shown_image(capture, _mean_image(capture)),
+        np.sqrt(shown_image(capture, _mean_image(capture))),
         extent=image_extent_um(capture),
         cmap="gray",
         vmin=0.0,
@@ -79,7 +80,7 @@ def part_figure(result: PartResult, capture: Capture) -> Figure:
                 )
             )
     _draw_bridges(axes, result)
-    part_frame(axes, result)
+    part_frame(axes, result, image_extent_um(capture))
     label_balls(axes, result, SIDE_IN)
     if any(math.isfinite(value) for value in values):
         figure.colorbar(ScalarMappable(norm, COLORS), ax=axes, label=f"{name} (µm)", shrink=0.8)
@@ -96,16 +97,16 @@ def _deviation(result: PartResult) -> tuple[str, list[float]]:
 
 
 def _mean_image(capture: Capture) -> NDArray[np.float32]:
-    total = np.zeros(capture.mask.shape, dtype=np.float32)
+    total: NDArray[np.float32] = np.zeros(capture.mask.shape, dtype=np.float32)
     for image in capture.images:
         total += image
     return total / np.float32(len(capture.images))
 
 
 def _reasons(result: PartResult) -> list[str]:
-    lines = [line if len(line) <= MAX_LETTERS else f"{line[: MAX_LETTERS - 3]}..." for line in result.reasons]
-    more = [f"and {len(lines) - MAX_REASONS} more: see result.json"] if len(lines) > MAX_REASONS else []
-    return lines[:MAX_REASONS] + more
+    lines = [line for reason in result.reasons for line in wrap(reason, MAX_LETTERS, subsequent_indent="      ")]
+    more = ["... more in result.json"] if len(lines) > MAX_LINES else []
+    return lines[:MAX_LINES] + more
 
 
 def _title_color(result: PartResult) -> str:

@@ -31,7 +31,7 @@ __all__ = ["deviation_figure"]
 
 SIDE_IN = 7.2
 COLORS = "viridis"
-LONGEST_ARROW = 0.45
+LONGEST_ARROW = 0.9
 """Length of the longest arrow, of the pitch."""
 ROUND = (1.0, 2.0, 5.0)
 
@@ -58,8 +58,8 @@ def _heights(figure: Figure, axes: Axes, result: PartResult) -> None:
                 place,
                 ball_radius_um(ball, result),
                 facecolor=colors(norm(value)) if known else "white",
-                edgecolor="0.3" if known else VERDICT_COLORS["fail"],
-                linewidth=0.8 if known else 1.6,
+                edgecolor=VERDICT_COLORS["fail"] if ball.verdict == "fail" else "0.3",
+                linewidth=1.8 if ball.verdict == "fail" else 0.8,
                 linestyle="-" if ball.present else (0, (3, 2)),
             )
         )

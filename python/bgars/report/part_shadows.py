@@ -48,7 +48,7 @@ def shadow_figure(result: PartResult, capture: Capture) -> Figure:
     _show_light(axes, capture, result, 0)
     for ball in result.balls:
         _draw(axes, ball, result, capture, 0, linewidth=0.9)
-    part_frame(axes, result, margin=2.0)
+    part_frame(axes, result, image_extent_um(capture), margin=2.0)
     middle = _typical_ball(result)
     grid = [panel for row in close.subplots(2, 2, squeeze=False) for panel in row]
     lights = np.unique(np.linspace(0, len(capture.rig), CLOSE_UPS, endpoint=False).astype(int))
@@ -63,7 +63,7 @@ def shadow_figure(result: PartResult, capture: Capture) -> Figure:
             half_um = REACH * ball_radius_um(middle, result)
             panel.set_xlim(place[0] - half_um, place[0] + half_um)
             panel.set_ylim(place[1] - half_um, place[1] + half_um)
-            panel.set_title(f"{middle.name}, {panel.get_title()}", fontsize=10)
+            panel.set_title(f"{middle.name}, light {light + 1}", fontsize=10)
     for panel in grid[len(lights) :]:
         panel.set_visible(False)
     return figure

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from operator import add, sub
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib import style as matplotlib_style
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 if TYPE_CHECKING:
@@ -38,10 +40,11 @@ __all__ = [
 VERDICT_COLORS = {"pass": "#56B4E9", "fail": "#D55E00", "undecided": "#E69F00"}
 """Okabe and Ito, Color universal design, 2008: told apart by colour-blind readers."""
 DPI = 110
-MAX_PICTURE_PX = 1600
+MAX_PICTURE_PX = 1100
 SETTINGS = {"font.size": 10, "axes.titlesize": 11, "axes.labelsize": 10, "legend.fontsize": 9, "legend.frameon": False}
 SMALLEST_NAME_PT = 5.5
 LARGEST_NAME_PT = 11.0
+FAILED_NAME = "#FFB27F"
 NAME_WIDTH = 0.62
 """Width of a character over its size."""
 
@@ -59,7 +62,7 @@ def new_figure(width_in: float, height_in: float) -> Figure:
 
 def save(figure: Figure, path: Path) -> None:
     """Write a PNG without the traces of the software that made it: the same figure, the same file."""
-    figure.savefig(path, format="png", metadata={"Software": None}, pil_kwargs={"optimize": True})
+    figure.savefig(path, format="png", metadata={"Software": None})
 
 
 def part_title(result: PartResult) -> str:
@@ -105,16 +108,19 @@ def ball_radius_um(ball: BallResult, result: PartResult) -> float:
     return (nominal_um or 10.0 * result.pixel_pitch_um) / 2
 
 
-def part_frame(axes: Axes, result: PartResult, *, margin: float = 1.2) -> None:
-    """Show the balls and a margin of so many radii, to scale, with axes in micrometres."""
+def part_frame(
+    axes: Axes, result: PartResult, extent_um: tuple[float, float, float, float] | None = None, *, margin: float = 1.2
+) -> None:
+    """Show the balls and a margin of so many radii within the image's extent, to scale, axes in micrometres."""
     places = [(place, ball_radius_um(ball, result)) for ball in result.balls if (place := ball_place_um(ball))]
     if places:
         rim = margin * max(radius for _, radius in places)
         x = [place[0] for place, _ in places]
         y = [place[1] for place, _ in places]
         reach = [radius + rim for _, radius in places]
-        axes.set_xlim(min(map(float.__sub__, x, reach)), max(map(float.__add__, x, reach)))
-        axes.set_ylim(min(map(float.__sub__, y, reach)), max(map(float.__add__, y, reach)))
+        left, right, bottom, top = extent_um or (-math.inf, math.inf, -math.inf, math.inf)
+        axes.set_xlim(max(left, min(map(sub, x, reach))), min(right, max(map(add, x, reach))))
+        axes.set_ylim(max(bottom, min(map(sub, y, reach))), min(top, max(map(add, y, reach))))
     axes.set_aspect("equal")
     axes.set_xlabel("x (µm)")
     axes.set_ylabel("y (µm)")
@@ -123,34 +129,34 @@ def part_frame(axes: Axes, result: PartResult, *, margin: float = 1.2) -> None:
 
 
 def name_size_pt(axes: Axes, result: PartResult, width_in: float) -> float:
-    """Size at which the longest name fits between neighbours, for axes of this width."""
+    """Size at which the longest name fits on a ball, for axes of this width."""
     left, right = axes.get_xlim()
-    pitch_um = result.pitch_um if math.isfinite(result.pitch_um) else _nearest_um(result)
-    room_pt = pitch_um / max(right - left, 1e-9) * width_in * 72.0
+    radii = [ball_radius_um(ball, result) for ball in result.balls] or [1.0]
+    room_pt = 2.0 * float(np.median(radii)) / max(right - left, 1e-9) * width_in * 72.0
     longest = max((len(ball.name) for ball in result.balls), default=2)
-    return min(0.9 * room_pt / (NAME_WIDTH * longest), LARGEST_NAME_PT)
+    return min(room_pt / (NAME_WIDTH * longest), LARGEST_NAME_PT)
 
 
-def label_balls(axes: Axes, result: PartResult, width_in: float, *, color: str = "white") -> None:
-    """Write the names; where they would run into each other, only of balls that do not pass, or fail."""
+def label_balls(axes: Axes, result: PartResult, width_in: float) -> None:
+    """Write the names on the balls, and beside them where they do not fit, then only of balls that fail."""
     size_pt = name_size_pt(axes, result, width_in)
+    crowded = size_pt < SMALLEST_NAME_PT
     for ball in result.balls:
         place = ball_place_um(ball)
-        crowded = size_pt < SMALLEST_NAME_PT
-        if place is None or (crowded and ball.verdict != "fail"):
+        failed = ball.verdict == "fail"
+        if place is None or (crowded and not failed):
             continue
-        marked = ball.verdict == "fail"
+        if crowded:
+            place = (place[0], place[1] + 1.2 * ball_radius_um(ball, result))
         axes.annotate(
             ball.name,
             place,
             ha="center",
-            va="center",
-            fontsize=max(size_pt, 7.0 if marked else SMALLEST_NAME_PT),
-            color="white" if marked else color,
-            fontweight="bold" if marked else "normal",
-            bbox={"boxstyle": "round,pad=0.12", "facecolor": VERDICT_COLORS["fail"], "edgecolor": "none"}
-            if marked
-            else None,
+            va="bottom" if crowded else "center",
+            fontsize=SMALLEST_NAME_PT + 1.5 if crowded else size_pt,
+            color=FAILED_NAME if failed else "white",
+            fontweight="bold" if failed else "normal",
+            path_effects=[withStroke(linewidth=1.8, foreground="0.1")],
             annotation_clip=True,
             zorder=6,
         )
@@ -163,16 +169,3 @@ def finite_range(values: list[float]) -> tuple[float, float]:
         return 0.0, 1.0
     low, high = min(known), max(known)
     return low, high if high > low else low + 1.0
-
-
-def _nearest_um(result: PartResult) -> float:
-    """Median distance to the nearest neighbour."""
-    places = np.array([place for ball in result.balls if (place := ball_place_um(ball))]).reshape(-1, 2)
-    if len(places) < 2:  # noqa: PLR2004 - a pair
-        return 4.0 * ball_radius_um(result.balls[0], result) if result.balls else 1.0
-    nearest = []
-    for index in range(len(places)):
-        distances = np.hypot(*(places - places[index]).T)
-        distances[index] = np.inf
-        nearest.append(float(distances.min()))
-    return float(np.median(nearest))
