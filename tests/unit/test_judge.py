@@ -164,6 +164,13 @@ def test_without_a_recipe_nothing_passes_and_what_is_missing_fails(good: tuple[F
     assert ball_of(result, "B2").verdict == "fail"
 
 
+def test_without_a_recipe_a_ball_of_another_size_is_named() -> None:
+    result = judge_part(*measured_part(simulated(defects={"B2": bgars.Defect.size(0.8)})))
+    assert next(warning for warning in result.warnings if "unlike" in warning).startswith("B2: ")
+    limited = judge_part(*measured_part(simulated(defects={"B2": bgars.Defect.size(0.8)})), RECIPE)
+    assert not any("unlike" in warning for warning in limited.warnings), "there the limits speak"
+
+
 def test_a_recipe_without_limits_is_undecided(good: tuple[FoundBalls, BallMeasurement]) -> None:
     assert judge_part(*good, replace(RECIPE, limits=Limits())).verdict == "undecided"
 

@@ -151,5 +151,12 @@ def test_the_sample_names_every_kind_of_limit() -> None:
 
 def test_the_documentation_lists_every_key() -> None:
     page = (ROOT / "docs" / "inspection.md").read_text(encoding="utf-8")
+    page = page.partition("## The recipe\n")[2].partition("\n## ")[0]
     rows = dict(re.findall(r"^\| `([a-z_.]+)` \| (.*) \|$", page, re.MULTILINE))
     assert rows == dict(recipe_keys())
+
+
+def test_the_recipe_of_the_documentation_is_one(tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "inspection.md").read_text(encoding="utf-8")
+    (text,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    assert bgars.read_part_recipe(write(tmp_path, text)).limits.seating_coplanarity_um == 80.0

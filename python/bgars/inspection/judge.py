@@ -12,6 +12,7 @@ from bgars.inspection.coplanarity import Coplanarity, measure_coplanarity
 from bgars.inspection.decision import worst
 from bgars.inspection.judge_ball import Position, judge_ball, true_position
 from bgars.inspection.judge_part import part_checks, part_reasons
+from bgars.inspection.odd_sizes import odd_sizes
 from bgars.inspection.places import Slot, match_balls
 from bgars.inspection.position import GridFit, fit_grid
 from bgars.inspection.warpage import board_height_um, board_terms, warpage
@@ -140,7 +141,7 @@ def judge_part(
         light_change_deg=measurement.light_change_deg,
         board_coefficients_um=measurement.board_coefficients_um,
         shadow_residual_rms=measurement.shadow_residual_rms,
-        warnings=(*warnings, *measurement.warnings, *_own_warnings(recipe, fit, coplanarity)),
+        warnings=(*warnings, *measurement.warnings, *_own_warnings(recipe, fit, coplanarity, balls)),
         recipe=recipe,
         pixel_pitch_um=pixel_pitch_um,
         files=files,
@@ -148,8 +149,12 @@ def judge_part(
     )
 
 
-def _own_warnings(recipe: PartRecipe | None, fit: GridFit | None, coplanarity: Coplanarity) -> list[str]:
+def _own_warnings(
+    recipe: PartRecipe | None, fit: GridFit | None, coplanarity: Coplanarity, balls: list[BallResult]
+) -> list[str]:
     warnings = [OWN_PITCH] if recipe is None and fit is not None else []
+    if recipe is None or recipe.limits.diameter_um is None:
+        warnings += odd_sizes([ball.name for ball in balls], [ball.diameter_um for ball in balls])
     if len(coplanarity.seating) >= MIN_ROCKING:
         count = len(coplanarity.seating)
         warnings.append(f"the part can rock between {count} seating planes; the worst is judged")
