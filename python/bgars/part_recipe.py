@@ -169,9 +169,10 @@ class PartRecipe:
         >>> PartRecipe("demo", BallLayout(rows=2, cols=3, pitch_um=800.0), view="top").name_of("A1", 0, 0)
         'A3'
         """
-        if self.view == "bottom" or self.layout.positions or row is None or col is None:
+        cols = self.layout.cols or 0
+        if self.view == "bottom" or row is None or col is None or not 0 <= col < cols:
             return image_name
-        return ball_name(row, (self.layout.cols or 0) - 1 - col)
+        return ball_name(row, cols - 1 - col)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the recipe as plain Python values."""

@@ -299,6 +299,14 @@ def test_a_drawing_of_the_other_side_mirrors_names_and_centre_of_gravity(
     assert shifted.seating_coplanarity_um == pytest.approx(mirrored.seating_coplanarity_um)
 
 
+def test_an_extra_ball_keeps_a_name_of_its_own_in_a_mirrored_view(good: tuple[FoundBalls, BallMeasurement]) -> None:
+    recipe = replace(RECIPE, view="top", layout=replace(RECIPE.layout, depopulated=("A1",)))
+    result = judge_part(*good, recipe)
+    names = [ball.name for ball in result.balls]
+    assert len(set(names)) == len(names) == 20
+    assert ball_of(result, "A1").kind == "extra"
+
+
 def test_a_list_of_positions_is_a_layout_too(good: tuple[FoundBalls, BallMeasurement]) -> None:
     lattice = judge_part(*good, RECIPE)
     listed = BallLayout(positions=tuple((b.name, b.x_nominal_um + 77.0, b.y_nominal_um) for b in lattice.balls))

@@ -14,7 +14,9 @@ from bgars.inspection.planes import ReferencePlane, off_lines, regression_plane,
 __all__ = ["Coplanarity", "measure_coplanarity", "quiet_heights"]
 
 Array = NDArray[np.float64]
-DRAWS = 512
+DRAWS = 256
+DRAWN_APEXES = 1 << 18
+"""Noisy apexes in memory at once; the result does not depend on it."""
 SEED = 20_240_229
 MIN_BALLS = 3
 OUTLIER = 4.0
@@ -92,8 +94,15 @@ def measure_coplanarity(
     quiet_um = apexes_um.copy()
     quiet_um[:, 2] = quiet_heights(apexes_um, u_apexes_um[:, 2])
     random = np.random.default_rng(seed)
-    noisy_um = quiet_um + random.standard_normal((draws, *apexes_um.shape)) * u_apexes_um
-    spread = _spread(_seating_um(noisy_um, gravity_um), _quiet_seating_um(quiet_um, gravity_um)) if seating else unknown
+    stood_um, leaned_um = [], []
+    at_once = max(1, DRAWN_APEXES // len(apexes_um))
+    for first in range(0, draws, at_once):
+        noise = random.standard_normal((min(at_once, draws - first), *apexes_um.shape))
+        noisy_um = quiet_um + noise * u_apexes_um
+        leaned_um.append(_regression_um(quiet_um, noisy_um[:, :, 2]))
+        if seating:
+            stood_um.append(_seating_um(noisy_um, gravity_um))
+    spread = _spread(np.concatenate(stood_um), _quiet_seating_um(quiet_um, gravity_um)) if seating else unknown
     quiet_regression = regression_plane(quiet_um)
     quiet_regression_um = quiet_regression.coplanarity_um if quiet_regression else math.nan
     return Coplanarity(
@@ -102,7 +111,7 @@ def measure_coplanarity(
         seating_um,
         *spread,
         regression_um,
-        *_spread(_regression_um(quiet_um, noisy_um[:, :, 2]), quiet_regression_um),
+        *_spread(np.concatenate(leaned_um), quiet_regression_um),
     )
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars.errors import ConvergenceError
+
 __all__ = ["FAKES", "hull_facets"]
 
 Array = NDArray[np.float64]
@@ -39,6 +41,11 @@ def hull_facets(points: Array, heights: Array, place: Array) -> tuple[NDArray[np
     shares : (d, 3) float64
         Barycentric coordinates of the place in the triangle.
 
+    Raises
+    ------
+    ConvergenceError
+        The walk did not end within its limit.
+
     Examples
     --------
     >>> points = np.array([[[-1.0, -1], [1, -1], [1, 1], [-1, 1]]])
@@ -53,7 +60,8 @@ def hull_facets(points: Array, heights: Array, place: Array) -> tuple[NDArray[np
     z = np.concatenate([heights, np.full((parts, FAKES), DEEP)], axis=1)
     corners = np.tile(np.arange(count, count + FAKES, dtype=np.intp), (parts, 1))
     active = np.arange(parts)
-    for _ in range(MAX_PIVOTS + count):
+    most = MAX_PIVOTS + count
+    for pivots in range(most + 1):
         at = corners[active]
         lift, slopes = _planes(ground[active], z[active], at)
         room = lift[:, None] + np.einsum("dni,di->dn", ground[active], slopes) - z[active]
@@ -62,6 +70,10 @@ def hull_facets(points: Array, heights: Array, place: Array) -> tuple[NDArray[np
         going = room[np.arange(len(active)), entering] < -FEASIBLE
         if not going.any():
             break
+        if pivots == most:
+            worst = float(-room.min())
+            msg = f"seating plane: no facet after {pivots} exchanges of apexes, {worst:.3g} of the range sticks out"
+            raise ConvergenceError(msg, pivots, worst)
         active, entering, at = active[going], entering[going], at[going]
         triangles = np.take_along_axis(ground[active], at[:, :, None], axis=1)
         here = _shares(triangles, np.zeros(2))

@@ -74,8 +74,10 @@ def match_balls(found: FoundBalls, measurement: BallMeasurement, recipe: PartRec
         if ball is None or ball.kind == "extra":
             slots.append(Slot(name, row, col, nominal, False, "ball", None))
             continue
-        kind: BallKind = "bridged" if name in joined else ball.kind
-        slots.append(Slot(name, row, col, nominal, True, kind, measured.get(name)))
+        reading = measured.get(name)
+        is_joined = name in joined or (reading is not None and reading.kind == "bridged")
+        kind: BallKind = "bridged" if is_joined else ball.kind
+        slots.append(Slot(name, row, col, nominal, True, kind, reading))
     taken = {slot.name for slot in slots if slot.found}
     for ball in found.balls:
         if ball.name not in taken:

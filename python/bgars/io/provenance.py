@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["capture_files", "checksums"]
 
+FILENAMES = "filenames.txt"
 BLOCK_BYTES = 1 << 20
 
 
@@ -34,7 +35,7 @@ def capture_files(capture: Capture) -> tuple[Path, ...]:
         return capture.files
     path = capture.folder / RECIPE_NAME
     recipe = read_recipe(path) if path.is_file() else default_recipe(capture.folder)
-    named = [RECIPE_NAME, recipe.dark, recipe.mask]
+    named = [RECIPE_NAME, FILENAMES if recipe.images is None else None, recipe.dark, recipe.mask]
     if isinstance(recipe.response, TableResponse):
         named.append(recipe.response.table)
     if recipe.lights is not None:
