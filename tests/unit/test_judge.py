@@ -253,6 +253,19 @@ def test_an_unknown_board_leaves_coplanarity_or_warpage_open(
     assert any("warpage" in reason for reason in result.reasons)
 
 
+def test_nothing_passes_under_a_light_that_is_not_where_the_rig_says(
+    good: tuple[FoundBalls, BallMeasurement],
+) -> None:
+    found, measurement = good
+    change_deg = measurement.light_change_deg.copy()
+    change_deg[5] = 4.9
+    assert judge_part(found, replace(measurement, light_change_deg=change_deg), RECIPE).verdict == "pass"
+    change_deg[5] = 5.6
+    result = judge_part(found, replace(measurement, light_change_deg=change_deg), RECIPE)
+    assert result.verdict == "undecided"
+    assert result.reasons[0].startswith("light 5 (counted from 0) stands 5.6 degrees")
+
+
 def test_too_near_a_limit_is_undecided(good: tuple[FoundBalls, BallMeasurement]) -> None:
     found, measurement = good
     result = judge_part(found, changed(measurement, "A1", diameter_um=639.8), RECIPE)

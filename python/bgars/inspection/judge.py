@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bgars.inspection.coplanarity import Coplanarity, measure_coplanarity
-from bgars.inspection.decision import worst
+from bgars.inspection.decision import COVERAGE_FACTOR, worst
 from bgars.inspection.judge_ball import Position, judge_ball, true_position
 from bgars.inspection.judge_part import part_checks, part_reasons
 from bgars.inspection.odd_sizes import odd_sizes
@@ -30,6 +30,8 @@ __all__ = ["judge_part"]
 
 OWN_PITCH = "no recipe: true positions are against a grid of the part's own pitch"
 MIN_ROCKING = 2
+MAX_LIGHT_CHANGE_DEG = 5.0
+"""Beyond this nothing that rests on the lights may pass."""
 
 
 def judge_part(
@@ -107,13 +109,14 @@ def judge_part(
     verdicts = [ball.verdict for ball in balls] + [check.verdict for check in checks if check.verdict is not None]
     if bridges or not any(ball.present for ball in balls):
         verdicts.append("fail")
-    if not limits:
+    strayed = _strayed_lights(measurement.light_change_deg)
+    if strayed or not limits:
         verdicts.append("undecided")
     return PartResult(
         name=name if recipe is None else recipe.name,
         balls=tuple(balls),
         verdict=worst(verdicts),
-        reasons=part_reasons(balls, checks, bridges, has_limits=bool(limits)),
+        reasons=(*part_reasons(balls, checks, bridges, has_limits=bool(limits)), *strayed),
         pitch_um=pitch_um,
         u_pitch_um=u_pitch_um,
         grid_angle_deg=math.nan if fit is None else math.degrees(fit.angle_rad),
@@ -155,10 +158,27 @@ def _own_warnings(
     warnings = [OWN_PITCH] if recipe is None and fit is not None else []
     if recipe is None or recipe.limits.diameter_um is None:
         warnings += odd_sizes([ball.name for ball in balls], [ball.diameter_um for ball in balls])
-    if len(coplanarity.seating) >= MIN_ROCKING:
-        count = len(coplanarity.seating)
+    count = len(coplanarity.seating)
+    if count >= MIN_ROCKING and _rocks(coplanarity):
         warnings.append(f"the part can rock between {count} seating planes; the worst is judged")
     return warnings
+
+
+def _rocks(coplanarity: Coplanarity) -> bool:
+    """Whether the seating planes differ by more than the uncertainty of the coplanarity, where it is known."""
+    deviations_um = np.array([plane.deviations_um for plane in coplanarity.seating])
+    u_um = coplanarity.u_seating_um
+    return not float(np.ptp(deviations_um, axis=0).max()) <= COVERAGE_FACTOR * u_um
+
+
+def _strayed_lights(change_deg: Array) -> list[str]:
+    """Lights that the shadows put elsewhere: a wrong rig, or an image under another light's name."""
+    return [
+        f"light {index} (counted from 0) stands {change:.1f} degrees from where the rig says, by its shadows; over "
+        f"{MAX_LIGHT_CHANGE_DEG:g} degrees the rig or the pairing of images and lights is wrong"
+        for index, change in enumerate(change_deg)
+        if change > MAX_LIGHT_CHANGE_DEG
+    ]
 
 
 def _finite_centres(slots: tuple[Slot, ...]) -> Array:
