@@ -76,10 +76,7 @@ def judge_part(
     coplanarity, rows = _coplanarity(slots, measurement, recipe, fit, nominal_um)
     limits = None if recipe is None else recipe.limits
     names = {
-        slot.name: slot.name
-        if recipe is None or slot.kind == "extra"
-        else recipe.name_of(slot.name, slot.row, slot.col)
-        for slot in slots
+        slot.name: slot.name if recipe is None else recipe.name_of(slot.name, slot.row, slot.col) for slot in slots
     }
     balls = []
     for index, slot in enumerate(slots):

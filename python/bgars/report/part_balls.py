@@ -15,6 +15,7 @@ from matplotlib.patches import Circle
 
 from bgars.report.part_style import (
     VERDICT_COLORS,
+    ball_deviations,
     ball_place_um,
     ball_radius_um,
     finite_range,
@@ -57,7 +58,7 @@ def part_figure(result: PartResult, capture: Capture) -> Figure:
         vmax=1.3,
         interpolation="nearest",
     )
-    name, values = _deviation(result)
+    name, values = ball_deviations(result)
     norm = Normalize(*finite_range(values))
     colors = colormaps[COLORS]
     for ball, value in zip(result.balls, values, strict=True):
@@ -86,14 +87,6 @@ def part_figure(result: PartResult, capture: Capture) -> Figure:
         figure.colorbar(ScalarMappable(norm, COLORS), ax=axes, label=f"{name} (µm)", shrink=0.8)
     _legend(axes, result)
     return figure
-
-
-def _deviation(result: PartResult) -> tuple[str, list[float]]:
-    """What colours the balls: the seating deviation, or the height where the part does not stand."""
-    seating = [ball.seating_deviation_um for ball in result.balls]
-    if any(math.isfinite(value) for value in seating):
-        return "apex below the seating plane", seating
-    return "height above the board", [ball.top_um for ball in result.balls]
 
 
 def _mean_image(capture: Capture) -> NDArray[np.float32]:

@@ -21,6 +21,7 @@ __all__ = ["histogram_figure"]
 
 BAR = "#0072B2"
 COVERAGE_FACTOR = 2.0
+LEAST_SPAN_UM = 1.0
 PANELS = (
     ("true_position_um", "true_position_um", "u_true_position_um", "true position (µm)"),
     ("diameter_um", "diameter_um", "u_diameter_um", "diameter (µm)"),
@@ -61,9 +62,13 @@ def _panel(
     edges = [limit for limit in limits or () if limit is not None]
     if values.size:
         low, high = float(values.min()), float(values.max())
-        room = max(high - low, 1.0)
+        room = max(0.02 * (high - low), 0.5 * (LEAST_SPAN_UM - (high - low)))
         bins = int(np.clip(np.sqrt(values.size) * 2, 5, 40))
-        axes.hist(values, bins=bins, range=(low - 0.02 * room, high + 0.02 * room), color=BAR, alpha=0.85)
+        axes.hist(values, bins=bins, range=(low - room, high + room), color=BAR, alpha=0.85)
+        axes.ticklabel_format(axis="x", useOffset=False)
+    else:
+        axes.set_xticks([])
+        axes.set_yticks([])
     for edge in edges:
         axes.axvline(edge, color=VERDICT_COLORS["fail"], linestyle="--", linewidth=1.6, zorder=4)
         if math.isfinite(u_um):
@@ -87,5 +92,7 @@ def _title(known: NDArray[np.float64], missing: int) -> str:
     if not known.size:
         return "not measured"
     gap = f"; {missing} not measured" if missing else ""
+    if known.size == 1:
+        return f"1 ball: {known[0]:.1f} µm{gap}"
     spread = f"mean {known.mean():.1f}, standard deviation {known.std():.1f}, {known.min():.1f} to {known.max():.1f} µm"
     return f"{known.size} balls: {spread}{gap}"

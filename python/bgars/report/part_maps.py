@@ -13,6 +13,7 @@ from matplotlib.patches import Circle
 
 from bgars.report.part_style import (
     VERDICT_COLORS,
+    ball_deviations,
     ball_place_um,
     ball_radius_um,
     finite_range,
@@ -46,7 +47,7 @@ def deviation_figure(result: PartResult) -> Figure:
 
 
 def _heights(figure: Figure, axes: Axes, result: PartResult) -> None:
-    values = [ball.seating_deviation_um for ball in result.balls]
+    name, values = ball_deviations(result)
     norm, colors = Normalize(*finite_range(values)), colormaps[COLORS]
     for ball, value in zip(result.balls, values, strict=True):
         place = ball_place_um(ball)
@@ -65,11 +66,12 @@ def _heights(figure: Figure, axes: Axes, result: PartResult) -> None:
         )
     seats = " / ".join(", ".join(seat.balls[:6]) for seat in result.seatings[:2])
     reading = _reading(result.seating_coplanarity_um, result.u_seating_coplanarity_um, result.seating_noise_bias_um)
-    axes.set_title(f"Height below the seating plane (rests on {seats or 'nothing'})\nseating coplanarity {reading}")
+    rests = f"rests on {seats}" if seats else "no seating plane"
+    axes.set_title(f"{name[0].upper()}{name[1:]} ({rests})\nseating coplanarity {reading}")
     part_frame(axes, result)
     label_balls(axes, result, SIDE_IN - 1.5)
     if any(math.isfinite(value) for value in values):
-        figure.colorbar(ScalarMappable(norm, COLORS), ax=axes, label="apex below the seating plane (µm)", shrink=0.8)
+        figure.colorbar(ScalarMappable(norm, COLORS), ax=axes, label=f"{name} (µm)", shrink=0.8)
 
 
 def _offsets(axes: Axes, result: PartResult) -> None:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "VERDICT_COLORS",
+    "ball_deviations",
     "ball_place_um",
     "ball_radius_um",
     "figure_style",
@@ -78,7 +79,9 @@ def shown_image(capture: Capture, image: NDArray[np.generic]) -> NDArray[np.floa
     values = np.asarray(image[::step, ::step], dtype=np.float32)
     dark = float(np.percentile(values, 0.5))
     top = float(np.percentile(values, 99.5))
-    scaled: NDArray[np.float32] = np.clip((values - dark) / max(top - dark, 1e-9), 0.0, 1.0)
+    if not top > dark:
+        return np.full(values.shape, 0.5, np.float32)
+    scaled: NDArray[np.float32] = np.clip((values - dark) / (top - dark), 0.0, 1.0)
     return scaled
 
 
@@ -106,6 +109,14 @@ def ball_radius_um(ball: BallResult, result: PartResult) -> float:
         return float(np.median(known)) / 2
     nominal_um = None if result.recipe is None else result.recipe.diameter_um
     return (nominal_um or 10.0 * result.pixel_pitch_um) / 2
+
+
+def ball_deviations(result: PartResult) -> tuple[str, list[float]]:
+    """What colours the balls: distance below the seating plane, or the height where the part does not stand."""
+    seating = [ball.seating_deviation_um for ball in result.balls]
+    if any(math.isfinite(value) for value in seating):
+        return "apex below the seating plane", seating
+    return "height above the local board", [ball.top_um for ball in result.balls]
 
 
 def part_frame(
