@@ -43,8 +43,8 @@ def decide(
     """Judge a reading against limits that are narrowed to pass and widened to fail.
 
     With the expanded uncertainty U = 2 u, conformance is proven within the limits shrunk by U, non-conformance outside
-    the limits widened by U (ISO 14253-1:2017, 5.2 and 5.3); between them nothing is proven. A reading that noise makes
-    too large by `bias` on average must pass as it is, and fails only with the bias taken off.
+    the limits widened by U (ISO 14253-1); between them nothing is proven. A reading that noise makes too large by `bias`
+    on average must pass as it is, and fails only with the bias taken off.
 
     Parameters
     ----------
@@ -59,7 +59,8 @@ def decide(
 
     References
     ----------
-    ISO 14253-1:2017, Geometrical product specifications: decision rules for verifying conformity or nonconformity.
+    ISO 14253-1, Geometrical product specifications: decision rules for verifying conformity or nonconformity with
+    specifications.
 
     Examples
     --------

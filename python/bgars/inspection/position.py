@@ -68,7 +68,7 @@ def fit_grid(nominal_um: Array, centres_um: Array, u_centres_um: Array, *, free_
     References
     ----------
     JEITA ED-7304, Measuring method for package dimensions of ball grid array: true position by the axes that fit all
-    centres best. Umeyama, IEEE Trans. Pattern Anal. Mach. Intell. 13 (1991) 376, eqs. 38-42: the turn and the scale.
+    centres best. Umeyama, IEEE Trans. Pattern Anal. Mach. Intell. 13 (1991) 376, eqs. 40-42: turn, shift and scale.
 
     Examples
     --------
