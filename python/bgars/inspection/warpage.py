@@ -44,8 +44,8 @@ def warpage(coefficients_um: Array, covariance: Array | None, centres_um: Array)
 
     References
     ----------
-    JEDEC JESD22-B112, Package warpage measurement of surface-mount integrated circuits at elevated temperature: highest
-    less lowest point against the least-squares plane.
+    JEDEC JESD22-B112, Package warpage measurement of surface-mount integrated circuits at elevated temperature:
+    highest less lowest point against the least-squares plane.
 
     Examples
     --------

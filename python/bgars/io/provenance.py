@@ -29,7 +29,7 @@ def capture_files(capture: Capture) -> tuple[Path, ...]:
     >>> import bgars
     >>> files = capture_files(bgars.read_capture(bgars.sample_capture()))
     >>> [path.name for path in files if path.suffix != ".png"]
-    ['capture.toml', 'light_directions.txt', 'light_intensities.txt']
+    ['capture.toml', 'filenames.txt', 'light_directions.txt', 'light_intensities.txt']
     """
     if capture.folder is None:
         return capture.files
