@@ -43,8 +43,8 @@ def decide(
     """Judge a reading against limits that are narrowed to pass and widened to fail.
 
     With the expanded uncertainty U = 2 u, conformance is proven within the limits shrunk by U, non-conformance outside
-    the limits widened by U (ISO 14253-1); between them nothing is proven. A reading that noise makes too large by `bias`
-    on average must pass as it is, and fails only with the bias taken off.
+    the limits widened by U (ISO 14253-1); between them nothing is proven. A reading that noise makes too large by
+    `bias` on average must pass as it is, and fails only with the bias taken off.
 
     Parameters
     ----------
