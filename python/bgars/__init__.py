@@ -11,6 +11,8 @@ The data flows one way: a capture becomes normals, normals become a height map, 
 
 from importlib.metadata import version
 
+from bgars.ball_records import BallLayout, FoundBall, FoundBalls
+from bgars.balls import find_balls
 from bgars.errors import (
     BgarsError,
     CalibrationError,
@@ -62,6 +64,7 @@ __version__ = version("bgars")
 __all__ = [
     "Ball",
     "BallResult",
+    "BallLayout",
     "BallTruth",
     "BgarsError",
     "Board",
@@ -74,6 +77,8 @@ __all__ = [
     "Defect",
     "Evaluation",
     "FileFormatError",
+    "FoundBall",
+    "FoundBalls",
     "HeightMap",
     "InputError",
     "Jitter",
@@ -97,6 +102,7 @@ __all__ = [
     "estimate_normals",
     "evaluate",
     "inspect",
+    "find_balls",
     "integrate_normals",
     "mesh_from_height",
     "named_recipes",

@@ -2,31 +2,46 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["BallLayout", "BallMeasurement", "FoundBall", "FoundBalls", "MeasuredBall"]
+from bgars.errors import InputError
+
+__all__ = ["BallLayout", "BallMeasurement", "FoundBall", "FoundBalls", "MeasuredBall", "place_name"]
 
 BallKind = Literal["ball", "extra", "bridged"]
+ROW_LETTERS = "ABCDEFGHJKLMNPRTUVWY"
 
 
 @dataclass(frozen=True)
 class BallLayout:
-    """Where balls should be: a lattice, or a list of places.
+    """Where balls should be: a square grid, or a list of places.
 
     Attributes
     ----------
     rows, cols : int or None
-        Size of the lattice; None for a list of places.
+        Size of the grid, seen as in the image; None with a list.
     pitch_um : float or None
-        Distance of neighbours in the lattice.
+        Distance of neighbours in the grid.
     depopulated : tuple of str
-        Names of places of the lattice that have no ball.
+        JEDEC names of places of the grid without a ball.
     positions : tuple of (str, float, float)
-        Name, x and y in um of each place, as the image shows them but for a shift and a turn; empty for a lattice.
+        Or every place: name, x and y in micrometres, x right and y up, any origin.
+
+    Raises
+    ------
+    InputError
+        Neither or both of grid and list, sizes that are not positive, names that are not in the grid or come twice.
+
+    Examples
+    --------
+    >>> BallLayout(rows=2, cols=3, pitch_um=800.0, depopulated=("B2",)).places()[3]
+    ('B1', 1, 0, 0.0, -800.0)
     """
 
     rows: int | None = None
@@ -34,6 +49,77 @@ class BallLayout:
     pitch_um: float | None = None
     depopulated: tuple[str, ...] = ()
     positions: tuple[tuple[str, float, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.positions:
+            if (self.rows, self.cols, self.pitch_um, self.depopulated) != (None, None, None, ()):
+                msg = "layout: must be a grid (rows, cols, pitch_um) or a list of positions, got both"
+                raise InputError(msg)
+            names = [name for name, _, _ in self.positions]
+            if not all(math.isfinite(x_um) and math.isfinite(y_um) for _, x_um, y_um in self.positions):
+                msg = "layout.positions: must be finite"
+                raise InputError(msg)
+        else:
+            for name, value in (("rows", self.rows), ("cols", self.cols), ("pitch_um", self.pitch_um)):
+                if value is None or not (math.isfinite(value) and value > 0):
+                    msg = f"layout.{name}: must be above 0 (or positions must be given), got {value}"
+                    raise InputError(msg)
+            names = list(self.depopulated)
+            known = {place_name(row, col) for row in range(self.rows or 0) for col in range(self.cols or 0)}
+            unknown = [name for name in names if name not in known]
+            if unknown:
+                msg = f"layout.depopulated: must name places of the {self.rows} x {self.cols} grid, got {unknown[0]!r}"
+                raise InputError(msg)
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            field_name = "positions" if self.positions else "depopulated"
+            msg = f"layout.{field_name}: names must differ, got {twice[0]!r} more than once"
+            raise InputError(msg)
+
+    def places(self) -> tuple[tuple[str, int, int, float, float], ...]:
+        """Name, row, column, x and y in micrometres of every place with a ball; rows count downward."""
+        if self.positions:
+            return _listed_places(self.positions)
+        pitch_um = self.pitch_um or 0.0
+        return tuple(
+            (place_name(row, col), row, col, col * pitch_um, -row * pitch_um)
+            for row in range(self.rows or 0)
+            for col in range(self.cols or 0)
+            if place_name(row, col) not in self.depopulated
+        )
+
+
+def place_name(row: int, col: int) -> str:
+    """JEDEC name of a place counted from 0: rows are letters without I, O, Q, S, X, Z; AA comes after Y.
+
+    Examples
+    --------
+    >>> place_name(0, 0), place_name(8, 11), place_name(20, 0)
+    ('A1', 'J12', 'AA1')
+    """
+    count = len(ROW_LETTERS)
+    letters = ROW_LETTERS[row % count]
+    while row >= count:
+        row = row // count - 1
+        letters = ROW_LETTERS[row % count] + letters
+    return f"{letters}{col + 1}"
+
+
+def _listed_places(positions: tuple[tuple[str, float, float], ...]) -> tuple[tuple[str, int, int, float, float], ...]:
+    """Listed places with rows and columns: the distinct y from the top, the distinct x from the left."""
+    rows = _ranks([-y_um for _, _, y_um in positions])
+    cols = _ranks([x_um for _, x_um, _ in positions])
+    return tuple((name, row, col, x, y) for (name, x, y), row, col in zip(positions, rows, cols, strict=True))
+
+
+def _ranks(values: list[float]) -> list[int]:
+    """Rank of each value among the distinct ones; values closer than a thousandth of the range are one."""
+    tolerance = max(1e-3 * (max(values) - min(values)), 1e-9)
+    ranks = [0] * len(values)
+    order = sorted(range(len(values)), key=values.__getitem__)
+    for before, index in pairwise(order):
+        ranks[index] = ranks[before] + (values[index] - values[before] > tolerance)
+    return ranks
 
 
 @dataclass(frozen=True)
@@ -87,6 +173,8 @@ class FoundBalls:
         Direction of the lattice's rows against the image's, counter-clockwise.
     origin_px : (float, float)
         Place (row 0, col 0) of the lattice, x and y as above.
+    odd_sizes : tuple of (str, float)
+        Name and radius over the median radius of each ball that differs from it by more than a quarter.
     """
 
     balls: tuple[FoundBall, ...]
@@ -97,6 +185,7 @@ class FoundBalls:
     pitch_px: float | None
     angle_deg: float
     origin_px: tuple[float, float]
+    odd_sizes: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,88 @@
+"""Solder that joins neighbours: a ridge where board should be."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bgars.records import FloatArray
+
+__all__ = ["joined_pairs"]
+
+NEIGHBOUR = 1.3
+"""Farthest neighbours, in pitches."""
+WIDTHS = (0.15, 0.25, 0.4, 0.6)
+"""Half widths of a ridge to try, in radii."""
+MIN_RIDGE = 0.35
+ABOVE_OTHERS = 0.1
+CLEAR = 0.25
+USUAL_RIDGE = 0.2
+ENOUGH_PAIRS = 4
+BRIGHTER = 1.2
+
+
+def joined_pairs(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    radius: NDArray[np.float64],
+    pitch: float,
+    slopes: tuple[FloatArray, FloatArray],
+    brightest: FloatArray,
+) -> list[tuple[int, int]]:
+    """Indices of neighbours that are joined.
+
+    A bridge slopes away from the line between two centres on both sides. So does, weakly, the shadowed board of narrow
+    gaps; that is alike in all gaps and darker than lit board, while solder shines.
+
+    Parameters
+    ----------
+    x, y, radius : (N,) float64
+        Circles in pixels of `slopes`, x right and y up, origin at the image centre.
+    pitch : float
+        Distance of neighbours in the same pixels.
+    slopes : two (H, W) float32
+        See :func:`bgars.balls.outward.slope_field`.
+    brightest : (H, W) float32
+        Highest level over the lights.
+    """
+    height, width = brightest.shape
+    apart = np.hypot(x[:, None] - x, y[:, None] - y)
+    reach = np.maximum(NEIGHBOUR * pitch, 1.02 * (radius[:, None] + radius))
+    pairs = [(int(i), int(j)) for i, j in np.argwhere(apart < reach) if i < j]
+    if not pairs:
+        return []
+    board = _board_level(x, y, radius, brightest)
+    across = np.linspace(-0.6, 0.6, 25)
+    ridges, levels = np.zeros(len(pairs)), np.zeros(len(pairs))
+    for index, (i, j) in enumerate(pairs):
+        along_x, along_y = (x[j] - x[i]) / apart[i, j], (y[j] - y[i]) / apart[i, j]
+        gap = max(apart[i, j] - radius[i] - radius[j], 1.0)
+        u = (radius[i] + gap * np.linspace(0.3, 0.7, 9))[:, None]
+        v = across * min(radius[i], radius[j])
+        row = np.rint(height / 2 - 0.5 - (y[i] + along_y * u + along_x * v)).astype(int).clip(0, height - 1)
+        col = np.rint(x[i] + along_x * u - along_y * v + width / 2 - 0.5).astype(int).clip(0, width - 1)
+        away = (along_x * slopes[1][row, col] - along_y * slopes[0][row, col]) * np.sign(v)
+        ridges[index] = max(away[:, np.abs(across) < half].mean() for half in WIDTHS)
+        levels[index] = brightest[row, col][:, 8:17].mean()
+    usual = float(np.median(ridges)) if len(pairs) >= ENOUGH_PAIRS else USUAL_RIDGE
+    joined = (ridges > MIN_RIDGE) & (ridges > usual + ABOVE_OTHERS)
+    joined &= (levels > BRIGHTER * board) | (ridges > usual + CLEAR)
+    joined |= np.array([apart[i, j] < radius[i] + radius[j] for i, j in pairs])
+    return [pair for pair, is_joined in zip(pairs, joined, strict=True) if is_joined]
+
+
+def _board_level(
+    x: NDArray[np.float64], y: NDArray[np.float64], radius: NDArray[np.float64], brightest: FloatArray
+) -> float:
+    """Median over the pixels outside all circles."""
+    height, width = brightest.shape
+    board = np.ones(brightest.shape, np.bool_)
+    for x_, y_, r in zip(x + width / 2 - 0.5, height / 2 - 0.5 - y, 1.1 * radius, strict=True):
+        rows = slice(max(int(y_ - r), 0), max(int(y_ + r) + 2, 0))
+        cols = slice(max(int(x_ - r), 0), max(int(x_ + r) + 2, 0))
+        board[rows, cols] = False
+    return float(np.median(brightest[board])) if board.any() else 0.0

@@ -1,0 +1,149 @@
+"""Coarse circles: the radius around a centre where most directions see an edge in several lights."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bgars.records import FloatArray
+
+    Array = NDArray[np.floating]
+
+__all__ = ["CoarseCircles", "scan_rims"]
+
+DIRECTIONS = 24
+RADII = 48
+PEAK_ADVANTAGE = 100.0
+CHUNK = 256
+AROUND_RIM = np.geomspace(0.78, 1.28, 21)
+RIM_BINS = np.flatnonzero(np.abs(np.log(AROUND_RIM)) < 0.06)  # noqa: PLR2004 - of the radius
+BESIDE_BINS = np.flatnonzero(np.abs(np.log(AROUND_RIM)) > 0.09)  # noqa: PLR2004 - of the radius
+SIDE = 4
+"""Radii between a rim and what must be smoother than it."""
+DARK_LEVELS = 0.3
+"""Grey levels added before the square root, which evens out the noise."""
+
+
+class CoarseCircles(NamedTuple):
+    """Circles to a pixel or two, N each, in array coordinates."""
+
+    row: NDArray[np.float64]
+    col: NDArray[np.float64]
+    radius_px: NDArray[np.float64]
+    strength: NDArray[np.float64]
+    share: NDArray[np.float64]
+
+
+def scan_rims(
+    image: FloatArray,
+    row: NDArray[np.float64],
+    col: NDArray[np.float64],
+    scale_px: NDArray[np.float64],
+    *,
+    span: tuple[float, float] = (0.3, 1.5),
+    rims: int = 2,
+) -> CoarseCircles:
+    """Find the circle of the strongest rim around each centre.
+
+    An edge of a highlight, a shadow or a texture shows in one or two lights or on one side; the rim of a ball shows at
+    the same radius in every direction, each time in about half of the lights. So: the third largest edge over lights,
+    its lower quartile over directions, its maximum over radii, less the edges farther in and out, because shading is
+    smooth and a rim is sharp.
+
+    Parameters
+    ----------
+    image : (L, H, W) float32
+        Linear grey levels of 255.
+    row, col, scale_px : (N,) float64
+        Centres and scales, in pixels of `image`.
+    span : (float, float)
+        Radii to try, in scales.
+    rims : int
+        Radii to follow up for each centre.
+    """
+    if not len(row):
+        return CoarseCircles(*(np.zeros(0) for _ in range(5)))
+    roots = np.sqrt(np.maximum(image, 0.0) + np.float32(DARK_LEVELS))
+    parts = [
+        _scan(roots, row[at : at + CHUNK], col[at : at + CHUNK], scale_px[at : at + CHUNK], span, rims)
+        for at in range(0, len(row), CHUNK)
+    ]
+    return CoarseCircles(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+def _scan(
+    roots: FloatArray, row: Array, col: Array, scale_px: Array, span: tuple[float, float], rims: int
+) -> CoarseCircles:
+    angle = (np.arange(DIRECTIONS) + 0.5) * (2 * math.pi / DIRECTIONS)
+    radii = scale_px[:, None] * np.geomspace(span[0], span[1], RADII)
+    edge = _edges(roots, row, col, radii, angle)
+    wide = np.maximum(edge, np.maximum(np.roll(edge, 1, axis=2), np.roll(edge, -1, axis=2)))
+    profile = np.quantile(wide, 0.25, axis=1) + 0.25 * np.median(edge, axis=1)
+    around = np.pad(profile, ((0, 0), (SIDE, SIDE)), mode="edge")
+    sharp = profile - 0.5 * (around[:, : -2 * SIDE] + around[:, 2 * SIDE :])
+    around = np.pad(sharp, ((0, 0), (2, 2)), constant_values=-np.inf)
+    neighbours = np.max([around[:, shift : shift + RADII] for shift in (0, 1, 3, 4)], axis=0)
+    sharp = np.where(sharp >= neighbours, sharp, sharp - PEAK_ADVANTAGE)
+    best = np.argsort(-sharp[:, 1:-1], axis=1)[:, :rims] + 1
+    radius_px = np.take_along_axis(radii, best, axis=1).ravel()
+    row, col = np.repeat(row, rims).astype(np.float64), np.repeat(col, rims).astype(np.float64)
+    near = np.geomspace(0.75, 1.33, 33)
+    for reach in (0.3, 0.15):
+        radii = radius_px[:, None] * near
+        edge = _edges(roots, row, col, radii, angle)
+        pick = np.argmax(edge * np.maximum(0.02, 1.0 - np.abs(np.log(near)) / reach), axis=2)
+        weight = np.take_along_axis(edge, pick[..., None], axis=2)[..., 0]
+        found = np.take_along_axis(radii, pick, axis=1)
+        step = _circle_step(found - radius_px[:, None], weight, angle, radius_px)
+        col += step[:, 0]
+        row -= step[:, 1]
+        radius_px = radius_px + step[:, 2]
+    edge = _edges(roots, row, col, radius_px[:, None] * AROUND_RIM, angle)
+    rim = edge[:, :, RIM_BINS].max(axis=2)
+    beside = np.median(edge[:, :, BESIDE_BINS], axis=2)
+    share = (rim > 1.5 * beside + 0.08).mean(axis=1)
+    return CoarseCircles(
+        np.asarray(row, np.float64),
+        np.asarray(col, np.float64),
+        radius_px,
+        np.quantile(rim - beside, 0.25, axis=1),
+        share,
+    )
+
+
+def _edges(roots: FloatArray, row: Array, col: Array, radii: Array, angle: Array) -> FloatArray:
+    """(N, A, radii) third largest over lights of the change of sqrt(level) from ring to ring."""
+    lights, height, width = roots.shape
+    r = np.rint(row[:, None, None] - np.sin(angle)[:, None] * radii[:, None, :]).astype(np.int32)
+    c = np.rint(col[:, None, None] + np.cos(angle)[:, None] * radii[:, None, :]).astype(np.int32)
+    inside = (r >= 0) & (r < height) & (c >= 0) & (c < width)
+    pixels = np.where(inside, r * width + c, 0)
+    value = roots.reshape(lights, -1).take(pixels, axis=1)
+    # Over three neighbouring directions: along a rim nothing changes, and noise falls.
+    value = value + np.roll(value, 1, axis=2) + np.roll(value, -1, axis=2)
+    edge = np.zeros_like(value)
+    np.abs(value[..., 2:] - value[..., :-2], out=edge[..., 1:-1])
+    edge[..., 1:-1] *= (inside[:, :, 2:] & inside[:, :, :-2]) * np.float32(1.0 / 3.0)
+    rank = max(1, round(lights * 3 / 8))
+    ranked: FloatArray = np.partition(edge, lights - rank, axis=0)[lights - rank]
+    return ranked
+
+
+def _circle_step(residual: Array, weight: FloatArray, angle: Array, radius_px: Array) -> Array:
+    """Shift right, shift up and growth that bring a circle onto rims found by direction, robustly."""
+    design = np.stack([np.cos(angle), np.sin(angle), np.ones(len(angle))], axis=1)
+    step = np.zeros((len(residual), 3))
+    use = weight
+    for _ in range(6):
+        normal = np.einsum("na,ai,aj->nij", use, design, design) + 1e-6 * np.eye(3)
+        step = np.linalg.solve(normal, np.einsum("na,na,ai->ni", use, residual, design)[..., None])[..., 0]
+        left = (residual - step @ design.T) / (0.05 * radius_px[:, None])
+        use = weight / (1.0 + left**2) ** 2
+    limit = 0.3 * radius_px[:, None]
+    clipped: Array = np.clip(step, -limit, limit)
+    return clipped
