@@ -4,10 +4,9 @@ Unknowns: of each ball x, y, z, radius, q; of each light two small turns; five c
 through lights and board, so the normal matrix is an arrow: blocks of 5 x 5, a border of 2 L + 5 (Triggs et al., "Bundle
 adjustment - a modern synthesis", 2000, section 6.1).
 
-Priors, all Gaussian but the last: the lights stand as the rig says, the board is nearly flat, balls are where their
-silhouettes are. Heights, elevations and q trade against each other (with all q raised and all lights lowered the shadows
-stay the same): a population of solder balls is round on the whole, so q has a Cauchy prior around 1, which one ball may
-leave when its shadow says so.
+Gaussian priors: the lights stand as the rig says, the board is nearly flat, balls are where their silhouettes are, q is 1.
+Heights, elevations and q trade against each other (with all q raised and all lights lowered the shadows stay the same),
+and a population of solder balls is round on the whole; which balls are not, the caller decides (`population`).
 """
 
 from __future__ import annotations
@@ -40,15 +39,13 @@ MAX_ROUNDS = 30
 STEP_TOLERANCE_PX = 1e-4
 Q_TOLERANCE = 1e-5
 CAUCHY = 2.5
-Q_CAUCHY = 3.0
-"""How many standard deviations of its prior a q may be off before it is set free."""
 MIN_Q, MAX_Q = 0.2, 2.0
 
 
 class Priors(NamedTuple):
     """Where unknowns are expected: values and standard deviations.
 
-    `balls` (N, 5) values and `u_balls` (N, 5) deviations (inf = free; the last column is the scale of q's Cauchy prior);
+    `balls` (N, 5) values and `u_balls` (N, 5) deviations (inf = free);
     `vectors` (L, 3) the rig's, `u_light_rad`; `board` (5,) and `u_board` (5,).
     """
 
@@ -238,7 +235,6 @@ def _normal(
 
     off = priors.balls - table
     pull = 1.0 / priors.u_balls**2
-    pull[:, 4] /= 1.0 + (off[:, 4] / (Q_CAUCHY * priors.u_balls[:, 4])) ** 2
     normal[:, range(5), range(5)] += pull + 1e-9
     right += pull * off
     ways = tangents(vectors)

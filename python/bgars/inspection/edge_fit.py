@@ -43,7 +43,9 @@ def group_sum(values: Array, group: Index, groups: int) -> Array:
     return np.bincount(group, weights=values, minlength=groups)
 
 
-def fit_stretches(columns: list[Array], value: Array, usable: Array, group: Group) -> StretchFit:
+def fit_stretches(
+    columns: list[Array], value: Array, usable: Array, group: Group, *, robust: bool = True
+) -> StretchFit:
     """Fit ``value = sum_c solution_c column_c`` in every stretch.
 
     Parameters
@@ -54,6 +56,8 @@ def fit_stretches(columns: list[Array], value: Array, usable: Array, group: Grou
     usable : (O, M) float64
         1 for pixels to use, else 0.
     group : Group
+    robust : bool
+        Fit a second time with Cauchy weights. Not where the model is meant to miss single pixels.
     """
     stretch, size, together = group
     count = len(columns)
@@ -63,7 +67,8 @@ def fit_stretches(columns: list[Array], value: Array, usable: Array, group: Grou
     freedom_lost = count * present.reshape(pairs, together).sum(axis=1)
     solution, noise = np.zeros((size, count)), np.zeros(pairs)
     inverse = np.zeros((size, count, count))
-    for turn in range(ROUNDS):
+    rounds = ROUNDS if robust else 1
+    for turn in range(rounds):
         normal, right = np.zeros((size, count, count)), np.zeros((size, count))
         for i, first in enumerate(columns):
             weighted = weight * first
@@ -82,7 +87,7 @@ def fit_stretches(columns: list[Array], value: Array, usable: Array, group: Grou
         square = group_sum((weight * residual**2).sum(axis=0), pair, pairs)
         points = group_sum(weight.sum(axis=0), pair, pairs)
         noise = np.sqrt(square / np.maximum(points - freedom_lost, 1.0))
-        if turn + 1 < ROUNDS:
+        if turn + 1 < rounds:
             spread = np.maximum(noise[pair], 1e-9)[None, :]
             weight = usable / (1.0 + (residual / (CAUCHY * spread)) ** 2)
     enough = group_sum(weight.sum(axis=0), stretch, size) >= MIN_PIXELS

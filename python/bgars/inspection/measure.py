@@ -13,6 +13,7 @@ from bgars.errors import InputError
 from bgars.inspection.bundle import Priors, Solution, angles_rad, solve_bundle
 from bgars.inspection.flat_top import flat_tops
 from bgars.inspection.outline import outline_centres
+from bgars.inspection.population import q_spread
 from bgars.inspection.problem import Problem, make_problem, thread_count
 from bgars.inspection.results import Usability, judge_balls, measurement
 from bgars.inspection.shadow_edges import Edges, EdgeSettings, measure_edges
@@ -30,22 +31,21 @@ __all__ = ["Fit", "fit_shadows", "measure_balls"]
 
 Array = NDArray[np.float64]
 
-COARSE = (0.06,)
-"""Spreads, in radii, that edges are first looked for with."""
-COARSE_REACH = 2.5
-FINE_PASSES = 3
+COARSE = (0.24, 0.08)
+"""Distances, in radii, that edges are first looked for in."""
+COARSE_EXTRA_PX = 1.5
+COARSE_STEPS = 6.0
+FINE_PASSES = 2
+FIRST_SPREAD_PX = 0.5
 REACH_SIGMAS = 3.2
 REACH_PX = 1.2
 TYPICAL_WAY = 2.0
 """Way of the light from a ball to the edge of its shadow, in radii."""
-RIG_DEG = 1.0
+RIG_DEG = 0.3
 """Lights may be this far from where the rig says (standard deviation of each axis), before their scatter says more."""
 CERTAIN_RIG_DEG = 1e-4
 RIG_LIMITS_DEG = (0.003, 2.0)
-Q_SPREAD = 0.003
-Q_LIMITS = (0.0005, 0.02)
-Q_OUTLIER = 3.0
-MIN_POPULATION = 5
+FIRST_Q_SPREAD = 0.02
 TILT = 0.003
 BOW_SLOPE = 0.02
 """Prior standard deviations of the board: tilt, and slope by bow at the edge of the image."""
@@ -171,7 +171,7 @@ def fit_shadows(
     table[:, 2] = heights
     progress(0.1)
     priors = _priors(problem, table, field, refine_lights)
-    spread = EdgeSpread(COARSE[-1] * float(np.median(table[:, 3])), 0.0)
+    spread = EdgeSpread(FIRST_SPREAD_PX, 0.0)
     gains = problem.irradiance.copy()
     index = np.flatnonzero(~problem.bridged)
     if not len(index):
@@ -205,7 +205,8 @@ def fit_shadows(
         solution, priors = _solve(used, start, problem.near, priors, chosen, turn, turn == passes - 1, refine_lights)
         table[chosen], vectors, board = solution.balls, solution.vectors, solution.board
         gains[index] *= edges.lit_levels()
-        spread = fit_spread(used)
+        if turn >= len(COARSE):
+            spread = fit_spread(used)
         progress(0.1 + 0.8 * (turn + 1) / passes)
         result = Fit(problem, index, usability, solution, edges, spread)
     return result
@@ -214,8 +215,8 @@ def fit_shadows(
 def _settings(turn: int, radius: float, spread: EdgeSpread) -> EdgeSettings:
     """Coarse first, then as sharp as the edges are."""
     if turn < len(COARSE):
-        size = max(COARSE[turn] * radius, 1.0)
-        return EdgeSettings(size, 0.0, COARSE_REACH * size + 1.0, max(1, int(size / 1.3)))
+        reach = COARSE[turn] * radius + COARSE_EXTRA_PX
+        return EdgeSettings(1.0, 0.0, reach, max(1, int(reach / COARSE_STEPS)), coarse=True)
     widest = float(np.hypot(spread.sharp_px, TYPICAL_WAY * spread.lamp_rad * radius))
     return EdgeSettings(spread.sharp_px, spread.lamp_rad, REACH_SIGMAS * widest + REACH_PX)
 
@@ -233,7 +234,7 @@ def _priors(problem: Problem, table: Array, field: NormalField | None, refine_li
             board, spread = fitted
             u_board = np.hypot(spread, u_board / 10.0)
     u_balls = np.column_stack(
-        [problem.u_centre, problem.u_centre, table[:, 3], problem.u_radius, np.full(len(table), Q_SPREAD)]
+        [problem.u_centre, problem.u_centre, table[:, 3], problem.u_radius, np.full(len(table), FIRST_Q_SPREAD)]
     )
     rig = np.radians(RIG_DEG if refine_lights else CERTAIN_RIG_DEG)
     return Priors(table.copy(), u_balls, problem.vectors.copy(), float(rig), board, u_board)
@@ -266,7 +267,7 @@ def _solve(
     refine_lights: bool,
 ) -> tuple[Solution, Priors]:
     """Bundle; once edges are sharp, the scatter of lights and of q is taken from the result (empirical Bayes)."""
-    sharp = turn > len(COARSE)
+    sharp = turn >= len(COARSE)
     redescend = REDESCEND if sharp else None
 
     def bundle(at: tuple[Array, Array, Board], rounds: int) -> Solution:
@@ -274,15 +275,10 @@ def _solve(
         return solve_bundle(edges, *at[:2], near, at[2], own, redescend=redescend, rounds=rounds)
 
     solution = bundle(start, LONG_ROUNDS if last else SHORT_ROUNDS)
-    for _ in range(EMPIRICAL_ROUNDS if sharp else 0):
-        u_q = np.sqrt(solution.covariance[:, 4, 4])
-        round_ones = np.abs(solution.balls[:, 4] - 1.0) < Q_OUTLIER * np.hypot(priors.u_balls[chosen, 4], u_q)
-        if round_ones.sum() >= MIN_POPULATION:
-            off = np.square(solution.balls[round_ones, 4] - 1.0) + np.square(u_q[round_ones])
-            scatter = float(np.clip(np.sqrt(off.mean()), *Q_LIMITS))
-            u_balls = priors.u_balls.copy()
-            u_balls[:, 4] = scatter
-            priors = priors._replace(u_balls=u_balls)
+    for _ in range(EMPIRICAL_ROUNDS if last else 1):
+        u_balls = priors.u_balls.copy()
+        u_balls[chosen, 4] = q_spread(solution, priors.u_balls[chosen, 4])
+        priors = priors._replace(u_balls=u_balls)
         if refine_lights:
             turns = np.square(angles_rad(solution.vectors, priors.vectors)) + np.square(solution.u_light_rad)
             scatter = float(np.clip(np.sqrt(turns.mean() / 2.0), *np.radians(RIG_LIMITS_DEG)))

@@ -11,6 +11,13 @@ the edge), and to first order a displacement a and a change b of the spread:
     I = lo T (1 - Phi) + hi T Phi - (hi - lo) [a T phi / s + b T (d / s) phi / s],
 
 linear in four unknowns: least squares, then once more with Cauchy weights.
+
+That holds for displacements below s. The coarse search goes by area: with H the unit step and r the reach,
+
+    I = lo T (1 - H) + hi T H - (hi - lo) a T [|d| < r/2] / r
+
+has the exact displacement a of any edge, sharp or blunt, that lies within r/2 (three unknowns; lit and dark, inside and
+outside of r/2, have r/2 of pixels each).
 """
 
 from __future__ import annotations
@@ -49,12 +56,22 @@ INV_SQRT_2PI = 0.3989422804014327
 
 
 class EdgeSettings(NamedTuple):
-    """How edges are looked for: spread of a sharp edge, growth of the spread along the ray, width of the search."""
+    """How edges are looked for.
+
+    Spread of a sharp edge, growth of the spread along the ray, distance to look to on both sides, distance of pixels.
+    `coarse`: by area instead, see the head of this file; finds edges up to half of `reach_px` away.
+    """
 
     spread_px: float
     lamp_spread_rad: float
     reach_px: float
     stride_px: int = 1
+    coarse: bool = False
+
+    @property
+    def coarse_px(self) -> float | None:
+        """Reach where the search is coarse, else None."""
+        return self.reach_px if self.coarse else None
 
 
 @dataclass(frozen=True)
@@ -170,7 +187,7 @@ def _measure(
     spread = np.sqrt(settings.spread_px**2 + (settings.lamp_spread_rad * way) ** 2)
     pixels = _pixels(radiance, shadows, balls, lights, board, gains, settings, beam, pick, row, col, spread)
     sector = ball * len(vectors) * SECTORS + light * SECTORS + place * SECTORS // len(angles)
-    return _solve(radiance, pixels, sector, angles[place], way, spread, shape, wide_balls, wide_lights, board)
+    return _solve(radiance, pixels, sector, angles[place], way, spread, shape, wide_balls, wide_lights, board, settings.coarse_px)
 
 
 class _Pixels(NamedTuple):
@@ -235,13 +252,20 @@ def _solve(
     balls: Balls,
     lights: Lights,
     board: Board,
+    coarse_px: float | None,
 ) -> list[Array]:
     """Least squares of every stretch; then its point."""
     size = shape[0] * shape[1] * shape[2]
-    lit = ndtr(pixels.distance)
-    bell = INV_SQRT_2PI * np.exp(-0.5 * pixels.distance**2) / spread[None, :] * pixels.texture
-    columns = [pixels.texture * (1.0 - lit), pixels.texture * lit, bell, bell * pixels.distance]
-    fit = fit_stretches(columns, pixels.value, pixels.weight, Group(sector, size, shape[2]))
+    if coarse_px is None:
+        lit = ndtr(pixels.distance)
+        bell = INV_SQRT_2PI * np.exp(-0.5 * pixels.distance**2) / spread[None, :] * pixels.texture
+        columns = [pixels.texture * (1.0 - lit), pixels.texture * lit, bell, bell * pixels.distance]
+    else:
+        lit = (pixels.distance >= 0.0).astype(np.float64)
+        bell = (np.abs(pixels.distance * spread[None, :]) < 0.5 * coarse_px) / coarse_px * pixels.texture
+        columns = [pixels.texture * (1.0 - lit), pixels.texture * lit, bell]
+    group = Group(sector, size, shape[2])
+    fit = fit_stretches(columns, pixels.value, pixels.weight, group, robust=coarse_px is None)
     contrast = (fit.solution[:, 1] - fit.solution[:, 0]).reshape(shape)
     pixel_sum = np.maximum(group_sum(fit.weight.sum(axis=0), sector, size), 1e-9)
     texture = (group_sum((fit.weight * pixels.texture).sum(axis=0), sector, size) / pixel_sum).reshape(shape)
@@ -255,7 +279,11 @@ def _solve(
     )
     edge = edge_at(mean_angle, balls, lights, board)
     beam = rays(edge.x, edge.y, balls, lights, board)
-    widened = mean_spread - np.where(measured, fit.solution[:, 3].reshape(shape) / safe, 0.0)
+    if coarse_px is None:
+        widened = mean_spread - np.where(measured, fit.solution[:, 3].reshape(shape) / safe, 0.0)
+        u_widened = np.where(measured, fit.deviation[:, 3].reshape(shape) / safe, np.inf)
+    else:
+        widened, u_widened = mean_spread, np.full(shape, np.inf)
     # A blurred convex shadow looks smaller than it is, by half of the squared spread times the curvature of its edge.
     tangent_along = (beam.toward_y * beam.gradient_x - beam.toward_x * beam.gradient_y) / beam.slope
     curvature = (1.0 - tangent_along**2) / (beam.distance * beam.slope)
@@ -267,7 +295,7 @@ def _solve(
         np.where(bad, 0.0, shift),
         np.where(bad, np.inf, fit.deviation[:, 2].reshape(shape) / safe),
         np.where(bad, np.nan, widened),
-        np.where(bad, np.inf, fit.deviation[:, 3].reshape(shape) / safe),
+        u_widened,
         mean_way,
         np.where(bad, np.nan, fit.solution[:, 0].reshape(shape)),
         np.where(bad, np.nan, fit.solution[:, 1].reshape(shape)),

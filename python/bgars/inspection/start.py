@@ -24,6 +24,7 @@ BESIDE = 0.09
 """Points inside and outside lie this share of the radius off the edge."""
 CLIP = (-0.5, 1.0)
 WEAK_STEP = 0.08
+TOP_SHARE = 0.7
 
 
 def edge_steps(
@@ -100,10 +101,21 @@ def first_heights(
         )
         known = np.isfinite(step)
         scores[index] = np.where(known, step, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 3.0)
-    common = int(np.argmax(np.median(scores, axis=0)))
+    common = _middle(np.median(scores, axis=0))
     for index, row in enumerate(table):
-        best = int(np.argmax(scores[index]))
-        if scores[index, best] < WEAK_STEP:
-            best = common
-        heights[index], steps[index] = HEIGHTS[best] * row[3], scores[index, best]
+        steps[index] = scores[index].max()
+        heights[index] = (_middle(scores[index]) if steps[index] >= WEAK_STEP else common) * row[3]
     return heights, steps
+
+
+def _middle(score: Array) -> float:
+    """Where a score that is flat at the top has its middle, in radii."""
+    best = int(np.argmax(score))
+    over = np.maximum(score - TOP_SHARE * score[best], 0.0)
+    first, last = best, best
+    while first > 0 and over[first - 1] > 0:
+        first -= 1
+    while last + 1 < len(score) and over[last + 1] > 0:
+        last += 1
+    part = slice(first, last + 1)
+    return float(np.average(HEIGHTS[part], weights=over[part])) if over[best] > 0 else float(HEIGHTS[best])
