@@ -49,7 +49,8 @@ FIRST_Q_SPREAD = 0.02
 TILT = 0.003
 BOW_SLOPE = 0.02
 """Prior standard deviations of the board: tilt, and slope by bow at the edge of the image."""
-EMPIRICAL_ROUNDS = 4
+EMPIRICAL_ROUNDS = 5
+SETTLED = 0.1
 SHORT_ROUNDS, LONG_ROUNDS = 8, 20
 REDESCEND = 3.5
 OUTLINE_SAFETY = 4.0
@@ -191,7 +192,7 @@ def fit_shadows(
             shadow_margin_px=settings.reach_px + 1.0,
             threads=threads,
         )
-        if turn in (len(COARSE), passes - 1):
+        if turn == passes - 1:
             priors = _with_outlines(problem, priors, shadows, table, spread)
         edges = measure_edges(
             problem.radiance, shadows, table[index], vectors, problem.near, board, gains[index], settings, threads
@@ -276,6 +277,7 @@ def _solve(
 
     solution = bundle(start, LONG_ROUNDS if last else SHORT_ROUNDS)
     for _ in range(EMPIRICAL_ROUNDS if last else 1):
+        before = priors
         u_balls = priors.u_balls.copy()
         u_balls[chosen, 4] = q_spread(solution, priors.u_balls[chosen, 4])
         priors = priors._replace(u_balls=u_balls)
@@ -283,5 +285,11 @@ def _solve(
             turns = np.square(angles_rad(solution.vectors, priors.vectors)) + np.square(solution.u_light_rad)
             scatter = float(np.clip(np.sqrt(turns.mean() / 2.0), *np.radians(RIG_LIMITS_DEG)))
             priors = priors._replace(u_light_rad=scatter)
+        if not last:
+            break
         solution = bundle((solution.balls, solution.vectors, solution.board), SHORT_ROUNDS)
+        if np.isclose(before.u_light_rad, priors.u_light_rad, rtol=SETTLED) and np.allclose(
+            before.u_balls[:, 4], priors.u_balls[:, 4], rtol=SETTLED
+        ):
+            break
     return solution, priors

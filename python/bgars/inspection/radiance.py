@@ -33,8 +33,8 @@ class Radiance:
         table = capture.response
         black = capture.black_level
         self._black = black if table is None else float(np.interp(black, np.arange(len(table)), table))
-        masked = not (capture.mask.strides == (0, 0) and bool(capture.mask[:1, :1].all()))
-        self._mask = np.ascontiguousarray(capture.mask).reshape(-1) if masked else None
+        self.masked = not (capture.mask.strides == (0, 0) and bool(capture.mask[:1, :1].all()))
+        self._mask = np.ascontiguousarray(capture.mask).reshape(-1) if self.masked else None
 
     @property
     def scale(self) -> float:

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from bgars.inspection.edge_fit import Group, fit_stretches, group_sum
-from bgars.inspection.shadow_model import Balls, Lights, edge_at, rays
+from bgars.inspection.shadow_model import Balls, Lights, Rays, edge_at, near_edge, rays
 
 if TYPE_CHECKING:
     from bgars.inspection.board import Board
@@ -47,7 +47,8 @@ SECTORS = 20
 WIDEST_RAD = np.radians(100.0)
 LINE_SPACING_PX = 1.45
 """Distance of neighbouring lines along the edge: above sqrt(2), so that no two lines share a pixel."""
-MAX_LINES = 128
+MAX_LINES = 96
+COARSE_LINES = 48
 LINES_AT_ONCE = 6000
 MIN_LIGHTS_LIT = 2
 LOWEST_TANGENT = 0.08
@@ -144,7 +145,8 @@ def measure_edges(
     threads : int
     """
     radius = float(np.median(table[:, 3]))
-    count = int(np.clip(2.0 * WIDEST_RAD * radius / LINE_SPACING_PX, 2 * SECTORS, MAX_LINES))
+    most = COARSE_LINES if settings.coarse else MAX_LINES
+    count = int(np.clip(2.0 * WIDEST_RAD * radius / LINE_SPACING_PX, 2 * SECTORS, most))
     angles = (np.arange(count) + 0.5) / count * 2.0 * WIDEST_RAD - WIDEST_RAD
     step = max(1, LINES_AT_ONCE // (len(vectors) * count))
     parts = [slice(first, first + step) for first in range(0, len(table), step)]
@@ -180,12 +182,13 @@ def _measure(
     ball, light, place = np.nonzero(keep)
     row, col = row[keep], col[keep]
     hidden = shadows.hidden.reshape(-1)[shadows.pixels(row, col)]
-    ball, light, place, row, col = (part[~hidden] for part in (ball, light, place, row, col))
+    ball, light, place = ball[~hidden], light[~hidden], place[~hidden]
     pick = (ball, light, place)
-    slope = beam.slope[pick]
-    way = beam.along[pick] / slope
+    here = Rays(*(np.broadcast_to(part, keep.shape)[pick] for part in beam))
+    way = here.along / here.slope
     spread = np.sqrt(settings.spread_px**2 + (settings.lamp_spread_rad * way) ** 2)
-    pixels = _pixels(radiance, shadows, balls, lights, board, gains, settings, beam, pick, row, col, spread)
+    point = (edge.x[pick], edge.y[pick])
+    pixels = _pixels(radiance, shadows, balls, board, gains, settings, here, point, ball, light, spread)
     sector = ball * len(vectors) * SECTORS + light * SECTORS + place * SECTORS // len(angles)
     return _solve(radiance, pixels, sector, angles[place], way, spread, shape, wide_balls, wide_lights, board, settings.coarse_px)
 
@@ -203,37 +206,40 @@ def _pixels(
     radiance: Radiance,
     shadows: ShadowMap,
     balls: Balls,
-    lights: Lights,
     board: Board,
     gains: Array,
     settings: EdgeSettings,
-    beam: object,
-    pick: tuple[Index, Index, Index],
-    row: Index,
-    col: Index,
+    beam: Rays,
+    point: tuple[Array, Array],
+    ball: Index,
+    light: Index,
     spread: Array,
 ) -> _Pixels:
-    ball, light, _ = pick
-    gradient_x, gradient_y = beam.gradient_x[pick], beam.gradient_y[pick]  # type: ignore[attr-defined]
+    """Pixels across the edge at points (M,), on the row or column that crosses it more steeply."""
+    row, col = np.rint(radiance.row(point[1])).astype(np.intp), np.rint(radiance.col(point[0])).astype(np.intp)
     steps = int(np.ceil(settings.reach_px / settings.stride_px))
     offsets = (np.arange(-steps, steps + 1) * settings.stride_px)[:, None]
-    along_cols = np.abs(gradient_x) >= np.abs(gradient_y)
+    along_cols = np.abs(beam.gradient_x) >= np.abs(beam.gradient_y)
     rows = row[None, :] + np.where(along_cols[None, :], 0, offsets)
     cols = col[None, :] + np.where(along_cols[None, :], offsets, 0)
     usable = (rows >= 0) & (rows < radiance.height) & (cols >= 0) & (cols < radiance.width)
     rows, cols = np.clip(rows, 0, radiance.height - 1), np.clip(cols, 0, radiance.width - 1)
-    rays_here = rays(radiance.x(cols), radiance.y(rows), balls.take(ball), lights.take(light), board)
-    distance = (rays_here.distance - balls.radius[ball]) / rays_here.slope
+    around = near_edge(beam, *point, balls.take(ball), board)
+    distance = around.distance(radiance.x(cols) - point[0], radiance.y(rows) - point[1])
     at = shadows.pixels(rows, cols)
     counts = np.take(shadows.count.reshape(len(shadows.count), -1), at, axis=1)
-    own_count = counts[light[None, :], np.arange(len(rows))[:, None], np.arange(len(ball))[None, :]]
     values = radiance.at(rows * radiance.width + cols)
-    value = values[light[None, :], np.arange(len(rows))[:, None], np.arange(len(ball))[None, :]].astype(np.float64)
-    lit = (counts == 0) & np.isfinite(values)
-    gain = gains[ball].T.astype(np.float32)[:, None, :]
-    total = np.where(lit, values, np.float32(0.0)).sum(axis=0)
-    weight_sum = np.where(lit, gain, np.float32(0.0)).sum(axis=0)
-    usable &= (lit.sum(axis=0) >= MIN_LIGHTS_LIT) & (own_count <= 1) & np.isfinite(value)
+    line = (light[None, :], np.arange(len(rows))[:, None], np.arange(len(ball))[None, :])
+    value = values[line].astype(np.float64)
+    lit = counts == 0
+    if np.isfinite(radiance.capture.saturation) or radiance.masked:
+        lit &= np.isfinite(values)
+        values[~lit] = 0.0
+    else:
+        values *= lit
+    total = values.sum(axis=0)
+    weight_sum = np.einsum("lom,lm->om", lit, gains[ball].T.astype(np.float32))
+    usable &= (lit.sum(axis=0, dtype=np.uint8) >= MIN_LIGHTS_LIT) & (counts[line] <= 1) & np.isfinite(value)
     usable &= ~shadows.hidden.reshape(-1)[at] & (np.abs(distance) <= settings.reach_px)
     texture = np.where(usable, total / np.maximum(weight_sum, 1e-9), 0.0).astype(np.float64)
     usable &= texture > 0

@@ -16,9 +16,10 @@ if TYPE_CHECKING:
 
 __all__ = ["ShadowMap"]
 
+Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 OUTLINE = np.linspace(-np.pi, np.pi, 25)
-FULL_DETAIL_RADIUS_PX = 25.0
+FULL_DETAIL_RADIUS_PX = 20.0
 """Balls of this radius are drawn pixel by pixel, larger ones on a coarser grid: the maps have margins anyway."""
 
 
@@ -103,5 +104,21 @@ class ShadowMap:
             )
             x, y = self._x[window[1]][None, :], self._y[window[0]][:, None]
             if x.size and y.size:
-                beam = rays(x, y, own, lamp, board)
-                self.count[light][window] += (beam.distance < own.radius + margin_px) & (beam.along > 0.0)
+                self.count[light][window] += _shadowed(x, y, own, lamp, board, margin_px)
+
+
+def _shadowed(x: Array, y: Array, ball: Balls, lamp: Lights, board: Board, margin_px: float) -> NDArray[np.bool_]:
+    """Board points of a grid whose rays pass a ball closer than its radius and a margin."""
+    if lamp.near:
+        beam = rays(x, y, ball, lamp, board)
+        return (beam.distance < ball.radius + margin_px) & (beam.along > 0.0)
+    # The board as its tangent plane under the ball: a map has margins. Everything is linear in x or in y.
+    slope_x, slope_y = (part / ball.q for part in board.slopes(ball.x, ball.y))
+    to_z = lamp.z / ball.q
+    length = np.sqrt(lamp.x**2 + lamp.y**2 + to_z**2)
+    to_x, to_y, to_z = lamp.x / length, lamp.y / length, to_z / length
+    across_x, across_y, down = x - ball.x, y - ball.y, ball.z / ball.q
+    along = (across_x * (to_x + slope_x * to_z) - down * to_z) + across_y * (to_y + slope_y * to_z)
+    square = np.square(across_x) + np.square(across_y) + np.square((slope_x * across_x - down) + slope_y * across_y)
+    square -= along * along
+    return (square < np.square(ball.radius + margin_px)) & (along < 0.0)

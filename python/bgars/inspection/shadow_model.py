@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from bgars.inspection.board import SHAPE_TERMS, Board, height_terms
 
-__all__ = ["Balls", "Edge", "Lights", "Rays", "ball_derivatives", "board_derivatives", "edge_at", "light_derivatives", "rays"]
+__all__ = ["Balls", "Edge", "Lights", "Nearby", "Rays", "ball_derivatives", "board_derivatives", "edge_at", "light_derivatives", "near_edge", "rays"]
 
 Array = NDArray[np.float64]
 
@@ -94,7 +94,7 @@ class Rays(NamedTuple):
 
     `distance` D to the centre; `outward` unit vector from the centre to the closest point; `along` the way from the
     board to that point; `lever` = 1 - along / (way to the lamp), 1 for distant lights; `turn` how far that point moves when
-    the light's vector changes by 1; `gradient_x`, `gradient_y` of D on the board; `toward_x`, `toward_y` of u.
+    the light's vector changes by 1; `gradient_x`, `gradient_y` of D on the board; `toward_x`, `toward_y`, `toward_z` of u.
     """
 
     distance: Array
@@ -108,6 +108,7 @@ class Rays(NamedTuple):
     gradient_y: Array
     toward_x: Array
     toward_y: Array
+    toward_z: Array
 
     @property
     def slope(self) -> Array:
@@ -145,7 +146,53 @@ def rays(x: Array, y: Array, balls: Balls, lights: Lights, board: Board) -> Rays
         slope_x, slope_y = board.slopes(x, y)
         rise = out_z / balls.q
         gradient_x, gradient_y = lever * (out_x + rise * slope_x), lever * (out_y + rise * slope_y)
-    return Rays(distance, out_x, out_y, out_z, along, lever, turn, gradient_x, gradient_y, to_x, to_y)
+    return Rays(distance, out_x, out_y, out_z, along, lever, turn, gradient_x, gradient_y, to_x, to_y, to_z)
+
+
+class Nearby(NamedTuple):
+    """Signed distance to an edge around points on it, to second order: (M,) constants of M points.
+
+    With P the displacement on the board from a point on the edge, p its component across the rays (heights over q) and
+    k = lever, ``D^2 = D0^2 + 2 D0 grad . P + k^2 |p|^2`` is exact on a plane; along the normal of the edge
+    ``D = D0 + slope d + bend d^2 / 2``.
+    """
+
+    centre: Array
+    first_x: Array
+    first_y: Array
+    second_xx: Array
+    second_xy: Array
+    second_yy: Array
+    inverse_slope: Array
+    half_bend: Array
+
+    def distance(self, dx: Array, dy: Array) -> Array:
+        """Signed distance to the edge at displacements (..., M), positive outside."""
+        square = dx * (self.first_x + self.second_xx * dx + self.second_xy * dy) + dy * (
+            self.first_y + self.second_yy * dy
+        )
+        square += self.centre * self.centre
+        distance: Array = (np.sqrt(np.maximum(square, 0.0)) - self.centre) * self.inverse_slope
+        return distance - self.half_bend * distance * distance
+
+
+def near_edge(beam: Rays, x: Array, y: Array, balls: Balls, board: Board) -> Nearby:
+    """Constants for the distance around points of an edge, (M,) each."""
+    slope_x, slope_y = board.slopes(x, y)
+    slope_x, slope_y = slope_x / balls.q, slope_y / balls.q
+    along_x, along_y = beam.toward_x + slope_x * beam.toward_z, beam.toward_y + slope_y * beam.toward_z
+    square = beam.lever**2
+    xx = square * (1.0 + slope_x**2 - along_x**2)
+    yy = square * (1.0 + slope_y**2 - along_y**2)
+    xy = square * (slope_x * slope_y - along_x * along_y)
+    slope = beam.slope
+    normal_x, normal_y = beam.gradient_x / slope, beam.gradient_y / slope
+    across = xx * normal_x**2 + 2.0 * xy * normal_x * normal_y + yy * normal_y**2
+    bend = (across - slope**2) / beam.distance
+    double = 2.0 * beam.distance
+    return Nearby(
+        beam.distance, double * beam.gradient_x, double * beam.gradient_y, xx, 2.0 * xy, yy, 1.0 / slope, 0.5 * bend / slope
+    )
 
 
 class Edge(NamedTuple):
