@@ -35,7 +35,9 @@ COARSE = (0.24, 0.08)
 """Distances, in radii, that edges are first looked for in."""
 COARSE_EXTRA_PX = 1.5
 COARSE_STEPS = 6.0
-FINE_PASSES = 2
+FINE_PASSES = 4
+"""Most passes with sharp edges; two where the first leaves little to do."""
+SMALL_CHANGE_PX = 0.5
 FIRST_SPREAD_PX = 0.5
 REACH_SIGMAS = 3.2
 REACH_PX = 1.2
@@ -179,7 +181,9 @@ def fit_shadows(
         return None
     passes = len(COARSE) + FINE_PASSES
     result: Fit | None = None
-    for turn in range(passes):
+    turn, last, change = 0, False, np.inf
+    while not last:
+        last = turn == passes - 1 or (turn > len(COARSE) and change < SMALL_CHANGE_PX)
         radius = float(np.median(table[:, 3]))
         settings = _settings(turn, radius, spread)
         shadows = ShadowMap(
@@ -192,7 +196,7 @@ def fit_shadows(
             shadow_margin_px=settings.reach_px + 1.0,
             threads=threads,
         )
-        if turn == passes - 1:
+        if last:
             priors = _with_outlines(problem, priors, shadows, table, spread)
         edges = measure_edges(
             problem.radiance, shadows, table[index], vectors, problem.near, board, gains[index], settings, threads
@@ -203,12 +207,14 @@ def fit_shadows(
             return Fit(problem, index, usability, None, edges, spread)
         used = edges.take(usability.usable)
         start = (table[chosen], vectors, board)
-        solution, priors = _solve(used, start, problem.near, priors, chosen, turn, turn == passes - 1, refine_lights)
+        solution, priors = _solve(used, start, problem.near, priors, chosen, turn, last, refine_lights)
+        change = float(np.percentile(np.abs(solution.balls - table[chosen]).max(axis=1), 90.0))
         table[chosen], vectors, board = solution.balls, solution.vectors, solution.board
-        gains[index] *= edges.lit_levels()
+        gains[index] = edges.lit_levels(gains[index])
         if turn >= len(COARSE):
             spread = fit_spread(used)
-        progress(0.1 + 0.8 * (turn + 1) / passes)
+        turn += 1
+        progress(0.1 + 0.8 * (1.0 if last else turn / passes))
         result = Fit(problem, index, usability, solution, edges, spread)
     return result
 

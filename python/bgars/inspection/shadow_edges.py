@@ -107,12 +107,12 @@ class Edges:
         """Some of the balls."""
         return Edges(*(getattr(self, part.name)[balls] for part in fields(self)))
 
-    def lit_levels(self) -> Array:
-        """(N, L) median lit level over the board's texture, 1 where unknown: what the gains were wrong by."""
+    def lit_levels(self, otherwise: Array) -> Array:
+        """(N, L) median lit level over the board's texture, `otherwise` where unknown: the gains as they really are."""
         known = np.isfinite(self.high)
-        high = np.where(known.any(axis=2)[:, :, None], self.high, 1.0)
-        levels = np.nanmedian(high, axis=2)
-        return np.where(levels > 0, levels, 1.0)
+        some = known.any(axis=2)
+        levels: Array = np.where(some, np.nanmedian(np.where(some[:, :, None], self.high, 1.0), axis=2), otherwise)
+        return np.where(levels > 0, levels, otherwise)
 
 
 def measure_edges(
