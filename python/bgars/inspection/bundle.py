@@ -131,7 +131,6 @@ def solve_bundle(
     table, vectors, coefficients = start.copy(), vectors.copy(), board.coefficients.copy()
     count, lights, _ = edges.x.shape
     excess = 0.0
-    border = 2 * lights + SHAPE_TERMS
     iterations = 0
     for iterations in range(1, rounds + 1):
         board = Board(coefficients)
@@ -146,9 +145,9 @@ def solve_bundle(
         weight = np.where(known, 1.0 / (variance * loss), 0.0)
         normal, cross, corner, right, right_border = _normal(blocks, residual, weight, table, vectors, coefficients, priors)
         inverse = np.linalg.inv(normal)
-        reduced = corner - np.einsum("nbi,nij,njc->bc", cross.transpose(0, 2, 1), inverse, cross)
-        rest = right_border - np.einsum("nib,nij,nj->b", cross, inverse, right)
-        step_border = np.linalg.solve(reduced, rest)
+        lever = inverse @ cross
+        reduced = corner - np.tensordot(cross, lever, axes=((0, 1), (0, 1)))
+        step_border = np.linalg.solve(reduced, right_border - np.tensordot(lever, right, axes=((0, 1), (0, 1))))
         step = np.einsum("nij,nj->ni", inverse, right - cross @ step_border)
         limit = 0.3 * table[:, 3]
         step[:, :4] = np.clip(step[:, :4], -limit[:, None], limit[:, None])
@@ -159,14 +158,19 @@ def solve_bundle(
         coefficients = coefficients + step_border[2 * lights :]
         if np.abs(step[:, :4]).max(initial=0.0) < STEP_TOLERANCE_PX and np.abs(step[:, 4]).max(initial=0.0) < Q_TOLERANCE:
             break
-    border_covariance = np.linalg.inv(reduced)
-    lever = np.einsum("nij,njb->nib", inverse, cross)
-    covariance = inverse + np.einsum("nib,bc,njc->nij", lever, border_covariance, lever)
+    board = Board(coefficients)
+    residual, blocks = _linearise(edges, table, vectors, near, board)
+    honest = _honest_weights(residual, variance, known, redescend)
+    normal, cross, corner, _, _ = _normal(blocks, residual, honest, table, vectors, coefficients, priors)
+    inverse = np.linalg.inv(normal)
+    lever = inverse @ cross
+    border_covariance = np.linalg.inv(corner - np.tensordot(cross, lever, axes=((0, 1), (0, 1))))
+    covariance = inverse + lever @ border_covariance @ lever.transpose(0, 2, 1)
     u_light = np.sqrt(np.diag(border_covariance)[: 2 * lights].reshape(lights, 2).sum(axis=1))
     return Solution(
         table,
         vectors,
-        Board(coefficients),
+        board,
         covariance,
         u_light,
         np.where(known, residual, np.nan),
@@ -174,6 +178,26 @@ def solve_bundle(
         excess,
         iterations,
     )
+
+
+def _honest_weights(residual: Array, variance: Array, known: NDArray[np.bool_], redescend: float | None) -> Array:
+    """Weights that give the covariance of the robust estimate: E[psi^2] / E[psi']^2 of Huber (1981), equation 6.5.
+
+    Points that were rejected count as little as they did in the fit.
+    """
+    square = np.where(known, residual**2 / variance, 0.0)
+    if redescend is None:
+        loss = 1.0 + square / CAUCHY**2
+        weight, change = 1.0 / loss, (1.0 - square / CAUCHY**2) / loss**2
+    else:
+        loss = 1.0 + square / redescend**2
+        weight, change = loss**-2.0, (1.0 - 3.0 * square / redescend**2) / loss**3
+    if not known.any():
+        return np.zeros(residual.shape)
+    mean_weight = float(weight[known].mean())
+    efficiency = max(float(change[known].mean()), 0.1) ** 2 / max(float((weight**2 * square)[known].mean()), 1e-9)
+    honest: Array = np.where(known, weight / (mean_weight * variance), 0.0) * min(efficiency, 1.0)
+    return honest
 
 
 def _excess(residual: Array, u_px: Array) -> float:

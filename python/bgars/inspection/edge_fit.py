@@ -14,6 +14,10 @@ Index = NDArray[np.intp]
 
 ROUNDS = 2
 CAUCHY = 2.5
+CAUCHY_FACTOR = 1.10
+"""What weights at 2.5 standard deviations make the formula of least squares too small by, for Gaussian noise: the square
+root of (E[psi^2] / E[psi']^2) over (E[w r^2] / E[w]^2) (Huber 1981, equation 6.5).
+"""
 MIN_PIXELS = 12.0
 RIDGE = 1e-9
 
@@ -92,5 +96,5 @@ def fit_stretches(
             weight = usable / (1.0 + (residual / (CAUCHY * spread)) ** 2)
     enough = group_sum(weight.sum(axis=0), stretch, size) >= MIN_PIXELS
     variance = np.maximum(np.einsum("sii->si", inverse), 0.0)
-    deviation: Array = np.sqrt(variance) * np.repeat(noise, together)[:, None]
+    deviation: Array = np.sqrt(variance) * np.repeat(noise, together)[:, None] * (CAUCHY_FACTOR if robust else 1.0)
     return StretchFit(solution, deviation, weight, noise, enough & present)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from bgars.ball_records import BallMeasurement, MeasuredBall
 from bgars.inspection.bundle import angles_rad
+from bgars.inspection.spread import SHARP_PX
 
 if TYPE_CHECKING:
     from bgars.ball_records import FoundBall, FoundBalls
@@ -32,6 +33,11 @@ FLAT_SHARE = 0.01
 """A flat top is taken off the height where it is significant and more than this share of the radius."""
 POOR_SHARE = 0.02
 MANY_OUTLIERS = 0.4
+MODEL_CENTRE_PX, MODEL_RADIUS_PX = 0.0022, 0.0035
+MODEL_HEIGHT_PER_RADIUS = -1.2
+"""Scatter of simulated balls beyond the fit's own uncertainty (docs/make_inspection_accuracy.py prints both), for sharp
+edges; it grows with the root of their spread. Height and radius err against each other: the tip of the shadow stays.
+"""
 CLIPPED_SHARE = 0.5
 LIGHT_WARNING_DEG = 5.0
 
@@ -94,6 +100,15 @@ def measurement(found: FoundBalls, problem: Problem, fit: Fit | None, flats: Fla
     )
 
 
+def _model_error(sharp_px: float) -> Array:
+    """(5, 5) covariance of what no residual shows: texture and shadow blurred together, pixels that straddle an edge."""
+    size = np.sqrt(sharp_px / SHARP_PX)
+    centre, radius = size * MODEL_CENTRE_PX, size * MODEL_RADIUS_PX
+    together = radius * np.array([0.0, 0.0, MODEL_HEIGHT_PER_RADIUS, 1.0, 0.0])
+    covariance: Array = np.diag([centre**2, centre**2, 0.0, 0.0, 0.0]) + np.outer(together, together)
+    return covariance
+
+
 def _measured(
     ball: FoundBall, fit: Fit, place: int, lights: int, flats: FlatTops | None, pitch: float
 ) -> MeasuredBall:
@@ -101,7 +116,7 @@ def _measured(
     solution = fit.solution
     assert solution is not None  # noqa: S101 - the caller looked
     x, y, z, radius, q = solution.balls[place]
-    covariance = solution.covariance[place]
+    covariance = solution.covariance[place] + _model_error(fit.spread.sharp_px)
     u = np.sqrt(np.diag(covariance))
     by_top = np.array([0.0, 0.0, 1.0, q, radius])
     u_top = float(np.sqrt(by_top @ covariance @ by_top))

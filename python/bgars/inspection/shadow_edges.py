@@ -53,6 +53,7 @@ LINES_AT_ONCE = 6000
 MIN_LIGHTS_LIT = 2
 LOWEST_TANGENT = 0.08
 """Tangent points lower than this share of the radius are left out: there the ball meets the board."""
+MAX_GROWTH = 0.3
 INV_SQRT_2PI = 0.3989422804014327
 
 
@@ -190,7 +191,7 @@ def _measure(
     point = (edge.x[pick], edge.y[pick])
     pixels = _pixels(radiance, shadows, balls, board, gains, settings, here, point, ball, light, spread)
     sector = ball * len(vectors) * SECTORS + light * SECTORS + place * SECTORS // len(angles)
-    return _solve(radiance, pixels, sector, angles[place], way, spread, shape, wide_balls, wide_lights, board, settings.coarse_px)
+    return _solve(radiance, pixels, sector, angles[place], way, spread, shape, wide_balls, wide_lights, board, settings)
 
 
 class _Pixels(NamedTuple):
@@ -258,10 +259,11 @@ def _solve(
     balls: Balls,
     lights: Lights,
     board: Board,
-    coarse_px: float | None,
+    settings: EdgeSettings,
 ) -> list[Array]:
     """Least squares of every stretch; then its point."""
     size = shape[0] * shape[1] * shape[2]
+    coarse_px, sharp_px = settings.coarse_px, settings.spread_px
     if coarse_px is None:
         lit = ndtr(pixels.distance)
         bell = INV_SQRT_2PI * np.exp(-0.5 * pixels.distance**2) / spread[None, :] * pixels.texture
@@ -293,7 +295,9 @@ def _solve(
     # A blurred convex shadow looks smaller than it is, by half of the squared spread times the curvature of its edge.
     tangent_along = (beam.toward_y * beam.gradient_x - beam.toward_x * beam.gradient_y) / beam.slope
     curvature = (1.0 - tangent_along**2) / (beam.distance * beam.slope)
-    shift = 0.5 * mean_spread**2 * curvature - np.where(measured, fit.solution[:, 2].reshape(shape) / safe, 0.0)
+    # And texture that grows outward by g a pixel, blurred with the shadow, moves its edge inward by g s^2.
+    blurred = 0.0 if coarse_px is not None else sharp_px**2 * _texture_growth(pixels, spread, sector, size).reshape(shape)
+    shift = blurred + 0.5 * mean_spread**2 * curvature - np.where(measured, fit.solution[:, 2].reshape(shape) / safe, 0.0)
     bad = ~measured
     return [
         np.where(bad, 0.0, edge.x + shift * beam.gradient_x / beam.slope),
@@ -308,3 +312,18 @@ def _solve(
         np.where(bad, np.nan, contrast * texture / radiance.scale),
         fit.noise.reshape(shape[:2]) / radiance.scale,
     ]
+
+
+def _texture_growth(pixels: _Pixels, spread: Array, sector: Index, size: int) -> Array:
+    """Relative growth of the board's texture per pixel across the edge, outward, for each stretch."""
+    near = pixels.weight * np.exp(-0.5 * np.square(pixels.distance / 2.0))
+    across = pixels.distance * spread[None, :]
+    total, first, level, second, mixed = (
+        group_sum(part.sum(axis=0), sector, size)
+        for part in (near, near * across, near * pixels.texture, near * across**2, near * across * pixels.texture)
+    )
+    total = np.maximum(total, 1e-9)
+    variance = second - first**2 / total
+    growth = (mixed - first * level / total) / np.maximum(variance, 1e-9)
+    relative: Array = np.where((variance > 0) & (level > 0), growth * total / np.maximum(level, 1e-9), 0.0)
+    return np.clip(relative, -MAX_GROWTH, MAX_GROWTH)

@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from bgars.inspection.shadow_edges import Edges
 
-__all__ = ["EdgeSpread", "fit_spread"]
+__all__ = ["SHARP_PX", "EdgeSpread", "fit_spread"]
 
 SHARPEST_PX = 0.2
 SHARP_PX = 0.3
