@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
+from bgars.balls import find_balls
+from bgars.inspection import measure_balls
 from bgars.inspection.exposure import check_capture
 from bgars.inspection.judge import judge_part
 from bgars.io.part_recipe import read_part_recipe
@@ -104,8 +105,7 @@ def _unused(recipe: PartRecipe | None, method: Method) -> tuple[str, ...]:
 
 def _found(capture: Capture, recipe: PartRecipe | None, threads: int | None) -> FoundBalls:
     layout = None if recipe is None else recipe.image_layout
-    found: FoundBalls = _stage("bgars.balls.find", "find_balls")(capture, layout=layout, threads=threads)
-    return found
+    return find_balls(capture, layout=layout, threads=threads)
 
 
 def _measured(
@@ -115,10 +115,4 @@ def _measured(
     threads: int | None,
     progress: Callable[[float], object],
 ) -> BallMeasurement:
-    measure_balls = _stage("bgars.inspection.measure", "measure_balls")
-    measurement: BallMeasurement = measure_balls(capture, found, field=field, threads=threads, progress=progress)
-    return measurement
-
-
-def _stage(module: str, name: str) -> Any:  # noqa: ANN401 - a function of a stage
-    return getattr(import_module(module), name)
+    return measure_balls(capture, found, field=field, threads=threads, progress=progress)

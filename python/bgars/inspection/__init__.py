@@ -1,1 +1,5 @@
-"""Inspection of a part's balls: measurement, reference planes, positions, limits, verdict."""
+"""Solder balls measured from the shadows that they cast."""
+
+from bgars.inspection.measure import measure_balls
+
+__all__ = ["measure_balls"]
