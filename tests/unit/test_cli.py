@@ -111,6 +111,8 @@ def test_every_command_has_help(command: str) -> None:
         (["reconstruct", "nowhere", "-o", "out", "--method", "magic"], "magic"),
         (["mesh", "nowhere.tif", "-o", "out.ply"], "nowhere.tif"),
         (["evaluate", "nowhere"], "nowhere"),
+        (["inspect", "nowhere", "-o", "out"], "nowhere: no such folder"),
+        (["inspect", "nowhere", "-o", "out", "--recipe", "none.toml"], "none.toml: cannot be read"),
         (["nonsense"], "nonsense"),
     ],
 )
