@@ -22,20 +22,25 @@ from bgars.errors import (
     UnsupportedImageError,
 )
 from bgars.evaluate import Evaluation, angular_error_deg, evaluate
+from bgars.inspection_pipeline import inspect
 from bgars.integrate import integrate_normals
 from bgars.io.capture import read_capture
 from bgars.io.height import read_height, write_height
 from bgars.io.mesh_files import write_mesh
 from bgars.io.normal_map import read_normal_map, write_normal_map
+from bgars.io.part_recipe import read_part_recipe
 from bgars.io.truth import read_truth
 from bgars.mesh import mesh_from_height
 from bgars.normals import estimate_normals
+from bgars.part_recipe import Limits, PartRecipe
+from bgars.part_result import BallResult, PartResult
 from bgars.pipeline import Reconstruction, reconstruct
 from bgars.recipes import named_recipes, read_scene, write_simulation
 from bgars.records import Capture, Component, HeightMap, NormalField, Truth
 from bgars.report.overview import write_overview
+from bgars.report.part import write_part_pictures
 from bgars.rig import LightRig
-from bgars.samples import sample_capture
+from bgars.samples import sample_capture, sample_part_recipe
 from bgars.simulate import (
     Ball,
     BallTruth,
@@ -58,6 +63,7 @@ __version__ = version("bgars")
 
 __all__ = [
     "Ball",
+    "BallResult",
     "BallLayout",
     "BallTruth",
     "BgarsError",
@@ -77,9 +83,12 @@ __all__ = [
     "InputError",
     "Jitter",
     "LightRig",
+    "Limits",
     "Lobe",
     "Material",
     "NormalField",
+    "PartRecipe",
+    "PartResult",
     "Reconstruction",
     "Scene",
     "SimulatedTruth",
@@ -92,6 +101,7 @@ __all__ = [
     "angular_error_deg",
     "estimate_normals",
     "evaluate",
+    "inspect",
     "find_balls",
     "integrate_normals",
     "mesh_from_height",
@@ -99,14 +109,17 @@ __all__ = [
     "read_capture",
     "read_height",
     "read_normal_map",
+    "read_part_recipe",
     "read_scene",
     "read_truth",
     "reconstruct",
     "sample_capture",
+    "sample_part_recipe",
     "simulate",
     "write_height",
     "write_mesh",
     "write_normal_map",
     "write_overview",
+    "write_part_pictures",
     "write_simulation",
 ]

@@ -251,6 +251,8 @@ class BallMeasurement:
         How far each light was moved from the rig's.
     shadow_residual_rms : float
         RMS residual of the shadow fit over the contrast of lit and shadowed board.
+    board_covariance : (6, 6) float64 or None
+        Covariance of `board_coefficients_um`, in their units; None when unknown.
     """
 
     balls: tuple[MeasuredBall, ...]
@@ -259,3 +261,4 @@ class BallMeasurement:
     light_change_deg: NDArray[np.float64]
     shadow_residual_rms: float
     warnings: tuple[str, ...] = field(default=())
+    board_covariance: NDArray[np.float64] | None = None

@@ -94,7 +94,7 @@ def test_evaluate_on_the_sample() -> None:
 
 
 @pytest.mark.parametrize(
-    "command", ["", "demo", "reconstruct", "normals", "mesh", "info", "evaluate", "simulate", "experiment"]
+    "command", ["", "demo", "reconstruct", "normals", "mesh", "info", "evaluate", "inspect", "simulate", "experiment"]
 )
 def test_every_command_has_help(command: str) -> None:
     run = bgars_command(*command.split(), "--help")
@@ -111,6 +111,8 @@ def test_every_command_has_help(command: str) -> None:
         (["reconstruct", "nowhere", "-o", "out", "--method", "magic"], "magic"),
         (["mesh", "nowhere.tif", "-o", "out.ply"], "nowhere.tif"),
         (["evaluate", "nowhere"], "nowhere"),
+        (["inspect", "nowhere", "-o", "out"], "nowhere: no such folder"),
+        (["inspect", "nowhere", "-o", "out", "--recipe", "none.toml"], "none.toml: cannot be read"),
         (["nonsense"], "nonsense"),
     ],
 )

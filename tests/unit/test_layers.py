@@ -9,13 +9,22 @@ import bgars
 import pytest
 
 PACKAGE = Path(bgars.__file__).parent
-RECORDS = {"ball_records": 1, "material_records": 1, "records": 3, "kernel_capture": 3.5}
+RECORDS = {
+    "ball_names": 1,
+    "ball_records": 1,
+    "material_records": 1,
+    "part_recipe": 2,
+    "records": 3,
+    "part_result": 3,
+    "kernel_capture": 3.5,
+}
 BASE = {"errors": 0, "light_files": 1, "rig": 2, **RECORDS}
 STAGES = dict.fromkeys(
     ("io", "calibrate", "least_squares", "reflectance", "integrate", "mesh", "balls", "inspection"), 4
 )
-LATER = {"normals": 4.5, "pipeline": 5, "evaluate": 5, "recipes": 5, "batch": 6, "report": 6, "experiments": 6}
-LEVEL = {**BASE, **STAGES, **LATER, "samples": 0, "cli": 7, "simulate": 4}
+JOINED = {"normals": 4.5, "pipeline": 5, "evaluate": 5, "inspection_pipeline": 5, "recipes": 5}
+LATER = {**JOINED, "batch": 6, "report": 6, "experiments": 6, "samples": 0, "cli": 7}
+LEVEL = {**BASE, **STAGES, **LATER, "simulate": 4}
 
 
 def stage(module: str) -> str:

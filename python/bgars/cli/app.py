@@ -15,6 +15,7 @@ import bgars
 from bgars.cli.console import EXIT_BAD_INPUT, fail, print_json, say, stage_progress
 from bgars.cli.describe import describe, describe_in_words
 from bgars.cli.experiment import register as register_experiment
+from bgars.cli.inspect import register as register_inspect
 from bgars.cli.outputs import write_normals, write_reconstruction
 from bgars.cli.simulate import register as register_simulate
 from bgars.errors import BgarsError
@@ -266,6 +267,7 @@ def evaluate(
         )
 
 
+register_inspect(app)
 register_simulate(app)
 register_experiment(app)
 

@@ -1,10 +1,10 @@
-"""A capture that ships with the package: one shiny solder ball, eight lights, rendered, with its true normals."""
+"""Samples that ship with the package: a capture of one solder ball with its true normals, and a part recipe."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["sample_capture"]
+__all__ = ["sample_capture", "sample_part_recipe"]
 
 
 def sample_capture() -> Path:
@@ -19,3 +19,14 @@ def sample_capture() -> Path:
     True
     """
     return Path(__file__).parent / "one_ball"
+
+
+def sample_part_recipe() -> Path:
+    """Return the part recipe of the simulated part ``defects-5x5``: layout, nominal sizes, every kind of limit.
+
+    Examples
+    --------
+    >>> sample_part_recipe().name
+    'defects-5x5.part.toml'
+    """
+    return Path(__file__).parent / "defects-5x5.part.toml"

@@ -1,0 +1,121 @@
+"""The command ``bgars inspect``."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+import bgars
+from bgars.cli.console import print_json, say, stage_progress
+from bgars.io.atomic import atomic_folder
+from bgars.normals import DEFAULT_METHOD, Method
+
+if TYPE_CHECKING:
+    from bgars.part_result import PartResult
+
+__all__ = ["EXIT_NOT_PASSED", "register"]
+
+EXIT_NOT_PASSED = 1
+MAX_ROWS = 30
+FILES = {
+    "result.json": "everything: readings, uncertainties, limits, verdicts, reasons, checksums of the input",
+    "balls.csv": "one line a ball, for a spreadsheet",
+}
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("inspect")(inspect)
+
+
+def inspect(
+    folder: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FOLDER", help="Capture folder, as for bgars reconstruct, with a pixel pitch.", show_default=False
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "--output", "-o", metavar="OUT", help="Folder for the results; made if missing.", show_default=False
+        ),
+    ],
+    recipe: Annotated[
+        Path | None,
+        typer.Option(
+            "--recipe",
+            "-r",
+            metavar="PART.toml",
+            help="Layout and limits of the part (docs/inspection.md).",
+            show_default=False,
+        ),
+    ] = None,
+    method: Annotated[Method, typer.Option("--method", "-m", help="Estimator of the normals.")] = DEFAULT_METHOD,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
+    ] = False,
+) -> None:
+    """Find, measure and judge the solder balls of a part.
+
+    Writes result.json, balls.csv and four pictures; part.png is the one to look at first.
+
+    Exit code 0: the part passes. 1: it fails, or is undecided because something is too near its limit, was not
+    measured, or has no limit; the output says which. 2: wrong use, a bad recipe, or a capture that cannot be measured.
+    """
+    part = None if recipe is None else bgars.read_part_recipe(recipe)
+    capture = bgars.read_capture(folder)
+    with stage_progress() as report, atomic_folder(output) as place:
+        result = bgars.inspect(capture, part, method=method, progress=report)
+        files = FILES | bgars.write_part_pictures(result, capture, place)
+        (place / "result.json").write_text(result.to_json(), encoding="utf-8")
+        (place / "balls.csv").write_text(result.to_csv(), encoding="utf-8")
+    if as_json:
+        print_json({**result.to_dict(), "output": list(files)})
+    else:
+        _tell(result, output, files)
+    if result.verdict != "pass":
+        raise typer.Exit(EXIT_NOT_PASSED)
+
+
+def _tell(result: PartResult, output: Path, files: dict[str, str]) -> None:
+    say(f"{result.name}: {result.verdict.upper()}")
+    for reason in result.reasons:
+        say(f"  {reason}")
+    say(_summary(result))
+    for warning in result.warnings:
+        say(f"warning: {warning}")
+    say()
+    lines = result.to_table().splitlines()
+    rows = list(zip(lines[1:], result.balls, strict=True))
+    if len(rows) > MAX_ROWS:
+        rows = [(line, ball) for line, ball in rows if ball.verdict != "pass"]
+    if rows:
+        say(lines[0])
+    for line, _ in rows[:MAX_ROWS]:
+        say(line)
+    if len(rows) > MAX_ROWS:
+        say(f"... and {len(rows) - MAX_ROWS} more in balls.csv")
+    say()
+    width = max(len(str(output / name)) for name in files)
+    for name, meaning in files.items():
+        say(f"  {output / name!s:<{width}}  {meaning}")
+
+
+def _summary(result: PartResult) -> str:
+    readings = (
+        ("seating coplanarity", result.seating_coplanarity_um, result.u_seating_coplanarity_um),
+        ("regression coplanarity", result.regression_coplanarity_um, result.u_regression_coplanarity_um),
+        ("warpage", result.warpage_um, result.u_warpage_um),
+        ("pitch", result.pitch_um, result.u_pitch_um),
+    )
+    told = []
+    for name, value, u in readings:
+        if not math.isfinite(value):
+            told.append(f"{name} not measured")
+        else:
+            told.append(f"{name} {value:.2f} um" + (f" (U = {2 * u:.2g} um)" if math.isfinite(u) else ""))
+    return "; ".join(told)

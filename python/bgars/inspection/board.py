@@ -1,0 +1,115 @@
+"""The board's shape: a quadratic surface, its heights and slopes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from bgars.records import NormalField
+
+__all__ = ["SHAPE_TERMS", "Board", "board_from_normals", "height_terms", "outside_balls", "slope_terms"]
+
+Array = NDArray[np.float64]
+
+SHAPE_TERMS = 5
+"""Coefficients c1 to c5 of z = c1 x + c2 y + c3 x^2 + c4 x y + c5 y^2; height 0 at the image centre by definition."""
+TRIM = 3.0
+MIN_BOARD_PIXELS = 100
+MAX_SAMPLES = 60_000
+ROUNDS = 4
+OUTSIDE = 1.1
+"""Pixels this many radii from a ball's centre are board."""
+
+
+class Board:
+    """A quadratic board ``z = c1 x + c2 y + c3 x^2 + c4 x y + c5 y^2``, all in pixels.
+
+    Parameters
+    ----------
+    coefficients : (5,) float64
+        c1 to c5.
+    """
+
+    def __init__(self, coefficients: Array | None = None) -> None:
+        self.coefficients: Array = np.zeros(SHAPE_TERMS) if coefficients is None else np.asarray(coefficients, float)
+        self.is_flat = not self.coefficients.any()
+
+    def height(self, x: Array, y: Array) -> Array:
+        """Height at (x, y), any shape."""
+        c1, c2, c3, c4, c5 = self.coefficients
+        height: Array = x * (c1 + c3 * x + c4 * y) + y * (c2 + c5 * y)
+        return height
+
+    def slopes(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Slopes dz/dx and dz/dy at (x, y)."""
+        c1, c2, c3, c4, c5 = self.coefficients
+        return c1 + 2.0 * c3 * x + c4 * y, c2 + c4 * x + 2.0 * c5 * y
+
+
+def height_terms(x: Array, y: Array) -> Array:
+    """(..., 5) derivatives of the height by c1 to c5."""
+    return np.stack([x, y, x * x, x * y, y * y], axis=-1)
+
+
+def slope_terms(x: Array, y: Array) -> tuple[Array, Array]:
+    """(..., 5) derivatives of both slopes by c1 to c5."""
+    one, zero = np.ones_like(x), np.zeros_like(x)
+    return (
+        np.stack([one, zero, 2.0 * x, y, zero], axis=-1),
+        np.stack([zero, one, zero, x, 2.0 * y], axis=-1),
+    )
+
+
+def outside_balls(height: int, width: int, table: Array) -> NDArray[np.bool_]:
+    """(H, W) True where no ball is, with a margin; `table` (N, 5) as x, y, z, radius, q in pixels."""
+    x, y = np.arange(width) + 0.5 - width / 2.0, height / 2.0 - 0.5 - np.arange(height)
+    outside = np.ones((height, width), dtype=np.bool_)
+    for centre_x, centre_y, _, radius, _ in table:
+        reach = OUTSIDE * radius + 2.0
+        cols = slice(*np.searchsorted(x, [centre_x - reach, centre_x + reach]))
+        rows = slice(*np.searchsorted(-y, [-centre_y - reach, -centre_y + reach]))
+        outside[rows, cols] &= (x[cols] - centre_x)[None, :] ** 2 + (y[rows] - centre_y)[:, None] ** 2 > reach * reach
+    return outside
+
+
+def board_from_normals(field: NormalField, outside: NDArray[np.bool_]) -> tuple[Array, Array] | None:
+    """Fit the quadratic board to the normals of board pixels, trimmed.
+
+    Parameters
+    ----------
+    field : NormalField
+        Normals of the whole image.
+    outside : (H, W) bool
+        True where no ball is.
+
+    Returns
+    -------
+    (coefficients, uncertainty) : ((5,), (5,)) or None
+        In pixels; the uncertainty is that of the scatter of 25 blocks' worth of pixels, because normals of neighbouring
+        pixels err together. None where there are too few board pixels.
+    """
+    rows, cols = np.nonzero(field.mask & outside)
+    if rows.size < MIN_BOARD_PIXELS:
+        return None
+    step = max(1, rows.size // MAX_SAMPLES)
+    rows, cols = rows[::step], cols[::step]
+    height, width = field.mask.shape
+    x, y = cols + 0.5 - width / 2.0, height / 2.0 - rows - 0.5
+    normals = field.normals[rows, cols].astype(np.float64)
+    slopes = np.concatenate([-normals[:, 0] / normals[:, 2], -normals[:, 1] / normals[:, 2]])
+    system = np.concatenate(slope_terms(x, y))
+    keep = np.isfinite(slopes)
+    coefficients = np.zeros(SHAPE_TERMS)
+    spread = 0.0
+    for _ in range(ROUNDS):
+        coefficients = np.linalg.lstsq(system[keep], slopes[keep], rcond=None)[0]
+        residuals = np.abs(slopes - system @ coefficients)
+        spread = max(1.4826 * float(np.median(residuals[keep])), 1e-6)
+        keep = residuals < TRIM * spread
+    scatter = np.linalg.inv(system[keep].T @ system[keep]) * spread**2
+    correlated = keep.sum() / 25.0
+    uncertainty: Array = np.sqrt(np.diag(scatter) * correlated)
+    return coefficients, uncertainty

@@ -1,0 +1,272 @@
+"""All balls, all lights and the board from measured points of shadow edges: robust Gauss-Newton with Schur complement.
+
+Unknowns: of each ball x, y, z, radius, q; of each light two small turns; five coefficients of the board. Balls meet only
+through lights and board, so the normal matrix is an arrow: blocks of 5 x 5, a border of 2 L + 5 (Triggs et al., "Bundle
+adjustment - a modern synthesis", 2000, section 6.1).
+
+Gaussian priors: the lights stand as the rig says, the board is nearly flat, balls are where their silhouettes are, q is 1.
+Heights, elevations and q trade against each other (with all q raised and all lights lowered the shadows stay the same),
+and a population of solder balls is round on the whole; which balls are not, the caller decides (`population`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bgars.inspection.board import SHAPE_TERMS, Board
+from bgars.inspection.shadow_model import (
+    BALL_TERMS,
+    Balls,
+    Lights,
+    ball_derivatives,
+    board_derivatives,
+    light_derivatives,
+    rays,
+)
+
+if TYPE_CHECKING:
+    from bgars.inspection.shadow_edges import Edges
+
+__all__ = ["Priors", "Solution", "angles_rad", "solve_bundle"]
+
+Array = NDArray[np.float64]
+
+MAX_ROUNDS = 30
+STEP_TOLERANCE_PX = 1e-4
+Q_TOLERANCE = 1e-5
+CAUCHY = 2.5
+MIN_Q, MAX_Q = 0.2, 2.0
+
+
+class Priors(NamedTuple):
+    """Where unknowns are expected: values and standard deviations.
+
+    `balls` (N, 5) values and `u_balls` (N, 5) deviations (inf = free);
+    `vectors` (L, 3) the rig's, `u_light_rad`; `board` (5,) and `u_board` (5,).
+    """
+
+    balls: Array
+    u_balls: Array
+    vectors: Array
+    u_light_rad: float
+    board: Array
+    u_board: Array
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Balls (N, 5), lights (L, 3), board and what is known of their uncertainty.
+
+    `covariance` (N, 5, 5) of each ball, lights and board included; `u_light_rad` (L,); `residual_px` (N, L, S) distance
+    of each point to its edge, NaN where none; `weight` (N, L, S); `iterations`; `light_turn_rad` (L, 2).
+    """
+
+    balls: Array
+    vectors: Array
+    board: Board
+    covariance: Array
+    u_light_rad: Array
+    residual_px: Array
+    weight: Array
+    excess_px: float
+    iterations: int
+
+
+def tangents(vectors: Array) -> Array:
+    """(L, 2, 3) changes per radian: first along the azimuth, then up."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    unit = vectors / length
+    side = np.column_stack([-unit[:, 1], unit[:, 0], np.zeros(len(unit))])
+    level = np.linalg.norm(side, axis=1, keepdims=True)
+    side = np.where(level > 1e-6, side / np.maximum(level, 1e-6), [1.0, 0.0, 0.0])  # noqa: PLR2004 - the zenith
+    return np.stack([side * length, np.cross(unit, side) * length], axis=1)
+
+
+def turned(vectors: Array, turns: Array) -> Array:
+    """Lights after small turns (L, 2); their length stays."""
+    moved = vectors + np.einsum("lk,lkc->lc", turns, tangents(vectors))
+    lengths: Array = np.linalg.norm(vectors, axis=1, keepdims=True) / np.linalg.norm(moved, axis=1, keepdims=True)
+    return moved * lengths
+
+
+def angles_rad(first: Array, second: Array) -> Array:
+    """(L,) angles between directions (or positions seen from the origin)."""
+    cross = np.linalg.norm(np.cross(first, second), axis=1)
+    angles: Array = np.arctan2(cross, (first * second).sum(axis=1))
+    return angles
+
+
+def solve_bundle(
+    edges: Edges,
+    start: Array,
+    vectors: Array,
+    near: bool,
+    board: Board,
+    priors: Priors,
+    *,
+    redescend: float | None,
+    rounds: int = MAX_ROUNDS,
+) -> Solution:
+    """Fit balls, lights and board to measured edge points.
+
+    Parameters
+    ----------
+    edges : Edges
+        Measured points.
+    start : (N, 5) float64
+    vectors : (L, 3) float64
+    near : bool
+    board : Board
+    priors : Priors
+    redescend : float or None
+        Points this many standard deviations off count a quarter, those far off nothing (Geman & McClure 1985): relief of
+        the board puts whole stretches of edge elsewhere. None for Cauchy weights, which find the way from farther off.
+    rounds : int
+        Most steps.
+    """
+    table, vectors, coefficients = start.copy(), vectors.copy(), board.coefficients.copy()
+    count, lights, _ = edges.x.shape
+    excess = 0.0
+    iterations = 0
+    for iterations in range(1, rounds + 1):
+        board = Board(coefficients)
+        residual, blocks = _linearise(edges, table, vectors, near, board)
+        known = np.isfinite(edges.u_px)
+        excess = _excess(residual[known], edges.u_px[known])
+        variance = np.where(known, edges.u_px**2 + excess**2, 1.0)
+        if redescend is None:
+            loss = 1.0 + residual**2 / (CAUCHY**2 * variance)
+        else:
+            loss = (1.0 + residual**2 / (redescend**2 * variance)) ** 2
+        weight = np.where(known, 1.0 / (variance * loss), 0.0)
+        normal, cross, corner, right, right_border = _normal(blocks, residual, weight, table, vectors, coefficients, priors)
+        inverse = np.linalg.inv(normal)
+        lever = inverse @ cross
+        reduced = corner - np.tensordot(cross, lever, axes=((0, 1), (0, 1)))
+        step_border = np.linalg.solve(reduced, right_border - np.tensordot(lever, right, axes=((0, 1), (0, 1))))
+        step = np.einsum("nij,nj->ni", inverse, right - cross @ step_border)
+        limit = 0.3 * table[:, 3]
+        step[:, :4] = np.clip(step[:, :4], -limit[:, None], limit[:, None])
+        step[:, 4] = np.clip(step[:, 4], -0.15, 0.15)
+        table = table + step
+        table[:, 4] = np.clip(table[:, 4], MIN_Q, MAX_Q)
+        vectors = turned(vectors, np.clip(step_border[: 2 * lights].reshape(lights, 2), -0.1, 0.1))
+        coefficients = coefficients + step_border[2 * lights :]
+        if np.abs(step[:, :4]).max(initial=0.0) < STEP_TOLERANCE_PX and np.abs(step[:, 4]).max(initial=0.0) < Q_TOLERANCE:
+            break
+    board = Board(coefficients)
+    residual, blocks = _linearise(edges, table, vectors, near, board)
+    honest = _honest_weights(residual, variance, known, redescend)
+    normal, cross, corner, _, _ = _normal(blocks, residual, honest, table, vectors, coefficients, priors)
+    inverse = np.linalg.inv(normal)
+    lever = inverse @ cross
+    border_covariance = np.linalg.inv(corner - np.tensordot(cross, lever, axes=((0, 1), (0, 1))))
+    covariance = inverse + lever @ border_covariance @ lever.transpose(0, 2, 1)
+    u_light = np.sqrt(np.diag(border_covariance)[: 2 * lights].reshape(lights, 2).sum(axis=1))
+    return Solution(
+        table,
+        vectors,
+        board,
+        covariance,
+        u_light,
+        np.where(known, residual, np.nan),
+        np.where(known, weight * variance, 0.0),
+        excess,
+        iterations,
+    )
+
+
+def _honest_weights(residual: Array, variance: Array, known: NDArray[np.bool_], redescend: float | None) -> Array:
+    """Weights that give the covariance of the robust estimate: E[psi^2] / E[psi']^2 of Huber (1981), equation 6.5.
+
+    Points that were rejected count as little as they did in the fit.
+    """
+    square = np.where(known, residual**2 / variance, 0.0)
+    if redescend is None:
+        loss = 1.0 + square / CAUCHY**2
+        weight, change = 1.0 / loss, (1.0 - square / CAUCHY**2) / loss**2
+    else:
+        loss = 1.0 + square / redescend**2
+        weight, change = loss**-2.0, (1.0 - 3.0 * square / redescend**2) / loss**3
+    if not known.any():
+        return np.zeros(residual.shape)
+    mean_weight = float(weight[known].mean())
+    efficiency = max(float(change[known].mean()), 0.1) ** 2 / max(float((weight**2 * square)[known].mean()), 1e-9)
+    honest: Array = np.where(known, weight / (mean_weight * variance), 0.0) * min(efficiency, 1.0)
+    return honest
+
+
+def _excess(residual: Array, u_px: Array) -> float:
+    """Scatter of the points beyond their own uncertainty, px: pixel grid, relief, light from neighbours."""
+    if residual.size == 0:
+        return 0.0
+    spread = 1.4826 * float(np.median(np.abs(residual)))
+    return float(np.sqrt(max(spread**2 - float(np.median(u_px)) ** 2, 0.0)))
+
+
+def _linearise(
+    edges: Edges, table: Array, vectors: Array, near: bool, board: Board
+) -> tuple[Array, tuple[Array, Array, Array]]:
+    """Distance of every point to its predicted edge, and derivatives by ball (..., 5), light (..., 2), board (..., 5)."""
+    balls = Balls.from_table(table).spread(2)
+    lamps = Lights.from_table(vectors, near).spread(1, 1)
+    beam = rays(edges.x, edges.y, balls, lamps, board)
+    slope = np.maximum(beam.slope, 1e-3)
+    ways = tangents(vectors)
+    by_light = light_derivatives(beam, balls, (ways[None, :, None, 0], ways[None, :, None, 1]))
+    by_ball = ball_derivatives(beam, balls, board)
+    by_board = board_derivatives(edges.x, edges.y, beam, balls)
+    inverse = (1.0 / slope)[..., None]
+    return (beam.distance - balls.radius) / slope, (by_ball * inverse, by_light * inverse, by_board * inverse)
+
+
+def _normal(
+    blocks: tuple[Array, Array, Array],
+    residual: Array,
+    weight: Array,
+    table: Array,
+    vectors: Array,
+    coefficients: Array,
+    priors: Priors,
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Blocks of the normal equations: (N, 5, 5), (N, 5, B), (B, B) and their right sides, priors in."""
+    by_ball, by_light, by_board = blocks
+    count, lights = residual.shape[:2]
+    border = 2 * lights + SHAPE_TERMS
+    weighted = by_ball * weight[..., None]
+    flat = (count, -1, BALL_TERMS)
+    normal = weighted.reshape(flat).transpose(0, 2, 1) @ by_ball.reshape(flat)
+    cross = np.zeros((count, BALL_TERMS, border))
+    cross[:, :, : 2 * lights] = np.einsum("nlsi,nlsk->nilk", weighted, by_light, optimize=True).reshape(count, 5, -1)
+    cross[:, :, 2 * lights :] = weighted.reshape(flat).transpose(0, 2, 1) @ by_board.reshape(count, -1, SHAPE_TERMS)
+    right = -np.einsum("nlsi,nls->ni", weighted, residual)
+    light_weighted = by_light * weight[..., None]
+    corner, right_border = np.zeros((border, border)), np.zeros(border)
+    own = np.einsum("nlsi,nlsk->lik", light_weighted, by_light, optimize=True)
+    mixed = np.einsum("nlsi,nlsk->lik", light_weighted, by_board, optimize=True)
+    for light in range(lights):
+        part = slice(2 * light, 2 * light + 2)
+        corner[part, part] = own[light]
+        corner[part, 2 * lights :] = mixed[light]
+        corner[2 * lights :, part] = mixed[light].T
+    corner[2 * lights :, 2 * lights :] = np.einsum("nlsi,nlsk->ik", by_board * weight[..., None], by_board, optimize=True)
+    right_border[: 2 * lights] = -np.einsum("nlsi,nls->li", light_weighted, residual).reshape(-1)
+    right_border[2 * lights :] = -np.einsum("nlsi,nls->i", by_board, weight * residual)
+
+    off = priors.balls - table
+    pull = 1.0 / priors.u_balls**2
+    normal[:, range(5), range(5)] += pull + 1e-9
+    right += pull * off
+    ways = tangents(vectors)
+    length = np.linalg.norm(vectors, axis=1)
+    away = np.einsum("lc,lkc->lk", priors.vectors - vectors, ways) / np.square(length)[:, None]
+    corner[range(border), range(border)] += np.concatenate(
+        [np.full(2 * lights, priors.u_light_rad**-2.0), priors.u_board**-2.0]
+    )
+    right_border[: 2 * lights] += away.reshape(-1) / priors.u_light_rad**2
+    right_border[2 * lights :] += (priors.board - coefficients) / priors.u_board**2
+    return normal, cross, corner, right, right_border

@@ -1,0 +1,94 @@
+r"""Flat tops, which no shadow shows: slopes that are missing around the top, against the population.
+
+On a ball the slope of the normal grows from its centre, n_r = r / R. On a flat top of radius a it is 0: the slopes that
+are missing add up to ``M = sum (r / R - n_r) = 2 pi a^3 / (3 R)`` over the disc, in pixels. What an estimator gets wrong
+on every ball alike is the population's median M and is subtracted. The cap that is gone is ``q (R - sqrt(R^2 - a^2))``
+high.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from bgars.records import NormalField
+
+__all__ = ["FlatTops", "flat_tops"]
+
+Array = NDArray[np.float64]
+
+REACH = 0.8
+"""Normals within this share of the radius are looked at: farther out they are worst."""
+MIN_KNOWN = 0.6
+MIN_POPULATION = 5
+LARGEST = 0.75
+"""A flat top wider than this share of the radius cannot be told from a ball that is not measured."""
+
+
+class FlatTops(NamedTuple):
+    """(N,) missing height in pixels and its standard uncertainty; NaN where too few normals are known."""
+
+    height_px: Array
+    u_height_px: Array
+
+
+def flat_tops(field: NormalField, table: Array) -> FlatTops:
+    """Measure what is missing from the tops of balls.
+
+    Parameters
+    ----------
+    field : NormalField
+    table : (N, 5) float64
+        x, y, z, radius, q in pixels.
+    """
+    missing = np.array([_missing_slope(field, row) for row in table])
+    known = np.isfinite(missing)
+    height, u_height = np.full(len(table), np.nan), np.full(len(table), np.nan)
+    if known.sum() < MIN_POPULATION:
+        return FlatTops(height, u_height)
+    usual = float(np.median(missing[known]))
+    spread = max(1.4826 * float(np.median(np.abs(missing[known] - usual))), 1e-6)
+    for index in np.flatnonzero(known):
+        radius, q = table[index, 3], table[index, 4]
+        height[index] = _cap(missing[index] - usual, radius, q)
+        # The cap grows steeply from 0: its uncertainty is that of one spread more.
+        u_height[index] = max(
+            _cap(missing[index] - usual + spread, radius, q) - height[index], _cap(spread, radius, q) * 0.5
+        )
+    return FlatTops(height, u_height)
+
+
+def _cap(missing: float, radius: float, q: float) -> float:
+    """Height of the cap of a sphere that would make so much slope missing (missing is in units of R^2)."""
+    share = min(np.cbrt(1.5 * max(missing, 0.0) / np.pi), LARGEST)
+    return float(q * radius * (1.0 - np.sqrt(1.0 - share * share)))
+
+
+def _missing_slope(field: NormalField, row: Array) -> float:
+    """Sum of (expected - found radial slope) over the disc, over R^2; NaN where too little is known."""
+    height, width = field.mask.shape
+    centre_x, centre_y, _, radius, q = row
+    reach = REACH * radius
+    col, line = centre_x + width / 2.0 - 0.5, height / 2.0 - 0.5 - centre_y
+    cols = np.arange(max(int(np.ceil(col - reach)), 0), min(int(np.floor(col + reach)) + 1, width))
+    rows = np.arange(max(int(np.ceil(line - reach)), 0), min(int(np.floor(line + reach)) + 1, height))
+    if cols.size < 3 or rows.size < 3:  # noqa: PLR2004 - no disc to speak of
+        return float("nan")
+    x, y = (cols - col)[None, :], (line - rows)[:, None]
+    r = np.hypot(x, y)
+    patch = (slice(rows[0], rows[-1] + 1), slice(cols[0], cols[-1] + 1))
+    normals = field.normals[patch].astype(np.float64)
+    inside = r < reach
+    known = inside & field.mask[patch] & np.isfinite(normals).all(axis=2)
+    if known.sum() < MIN_KNOWN * inside.sum():
+        return float("nan")
+    # Spheroid: the slope of the normal's profile is r / (q sqrt(R^2 - r^2)).
+    steep = np.where(inside, r / np.sqrt(np.maximum(radius**2 - r**2, 1e-9)) / q, 0.0)
+    expected = steep / np.sqrt(1.0 + steep**2)
+    with np.errstate(invalid="ignore"):
+        found = (normals[..., 0] * x + normals[..., 1] * y) / np.maximum(r, 1e-9)
+    gap = np.where(known, expected - np.where(known, found, 0.0), 0.0)
+    return float(np.clip(gap[known], -1.0, 1.0).mean() * inside.sum() / radius**2)

@@ -1,0 +1,311 @@
+"""From measured balls to a verdict on the part."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bgars.inspection.coplanarity import Coplanarity, measure_coplanarity
+from bgars.inspection.decision import COVERAGE_FACTOR, worst
+from bgars.inspection.judge_ball import Position, judge_ball, true_position
+from bgars.inspection.judge_part import part_checks, part_reasons
+from bgars.inspection.odd_sizes import odd_sizes
+from bgars.inspection.places import Slot, match_balls
+from bgars.inspection.position import GridFit, fit_grid
+from bgars.inspection.warpage import board_height_um, board_terms, warpage
+from bgars.part_result import BallResult, PartResult, SeatingResult
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bgars.ball_records import BallMeasurement, FoundBalls
+    from bgars.part_recipe import PartRecipe
+
+    Array = NDArray[np.float64]
+
+__all__ = ["judge_part"]
+
+OWN_PITCH = "no recipe: true positions are against a grid of the part's own pitch"
+MIN_ROCKING = 2
+MAX_LIGHT_CHANGE_DEG = 5.0
+"""Beyond this nothing that rests on the lights may pass."""
+
+
+def judge_part(
+    found: FoundBalls,
+    measurement: BallMeasurement,
+    recipe: PartRecipe | None = None,
+    *,
+    name: str = "part",
+    pixel_pitch_um: float = math.nan,
+    files: tuple[tuple[str, str], ...] = (),
+    version: str = "",
+    warnings: tuple[str, ...] = (),
+) -> PartResult:
+    """Judge a measured part.
+
+    Parameters
+    ----------
+    found : FoundBalls
+        The balls in the image, missing places, bridges.
+    measurement : BallMeasurement
+        What was measured of them.
+    recipe : PartRecipe, optional
+        Layout and limits. Without one, missing, extra and bridged balls still fail, and everything else is undecided.
+    name : str
+        Of the part, where there is no recipe.
+    pixel_pitch_um, files, version
+        Copied into the result.
+    warnings : tuple of str
+        Put before those of the measurement.
+
+    Returns
+    -------
+    PartResult
+
+    Raises
+    ------
+    InputError
+        Records that do not belong together.
+    """
+    slots = match_balls(found, measurement, recipe)
+    fit, nominal_um = _grid(slots, recipe)
+    coplanarity, rows = _coplanarity(slots, measurement, recipe, fit, nominal_um)
+    limits = None if recipe is None else recipe.limits
+    names = {
+        slot.name: slot.name if recipe is None else recipe.name_of(slot.name, slot.row, slot.col) for slot in slots
+    }
+    balls = []
+    for index, slot in enumerate(slots):
+        partners = _partners(slot.name, found.bridges)
+        position = _position(slot, nominal_um[index])
+        verdict, reasons = judge_ball(slot, position, limits, tuple(names.get(each, each) for each in partners))
+        ball = _ball(slot, names[slot.name], nominal_um[index], position)
+        balls.append(replace(ball, verdict=verdict, reasons=reasons))
+    for row, index in enumerate(rows):
+        if coplanarity.seating:
+            seat_um = float(coplanarity.seating[0].deviations_um[row])
+            balls[index] = replace(balls[index], seating_deviation_um=seat_um)
+        if coplanarity.regression is not None:
+            deviation_um = float(coplanarity.regression.deviations_um[row])
+            balls[index] = replace(balls[index], regression_deviation_um=deviation_um)
+    pitch_um, u_pitch_um = _pitch(fit, recipe)
+    warpage_um, u_warpage_um = warpage(
+        measurement.board_coefficients_um, measurement.board_covariance, _finite_centres(slots)
+    )
+    unmeasured = [
+        names[slot.name]
+        for index, slot in enumerate(slots)
+        if slot.found and slot.kind != "extra" and index not in rows
+    ]
+    checks = part_checks(coplanarity, (pitch_um, u_pitch_um), (warpage_um, u_warpage_um), limits, unmeasured=unmeasured)
+    bridges = tuple((names.get(one, one), names.get(two, two)) for one, two in found.bridges)
+    verdicts = [ball.verdict for ball in balls] + [check.verdict for check in checks if check.verdict is not None]
+    if bridges or not any(ball.present for ball in balls):
+        verdicts.append("fail")
+    strayed = _strayed_lights(measurement.light_change_deg)
+    if strayed or not limits:
+        verdicts.append("undecided")
+    return PartResult(
+        name=name if recipe is None else recipe.name,
+        balls=tuple(balls),
+        verdict=worst(verdicts),
+        reasons=(*part_reasons(balls, checks, bridges, has_limits=bool(limits)), *strayed),
+        pitch_um=pitch_um,
+        u_pitch_um=u_pitch_um,
+        grid_angle_deg=math.nan if fit is None else math.degrees(fit.angle_rad),
+        seating_coplanarity_um=coplanarity.seating_um,
+        u_seating_coplanarity_um=coplanarity.u_seating_um,
+        seating_noise_bias_um=coplanarity.seating_bias_um,
+        regression_coplanarity_um=coplanarity.regression_um,
+        u_regression_coplanarity_um=coplanarity.u_regression_um,
+        regression_noise_bias_um=coplanarity.regression_bias_um,
+        warpage_um=warpage_um,
+        u_warpage_um=u_warpage_um,
+        seatings=tuple(
+            SeatingResult(
+                tuple(balls[rows[touching]].name for touching in plane.balls),
+                plane.coplanarity_um,
+                plane.slope_x,
+                plane.slope_y,
+                plane.offset_um,
+            )
+            for plane in coplanarity.seating
+        ),
+        checks=checks,
+        bridges=bridges,
+        light_directions=measurement.light_directions,
+        light_change_deg=measurement.light_change_deg,
+        board_coefficients_um=measurement.board_coefficients_um,
+        shadow_residual_rms=measurement.shadow_residual_rms,
+        warnings=(*warnings, *measurement.warnings, *_own_warnings(recipe, fit, coplanarity, balls)),
+        recipe=recipe,
+        pixel_pitch_um=pixel_pitch_um,
+        files=files,
+        version=version,
+    )
+
+
+def _own_warnings(
+    recipe: PartRecipe | None, fit: GridFit | None, coplanarity: Coplanarity, balls: list[BallResult]
+) -> list[str]:
+    warnings = [OWN_PITCH] if recipe is None and fit is not None else []
+    if recipe is None or recipe.limits.diameter_um is None:
+        warnings += odd_sizes([ball.name for ball in balls], [ball.diameter_um for ball in balls])
+    count = len(coplanarity.seating)
+    if count >= MIN_ROCKING and _rocks(coplanarity):
+        warnings.append(f"the part can rock between {count} seating planes; the worst is judged")
+    return warnings
+
+
+def _rocks(coplanarity: Coplanarity) -> bool:
+    """Whether the seating planes differ by more than the uncertainty of the coplanarity, where it is known."""
+    deviations_um = np.array([plane.deviations_um for plane in coplanarity.seating])
+    u_um = coplanarity.u_seating_um
+    return not float(np.ptp(deviations_um, axis=0).max()) <= COVERAGE_FACTOR * u_um
+
+
+def _strayed_lights(change_deg: Array) -> list[str]:
+    """Lights that the shadows put elsewhere: a wrong rig, or an image under another light's name."""
+    return [
+        f"light {index} (counted from 0) stands {change:.1f} degrees from where the rig says, by its shadows; over "
+        f"{MAX_LIGHT_CHANGE_DEG:g} degrees the rig or the pairing of images and lights is wrong"
+        for index, change in enumerate(change_deg)
+        if change > MAX_LIGHT_CHANGE_DEG
+    ]
+
+
+def _finite_centres(slots: tuple[Slot, ...]) -> Array:
+    centres_um = [(slot.measured.x_um, slot.measured.y_um) for slot in slots if slot.measured is not None]
+    array_um = np.array(centres_um, dtype=np.float64).reshape(-1, 2)
+    return array_um[np.isfinite(array_um).all(axis=1)]
+
+
+def _grid(slots: tuple[Slot, ...], recipe: PartRecipe | None) -> tuple[GridFit | None, Array]:
+    """The grid through all whole balls, and (n, 2) places of all slots in the image (NaN where there is none)."""
+    whole = [
+        (slot.nominal, slot.measured)
+        for slot in slots
+        if slot.nominal is not None and slot.measured is not None and slot.kind == "ball"
+    ]
+    centres_um = np.array([(ball.x_um, ball.y_um) for _, ball in whole], dtype=np.float64).reshape(-1, 2)
+    known = np.isfinite(centres_um).all(axis=1)
+    nominal = np.array([place for place, _ in whole], dtype=np.float64).reshape(-1, 2)
+    u_um = np.array([(ball.u_x_um, ball.u_y_um) for _, ball in whole], dtype=np.float64).reshape(-1, 2)
+    fit = fit_grid(nominal[known], centres_um[known], u_um[known], free_scale=recipe is None)
+    places_um = np.full((len(slots), 2), math.nan)
+    if fit is not None:
+        for index, slot in enumerate(slots):
+            if slot.nominal is not None:
+                places_um[index] = fit.place(np.array(slot.nominal))
+    return fit, places_um
+
+
+def _pitch(fit: GridFit | None, recipe: PartRecipe | None) -> tuple[float, float]:
+    if fit is None or (recipe is not None and recipe.layout.pitch_um is None):
+        return math.nan, math.nan
+    unit_um = 1.0 if recipe is None else float(recipe.layout.pitch_um or math.nan)
+    return fit.free_scale * unit_um, fit.u_free_scale * unit_um
+
+
+def _position(slot: Slot, nominal_um: Array) -> Position:
+    if slot.measured is None or slot.nominal is None:
+        return Position(math.nan, math.nan)
+    centre_um = np.array([slot.measured.x_um, slot.measured.y_um])
+    return true_position(centre_um - nominal_um, np.array([slot.measured.u_x_um, slot.measured.u_y_um]))
+
+
+def _coplanarity(
+    slots: tuple[Slot, ...],
+    measurement: BallMeasurement,
+    recipe: PartRecipe | None,
+    fit: GridFit | None,
+    nominal_um: Array,
+) -> tuple[Coplanarity, list[int]]:
+    """Coplanarity of the apexes in the world, and the slots that have one."""
+    coefficients_um = measurement.board_coefficients_um
+    rows, tops = [], []
+    for index, slot in enumerate(slots):
+        ball = slot.measured
+        if ball is not None and slot.kind != "extra" and np.isfinite([ball.x_um, ball.y_um, ball.top_um]).all():
+            rows.append(index)
+            tops.append((ball.x_um, ball.y_um, ball.top_um, ball.u_x_um, ball.u_y_um, ball.u_top_um))
+    table = np.array(tops, dtype=np.float64).reshape(-1, 6)
+    if not np.isfinite(coefficients_um[1:]).all():
+        rows, table = [], table[:0]
+    apexes_um, u_um = table[:, :3].copy(), table[:, 3:].copy()
+    if rows:
+        apexes_um[:, 2] += board_height_um(coefficients_um, table[:, 0], table[:, 1])
+        u_um[:, 2] = np.hypot(u_um[:, 2], _u_board_um(measurement, table))
+    gravity_um = _gravity_um(recipe, fit, nominal_um, slots)
+    if not np.isfinite(gravity_um).all():  # a single ball, or a single whole one
+        apexes_um, u_um, gravity_um = apexes_um[:0], u_um[:0], np.zeros(2)
+    return measure_coplanarity(apexes_um, u_um, gravity_um), rows
+
+
+def _u_board_um(measurement: BallMeasurement, table: Array) -> Array:
+    """(n,) standard uncertainty of the board's bend under the balls; its tilt moves no apex against the planes."""
+    covariance = measurement.board_covariance
+    if covariance is None:
+        return np.zeros(len(table))
+    terms = board_terms(table[:, 0], table[:, 1])
+    scale = np.abs(terms).max(axis=0)
+    plane = terms[:, :3] / np.where(scale[:3] > 0, scale[:3], 1.0)
+    bend = terms[:, 3:] - plane @ np.linalg.lstsq(plane, terms[:, 3:], rcond=None)[0]
+    variance: Array = np.einsum("ni,ij,nj->n", bend, covariance[3:, 3:], bend)
+    return np.sqrt(np.maximum(variance, 0.0))
+
+
+def _gravity_um(recipe: PartRecipe | None, fit: GridFit | None, nominal_um: Array, slots: tuple[Slot, ...]) -> Array:
+    """Centre of gravity in the image: as the recipe says, else the mean of all places."""
+    if recipe is not None and recipe.gravity_um is not None and fit is not None:
+        x_um, y_um = recipe.gravity_um
+        return fit.place(np.array([x_um if recipe.view == "bottom" else -x_um, y_um]))
+    on_layout = np.array([slot.nominal is not None for slot in slots], dtype=np.bool_)
+    places_um = nominal_um[on_layout]
+    return places_um.mean(axis=0) if len(places_um) else np.full(2, math.nan)
+
+
+def _partners(name: str, bridges: tuple[tuple[str, str], ...]) -> tuple[str, ...]:
+    return tuple(two if one == name else one for one, two in bridges if name in {one, two})
+
+
+def _ball(slot: Slot, name: str, nominal_um: Array, position: Position) -> BallResult:
+    """The readings of a ball, not judged yet."""
+    result = BallResult(
+        name,
+        slot.row,
+        slot.col,
+        slot.found,
+        "undecided",
+        (),
+        kind=slot.kind,
+        x_nominal_um=float(nominal_um[0]),
+        y_nominal_um=float(nominal_um[1]),
+        true_position_um=position.distance_um,
+        u_true_position_um=position.u_um,
+    )
+    ball = slot.measured
+    if ball is None:
+        return result
+    return replace(
+        result,
+        x_um=ball.x_um,
+        u_x_um=ball.u_x_um,
+        y_um=ball.y_um,
+        u_y_um=ball.u_y_um,
+        diameter_um=ball.diameter_um,
+        u_diameter_um=ball.u_diameter_um,
+        centre_z_um=ball.centre_z_um,
+        u_centre_z_um=ball.u_centre_z_um,
+        top_um=ball.top_um,
+        u_top_um=ball.u_top_um,
+        q=ball.q,
+        u_q=ball.u_q,
+        flat_um=ball.flat_um,
+        u_flat_um=ball.u_flat_um,
+        lights_used=ball.lights_used,
+    )

@@ -1,0 +1,123 @@
+"""The verdict on one ball: it passes only when it is there, alone, measured, and inside every limit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bgars.inspection.decision import decide
+from bgars.part_recipe import BALL_LIMITS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from bgars.ball_records import MeasuredBall
+    from bgars.inspection.places import Slot
+    from bgars.part_recipe import Limits
+    from bgars.part_result import Verdict
+
+__all__ = ["NO_LIMITS", "Position", "judge_ball", "true_position"]
+
+NO_LIMITS = "no limits given"
+WORDS = {
+    "true_position_um": "true position",
+    "diameter_um": "diameter",
+    "height_um": "height",
+    "q": "vertical over horizontal radius",
+    "flat_um": "flat top",
+}
+MISSING = "no ball at its place"
+EXTRA = "a ball where none should be"
+NOT_MEASURED = "found, but not measured"
+
+
+@dataclass(frozen=True)
+class Position:
+    """Distance from the place in the grid, and its standard uncertainty."""
+
+    distance_um: float
+    u_um: float
+
+
+def true_position(off_um: NDArray[np.float64], u_um: NDArray[np.float64]) -> Position:
+    """The length of an offset (2,) with the uncertainties (2,) of its parts.
+
+    Examples
+    --------
+    >>> true_position(np.array([3.0, 4.0]), np.array([0.5, 0.5]))
+    Position(distance_um=5.0, u_um=0.5)
+    """
+    distance_um = math.hypot(*off_um)
+    if distance_um > 0:
+        return Position(distance_um, math.hypot(*(off_um * u_um)) / distance_um)
+    return Position(distance_um, math.hypot(*u_um) / math.sqrt(2.0))
+
+
+def judge_ball(
+    slot: Slot, position: Position, limits: Limits | None, partners: tuple[str, ...] = ()
+) -> tuple[Verdict, tuple[str, ...]]:
+    """Judge a ball and say why it does not pass.
+
+    Parameters
+    ----------
+    slot : Slot
+        Place and ball.
+    position : Position
+        Its true position; NaN where unknown.
+    limits : Limits or None
+        None or empty: presence is judged, nothing else.
+    partners : tuple of str
+        Balls that it is joined to.
+    """
+    if not slot.found:
+        return "fail", (MISSING,)
+    failed, open_ = [], []
+    if slot.kind == "extra":
+        failed.append(EXTRA)
+    if slot.kind == "bridged" or partners:
+        failed.append(f"joined to {', '.join(partners)}" if partners else "joined to a neighbour")
+    if slot.measured is None:
+        open_.append(NOT_MEASURED)
+    else:
+        open_ += slot.measured.reasons
+        open_ += _holes(slot.measured, limits)
+        if limits and slot.kind != "extra":
+            for name, value, u in _readings(slot.measured, position):
+                allowed = limits.range_of(name)
+                if allowed is None:
+                    continue
+                verdict, reason = decide(WORDS[name], value, u, allowed, unit="" if name == "q" else "um")
+                if verdict != "pass":
+                    (failed if verdict == "fail" else open_).append(reason)
+    if not limits:
+        open_.append(NO_LIMITS)
+    reasons = tuple(dict.fromkeys([*failed, *open_]))
+    if failed:
+        return "fail", reasons
+    return ("undecided" if open_ else "pass"), reasons
+
+
+def _readings(ball: MeasuredBall, position: Position) -> Iterator[tuple[str, float, float]]:
+    pairs = {
+        "true_position_um": (position.distance_um, position.u_um),
+        "diameter_um": (ball.diameter_um, ball.u_diameter_um),
+        "height_um": (ball.top_um, ball.u_top_um),
+        "q": (ball.q, ball.u_q),
+        "flat_um": (ball.flat_um, ball.u_flat_um),
+    }
+    for name in BALL_LIMITS:
+        yield name, *pairs[name]
+
+
+def _holes(ball: MeasuredBall, limits: Limits | None) -> Iterator[str]:
+    """What was not measured of a ball, limit or not: such a ball never passes."""
+    limited = () if limits is None else tuple(name for name in BALL_LIMITS if limits.range_of(name) is not None)
+    core = {"position": (ball.x_um, ball.y_um), "diameter_um": (ball.diameter_um,), "height_um": (ball.top_um,)}
+    for name, values in core.items():
+        if name not in limited and not all(math.isfinite(value) for value in values):
+            yield f"{WORDS.get(name, name)} was not measured"

@@ -1,0 +1,301 @@
+"""Balls measured from the shadows that they cast: heights, diameters, shapes, and the lights along with them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bgars.inspection.board import SHAPE_TERMS, Board, board_from_normals, outside_balls
+from bgars.errors import InputError
+from bgars.inspection.bundle import Priors, Solution, angles_rad, solve_bundle
+from bgars.inspection.flat_top import flat_tops
+from bgars.inspection.outline import outline_centres
+from bgars.inspection.population import q_spread
+from bgars.inspection.problem import Problem, make_problem, thread_count
+from bgars.inspection.results import Usability, judge_balls, measurement
+from bgars.inspection.shadow_edges import Edges, EdgeSettings, measure_edges
+from bgars.inspection.shadow_map import ShadowMap
+from bgars.inspection.spread import EdgeSpread, fit_spread
+from bgars.inspection.start import first_heights
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from bgars.ball_records import BallMeasurement, FoundBalls
+    from bgars.records import Capture, NormalField
+
+__all__ = ["Fit", "fit_shadows", "measure_balls"]
+
+Array = NDArray[np.float64]
+
+COARSE = (0.24, 0.08)
+"""Distances, in radii, that edges are first looked for in."""
+COARSE_EXTRA_PX = 1.5
+COARSE_STEPS = 6.0
+FINE_PASSES = 4
+"""Most passes with sharp edges; two where the first leaves little to do."""
+SMALL_CHANGE_PX = 0.5
+FIRST_SPREAD_PX = 0.5
+REACH_SIGMAS = 3.2
+REACH_PX = 1.2
+TYPICAL_WAY = 2.0
+"""Way of the light from a ball to the edge of its shadow, in radii."""
+RIG_DEG = 0.3
+"""Lights may be this far from where the rig says (standard deviation of each axis), before their scatter says more."""
+CERTAIN_RIG_DEG = 1e-4
+RIG_LIMITS_DEG = (0.003, 2.0)
+FIRST_Q_SPREAD = 0.02
+TILT = 0.003
+BOW_SLOPE = 0.02
+"""Prior standard deviations of the board: tilt, and slope by bow at the edge of the image."""
+EMPIRICAL_ROUNDS = 5
+SETTLED = 0.1
+SHORT_ROUNDS, LONG_ROUNDS = 8, 20
+REDESCEND = 3.5
+OUTLINE_SAFETY = 4.0
+OUTLINE_FLOOR_PX = 0.01
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Everything the shadows gave, in pixels.
+
+    `index` (n,) balls whose shadows were looked at (no bridges); `solution` only of those that `usability` calls usable.
+    """
+
+    problem: Problem
+    index: NDArray[np.intp]
+    usability: Usability
+    solution: Solution | None
+    edges: Edges
+    spread: EdgeSpread
+
+
+def measure_balls(
+    capture: Capture,
+    found: FoundBalls,
+    *,
+    field: NormalField | None = None,
+    refine_lights: bool = True,
+    threads: int | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> BallMeasurement:
+    """Measure every ball of a part from the shadows in its images.
+
+    Each light throws the shadow of each ball on the board. Stretches of the edges of all shadows are measured to a few
+    hundredths of a pixel, and balls (centre, height, radius, q), directions of the lights and shape of the board are
+    fitted to all of them at once.
+
+    Parameters
+    ----------
+    capture : Capture
+        Its response, dark frame, black level, saturation and intensities are honoured.
+    found : FoundBalls
+        Balls in the image.
+    field : NormalField, optional
+        Normals of the same capture: flat tops, which no shadow shows, and a first shape of the board come from it.
+    refine_lights : bool
+        Also fit where the lights are; the rig is the prior. Otherwise the rig is taken as exact.
+    threads : int, optional
+        Most threads to work on; by default what ``RAYON_NUM_THREADS`` says, else one a core. The result does not depend
+        on it.
+    progress : callable, optional
+        Called with the fraction done.
+
+    Returns
+    -------
+    BallMeasurement
+        Balls in the order of `found`. What could not be measured is NaN, with reasons. Heights are above the smooth
+        board under the ball. They rest on two assumptions, which no image can replace: errors of the rig are independent
+        from light to light, and the balls are round on the whole (one ball may well be flattened).
+
+    Raises
+    ------
+    InputError
+        A capture without a pixel pitch, balls outside the image, a field of another size.
+
+    References
+    ----------
+    DESIGN section 8; B. Triggs et al., "Bundle adjustment - a modern synthesis" (2000); S. Geman and D. McClure,
+    "Bayesian image analysis" (1985), for the weights.
+
+    Examples
+    --------
+    >>> import bgars
+    >>> from bgars.ball_records import FoundBall, FoundBalls
+    >>> from bgars.inspection import measure_balls
+    >>> scene = bgars.Scene.ball(600.0, height_um=500.0)
+    >>> capture, truth = bgars.simulate(scene, bgars.LightRig.ring(8), bgars.Material(), bgars.Camera(supersample=4))
+    >>> ball = FoundBall("A1", 0, 0, 0.1, -0.1, 30.1, u_centre_px=0.2, u_radius_px=0.2)
+    >>> found = FoundBalls((ball,), (), (), 1, 1, None, 0.0, (0.0, 0.0))
+    >>> round(measure_balls(capture, found, refine_lights=False).balls[0].top_um)
+    500
+    """
+    if field is not None and field.mask.shape != capture.images.shape[1:]:
+        msg = f"field: must have the shape of the images {capture.images.shape[1:]}, got {field.mask.shape}"
+        raise InputError(msg)
+    workers = thread_count(threads)
+    report = progress or _quiet
+    problem = make_problem(capture, found)
+    fit = fit_shadows(problem, field, refine_lights=refine_lights, threads=workers, progress=report)
+    flats = None if field is None or fit is None or fit.solution is None else flat_tops(field, fit.solution.balls)
+    report(1.0)
+    return measurement(found, problem, fit, flats)
+
+
+def _quiet(_: float) -> None:
+    """No progress."""
+
+
+def fit_shadows(
+    problem: Problem,
+    field: NormalField | None,
+    *,
+    refine_lights: bool,
+    threads: int,
+    progress: Callable[[float], object],
+) -> Fit | None:
+    """Fit shadows in passes, from coarse to fine; None where there is nothing to fit."""
+    if not len(problem.table):
+        return None
+    table, vectors, board = problem.table.copy(), problem.vectors.copy(), Board()
+    heights, _ = first_heights(
+        problem.radiance,
+        table,
+        vectors,
+        problem.near,
+        board,
+        problem.irradiance.mean(axis=0),
+        [problem.neighbours(index) for index in range(len(table))],
+    )
+    table[:, 2] = heights
+    progress(0.1)
+    priors = _priors(problem, table, field, refine_lights)
+    spread = EdgeSpread(FIRST_SPREAD_PX, 0.0)
+    gains = problem.irradiance.copy()
+    index = np.flatnonzero(~problem.bridged)
+    if not len(index):
+        return None
+    passes = len(COARSE) + FINE_PASSES
+    result: Fit | None = None
+    turn, last, change = 0, False, np.inf
+    while not last:
+        last = turn == passes - 1 or (turn > len(COARSE) and change < SMALL_CHANGE_PX)
+        radius = float(np.median(table[:, 3]))
+        settings = _settings(turn, radius, spread)
+        shadows = ShadowMap(
+            problem.radiance,
+            np.concatenate([table, problem.stand_ins(table)]),
+            vectors,
+            problem.near,
+            board,
+            silhouette_margin_px=min(settings.reach_px, 0.1 * radius + 2.0),
+            shadow_margin_px=settings.reach_px + 1.0,
+            threads=threads,
+        )
+        if last:
+            priors = _with_outlines(problem, priors, shadows, table, spread)
+        edges = measure_edges(
+            problem.radiance, shadows, table[index], vectors, problem.near, board, gains[index], settings, threads
+        )
+        usability = judge_balls(edges)
+        chosen = index[usability.usable]
+        if not len(chosen):
+            return Fit(problem, index, usability, None, edges, spread)
+        used = edges.take(usability.usable)
+        start = (table[chosen], vectors, board)
+        solution, priors = _solve(used, start, problem.near, priors, chosen, turn, last, refine_lights)
+        change = float(np.percentile(np.abs(solution.balls - table[chosen]).max(axis=1), 90.0))
+        table[chosen], vectors, board = solution.balls, solution.vectors, solution.board
+        gains[index] = edges.lit_levels(gains[index])
+        if turn >= len(COARSE):
+            spread = fit_spread(used)
+        turn += 1
+        progress(0.1 + 0.8 * (1.0 if last else turn / passes))
+        result = Fit(problem, index, usability, solution, edges, spread)
+    return result
+
+
+def _settings(turn: int, radius: float, spread: EdgeSpread) -> EdgeSettings:
+    """Coarse first, then as sharp as the edges are."""
+    if turn < len(COARSE):
+        reach = COARSE[turn] * radius + COARSE_EXTRA_PX
+        return EdgeSettings(1.0, 0.0, reach, max(1, int(reach / COARSE_STEPS)), coarse=True)
+    widest = float(np.hypot(spread.sharp_px, TYPICAL_WAY * spread.lamp_rad * radius))
+    return EdgeSettings(spread.sharp_px, spread.lamp_rad, REACH_SIGMAS * widest + REACH_PX)
+
+
+def _priors(problem: Problem, table: Array, field: NormalField | None, refine_lights: bool) -> Priors:
+    """What is known before: the finder's circles, the rig, a board that is nearly flat."""
+    radiance = problem.radiance
+    half = max(radiance.height, radiance.width) / 2.0
+    u_board = np.array([TILT, TILT, BOW_SLOPE / half, BOW_SLOPE / half, BOW_SLOPE / half])
+    board = np.zeros(SHAPE_TERMS)
+    if field is not None:
+        outside = outside_balls(radiance.height, radiance.width, table)
+        fitted = board_from_normals(field, outside)
+        if fitted is not None:
+            board, spread = fitted
+            u_board = np.hypot(spread, u_board / 10.0)
+    u_balls = np.column_stack(
+        [problem.u_centre, problem.u_centre, table[:, 3], problem.u_radius, np.full(len(table), FIRST_Q_SPREAD)]
+    )
+    rig = np.radians(RIG_DEG if refine_lights else CERTAIN_RIG_DEG)
+    return Priors(table.copy(), u_balls, problem.vectors.copy(), float(rig), board, u_board)
+
+
+def _with_outlines(problem: Problem, priors: Priors, shadows: ShadowMap, table: Array, spread: EdgeSpread) -> Priors:
+    """Centres of the priors: the finder's and the outlines', weighted."""
+    azimuths = np.arctan2(problem.vectors[:, 1], problem.vectors[:, 0])
+    centres, u_outline = outline_centres(problem.radiance, shadows, table, azimuths, spread.sharp_px)
+    known = np.isfinite(u_outline) & ~problem.bridged
+    by_outline = np.where(known, 1.0 / (OUTLINE_FLOOR_PX**2 + np.square(OUTLINE_SAFETY * np.where(known, u_outline, 1.0))), 0.0)
+    by_finder = 1.0 / problem.u_centre**2
+    balls, u_balls = priors.balls.copy(), priors.u_balls.copy()
+    weight = by_outline + by_finder
+    for axis in (0, 1):
+        outline = np.where(known, centres[:, axis], 0.0)
+        balls[:, axis] = (by_outline * outline + by_finder * problem.table[:, axis]) / weight
+        u_balls[:, axis] = 1.0 / np.sqrt(weight)
+    return priors._replace(balls=balls, u_balls=u_balls)
+
+
+def _solve(
+    edges: Edges,
+    start: tuple[Array, Array, Board],
+    near: bool,
+    priors: Priors,
+    chosen: NDArray[np.intp],
+    turn: int,
+    last: bool,
+    refine_lights: bool,
+) -> tuple[Solution, Priors]:
+    """Bundle; once edges are sharp, the scatter of lights and of q is taken from the result (empirical Bayes)."""
+    sharp = turn >= len(COARSE)
+    redescend = REDESCEND if sharp else None
+
+    def bundle(at: tuple[Array, Array, Board], rounds: int) -> Solution:
+        own = priors._replace(balls=priors.balls[chosen], u_balls=priors.u_balls[chosen])
+        return solve_bundle(edges, *at[:2], near, at[2], own, redescend=redescend, rounds=rounds)
+
+    solution = bundle(start, LONG_ROUNDS if last else SHORT_ROUNDS)
+    for _ in range(EMPIRICAL_ROUNDS if last else 1):
+        before = priors
+        u_balls = priors.u_balls.copy()
+        u_balls[chosen, 4] = q_spread(solution, priors.u_balls[chosen, 4])
+        priors = priors._replace(u_balls=u_balls)
+        if refine_lights:
+            turns = np.square(angles_rad(solution.vectors, priors.vectors)) + np.square(solution.u_light_rad)
+            scatter = float(np.clip(np.sqrt(turns.mean() / 2.0), *np.radians(RIG_LIMITS_DEG)))
+            priors = priors._replace(u_light_rad=scatter)
+        if not last:
+            break
+        solution = bundle((solution.balls, solution.vectors, solution.board), SHORT_ROUNDS)
+        if np.isclose(before.u_light_rad, priors.u_light_rad, rtol=SETTLED) and np.allclose(
+            before.u_balls[:, 4], priors.u_balls[:, 4], rtol=SETTLED
+        ):
+            break
+    return solution, priors

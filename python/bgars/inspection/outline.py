@@ -1,0 +1,142 @@
+r"""Centres of balls from their outlines, each light on the side that it shines on.
+
+There ball and board are both lit and their edge is sharp, while the board's shape and the light's direction do not enter:
+what shadows cannot tell apart (a tilt of all lights and of the board, and a shift of all balls) outlines can. With r the
+distance to the centre, along the outline
+
+    I = outside Phi(d / s) + (inside + bend sqrt(1 - r^2 / R^2)) (1 - Phi(d / s)) + move phi(d / s) / s,   d = r - R.
+
+What the shading of the rim does to the edge is the same on the opposite side under the opposite light, so it spoils the
+radius only, which is left free.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from bgars.inspection.edge_fit import Group, fit_stretches
+
+if TYPE_CHECKING:
+    from bgars.inspection.radiance import Radiance
+    from bgars.inspection.shadow_map import ShadowMap
+
+__all__ = ["outline_centres"]
+
+Array = NDArray[np.float64]
+
+SECTORS = 8
+WIDEST_RAD = np.radians(64.0)
+LINE_SPACING_PX = 1.45
+MAX_LINES = 48
+REACH_PX = 3.5
+MIN_STRETCHES = 12
+MIN_SPREAD_DEG = 200.0
+ROUNDS = 12
+CAUCHY = 2.5
+NEIGHBOUR_GAP_PX = 5.0
+INV_SQRT_2PI = 0.3989422804014327
+
+
+def outline_centres(
+    radiance: Radiance, shadows: ShadowMap, table: Array, azimuths_rad: Array, spread_px: float
+) -> tuple[Array, Array]:
+    """Centres (N, 2) and their standard uncertainty (N,); NaN and inf where too little of an outline is seen.
+
+    Parameters
+    ----------
+    radiance : Radiance
+    shadows : ShadowMap
+        Where the board is shadowed.
+    table : (N, 5) float64
+        Balls, good to a pixel.
+    azimuths_rad : (L,) float64
+        Of the lights.
+    spread_px : float
+        Of sharp edges in these images.
+    """
+    count, lights = len(table), len(azimuths_rad)
+    radius = float(np.median(table[:, 3]))
+    lines = int(np.clip(2.0 * WIDEST_RAD * radius / LINE_SPACING_PX, 2 * SECTORS, MAX_LINES))
+    offset = (np.arange(lines) + 0.5) / lines * 2.0 * WIDEST_RAD - WIDEST_RAD
+    angle = azimuths_rad[None, :, None] + offset[None, None, :]
+    centre_x, centre_y, reach = (table[:, i, None, None] for i in (0, 1, 3))
+    edge_x, edge_y = centre_x + reach * np.cos(angle), centre_y + reach * np.sin(angle)
+    free = np.ones(edge_x.shape, dtype=np.bool_)
+    for index, (x, y, _, size, _) in enumerate(table):
+        near = np.hypot(table[:, 0] - x, table[:, 1] - y) < size + table[:, 3] + 2.0 * NEIGHBOUR_GAP_PX
+        for other in np.flatnonzero(near):
+            if other != index:
+                gap = np.hypot(edge_x[other] - x, edge_y[other] - y) - size
+                free[other] &= gap > NEIGHBOUR_GAP_PX
+    ball, light, place = np.nonzero(free)
+    pick = (ball, light, place)
+    value, distance, usable = _across(radiance, shadows, table, pick, angle, edge_x[pick], edge_y[pick])
+    scaled = distance / spread_px
+    outside = ndtr(scaled)
+    inside = 1.0 - outside
+    depth = np.sqrt(np.maximum(1.0 - np.square(1.0 + distance / table[ball, 3]), 0.0))
+    bell = INV_SQRT_2PI * np.exp(-0.5 * scaled**2) / spread_px
+    stretch = (ball * lights + light) * SECTORS + place * SECTORS // lines
+    group = Group(stretch, count * lights * SECTORS, SECTORS)
+    fit = fit_stretches([inside, outside, bell, inside * depth], value, usable, group)
+    step = fit.solution[:, 0] - fit.solution[:, 1]
+    known = fit.measured & (np.abs(step) > 3.0 * fit.deviation[:, 2] / REACH_PX)
+    shift = np.where(known, fit.solution[:, 2] / np.where(known, step, 1.0), 0.0).reshape(count, -1)
+    u_shift = np.where(known, fit.deviation[:, 2] / np.abs(np.where(known, step, 1.0)), np.inf).reshape(count, -1)
+    usable_shift = np.abs(shift) < REACH_PX
+    middle = azimuths_rad[:, None] + WIDEST_RAD * ((np.arange(SECTORS) + 0.5) / SECTORS * 2.0 - 1.0)[None, :]
+    return _centres(table, middle.reshape(-1), shift, np.where(usable_shift, u_shift, np.inf))
+
+
+def _across(
+    radiance: Radiance,
+    shadows: ShadowMap,
+    table: Array,
+    pick: tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]],
+    angle: Array,
+    edge_x: Array,
+    edge_y: Array,
+) -> tuple[Array, Array, Array]:
+    """Values, distances to the outline and 1 or 0 for usable, (O, M), on lines across it."""
+    ball, light, place = pick
+    toward = angle[0, light, place]
+    steps = int(np.ceil(REACH_PX))
+    offsets = np.arange(-steps, steps + 1)[:, None]
+    along_cols = np.abs(np.cos(toward)) >= np.abs(np.sin(toward))
+    rows = np.rint(radiance.row(edge_y)).astype(np.intp)[None, :] + np.where(along_cols[None, :], 0, offsets)
+    cols = np.rint(radiance.col(edge_x)).astype(np.intp)[None, :] + np.where(along_cols[None, :], offsets, 0)
+    usable = (rows >= 0) & (rows < radiance.height) & (cols >= 0) & (cols < radiance.width)
+    rows, cols = np.clip(rows, 0, radiance.height - 1), np.clip(cols, 0, radiance.width - 1)
+    distance = np.hypot(radiance.x(cols) - table[ball, 0], radiance.y(rows) - table[ball, 1]) - table[ball, 3]
+    value = radiance.under(np.broadcast_to(light, rows.shape), rows * radiance.width + cols).astype(np.float64)
+    at = shadows.pixels(rows, cols)
+    shadowed = shadows.count.reshape(len(shadows.count), -1)[np.broadcast_to(light, rows.shape), at] > 0
+    usable &= np.isfinite(value) & (np.abs(distance) <= REACH_PX) & ~(shadowed & (distance > 0))
+    return np.where(usable, value, 0.0), distance, usable.astype(np.float64)
+
+
+def _centres(table: Array, middle: Array, shift: Array, u_shift: Array) -> tuple[Array, Array]:
+    """Robust circles through the shifts of outlines: centre moves, radius free."""
+    design = np.column_stack([np.cos(middle), np.sin(middle), np.ones(len(middle))])
+    centres, u_centre = np.full((len(table), 2), np.nan), np.full(len(table), np.inf)
+    for index in range(len(table)):
+        known = np.isfinite(u_shift[index])
+        directions = np.unique(np.floor(np.degrees(middle[known]) % 360.0 / 20.0)).size * 20.0
+        if known.sum() < MIN_STRETCHES or directions < MIN_SPREAD_DEG:
+            continue
+        system, found = design[known], shift[index, known]
+        scale = max(1.4826 * float(np.median(np.abs(found - np.median(found)))), 1e-3)
+        change, weight = np.zeros(3), np.ones(len(found))
+        for _ in range(ROUNDS):
+            residual = found - system @ change
+            weight = 1.0 / (1.0 + (residual / (CAUCHY * scale)) ** 2)
+            change = np.linalg.solve(system.T @ (weight[:, None] * system), system.T @ (weight * found))
+            scale = max(1.4826 * float(np.median(np.abs(found - system @ change))), 1e-3)
+        covariance = np.linalg.inv(system.T @ (weight[:, None] * system)) * scale**2
+        centres[index] = table[index, :2] + change[:2]
+        u_centre[index] = np.sqrt((covariance[0, 0] + covariance[1, 1]) / 2.0)
+    return centres, u_centre

@@ -1,0 +1,54 @@
+"""Which balls are round like the others, and how much the round ones scatter."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from bgars.inspection.bundle import Solution
+
+__all__ = ["q_spread"]
+
+Array = NDArray[np.float64]
+
+LIMITS = (0.0005, 0.02)
+UNKNOWN = 0.003
+"""Scatter of q among round balls: bounds, and what is taken where too few balls are seen."""
+MIN_POPULATION = 5
+OUTLIER = 4.0
+FREE = 0.2
+ROUNDS = 10
+
+
+def q_spread(solution: Solution, u_prior: Array) -> Array:
+    """(N,) standard deviations of the priors of q around 1: one for all round balls, wide for a ball that is not round.
+
+    Parameters
+    ----------
+    solution : Solution
+    u_prior : (N,) float64
+        The priors it was made with: their part is taken out, so that the shadow alone says whether a ball is round.
+
+    Notes
+    -----
+    Empirical Bayes: the scatter s of the round ones is where ``mean of (q - 1)^2 - u^2`` has it, within bounds.
+    """
+    information = 1.0 / solution.covariance[:, 4, 4]
+    by_shadow = np.maximum(information - 1.0 / u_prior**2, 1e-3 * information)
+    off = (solution.balls[:, 4] - 1.0) * information / by_shadow
+    variance = 1.0 / by_shadow
+    scatter = UNKNOWN
+    for _ in range(ROUNDS):
+        total = variance + scatter**2
+        round_ones = np.square(off) < OUTLIER**2 * total
+        if round_ones.sum() < MIN_POPULATION:
+            scatter = UNKNOWN
+            break
+        weight = 1.0 / np.square(total[round_ones])
+        excess = float((weight * (np.square(off[round_ones]) - variance[round_ones])).sum() / weight.sum())
+        scatter = float(np.clip(np.sqrt(max(excess, 0.0)), *LIMITS))
+    round_ones = np.square(off) < OUTLIER**2 * (variance + scatter**2)
+    return np.where(round_ones, scatter, FREE)

@@ -1,0 +1,121 @@
+"""A first height for every ball: the one whose predicted shadow edges are the darkest inside and the brightest outside."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bgars.inspection.shadow_model import Balls, Lights, edge_at, rays
+
+if TYPE_CHECKING:
+    from bgars.inspection.board import Board
+    from bgars.inspection.radiance import Radiance
+
+__all__ = ["edge_steps", "first_heights"]
+
+Array = NDArray[np.float64]
+
+HEIGHTS = np.linspace(0.0, 1.15, 24)
+"""Heights of the centre that are tried, in radii."""
+ANGLES = np.radians(np.linspace(-60.0, 60.0, 13))
+BESIDE = 0.09
+"""Points inside and outside lie this share of the radius off the edge."""
+CLIP = (-0.5, 1.0)
+WEAK_STEP = 0.08
+TOP_SHARE = 0.7
+
+
+def edge_steps(
+    radiance: Radiance, balls: Balls, lights: Lights, images: NDArray[np.intp], hidden: Balls, board: Board, gains: Array
+) -> Array:
+    """Mean relative step of brightness from inside to outside of predicted edges, clipped; NaN where nothing is seen.
+
+    Parameters
+    ----------
+    radiance : Radiance
+    balls, lights : Balls, Lights
+        Predictions; arrays that broadcast with each other, without an axis for the points on the edge.
+    images : ndarray of int
+        Which image each prediction is looked for in; broadcasts, too.
+    hidden : Balls
+        (N,) all balls, whose silhouettes hide the board.
+    board : Board
+    gains : (L,) float64
+        Relative irradiance of the board under each light.
+    """
+    balls, lights = balls.spread(1), Lights(lights.x[..., None], lights.y[..., None], lights.z[..., None], lights.near)
+    edge = edge_at(ANGLES, balls, lights, board)
+    beam = rays(edge.x, edge.y, balls, lights, board)
+    off = np.maximum(BESIDE * balls.radius, 1.5) / beam.slope
+    out_x, out_y = beam.gradient_x * off, beam.gradient_y * off
+    sides = []
+    for sign in (-1.0, 1.0):
+        x, y = edge.x + sign * out_x, edge.y + sign * out_y
+        row, col = np.rint(radiance.row(y)).astype(np.intp), np.rint(radiance.col(x)).astype(np.intp)
+        seen = (row >= 0) & (row < radiance.height) & (col >= 0) & (col < radiance.width) & (edge.tangent_height > 0)
+        row, col = np.clip(row, 0, radiance.height - 1), np.clip(col, 0, radiance.width - 1)
+        values = radiance.at(row * radiance.width + col) / gains.astype(np.float32).reshape(-1, *[1] * row.ndim)
+        texture = np.nan_to_num(values).mean(axis=0)
+        image = np.broadcast_to(images[..., None], row.shape)
+        own = np.take_along_axis(values, image[None], axis=0)[0]
+        seen &= np.isfinite(own) & (texture > 0)
+        for index in range(len(hidden.x)):
+            near = (hidden.radius[index] + 2.0) ** 2
+            seen &= np.square(x - hidden.x[index]) + np.square(y - hidden.y[index]) > near
+        sides.append(np.where(seen, own / np.where(texture > 0, texture, 1.0), np.nan))
+    step = np.clip(sides[1] - sides[0], *CLIP)
+    known = np.isfinite(step)
+    points = known.sum(axis=-1)
+    mean: Array = np.where(points >= 3, np.where(known, step, 0.0).sum(axis=-1) / np.maximum(points, 1), np.nan)  # noqa: PLR2004
+    return mean
+
+
+def first_heights(
+    radiance: Radiance, table: Array, vectors: Array, near: bool, board: Board, gains: Array, neighbours: list[Array]
+) -> tuple[Array, Array]:
+    """(N,) heights of the centres, and the step of brightness that each was found by.
+
+    Parameters
+    ----------
+    radiance : Radiance
+    table : (N, 5) float64
+        Balls as spheres, any height.
+    vectors, near : (L, 3), bool
+        Lights.
+    board : Board
+    gains : (L,) float64
+    neighbours : list of (m, 5) float64
+        Per ball, the balls (itself too) that may hide the board around it.
+    """
+    heights, steps = np.zeros(len(table)), np.zeros(len(table))
+    lights = Lights.from_table(vectors, near).spread(1, 0)
+    images = np.arange(len(vectors))[None, :]
+    scores = np.zeros((len(table), len(HEIGHTS)))
+    for index, row in enumerate(table):
+        tried = np.repeat(row[None, :], len(HEIGHTS), axis=0)
+        tried[:, 2] = HEIGHTS * row[3]
+        step = edge_steps(
+            radiance, Balls.from_table(tried).spread(1), lights, images, Balls.from_table(neighbours[index]), board, gains
+        )
+        known = np.isfinite(step)
+        scores[index] = np.where(known, step, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 3.0)
+    common = _middle(np.median(scores, axis=0))
+    for index, row in enumerate(table):
+        steps[index] = scores[index].max()
+        heights[index] = (_middle(scores[index]) if steps[index] >= WEAK_STEP else common) * row[3]
+    return heights, steps
+
+
+def _middle(score: Array) -> float:
+    """Where a score that is flat at the top has its middle, in radii."""
+    best = int(np.argmax(score))
+    over = np.maximum(score - TOP_SHARE * score[best], 0.0)
+    first, last = best, best
+    while first > 0 and over[first - 1] > 0:
+        first -= 1
+    while last + 1 < len(score) and over[last + 1] > 0:
+        last += 1
+    part = slice(first, last + 1)
+    return float(np.average(HEIGHTS[part], weights=over[part])) if over[best] > 0 else float(HEIGHTS[best])

@@ -1,0 +1,230 @@
+"""The part recipe ``part.toml``: what it may hold, and clear words for what it may not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import ConfigDict, Field, model_validator
+
+from bgars.ball_names import ball_name, ball_place
+from bgars.ball_records import BallLayout
+from bgars.errors import FileFormatError, InputError
+from bgars.io.positions import read_positions
+from bgars.io.strict_toml import Strict, checked, read_values
+from bgars.part_recipe import BALL_LIMITS, PART_LIMITS, Limits, PartRecipe, View
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from os import PathLike
+
+__all__ = ["LimitsTable", "PartTable", "read_part_recipe", "recipe_keys"]
+
+MAX_BALLS = 32_767
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Range = tuple[NotNegative, NotNegative]
+
+
+class StrictNumbers(Strict):
+    """A table that takes neither text nor true for a number."""
+
+    model_config = ConfigDict(strict=True)
+
+
+class LimitsTable(StrictNumbers):
+    """The ``[limits]`` table."""
+
+    true_position_um: Positive | None = Field(
+        None, description="largest distance of a ball from its grid place; half of a diametral tolerance"
+    )
+    diameter_um: Range | None = Field(None, description="lowest and highest horizontal diameter")
+    height_um: Range | None = Field(None, description="lowest and highest top above the local board")
+    q: Range | None = Field(None, description="lowest and highest vertical over horizontal radius (a ratio)")
+    flat_um: Positive | None = Field(None, description="largest height that a flat top may lack")
+    pitch_um: Range | None = Field(None, description="lowest and highest pitch of the best-fitting grid")
+    seating_coplanarity_um: Positive | None = Field(None, description="largest apex distance from the seating plane")
+    regression_coplanarity_um: Positive | None = Field(
+        None, description="largest apex distance from the regression plane"
+    )
+    warpage_um: Positive | None = Field(None, description="largest warpage of the board under the balls")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _in_order(cls, values: Any) -> Any:  # noqa: ANN401 - whatever the file holds
+        if not isinstance(values, dict):
+            return values
+        for name in (*BALL_LIMITS, *PART_LIMITS):
+            limit = values.get(name)
+            if isinstance(limit, list):
+                numbers = [number for number in limit if isinstance(number, int | float)]
+                pair = 2
+                if len(numbers) == len(limit) == pair and not limit[0] < limit[1]:
+                    msg = f"{name}: must be [lowest, highest] with lowest < highest, got {limit}"
+                    raise ValueError(msg)
+                # TOML has arrays only; strict mode wants a tuple for a pair.
+                values = {**values, name: tuple(limit)}
+        return values
+
+
+class MaterialTable(StrictNumbers):
+    """The ``[material]`` table."""
+
+    file: str = Field(description="material fitted on an earlier capture of the same part and rig")
+
+
+class PartTable(StrictNumbers):
+    """The whole of ``part.toml``; file names are relative to its folder."""
+
+    name: Annotated[str, Field(min_length=1)] = Field(description="name of the part")
+    view: View = Field("bottom", description='side that names and positions refer to; "top" exchanges left and right')
+    rows: Annotated[int, Field(ge=1, le=MAX_BALLS)] | None = Field(None, description="rows of the lattice")
+    cols: Annotated[int, Field(ge=1, le=MAX_BALLS)] | None = Field(None, description="columns of the lattice")
+    pitch_um: Positive | None = Field(None, description="distance of neighbours in the lattice")
+    depopulated: list[str] | None = Field(None, description='names of lattice places without a ball, such as ["C3"]')
+    positions: str | None = Field(
+        None, description="instead of the lattice: CSV file with the columns name, x_um, y_um (x right, y up)"
+    )
+    diameter_um: Positive | None = Field(None, description="nominal horizontal diameter")
+    height_um: Positive | None = Field(None, description="nominal height of the tops above the board")
+    gravity_um: list[Number] | None = Field(
+        None, description="[x, y] of the centre of gravity against the middle; the mean of the places by default"
+    )
+    limits: LimitsTable = Field(default_factory=lambda: LimitsTable.model_validate({}), description="what is judged")
+    material: MaterialTable | None = Field(None, description="a known material")
+
+    @model_validator(mode="after")
+    def _one_layout(self) -> PartTable:
+        lattice = {"rows": self.rows, "cols": self.cols, "pitch_um": self.pitch_um}
+        missing = [name for name, value in lattice.items() if value is None]
+        if self.positions is not None:
+            given = [*(name for name in lattice if name not in missing)]
+            given += [] if self.depopulated is None else ["depopulated"]
+            if given:
+                msg = f"contradicting layout: positions goes without {', '.join(given)}"
+                raise ValueError(msg)
+        elif missing:
+            msg = f"the layout needs rows, cols and pitch_um, or positions; missing: {', '.join(missing)}"
+            raise ValueError(msg)
+        return self
+
+
+def read_part_recipe(path: str | PathLike[str]) -> PartRecipe:
+    """Read and check a part recipe.
+
+    Parameters
+    ----------
+    path : path
+        A ``part.toml`` (docs/inspection.md lists its keys).
+
+    Returns
+    -------
+    PartRecipe
+
+    Raises
+    ------
+    FileFormatError
+        The file, its CSV of positions or its material file is missing, or does not parse.
+    InputError
+        An unknown key (the nearest known one is named: limits carry their unit), a wrong type, a value out of range,
+        or a layout that contradicts itself; file, key, rule and value are named.
+
+    Examples
+    --------
+    >>> import bgars
+    >>> recipe = bgars.read_part_recipe(bgars.sample_part_recipe())
+    >>> recipe.layout.rows, recipe.limits.height_um
+    (5, (460.0, 540.0))
+    """
+    path = Path(path)
+    table = checked(PartTable, read_values(path), path)
+    try:
+        layout = _layout(table, path)
+        _check_sizes(table)
+    except InputError as error:
+        msg = f"{path}: {error}"
+        raise InputError(msg) from None
+    return PartRecipe(
+        name=table.name,
+        layout=layout,
+        view=table.view,
+        limits=Limits(**table.limits.model_dump()),
+        diameter_um=table.diameter_um,
+        height_um=table.height_um,
+        gravity_um=None if table.gravity_um is None else (table.gravity_um[0], table.gravity_um[1]),
+        material_file=_material(table, path),
+        file=path,
+    )
+
+
+def recipe_keys() -> Iterator[tuple[str, str]]:
+    """Yield each key of a part recipe and what it means, for the documentation."""
+    for name, entry in PartTable.model_fields.items():
+        if name == "limits":
+            yield from ((f"limits.{key}", str(part.description)) for key, part in LimitsTable.model_fields.items())
+        elif name == "material":
+            yield from ((f"material.{key}", str(part.description)) for key, part in MaterialTable.model_fields.items())
+        else:
+            yield name, str(entry.description)
+
+
+def _layout(table: PartTable, path: Path) -> BallLayout:
+    if table.positions is not None:
+        return BallLayout(positions=read_positions(path.parent / table.positions, table.diameter_um))
+    rows, cols, pitch_um = table.rows or 0, table.cols or 0, table.pitch_um or 0.0
+    if rows * cols > MAX_BALLS:
+        msg = f"rows x cols: must be {MAX_BALLS} balls or fewer, got {rows} x {cols}"
+        raise InputError(msg)
+    seen: set[str] = set()
+    for name in table.depopulated or ():
+        try:
+            row, col = ball_place(name)
+        except InputError as error:
+            msg = f"depopulated: {error}"
+            raise InputError(msg) from None
+        if row >= rows or col >= cols:
+            last = ball_name(rows - 1, cols - 1)
+            msg = f"depopulated: must be on the {rows} x {cols} lattice (A1 to {last}), got {name!r}"
+            raise InputError(msg)
+        if name in seen:
+            msg = f"depopulated: must name each place once, got {name!r} twice"
+            raise InputError(msg)
+        seen.add(name)
+    if len(seen) == rows * cols:
+        msg = f"depopulated: must leave a ball, got all {len(seen)} places of the {rows} x {cols} lattice"
+        raise InputError(msg)
+    return BallLayout(rows, cols, pitch_um, tuple(table.depopulated or ()))
+
+
+def _check_sizes(table: PartTable) -> None:
+    if table.gravity_um is not None and len(table.gravity_um) != len("xy"):
+        msg = f"gravity_um: must be [x, y], got {table.gravity_um}"
+        raise InputError(msg)
+    limits = table.limits
+    for name, nominal in (
+        ("diameter_um", table.diameter_um),
+        ("height_um", table.height_um),
+        ("pitch_um", table.pitch_um),
+    ):
+        limit = getattr(limits, name)
+        if nominal is not None and limit is not None and not limit[0] <= nominal <= limit[1]:
+            span = f"{limit[0]:g} to {limit[1]:g}"
+            msg = f"{name}: the nominal value must be within limits.{name} ({span}), got {nominal:g}"
+            raise InputError(msg)
+    if table.pitch_um is not None and table.diameter_um is not None and table.diameter_um >= table.pitch_um:
+        msg = f"diameter_um: must be below pitch_um ({table.pitch_um:g}), or balls touch, got {table.diameter_um:g}"
+        raise InputError(msg)
+    if table.positions is not None and limits.pitch_um is not None:
+        msg = "limits.pitch_um: goes with rows, cols and pitch_um; a list of positions has no pitch"
+        raise InputError(msg)
+
+
+def _material(table: PartTable, path: Path) -> Path | None:
+    if table.material is None:
+        return None
+    file = path.parent / table.material.file
+    if not file.is_file():
+        msg = f"{path}: material.file: no such file: {file}"
+        raise FileFormatError(msg)
+    return file

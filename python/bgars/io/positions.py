@@ -1,0 +1,85 @@
+"""Nominal positions of balls: a CSV of name, x_um, y_um."""
+
+from __future__ import annotations
+
+import csv
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bgars.errors import FileFormatError, InputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+__all__ = ["read_positions"]
+
+COLUMNS = ["name", "x_um", "y_um"]
+MAX_BALLS = 32_767
+
+
+def read_positions(path: Path, diameter_um: float | None = None) -> tuple[tuple[str, float, float], ...]:
+    """Read nominal positions, x right and y up.
+
+    Parameters
+    ----------
+    path : Path
+        CSV file with the header ``name,x_um,y_um``.
+    diameter_um : float, optional
+        Nominal diameter: places nearer to each other are refused.
+
+    Raises
+    ------
+    FileFormatError
+        The file is missing, or is no such table; the line is named.
+    InputError
+        A name twice, or places that coincide.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            lines = [[cell.strip() for cell in row] for row in csv.reader(file)]
+    except OSError as error:
+        msg = f"{path}: cannot be read ({error.strerror})"
+        raise FileFormatError(msg) from error
+    except (csv.Error, UnicodeDecodeError) as error:
+        msg = f"{path}: is not a CSV table ({error})"
+        raise FileFormatError(msg) from error
+    if not lines or lines[0] != COLUMNS:
+        header = ",".join(lines[0]) if lines else ""
+        msg = f"{path}: line 1: must be the header {','.join(COLUMNS)}, got {header!r}"
+        raise FileFormatError(msg)
+    places = [_place(path, number, cells) for number, cells in enumerate(lines[1:], start=2) if any(cells)]
+    if not 0 < len(places) <= MAX_BALLS:
+        msg = f"{path}: must hold 1 to {MAX_BALLS} positions, got {len(places)}"
+        raise FileFormatError(msg)
+    names = [name for name, _, _ in places]
+    if len(set(names)) < len(names):
+        twice = next(name for index, name in enumerate(names) if name in names[:index])
+        msg = f"{path}: name: must be given once, got {twice!r} twice"
+        raise InputError(msg)
+    _refuse_close(path, places, diameter_um or 0.0)
+    return tuple(places)
+
+
+def _place(path: Path, number: int, cells: list[str]) -> tuple[str, float, float]:
+    try:
+        name, x_um, y_um = cells[0], float(cells[1]), float(cells[2])
+        if not (name and len(cells) == len(COLUMNS) and math.isfinite(x_um) and math.isfinite(y_um)):
+            raise ValueError
+    except (ValueError, IndexError):
+        msg = f"{path}: line {number}: must be a name and two finite numbers, got {','.join(cells)!r}"
+        raise FileFormatError(msg) from None
+    return name, x_um, y_um
+
+
+def _refuse_close(path: Path, places: list[tuple[str, float, float]], least_um: float) -> None:
+    points_um = np.array([place[1:] for place in places])
+    for index in range(len(points_um) - 1):
+        distances_um = np.hypot(*(points_um[index + 1 :] - points_um[index]).T)
+        nearest = int(distances_um.argmin())
+        if distances_um[nearest] <= least_um:
+            pair = f"{places[index][0]} and {places[index + 1 + nearest][0]}"
+            rule = f"must be more than {least_um:g} um apart" if least_um else "must be at different places"
+            msg = f"{path}: {pair}: {rule}, got {distances_um[nearest]:g} um"
+            raise InputError(msg)

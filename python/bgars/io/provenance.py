@@ -1,0 +1,67 @@
+"""Which files a capture was read from, with their checksums."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bgars.errors import FileFormatError
+from bgars.io.capture_lights import default_recipe
+from bgars.io.recipe import RECIPE_NAME, TableResponse, read_recipe
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from bgars.records import Capture
+
+__all__ = ["capture_files", "checksums"]
+
+FILENAMES = "filenames.txt"
+BLOCK_BYTES = 1 << 20
+
+
+def capture_files(capture: Capture) -> tuple[Path, ...]:
+    """Return the files that a capture was read from: images, recipe, dark frame, mask, response, lights.
+
+    Examples
+    --------
+    >>> import bgars
+    >>> files = capture_files(bgars.read_capture(bgars.sample_capture()))
+    >>> [path.name for path in files if path.suffix != ".png"]
+    ['capture.toml', 'filenames.txt', 'light_directions.txt', 'light_intensities.txt']
+    """
+    if capture.folder is None:
+        return capture.files
+    path = capture.folder / RECIPE_NAME
+    recipe = read_recipe(path) if path.is_file() else default_recipe(capture.folder)
+    named = [RECIPE_NAME, FILENAMES if recipe.images is None else None, recipe.dark, recipe.mask]
+    if isinstance(recipe.response, TableResponse):
+        named.append(recipe.response.table)
+    if recipe.lights is not None:
+        named += [value for value in vars(recipe.lights).values() if isinstance(value, str)]
+    others = [capture.folder / name for name in named if name is not None]
+    return (*capture.files, *(file for file in others if file.is_file()))
+
+
+def checksums(files: Iterable[Path]) -> tuple[tuple[str, str], ...]:
+    """Return name and SHA-256 of each file, in hexadecimal.
+
+    Raises
+    ------
+    FileFormatError
+        A file is gone or cannot be read.
+    """
+    return tuple((path.name, _sha256(path)) for path in files)
+
+
+def _sha256(path: Path) -> str:
+    digest = hashlib.sha256()
+    try:
+        with path.open("rb") as file:
+            while block := file.read(BLOCK_BYTES):
+                digest.update(block)
+    except OSError as error:
+        msg = f"{path}: cannot be read ({error.strerror})"
+        raise FileFormatError(msg) from error
+    return digest.hexdigest()

@@ -1,0 +1,284 @@
+"""The result of an inspection: every ball, the part, and a verdict with its reasons."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from dataclasses import dataclass, fields
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bgars.ball_records import BallKind
+from bgars.part_recipe import PartRecipe
+
+__all__ = ["BallResult", "PartCheck", "PartResult", "SeatingResult", "Verdict"]
+
+Verdict = Literal["pass", "fail", "undecided"]
+DIGITS = 6
+CSV_DIGITS = 3
+TABLE = (
+    ("ball", "name", ""),
+    ("x um", "x_um", ".1f"),
+    ("y um", "y_um", ".1f"),
+    ("position um", "true_position_um", ".1f"),
+    ("diameter um", "diameter_um", ".1f"),
+    ("height um", "top_um", ".1f"),
+    ("seating um", "seating_deviation_um", ".1f"),
+    ("q", "q", ".3f"),
+    ("flat um", "flat_um", ".1f"),
+    ("verdict", "verdict", ""),
+)
+
+
+@dataclass(frozen=True)
+class BallResult:
+    """One ball, or a place that should have one; NaN = not measured. ``u_..`` are standard uncertainties (k = 1).
+
+    Attributes
+    ----------
+    name : str
+        In the recipe's view.
+    row, col : int or None
+        From 0 at the top left of the image; None off the lattice.
+    present : bool
+        False for a missing ball.
+    kind : {"ball", "extra", "bridged"}
+        See :class:`bgars.ball_records.FoundBall`.
+    x_um, y_um : float
+        Centre; x right, y up, origin at the centre of the image.
+    x_nominal_um, y_nominal_um : float
+        Its place in the best-fitting grid.
+    true_position_um : float
+        Distance of the centre from that place.
+    diameter_um, centre_z_um, top_um, q, flat_um : float
+        As in :class:`bgars.ball_records.MeasuredBall`.
+    seating_deviation_um, regression_deviation_um : float
+        Distance of the apex below either plane.
+    lights_used : int
+        Lights whose shadow was usable.
+    verdict : {"pass", "fail", "undecided"}
+    reasons : tuple of str
+        Why it is not "pass".
+    """
+
+    name: str
+    row: int | None
+    col: int | None
+    present: bool
+    verdict: Verdict
+    reasons: tuple[str, ...]
+    kind: BallKind = "ball"
+    x_um: float = math.nan
+    u_x_um: float = math.nan
+    y_um: float = math.nan
+    u_y_um: float = math.nan
+    x_nominal_um: float = math.nan
+    y_nominal_um: float = math.nan
+    true_position_um: float = math.nan
+    u_true_position_um: float = math.nan
+    diameter_um: float = math.nan
+    u_diameter_um: float = math.nan
+    centre_z_um: float = math.nan
+    u_centre_z_um: float = math.nan
+    top_um: float = math.nan
+    u_top_um: float = math.nan
+    q: float = math.nan
+    u_q: float = math.nan
+    flat_um: float = math.nan
+    u_flat_um: float = math.nan
+    seating_deviation_um: float = math.nan
+    regression_deviation_um: float = math.nan
+    lights_used: int = 0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the record as plain Python values; None where something was not measured."""
+        return {entry.name: _plain(getattr(self, entry.name), DIGITS) for entry in fields(self)}
+
+
+@dataclass(frozen=True)
+class PartCheck:
+    """A quantity of the whole part, and how it was judged.
+
+    Attributes
+    ----------
+    name : str
+        Such as "seating_coplanarity_um".
+    value_um, u_um, bias_um : float
+        Reading, its standard uncertainty, and by how much noise makes it too large on average.
+    lowest_um, highest_um : float or None
+        Limits.
+    verdict : Verdict or None
+        None when there is no limit.
+    reason : str
+        In words.
+    """
+
+    name: str
+    value_um: float
+    u_um: float
+    bias_um: float
+    lowest_um: float | None
+    highest_um: float | None
+    verdict: Verdict | None
+    reason: str
+
+
+@dataclass(frozen=True)
+class SeatingResult:
+    """A plane on which the part comes to rest: ``z = slope_x x + slope_y y + offset_um`` in the image's axes.
+
+    Attributes
+    ----------
+    balls : tuple of str
+        Balls that touch it.
+    coplanarity_um : float
+        Largest distance of an apex below it.
+    """
+
+    balls: tuple[str, ...]
+    coplanarity_um: float
+    slope_x: float
+    slope_y: float
+    offset_um: float
+
+
+@dataclass(frozen=True, eq=False)
+class PartResult:
+    """What an inspection found. NaN = not measured; ``u_..`` are standard uncertainties (k = 1).
+
+    Attributes
+    ----------
+    name : str
+        Of the part (recipe) or the capture.
+    balls : tuple of BallResult
+        Places in reading order, missing ones too; balls off the layout last.
+    verdict : {"pass", "fail", "undecided"}
+        "fail" if anything fails, else "undecided" if anything is undecided or was not measured.
+    reasons : tuple of str
+        Why it is not "pass".
+    pitch_um, u_pitch_um : float
+        Pitch of the best-fitting grid; NaN for a list of positions or a single ball.
+    grid_angle_deg : float
+        Turn of the grid against the image, counter-clockwise.
+    seating_coplanarity_um, u_seating_coplanarity_um, seating_noise_bias_um : float
+        Worst of `seatings`; its bias is not subtracted.
+    regression_coplanarity_um, u_regression_coplanarity_um, regression_noise_bias_um : float
+        By regression plane.
+    warpage_um, u_warpage_um : float
+        Of the board under the balls.
+    seatings : tuple of SeatingResult
+        Every plane on which the part comes to rest, the worst first; more than one: the part can rock.
+    checks : tuple of PartCheck
+        Quantities of the whole part.
+    bridges : tuple of (str, str)
+        Balls that are joined.
+    light_directions : (L, 3) float64
+        Refined directions to the lights.
+    light_change_deg : (L,) float64
+        How far each light was moved from the rig's.
+    board_coefficients_um : (6,) float64
+        Shape of the board, see :class:`bgars.ball_records.BallMeasurement`.
+    shadow_residual_rms : float
+        Of the shadow fit, over the contrast.
+    warnings : tuple of str
+        What to look at although numbers are right.
+    recipe : PartRecipe or None
+    pixel_pitch_um : float
+    files : tuple of (str, str)
+        Name and SHA-256 of every input file.
+    version : str
+        Of bgars.
+    """
+
+    name: str
+    balls: tuple[BallResult, ...]
+    verdict: Verdict
+    reasons: tuple[str, ...]
+    pitch_um: float
+    u_pitch_um: float
+    grid_angle_deg: float
+    seating_coplanarity_um: float
+    u_seating_coplanarity_um: float
+    seating_noise_bias_um: float
+    regression_coplanarity_um: float
+    u_regression_coplanarity_um: float
+    regression_noise_bias_um: float
+    warpage_um: float
+    u_warpage_um: float
+    seatings: tuple[SeatingResult, ...]
+    checks: tuple[PartCheck, ...]
+    bridges: tuple[tuple[str, str], ...]
+    light_directions: NDArray[np.float64]
+    light_change_deg: NDArray[np.float64]
+    board_coefficients_um: NDArray[np.float64]
+    shadow_residual_rms: float
+    warnings: tuple[str, ...]
+    recipe: PartRecipe | None
+    pixel_pitch_um: float
+    files: tuple[tuple[str, str], ...] = ()
+    version: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain Python values; None where something was not measured."""
+        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        values["balls"] = [ball.to_dict() for ball in self.balls]
+        values["recipe"] = None if self.recipe is None else self.recipe.to_dict()
+        values["files"] = [{"name": name, "sha256": digest} for name, digest in self.files]
+        for name in ("seatings", "checks"):
+            values[name] = [{key: _plain(value, DIGITS) for key, value in vars(row).items()} for row in values[name]]
+        # Slopes and curvatures are small numbers: they keep all digits.
+        exact = {"board_coefficients_um": [None if math.isnan(c) else float(c) for c in self.board_coefficients_um]}
+        return {name: _plain(value, DIGITS) for name, value in values.items()} | exact
+
+    def to_json(self) -> str:
+        """Return :meth:`to_dict` as JSON text."""
+        return json.dumps(self.to_dict(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+    def to_csv(self) -> str:
+        """Return the balls as CSV text, one line a ball; empty cells where something was not measured."""
+        text = io.StringIO()
+        names = [entry.name for entry in fields(BallResult)]
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(names)
+        for ball in self.balls:
+            cells = [_plain(getattr(ball, name), CSV_DIGITS) for name in names]
+            writer.writerow(["; ".join(cell) if isinstance(cell, list) else cell for cell in cells])
+        return text.getvalue()
+
+    def to_table(self) -> str:
+        """Return the balls as a table for people; "-" where something was not measured."""
+        rows = [[title for title, _, _ in TABLE]]
+        rows += [[_cell(getattr(ball, name), form) for _, name, form in TABLE] for ball in self.balls]
+        widths = [max(len(row[at]) for row in rows) for at in range(len(TABLE))]
+        last = len(TABLE) - 1
+        lines = []
+        for row in rows:
+            cells = [
+                f"{cell:<{w}}" if at in {0, last} else f"{cell:>{w}}"
+                for at, (cell, w) in enumerate(zip(row, widths, strict=True))
+            ]
+            lines.append("  ".join(cells).rstrip())
+        return "\n".join(lines)
+
+
+def _cell(value: Any, form: str) -> str:  # noqa: ANN401 - a field of a record
+    if isinstance(value, float):
+        return format(value, form) if math.isfinite(value) else "-"
+    return str(value)
+
+
+def _plain(value: Any, digits: int) -> Any:  # noqa: ANN401 - a field of a record
+    """Rounded numbers, None for NaN, lists for tuples and arrays."""
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist(), digits)
+    if isinstance(value, dict):
+        return {key: _plain(entry, digits) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry, digits) for entry in value]
+    if isinstance(value, float):
+        return round(value, digits) if math.isfinite(value) else None
+    return value

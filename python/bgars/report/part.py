@@ -1,0 +1,73 @@
+"""The pictures of an inspection."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bgars.errors import InputError
+from bgars.io.atomic import atomic_file
+from bgars.report.part_balls import part_figure
+from bgars.report.part_histograms import histogram_figure
+from bgars.report.part_maps import deviation_figure
+from bgars.report.part_shadows import shadow_figure
+from bgars.report.part_style import figure_style, save
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from bgars.part_result import PartResult
+    from bgars.records import Capture
+
+__all__ = ["PICTURES", "write_part_pictures"]
+
+PICTURES = {
+    "part.png": "the picture to look at first: every ball outlined, named, coloured by its deviation",
+    "shadows.png": "the fitted shadows over the images: what heights rest on",
+    "deviations.png": "maps of heights and of offsets from the grid",
+    "histograms.png": "how readings are spread, against their limits",
+}
+
+
+def write_part_pictures(result: PartResult, capture: Capture, folder: str | PathLike[str]) -> dict[str, str]:
+    """Write four PNG files of an inspection.
+
+    Parameters
+    ----------
+    result : PartResult
+        From :func:`bgars.inspect`.
+    capture : Capture
+        That it was made from.
+    folder : path
+        An existing folder.
+
+    Returns
+    -------
+    dict of str
+        Names of the files and what they show.
+
+    Raises
+    ------
+    InputError
+        A capture without a pixel pitch, or with another number of lights than the result.
+    FileFormatError
+        A file cannot be written.
+    """
+    if capture.pixel_pitch_um is None:
+        msg = "capture.pixel_pitch_um: needed for pictures in um, got none"
+        raise InputError(msg)
+    if len(result.light_directions) != len(capture.images):
+        msg = f"capture: must have the {len(result.light_directions)} lights of the result, got {len(capture.images)}"
+        raise InputError(msg)
+    folder = Path(folder)
+    with figure_style():
+        figures = {
+            "part.png": part_figure(result, capture),
+            "shadows.png": shadow_figure(result, capture),
+            "deviations.png": deviation_figure(result),
+            "histograms.png": histogram_figure(result),
+        }
+        for name, figure in figures.items():
+            with atomic_file(folder / name) as temporary:
+                save(figure, temporary)
+    return dict(PICTURES)

@@ -1,0 +1,162 @@
+"""Part recipes: what they give, and one clear message for each mistake."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import bgars
+import pytest
+from bgars.io.part_recipe import recipe_keys
+
+ROOT = Path(__file__).parents[2]
+LATTICE = 'name = "p"\nrows = 4\ncols = 5\npitch_um = 1000.0\n'
+GRID = "rows = 4\ncols = 5\npitch_um = 1000.0\n"
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "part.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def refused(path: Path, *words: str) -> None:
+    with pytest.raises(bgars.BgarsError) as caught:
+        bgars.read_part_recipe(path)
+    message = str(caught.value)
+    assert "\n" not in message
+    for word in words:
+        assert word in message, message
+
+
+def test_a_whole_recipe(tmp_path: Path) -> None:
+    (tmp_path / "solder.json").touch()
+    text = LATTICE + (
+        'view = "top"\ndepopulated = ["B2", "C3"]\ndiameter_um = 600\nheight_um = 500\ngravity_um = [10, -20.5]\n'
+        '[limits]\ndiameter_um = [560, 640]\nseating_coplanarity_um = 80\n[material]\nfile = "solder.json"\n'
+    )
+    recipe = bgars.read_part_recipe(write(tmp_path, text))
+    assert recipe.layout.depopulated == ("B2", "C3")
+    assert recipe.image_layout.depopulated == ("B4", "C3")
+    assert recipe.gravity_um == (10.0, -20.5)
+    assert recipe.limits.diameter_um == (560.0, 640.0)
+    assert recipe.limits.range_of("seating_coplanarity_um") == (None, 80.0)
+    assert recipe.limits.height_um is None
+    assert recipe.material_file == tmp_path / "solder.json"
+
+
+def test_positions_instead_of_a_lattice(tmp_path: Path) -> None:
+    (tmp_path / "balls.csv").write_text("name,x_um,y_um\nA1, -500, 0\nA2,500,0\n\nB7,0,800\n", encoding="utf-8")
+    recipe = bgars.read_part_recipe(write(tmp_path, 'name = "p"\npositions = "balls.csv"\nview = "top"\n'))
+    assert recipe.layout.positions == (("A1", -500.0, 0.0), ("A2", 500.0, 0.0), ("B7", 0.0, 800.0))
+    assert recipe.image_layout.positions[0] == ("A1", 500.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (LATTICE + "pitch = 3\n", ["unknown key 'pitch'", "'pitch_um'"]),
+        (LATTICE + "[limits]\ndiameter = [1, 2]\n", ["unknown key 'limits.diameter'", "'diameter_um'"]),
+        (LATTICE + "[limits]\ndiameter_mm = [0.5, 0.6]\n", ["unknown key 'limits.diameter_mm'", "'diameter_um'"]),
+        (LATTICE + "[limits]\nheight = [1, 2]\n", ["unknown key 'limits.height'", "'height_um'"]),
+        (LATTICE + "[limits]\ntrue_position = 50\n", ["limits.true_position", "'true_position_um'"]),
+        (LATTICE + "[limits]\nseating_coplanarity = 50\n", ["limits.seating_coplanarity", "'seating_coplanarity_um'"]),
+        (LATTICE + "[limits]\nwarpage = 50\n", ["limits.warpage", "'warpage_um'"]),
+        (LATTICE + "[limits]\ndiameter_um = [640, 560]\n", ["limits", "diameter_um", "lowest < highest", "[640, 560]"]),
+        (LATTICE + "[limits]\ndiameter_um = [600, 600]\n", ["limits", "diameter_um", "lowest < highest"]),
+        (LATTICE + "[limits]\ndiameter_um = 600\n", ["limits.diameter_um", "600"]),
+        (LATTICE + "[limits]\ndiameter_um = [1, 2, 3]\n", ["limits.diameter_um"]),
+        (LATTICE + "[limits]\ndiameter_um = [-5, 640]\n", ["limits.diameter_um", "greater than or equal to 0", "-5"]),
+        (LATTICE + "[limits]\nwarpage_um = -5\n", ["limits.warpage_um", "greater than 0", "-5"]),
+        (LATTICE + "[limits]\nwarpage_um = [0, 5]\n", ["limits.warpage_um", "number"]),
+        (LATTICE + "[limits]\nwarpage_um = nan\n", ["limits.warpage_um", "nan"]),
+        (LATTICE + "[limits]\nwarpage_um = inf\n", ["limits.warpage_um", "finite", "inf"]),
+        (LATTICE + '[limits]\nwarpage_um = "50 um"\n', ["limits.warpage_um", "number", "50 um"]),
+        (LATTICE + "[limits]\nwarpage_um = true\n", ["limits.warpage_um", "True"]),
+        (LATTICE + "[limit]\nwarpage_um = 5\n", ["unknown key 'limit'", "'limits'"]),
+        ('name = "p"\nrows = 4\ncols = 5\n', ["missing: pitch_um"]),
+        ('name = "p"\n', ["rows, cols and pitch_um, or positions"]),
+        (GRID, ["name", "required"]),
+        (LATTICE + 'positions = "b.csv"\n', ["contradicting layout", "positions goes without rows, cols, pitch_um"]),
+        ('name = "p"\npositions = "b.csv"\ndepopulated = ["A1"]\n', ["positions goes without depopulated"]),
+        ('name = "p"\npositions = "b.csv"\n', ["b.csv", "cannot be read"]),
+        (LATTICE + 'depopulated = ["E1"]\n', ["depopulated", "4 x 5 lattice (A1 to D5)", "'E1'"]),
+        (LATTICE + 'depopulated = ["A6"]\n', ["depopulated", "A1 to D5", "'A6'"]),
+        (LATTICE + 'depopulated = ["I1"]\n', ["depopulated", "ABCDEFGH", "'I1'"]),
+        (LATTICE + 'depopulated = ["a1"]\n', ["depopulated", "'a1'"]),
+        (LATTICE + 'depopulated = ["A1", "A1"]\n', ["depopulated", "once", "'A1' twice"]),
+        ('name = "p"\nrows = 1\ncols = 1\npitch_um = 9\ndepopulated = ["A1"]\n', ["must leave a ball"]),
+        ('name = "p"\nrows = 0\ncols = 5\npitch_um = 9\n', ["rows", "greater than or equal to 1", "0"]),
+        ('name = "p"\nrows = 2.5\ncols = 5\npitch_um = 9\n', ["rows", "integer", "2.5"]),
+        ('name = "p"\nrows = 200\ncols = 200\npitch_um = 9\n', ["32767", "200 x 200"]),
+        ('name = "p"\nrows = 2\ncols = 5\npitch_um = -9\n', ["pitch_um", "greater than 0", "-9"]),
+        (LATTICE + 'view = "side"\n', ["view", "'bottom' or 'top'", "side"]),
+        (LATTICE + "diameter_um = 1000\n", ["diameter_um", "below pitch_um", "1000"]),
+        (
+            LATTICE + "diameter_um = 600\n[limits]\ndiameter_um = [400, 500]\n",
+            ["diameter_um", "within limits.diameter_um (400 to 500)", "600"],
+        ),
+        (LATTICE + "height_um = 600\n[limits]\nheight_um = [400, 500]\n", ["height_um", "400 to 500", "600"]),
+        (LATTICE + "[limits]\npitch_um = [990, 999]\n", ["pitch_um", "990 to 999", "1000"]),
+        (LATTICE + "gravity_um = [1, 2, 3]\n", ["gravity_um", "[x, y]"]),
+        (LATTICE + '[material]\nfile = "none.json"\n', ["material.file", "no such file"]),
+        (LATTICE + "[material]\n", ["material.file", "required"]),
+        ("rows = \n", ["is not valid TOML"]),
+    ],
+)
+def test_mistakes(tmp_path: Path, text: str, words: list[str]) -> None:
+    refused(write(tmp_path, text), "part.toml" if "b.csv" not in words else "b.csv", *words)
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ("", ["line 1", "name,x_um,y_um"]),
+        ("name,x,y\nA1,0,0\n", ["line 1", "name,x_um,y_um", "name,x,y"]),
+        ("name,x_um,y_um\n", ["1 to 32767 positions", "0"]),
+        ("name,x_um,y_um\nA1,0\n", ["line 2", "two finite numbers", "A1,0"]),
+        ("name,x_um,y_um\nA1,0,0\nA2,left,0\n", ["line 3", "left"]),
+        ("name,x_um,y_um\nA1,nan,0\n", ["line 2", "finite"]),
+        ("name,x_um,y_um\n,0,0\n", ["line 2", "a name"]),
+        ("name,x_um,y_um\nA1,0,0,5\n", ["line 2", "A1,0,0,5"]),
+        ("name,x_um,y_um\nA1,0,0\nA1,900,0\n", ["once", "'A1' twice"]),
+        ("name,x_um,y_um\nA1,0,0\nA2,0,0\n", ["A1 and A2", "more than 600 um apart", "0 um"]),
+        ("name,x_um,y_um\nA1,0,0\nA2,0,599\n", ["A1 and A2", "599"]),
+    ],
+)
+def test_mistakes_in_positions(tmp_path: Path, table: str, words: list[str]) -> None:
+    (tmp_path / "b.csv").write_text(table, encoding="utf-8")
+    refused(write(tmp_path, 'name = "p"\npositions = "b.csv"\ndiameter_um = 600\n'), "b.csv", *words)
+
+
+def test_a_pitch_limit_needs_a_pitch(tmp_path: Path) -> None:
+    (tmp_path / "b.csv").write_text("name,x_um,y_um\nA1,0,0\n", encoding="utf-8")
+    refused(
+        write(tmp_path, 'name = "p"\npositions = "b.csv"\n[limits]\npitch_um = [1, 2]\n'),
+        "limits.pitch_um",
+        "positions",
+    )
+
+
+def test_files_that_are_none(tmp_path: Path) -> None:
+    refused(tmp_path / "none.toml", "none.toml", "cannot be read")
+    refused(tmp_path, "cannot be read")
+
+
+def test_the_sample_names_every_kind_of_limit() -> None:
+    recipe = bgars.read_part_recipe(bgars.sample_part_recipe())
+    missing = [name for name, _ in recipe_keys() if name.startswith("limits.") and not recipe.limits.range_of(name[7:])]
+    assert missing == []
+
+
+def test_the_documentation_lists_every_key() -> None:
+    page = (ROOT / "docs" / "inspection.md").read_text(encoding="utf-8")
+    page = page.partition("## The recipe\n")[2].partition("\n## ")[0]
+    rows = dict(re.findall(r"^\| `([a-z_.]+)` \| (.*) \|$", page, re.MULTILINE))
+    assert rows == dict(recipe_keys())
+
+
+def test_the_recipe_of_the_documentation_is_one(tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "inspection.md").read_text(encoding="utf-8")
+    (text,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    assert bgars.read_part_recipe(write(tmp_path, text)).limits.seating_coplanarity_um == 80.0
