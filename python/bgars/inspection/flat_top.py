@@ -1,7 +1,7 @@
 r"""Flat tops, which no shadow shows: slopes that are missing around the top, against the population.
 
-On a ball the slope of the normal grows from its centre, n_r = r / R. On a flat top of radius a it is 0: the slopes that
-are missing add up to ``M = sum (r / R - n_r) = 2 pi a^3 / (3 R)`` over the disc, in pixels. What an estimator gets wrong
+On a ball the tilt of the normal grows from its centre, n_r = q r / R at first. On a flat top of radius a it is 0: what is
+missing adds up to ``M = sum (q r / R - n_r) = 2 pi q a^3 / (3 R)`` over the disc, in pixels. What an estimator gets wrong
 on every ball alike is the population's median M and is subtracted. The cap that is gone is ``q (R - sqrt(R^2 - a^2))``
 high.
 """
@@ -63,7 +63,7 @@ def flat_tops(field: NormalField, table: Array) -> FlatTops:
 
 def _cap(missing: float, radius: float, q: float) -> float:
     """Height of the cap of a sphere that would make so much slope missing (missing is in units of R^2)."""
-    share = min(np.cbrt(1.5 * max(missing, 0.0) / np.pi), LARGEST)
+    share = min(np.cbrt(1.5 * max(missing, 0.0) / (np.pi * q)), LARGEST)
     return float(q * radius * (1.0 - np.sqrt(1.0 - share * share)))
 
 
@@ -85,8 +85,8 @@ def _missing_slope(field: NormalField, row: Array) -> float:
     known = inside & field.mask[patch] & np.isfinite(normals).all(axis=2)
     if known.sum() < MIN_KNOWN * inside.sum():
         return float("nan")
-    # Spheroid: the slope of the normal's profile is r / (q sqrt(R^2 - r^2)).
-    steep = np.where(inside, r / np.sqrt(np.maximum(radius**2 - r**2, 1e-9)) / q, 0.0)
+    # Spheroid: its profile q sqrt(R^2 - r^2) is q r / sqrt(R^2 - r^2) steep.
+    steep = np.where(inside, q * r / np.sqrt(np.maximum(radius**2 - r**2, 1e-9)), 0.0)
     expected = steep / np.sqrt(1.0 + steep**2)
     with np.errstate(invalid="ignore"):
         found = (normals[..., 0] * x + normals[..., 1] * y) / np.maximum(r, 1e-9)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bgars.inspection.board import SHAPE_TERMS, Board, board_from_normals, outside_balls
 from bgars.errors import InputError
 from bgars.inspection.bundle import Priors, Solution, angles_rad, solve_bundle
+from bgars.inspection.checks import check_shifts, explain_dark_steps, refuse_repeated
 from bgars.inspection.flat_top import flat_tops
 from bgars.inspection.outline import outline_centres
 from bgars.inspection.population import q_spread
@@ -56,6 +57,7 @@ SETTLED = 0.1
 SHORT_ROUNDS, LONG_ROUNDS = 8, 20
 REDESCEND = 3.5
 OUTLINE_SAFETY = 4.0
+SHIFT_BALLS = 24
 OUTLINE_FLOOR_PX = 0.01
 
 
@@ -72,6 +74,7 @@ class Fit:
     solution: Solution | None
     edges: Edges
     spread: EdgeSpread
+    warnings: tuple[str, ...]
 
 
 def measure_balls(
@@ -115,7 +118,9 @@ def measure_balls(
     Raises
     ------
     InputError
-        A capture without a pixel pitch, balls outside the image, a field of another size.
+        A capture without a pixel pitch, balls outside the image, a field of another size, an image twice.
+    CalibrationError
+        An image whose shadows say clearly that it belongs to another light, or that it is shifted.
 
     References
     ----------
@@ -139,6 +144,7 @@ def measure_balls(
         raise InputError(msg)
     workers = thread_count(threads)
     report = progress or _quiet
+    refuse_repeated(capture)
     problem = make_problem(capture, found)
     fit = fit_shadows(problem, field, refine_lights=refine_lights, threads=workers, progress=report)
     flats = None if field is None or fit is None or fit.solution is None else flat_tops(field, fit.solution.balls)
@@ -162,7 +168,7 @@ def fit_shadows(
     if not len(problem.table):
         return None
     table, vectors, board = problem.table.copy(), problem.vectors.copy(), Board()
-    heights, _ = first_heights(
+    heights, steps = first_heights(
         problem.radiance,
         table,
         vectors,
@@ -172,6 +178,7 @@ def fit_shadows(
         [problem.neighbours(index) for index in range(len(table))],
     )
     table[:, 2] = heights
+    warnings = explain_dark_steps(problem, table, steps)
     progress(0.1)
     priors = _priors(problem, table, field, refine_lights)
     spread = EdgeSpread(FIRST_SPREAD_PX, 0.0)
@@ -198,13 +205,17 @@ def fit_shadows(
         )
         if last:
             priors = _with_outlines(problem, priors, shadows, table, spread)
+            few = np.argsort(np.hypot(table[:, 0], table[:, 1]))[:SHIFT_BALLS]
+            azimuths = np.arctan2(vectors[:, 1], vectors[:, 0])
+            wide = outline_centres(problem.radiance, shadows, table[few], azimuths, spread.sharp_px, coarse=True)
+            warnings += check_shifts(wide)
         edges = measure_edges(
             problem.radiance, shadows, table[index], vectors, problem.near, board, gains[index], settings, threads
         )
         usability = judge_balls(edges)
         chosen = index[usability.usable]
         if not len(chosen):
-            return Fit(problem, index, usability, None, edges, spread)
+            return Fit(problem, index, usability, None, edges, spread, warnings)
         used = edges.take(usability.usable)
         start = (table[chosen], vectors, board)
         solution, priors = _solve(used, start, problem.near, priors, chosen, turn, last, refine_lights)
@@ -215,7 +226,7 @@ def fit_shadows(
             spread = fit_spread(used)
         turn += 1
         progress(0.1 + 0.8 * (1.0 if last else turn / passes))
-        result = Fit(problem, index, usability, solution, edges, spread)
+        result = Fit(problem, index, usability, solution, edges, spread, warnings)
     return result
 
 
@@ -247,10 +258,13 @@ def _priors(problem: Problem, table: Array, field: NormalField | None, refine_li
     return Priors(table.copy(), u_balls, problem.vectors.copy(), float(rig), board, u_board)
 
 
-def _with_outlines(problem: Problem, priors: Priors, shadows: ShadowMap, table: Array, spread: EdgeSpread) -> Priors:
+def _with_outlines(
+    problem: Problem, priors: Priors, shadows: ShadowMap, table: Array, spread: EdgeSpread
+) -> Priors:
     """Centres of the priors: the finder's and the outlines', weighted."""
     azimuths = np.arctan2(problem.vectors[:, 1], problem.vectors[:, 0])
-    centres, u_outline = outline_centres(problem.radiance, shadows, table, azimuths, spread.sharp_px)
+    outlines = outline_centres(problem.radiance, shadows, table, azimuths, spread.sharp_px)
+    centres, u_outline = outlines.centres, outlines.u_centre
     known = np.isfinite(u_outline) & ~problem.bridged
     by_outline = np.where(known, 1.0 / (OUTLINE_FLOOR_PX**2 + np.square(OUTLINE_SAFETY * np.where(known, u_outline, 1.0))), 0.0)
     by_finder = 1.0 / problem.u_centre**2

@@ -14,7 +14,7 @@ __all__ = ["q_spread"]
 
 Array = NDArray[np.float64]
 
-LIMITS = (0.0005, 0.02)
+LIMITS = (0.0003, 0.02)
 UNKNOWN = 0.003
 """Scatter of q among round balls: bounds, and what is taken where too few balls are seen."""
 MIN_POPULATION = 5

@@ -84,7 +84,8 @@ def measurement(found: FoundBalls, problem: Problem, fit: Fit | None, flats: Fla
     c1, c2, c3, c4, c5 = solution.board.coefficients
     moved = np.degrees(angles_rad(solution.vectors, problem.vectors))
     refined = solution.vectors / np.linalg.norm(solution.vectors, axis=1, keepdims=True)
-    warnings = tuple(
+    warnings = fit.warnings if fit is not None else ()
+    warnings += tuple(
         f"light {light}: its shadows say that it stands {moved[light]:.1f} degrees from where the rig says"
         for light in np.flatnonzero(moved > LIGHT_WARNING_DEG)
     )

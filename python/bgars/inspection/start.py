@@ -75,7 +75,7 @@ def edge_steps(
 def first_heights(
     radiance: Radiance, table: Array, vectors: Array, near: bool, board: Board, gains: Array, neighbours: list[Array]
 ) -> tuple[Array, Array]:
-    """(N,) heights of the centres, and the step of brightness that each was found by.
+    """(N,) heights of the centres, and (N, L) the step of brightness under each light there (NaN: not seen).
 
     Parameters
     ----------
@@ -89,7 +89,8 @@ def first_heights(
     neighbours : list of (m, 5) float64
         Per ball, the balls (itself too) that may hide the board around it.
     """
-    heights, steps = np.zeros(len(table)), np.zeros(len(table))
+    heights, steps = np.zeros(len(table)), np.full((len(table), len(vectors)), np.nan)
+    seen = np.full((len(table), len(HEIGHTS), len(vectors)), np.nan)
     lights = Lights.from_table(vectors, near).spread(1, 0)
     images = np.arange(len(vectors))[None, :]
     scores = np.zeros((len(table), len(HEIGHTS)))
@@ -99,12 +100,14 @@ def first_heights(
         step = edge_steps(
             radiance, Balls.from_table(tried).spread(1), lights, images, Balls.from_table(neighbours[index]), board, gains
         )
+        seen[index] = step
         known = np.isfinite(step)
         scores[index] = np.where(known, step, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 3.0)
     common = _middle(np.median(scores, axis=0))
     for index, row in enumerate(table):
-        steps[index] = scores[index].max()
-        heights[index] = (_middle(scores[index]) if steps[index] >= WEAK_STEP else common) * row[3]
+        height = _middle(scores[index]) if scores[index].max() >= WEAK_STEP else common
+        heights[index] = height * row[3]
+        steps[index] = seen[index, int(np.argmin(np.abs(HEIGHTS - height)))]
     return heights, steps
 
 
