@@ -56,7 +56,7 @@ EMPIRICAL_ROUNDS = 5
 SETTLED = 0.1
 SHORT_ROUNDS, LONG_ROUNDS = 8, 20
 REDESCEND = 3.5
-OUTLINE_SAFETY = 4.0
+OUTLINE_SAFETY = 1.5
 SHIFT_BALLS = 24
 OUTLINE_FLOOR_PX = 0.01
 
@@ -266,7 +266,12 @@ def _with_outlines(
     outlines = outline_centres(problem.radiance, shadows, table, azimuths, spread.sharp_px)
     centres, u_outline = outlines.centres, outlines.u_centre
     known = np.isfinite(u_outline) & ~problem.bridged
-    by_outline = np.where(known, 1.0 / (OUTLINE_FLOOR_PX**2 + np.square(OUTLINE_SAFETY * np.where(known, u_outline, 1.0))), 0.0)
+    # What outlines scatter beyond their own word shows against the shadows' centres, but for a common shift.
+    u_outline = np.where(known, u_outline, 1.0)
+    off = (centres - table[:, :2])[known]
+    scatter = 1.4826 * np.median(np.abs(off - np.median(off, axis=0)) / u_outline[known, None]) if known.any() else 1.0
+    u_outline = OUTLINE_SAFETY * max(float(scatter), 1.0) * u_outline
+    by_outline = np.where(known, 1.0 / (OUTLINE_FLOOR_PX**2 + u_outline**2), 0.0)
     by_finder = 1.0 / problem.u_centre**2
     balls, u_balls = priors.balls.copy(), priors.u_balls.copy()
     weight = by_outline + by_finder

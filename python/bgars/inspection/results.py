@@ -33,7 +33,7 @@ FLAT_SHARE = 0.01
 """A flat top is taken off the height where it is significant and more than this share of the radius."""
 POOR_SHARE = 0.02
 MANY_OUTLIERS = 0.4
-MODEL_CENTRE_PX, MODEL_RADIUS_PX = 0.0022, 0.0035
+MODEL_CENTRE_PX, MODEL_RADIUS_PX = 0.0018, 0.0030
 MODEL_HEIGHT_PER_RADIUS = -1.2
 """Scatter of simulated balls beyond the fit's own uncertainty (docs/make_inspection_accuracy.py prints both), for sharp
 edges; it grows with the root of their spread. Height and radius err against each other: the tip of the shadow stays.

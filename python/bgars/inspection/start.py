@@ -23,6 +23,7 @@ ANGLES = np.radians(np.linspace(-60.0, 60.0, 13))
 BESIDE = 0.09
 """Points inside and outside lie this share of the radius off the edge."""
 CLIP = (-0.5, 1.0)
+MIN_POINTS = 5
 WEAK_STEP = 0.08
 TOP_SHARE = 0.7
 
@@ -68,7 +69,7 @@ def edge_steps(
     step = np.clip(sides[1] - sides[0], *CLIP)
     known = np.isfinite(step)
     points = known.sum(axis=-1)
-    mean: Array = np.where(points >= 3, np.where(known, step, 0.0).sum(axis=-1) / np.maximum(points, 1), np.nan)  # noqa: PLR2004
+    mean: Array = np.where(points >= MIN_POINTS, np.where(known, step, 0.0).sum(axis=-1) / np.maximum(points, 1), np.nan)
     return mean
 
 
