@@ -40,6 +40,9 @@ FINE_PASSES = 4
 """Most passes with sharp edges; two where the first leaves little to do."""
 SMALL_CHANGE_PX = 0.5
 FIRST_SPREAD_PX = 0.5
+SPREADS_PX = (0.3, 0.5, 0.8, 1.3, 2.0)
+SPREAD_BALLS = 8
+SMALL_SPREAD_CHANGE = 0.15
 REACH_SIGMAS = 3.2
 REACH_PX = 1.2
 TYPICAL_WAY = 2.0
@@ -222,12 +225,39 @@ def fit_shadows(
         change = float(np.percentile(np.abs(solution.balls - table[chosen]).max(axis=1), 90.0))
         table[chosen], vectors, board = solution.balls, solution.vectors, solution.board
         gains[index] = edges.lit_levels(gains[index])
+        before = spread
         if turn >= len(COARSE):
             spread = fit_spread(used)
+        elif turn == len(COARSE) - 1:
+            spread = _first_spread(problem, shadows, table[chosen], vectors, board, gains[chosen], settings, threads)
+        if abs(spread.sharp_px - before.sharp_px) > SMALL_SPREAD_CHANGE * before.sharp_px and turn >= len(COARSE):
+            change = np.inf
         turn += 1
         progress(0.1 + 0.8 * (1.0 if last else turn / passes))
         result = Fit(problem, index, usability, solution, edges, spread, warnings)
     return result
+
+
+def _first_spread(
+    problem: Problem,
+    shadows: ShadowMap,
+    table: Array,
+    vectors: Array,
+    board: Board,
+    gains: Array,
+    settings: EdgeSettings,
+    threads: int,
+) -> EdgeSpread:
+    """The spread, of a few, that leaves the least noise on a few balls."""
+    few = slice(0, None, max(1, len(table) // SPREAD_BALLS))
+    noise = []
+    for spread_px in SPREADS_PX:
+        tried = EdgeSettings(spread_px, 0.0, settings.reach_px)
+        edges = measure_edges(
+            problem.radiance, shadows, table[few], vectors, problem.near, board, gains[few], tried, threads
+        )
+        noise.append(float(np.median(edges.noise_levels)))
+    return EdgeSpread(SPREADS_PX[int(np.argmin(noise))], 0.0)
 
 
 def _settings(turn: int, radius: float, spread: EdgeSpread) -> EdgeSettings:

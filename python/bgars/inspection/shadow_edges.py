@@ -43,12 +43,14 @@ __all__ = ["EdgeSettings", "Edges", "measure_edges"]
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-SECTORS = 20
+SECTORS, FEWEST_SECTORS = 20, 4
 WIDEST_RAD = np.radians(100.0)
 LINE_SPACING_PX = 1.45
 """Distance of neighbouring lines along the edge: above sqrt(2), so that no two lines share a pixel."""
 MAX_LINES = 96
 COARSE_LINES = 48
+FEWEST_LINES = 12
+LINES_A_STRETCH = 3
 LINES_AT_ONCE = 6000
 MIN_LIGHTS_LIT = 2
 LOWEST_TANGENT = 0.08
@@ -147,7 +149,7 @@ def measure_edges(
     """
     radius = float(np.median(table[:, 3]))
     most = COARSE_LINES if settings.coarse else MAX_LINES
-    count = int(np.clip(2.0 * WIDEST_RAD * radius / LINE_SPACING_PX, 2 * SECTORS, most))
+    count = int(np.clip(2.0 * WIDEST_RAD * radius / LINE_SPACING_PX, FEWEST_LINES, most))
     angles = (np.arange(count) + 0.5) / count * 2.0 * WIDEST_RAD - WIDEST_RAD
     step = max(1, LINES_AT_ONCE // (len(vectors) * count))
     parts = [slice(first, first + step) for first in range(0, len(table), step)]
@@ -173,7 +175,8 @@ def _measure(
 ) -> list[Array]:
     """The same for some of the balls."""
     balls, lights = Balls.from_table(table), Lights.from_table(vectors, near)
-    shape = (len(table), len(vectors), SECTORS)
+    sectors = int(np.clip(len(angles) // LINES_A_STRETCH, FEWEST_SECTORS, SECTORS))
+    shape = (len(table), len(vectors), sectors)
     wide_balls, wide_lights = balls.spread(2), lights.spread(1, 1)
     edge = edge_at(angles[None, None, :], wide_balls, wide_lights, board)
     beam = rays(edge.x, edge.y, wide_balls, wide_lights, board)
@@ -190,7 +193,7 @@ def _measure(
     spread = np.sqrt(settings.spread_px**2 + (settings.lamp_spread_rad * way) ** 2)
     point = (edge.x[pick], edge.y[pick])
     pixels = _pixels(radiance, shadows, balls, board, gains, settings, here, point, ball, light, spread)
-    sector = ball * len(vectors) * SECTORS + light * SECTORS + place * SECTORS // len(angles)
+    sector = (ball * len(vectors) + light) * sectors + place * sectors // len(angles)
     return _solve(radiance, pixels, sector, angles[place], way, spread, shape, wide_balls, wide_lights, board, settings)
 
 
