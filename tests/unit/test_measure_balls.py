@@ -25,7 +25,13 @@ def board(bow_um: float = 0.0, i_d: float = 0.12) -> bgars.Board:
 def array(rows: int, cols: int, seed: int, *, bow_um: float = 0.0, **options: object) -> bgars.Scene:
     jitter = bgars.Jitter(height_um=8.0, radius_um=3.0, position_um=5.0)
     return bgars.Scene.ball_array(
-        rows, cols, rotation_deg=0.3, jitter=jitter, seed=seed, board=board(bow_um), **options  # type: ignore[arg-type]
+        rows,
+        cols,
+        rotation_deg=0.3,
+        jitter=jitter,
+        seed=seed,
+        board=board(bow_um),
+        **options,  # type: ignore[arg-type]
     )
 
 
@@ -58,7 +64,11 @@ def photograph(
 ) -> tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]:
     options = {"supersample": 4, "full_well_e": 15000.0, "read_noise_levels": 0.15} | camera
     capture, truth = bgars.simulate(
-        scene, rig, MATTE, bgars.Camera(pixel_pitch_um=pitch_um, **options), seed=seed  # type: ignore[arg-type]
+        scene,
+        rig,
+        MATTE,
+        bgars.Camera(pixel_pitch_um=pitch_um, **options),
+        seed=seed,  # type: ignore[arg-type]
     )
     return capture, truth, circles(truth, pitch_um, seed)
 
@@ -223,7 +233,7 @@ def test_bridged_balls_have_no_height(part: tuple[bgars.Capture, bgars.Simulated
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        (lambda images: np.zeros_like(images), "too little contrast"),
+        (np.zeros_like, "too little contrast"),
         (lambda images: np.full_like(images, 255), "saturated"),
         (lambda images: images // 20, "too little contrast"),
     ],

@@ -65,9 +65,7 @@ def check_shadows(capture: Capture, found: FoundBalls) -> tuple[str, ...]:
     table = problem.table.copy()
     neighbours = [problem.neighbours(index) for index in range(len(table))]
     gains = problem.irradiance.mean(axis=0)
-    heights, steps = first_heights(
-        problem.radiance, table, problem.vectors, problem.near, Board(), gains, neighbours
-    )
+    heights, steps = first_heights(problem.radiance, table, problem.vectors, problem.near, Board(), gains, neighbours)
     table[:, 2] = heights
     return explain_dark_steps(problem, table, steps)
 
@@ -174,7 +172,10 @@ def _name_lights(problem: Problem, answers: dict[int, Array]) -> tuple[list[str]
             messages.append(f"image {light} has the shadows of light {other}")
     for light, direction in answers.items():
         if light not in like:
-            azimuth, elevation = np.degrees(np.arctan2(direction[1], direction[0])) % 360.0, np.degrees(np.arcsin(direction[2]))
+            azimuth, elevation = (
+                np.degrees(np.arctan2(direction[1], direction[0])) % 360.0,
+                np.degrees(np.arcsin(direction[2])),
+            )
             off = np.degrees(np.arccos(np.clip(unit[light] @ direction, -1.0, 1.0)))
             (messages if off > NEAR_DEG else doubts).append(
                 f"light {light} stands about {off:.0f} degrees from where the rig says: its shadows point to azimuth "
@@ -192,11 +193,13 @@ def _turn_deg(first: Array, second: Array) -> float:
 def _steps(problem: Problem, balls: Array, chosen: NDArray[np.intp], vectors: Array, light: int) -> Array:
     """(C,) mean steps of one image under C candidates: balls (C, n, 5) and lights (C, 3)."""
     table = Balls(*np.moveaxis(balls, -1, 0))
-    lights = Lights(*(part[:, None] for part in vectors.T), problem.near)
+    lights = Lights.from_table(vectors, problem.near).spread(0, 1)
     silhouettes = np.concatenate([problem.table, problem.extra])
     hidden = Balls.from_table(silhouettes)
     images = np.full((1, 1), light)
-    steps = edge_steps(problem.radiance, table, lights, images, hidden, Board(), problem.irradiance[chosen].mean(axis=0))
+    steps = edge_steps(
+        problem.radiance, table, lights, images, hidden, Board(), problem.irradiance[chosen].mean(axis=0)
+    )
     known = np.isfinite(steps)
     mean: Array = np.where(known, steps, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 2.0)
     return mean
@@ -256,7 +259,7 @@ def check_shifts(outlines: Outlines) -> tuple[str, ...]:
         angle = np.broadcast_to(azimuth + outlines.offset_rad[None, :], off.shape)[known]
         system, found = np.column_stack([np.cos(angle), np.sin(angle)]), off[known]
         spread = max(1.4826 * float(np.median(np.abs(found - np.median(found)))), 1e-3)
-        keep = np.abs(found - np.median(found)) < 4.0 * spread  # noqa: PLR2004
+        keep = np.abs(found - np.median(found)) < 4.0 * spread
         move = np.linalg.lstsq(system[keep], found[keep], rcond=None)[0]
         u_move = spread / np.sqrt(max(int(keep.sum()), 1) / 2.0)
         size = float(np.hypot(*move))

@@ -1,7 +1,9 @@
 r"""Flat tops, which no shadow shows: slopes that are missing around the top, against the population.
 
-On a ball the tilt of the normal grows from its centre, n_r = q r / R at first. On a flat top of radius a it is 0: what is
-missing adds up to ``M = sum (q r / R - n_r) = 2 pi q a^3 / (3 R)`` over the disc, in pixels. What an estimator gets wrong
+On a ball the tilt of the normal grows from its centre, n_r = q r / R at first. On a flat top of radius a it is 0:
+what is
+missing adds up to ``M = sum (q r / R - n_r) = 2 pi q a^3 / (3 R)`` over the disc, in pixels. What an estimator gets
+wrong
 on every ball alike is the population's median M and is subtracted. The cap that is gone is ``q (R - sqrt(R^2 - a^2))``
 high.
 """

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bgars.inspection.board import SHAPE_TERMS, Board, board_from_normals, outside_balls
 from bgars.errors import InputError
+from bgars.inspection.board import SHAPE_TERMS, Board, board_from_normals, outside_balls
 from bgars.inspection.bundle import Priors, Solution, angles_rad, solve_bundle
 from bgars.inspection.checks import check_shifts, explain_dark_steps, refuse_repeated
 from bgars.inspection.flat_top import flat_tops
@@ -68,7 +68,8 @@ OUTLINE_FLOOR_PX = 0.01
 class Fit:
     """Everything the shadows gave, in pixels.
 
-    `index` (n,) balls whose shadows were looked at (no bridges); `solution` only of those that `usability` calls usable.
+    `index` (n,) balls whose shadows were looked at (no bridges); `solution` only of those that `usability` calls
+    usable.
     """
 
     problem: Problem
@@ -115,7 +116,8 @@ def measure_balls(
     -------
     BallMeasurement
         Balls in the order of `found`. What could not be measured is NaN, with reasons. Heights are above the smooth
-        board under the ball. They rest on two assumptions, which no image can replace: errors of the rig are independent
+        board under the ball. They rest on two assumptions, which no image can replace: errors of the rig are
+        independent
         from light to light, and the balls are round on the whole (one ball may well be flattened).
 
     Raises
@@ -288,9 +290,7 @@ def _priors(problem: Problem, table: Array, field: NormalField | None, refine_li
     return Priors(table.copy(), u_balls, problem.vectors.copy(), float(rig), board, u_board)
 
 
-def _with_outlines(
-    problem: Problem, priors: Priors, shadows: ShadowMap, table: Array, spread: EdgeSpread
-) -> Priors:
+def _with_outlines(problem: Problem, priors: Priors, shadows: ShadowMap, table: Array, spread: EdgeSpread) -> Priors:
     """Centres of the priors: the finder's and the outlines', weighted."""
     azimuths = np.arctan2(problem.vectors[:, 1], problem.vectors[:, 0])
     outlines = outline_centres(problem.radiance, shadows, table, azimuths, spread.sharp_px)

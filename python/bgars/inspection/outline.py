@@ -1,7 +1,9 @@
 r"""Centres of balls from their outlines, each light on the side that it shines on.
 
-There ball and board are both lit and their edge is sharp, while the board's shape and the light's direction do not enter:
-what shadows cannot tell apart (a tilt of all lights and of the board, and a shift of all balls) outlines can. With r the
+There ball and board are both lit and their edge is sharp, while the board's shape and the light's direction do not
+enter:
+what shadows cannot tell apart (a tilt of all lights and of the board, and a shift of all balls) outlines can. With r
+the
 distance to the centre, along the outline
 
     I = outside Phi(d / s) + (inside + bend sqrt(1 - r^2 / R^2)) (1 - Phi(d / s)) + move phi(d / s) / s,   d = r - R.

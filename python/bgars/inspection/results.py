@@ -102,7 +102,7 @@ def measurement(found: FoundBalls, problem: Problem, fit: Fit | None, flats: Fla
 
 
 def _model_error(sharp_px: float) -> Array:
-    """(5, 5) covariance of what no residual shows: texture and shadow blurred together, pixels that straddle an edge."""
+    """(5, 5) covariance of what no residual shows: blurred texture, pixels that straddle an edge."""
     size = np.sqrt(sharp_px / SHARP_PX)
     centre, radius = size * MODEL_CENTRE_PX, size * MODEL_RADIUS_PX
     together = radius * np.array([0.0, 0.0, MODEL_HEIGHT_PER_RADIUS, 1.0, 0.0])
@@ -110,12 +110,10 @@ def _model_error(sharp_px: float) -> Array:
     return covariance
 
 
-def _measured(
-    ball: FoundBall, fit: Fit, place: int, lights: int, flats: FlatTops | None, pitch: float
-) -> MeasuredBall:
+def _measured(ball: FoundBall, fit: Fit, place: int, lights: int, flats: FlatTops | None, pitch: float) -> MeasuredBall:
     """A ball with its numbers."""
     solution = fit.solution
-    assert solution is not None  # noqa: S101 - the caller looked
+    assert solution is not None
     x, y, z, radius, q = solution.balls[place]
     covariance = solution.covariance[place] + _model_error(fit.spread.sharp_px)
     u = np.sqrt(np.diag(covariance))

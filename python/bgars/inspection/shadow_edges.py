@@ -5,7 +5,8 @@ Near the predicted edge of a shadow, at signed distance d, the board reads
     I = T [lo + (hi - lo) Phi(d / s)] + e,
 
 T the board's own texture (mean of the lights that reach the pixel, each divided by its gain), s the spread of the edge
-by pixel, lens and size of the lamp. A stretch of edge has its own lo and hi (light from neighbouring balls differs along
+by pixel, lens and size of the lamp. A stretch of edge has its own lo and hi (light from neighbouring balls differs
+along
 the edge), and to first order a displacement a and a change b of the spread:
 
     I = lo T (1 - Phi) + hi T Phi - (hi - lo) [a T phi / s + b T (d / s) phi / s],
@@ -113,8 +114,8 @@ class Edges:
     def lit_levels(self, otherwise: Array) -> Array:
         """(N, L) median lit level over the board's texture, `otherwise` where unknown: the gains as they really are."""
         known = np.isfinite(self.high)
-        some = known.any(axis=2)
-        levels: Array = np.where(some, np.nanmedian(np.where(some[:, :, None], self.high, 1.0), axis=2), otherwise)
+        some = known.any(axis=2, keepdims=True)
+        levels: Array = np.where(some[..., 0], np.nanmedian(np.where(some, self.high, 1.0), axis=2), otherwise)
         return np.where(levels > 0, levels, otherwise)
 
 
@@ -299,8 +300,12 @@ def _solve(
     tangent_along = (beam.toward_y * beam.gradient_x - beam.toward_x * beam.gradient_y) / beam.slope
     curvature = (1.0 - tangent_along**2) / (beam.distance * beam.slope)
     # And texture that grows outward by g a pixel, blurred with the shadow, moves its edge inward by g s^2.
-    blurred = 0.0 if coarse_px is not None else sharp_px**2 * _texture_growth(pixels, spread, sector, size).reshape(shape)
-    shift = blurred + 0.5 * mean_spread**2 * curvature - np.where(measured, fit.solution[:, 2].reshape(shape) / safe, 0.0)
+    blurred = (
+        0.0 if coarse_px is not None else sharp_px**2 * _texture_growth(pixels, spread, sector, size).reshape(shape)
+    )
+    shift = (
+        blurred + 0.5 * mean_spread**2 * curvature - np.where(measured, fit.solution[:, 2].reshape(shape) / safe, 0.0)
+    )
     bad = ~measured
     return [
         np.where(bad, 0.0, edge.x + shift * beam.gradient_x / beam.slope),

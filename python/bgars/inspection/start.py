@@ -1,4 +1,4 @@
-"""A first height for every ball: the one whose predicted shadow edges are the darkest inside and the brightest outside."""
+"""A first height for every ball: where predicted shadow edges are darkest inside and brightest outside."""
 
 from __future__ import annotations
 
@@ -29,7 +29,13 @@ TOP_SHARE = 0.7
 
 
 def edge_steps(
-    radiance: Radiance, balls: Balls, lights: Lights, images: NDArray[np.intp], hidden: Balls, board: Board, gains: Array
+    radiance: Radiance,
+    balls: Balls,
+    lights: Lights,
+    images: NDArray[np.intp],
+    hidden: Balls,
+    board: Board,
+    gains: Array,
 ) -> Array:
     """Mean relative step of brightness from inside to outside of predicted edges, clipped; NaN where nothing is seen.
 
@@ -69,7 +75,9 @@ def edge_steps(
     step = np.clip(sides[1] - sides[0], *CLIP)
     known = np.isfinite(step)
     points = known.sum(axis=-1)
-    mean: Array = np.where(points >= MIN_POINTS, np.where(known, step, 0.0).sum(axis=-1) / np.maximum(points, 1), np.nan)
+    mean: Array = np.where(
+        points >= MIN_POINTS, np.where(known, step, 0.0).sum(axis=-1) / np.maximum(points, 1), np.nan
+    )
     return mean
 
 
@@ -99,7 +107,13 @@ def first_heights(
         tried = np.repeat(row[None, :], len(HEIGHTS), axis=0)
         tried[:, 2] = HEIGHTS * row[3]
         step = edge_steps(
-            radiance, Balls.from_table(tried).spread(1), lights, images, Balls.from_table(neighbours[index]), board, gains
+            radiance,
+            Balls.from_table(tried).spread(1),
+            lights,
+            images,
+            Balls.from_table(neighbours[index]),
+            board,
+            gains,
         )
         seen[index] = step
         known = np.isfinite(step)
