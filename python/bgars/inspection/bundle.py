@@ -191,7 +191,7 @@ def solve_bundle(
 
 
 def _honest_weights(residual: Array, variance: Array, known: NDArray[np.bool_], redescend: float | None) -> Array:
-    """Weights that give the covariance of the robust estimate: E[psi^2] / E[psi']^2 of Huber (1981), equation 6.5.
+    """Weights that give the covariance of the robust estimate: E[psi^2] / E[psi']^2 of Huber (1981), section 7.6.
 
     Points that were rejected count as little as they did in the fit.
     """
@@ -221,8 +221,7 @@ def _excess(residual: Array, u_px: Array) -> float:
 def _linearise(
     edges: Edges, table: Array, vectors: Array, near: bool, board: Board
 ) -> tuple[Array, tuple[Array, Array, Array]]:
-    """Distance of every point to its predicted edge, and derivatives by ball (..., 5), light (..., 2), board (...,
-    5)."""
+    """Distance of every point to its predicted edge, and derivatives (..., 5), (..., 2), (..., 5): ball, light, board."""
     balls = Balls.from_table(table).spread(2)
     lamps = Lights.from_table(vectors, near).spread(1, 1)
     beam = rays(edges.x, edges.y, balls, lamps, board)

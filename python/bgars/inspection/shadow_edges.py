@@ -114,8 +114,9 @@ class Edges:
     def lit_levels(self, otherwise: Array) -> Array:
         """(N, L) median lit level over the board's texture, `otherwise` where unknown: the gains as they really are."""
         known = np.isfinite(self.high)
-        some = known.any(axis=2, keepdims=True)
-        levels: Array = np.where(some[..., 0], np.nanmedian(np.where(some, self.high, 1.0), axis=2), otherwise)
+        some: NDArray[np.bool_] = np.asarray(known.any(axis=2))
+        high = np.where(some[:, :, None], self.high, 1.0)
+        levels: Array = np.where(some, np.nanmedian(high, axis=2), otherwise)
         return np.where(levels > 0, levels, otherwise)
 
 
