@@ -215,7 +215,8 @@ def tables(data: Path) -> list[str]:
     """All lines between the marks."""
     lines = [
         "| scene | balls | pitch (um) | centre, each axis: RMS | radius: bias / sigma | top: bias / sigma "
-        "| robust sigma | u(top) | seating coplanarity: error | lights: worst (deg) | flat tops (truth: K3 C5, 60) | CPU (s) |",
+        "| robust sigma | u(top) | seating coplanarity: error | lights: worst (deg) "
+        "| flat tops (truth: K3 C5, 60) | CPU (s) |",
         "| --- |" + " ---: |" * 11,
     ]
     for name in SCENES:

@@ -334,6 +334,21 @@ def test_a_sound_capture_has_no_warnings(part: tuple[bgars.Capture, bgars.Simula
     assert measure_balls(part[0], part[2]).warnings == ()
 
 
+@pytest.mark.parametrize("elevation_deg", [22.0, 65.0])
+def test_low_and_high_lights_raise_no_false_alarm(elevation_deg: float) -> None:
+    capture, truth, found = photograph(array(4, 5, 11), bgars.LightRig.ring(8, elevation_deg=elevation_deg))
+    measured = measure_balls(capture, found)
+    assert measured.warnings == ()
+    assert rms(errors(measured, truth, "top_um")) < 0.8
+
+
+def test_small_balls_and_blurred_images() -> None:
+    capture, truth, found = photograph(array(4, 4, 12), bgars.LightRig.ring(8), pitch_um=25.0)
+    assert rms(errors(measure_balls(capture, found), truth, "top_um")) < 1.0
+    capture, truth, found = photograph(array(3, 3, 12), bgars.LightRig.ring(8), pitch_um=10.0, blur_px=2.0)
+    assert rms(errors(measure_balls(capture, found), truth, "top_um")) < 1.0
+
+
 def test_bad_arguments_are_named(part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]) -> None:
     capture, _, found = part
     with pytest.raises(bgars.InputError, match="pixel_pitch_um"):

@@ -221,7 +221,7 @@ def _excess(residual: Array, u_px: Array) -> float:
 def _linearise(
     edges: Edges, table: Array, vectors: Array, near: bool, board: Board
 ) -> tuple[Array, tuple[Array, Array, Array]]:
-    """Distance of every point to its predicted edge, and derivatives (..., 5), (..., 2), (..., 5): ball, light, board."""
+    """Distance of every point to its predicted edge, and derivatives by ball, light and board."""
     balls = Balls.from_table(table).spread(2)
     lamps = Lights.from_table(vectors, near).spread(1, 1)
     beam = rays(edges.x, edges.y, balls, lamps, board)

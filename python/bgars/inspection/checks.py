@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bgars.errors import CalibrationError, InputError
 from bgars.inspection.board import Board
-from bgars.inspection.problem import make_problem
 from bgars.inspection.shadow_model import Balls, Lights
-from bgars.inspection.start import edge_steps, first_heights
+from bgars.inspection.start import edge_steps
 
 if TYPE_CHECKING:
-    from bgars.ball_records import FoundBalls
     from bgars.inspection.outline import Outlines
     from bgars.inspection.problem import Problem
+    from bgars.inspection.shadow_edges import Edges
     from bgars.records import Capture
 
-__all__ = ["check_shadows", "check_shifts", "explain_dark_steps", "refuse_repeated"]
+__all__ = ["Complaint", "check_shifts", "explain_dark_steps", "refuse_misfits", "refuse_repeated"]
 
 Array = NDArray[np.float64]
 
@@ -27,6 +26,11 @@ SAMPLE = 50_000
 GOOD_STEP = 0.5
 """Mean step of brightness over predicted edges, relative to the board, that needs no explanation."""
 MUCH_BETTER = 0.2
+FITTING_WEIGHT, FITTING_SHARE, STRONG = 0.3, 0.7, 0.4
+"""A light is fine when this share of its stretches of edge fit, where it stands at most `FAR_DEG` from the rig."""
+FAR_DEG = 5.0
+MIN_WITNESSES = 3
+"""Balls that must agree before an image is refused."""
 MOST_BALLS = 12
 TURNS_DEG = np.arange(-180.0, 180.0, 7.5)
 RAISES_DEG = np.arange(-15.0, 16.0, 5.0)
@@ -41,33 +45,6 @@ SHIFT_WARNING_PX, SHIFT_ERROR_PX = 0.4, 1.0
 SHIFT_SIGMAS = 6.0
 MIN_STRETCHES = 20
 LOWEST_DEG, HIGHEST_DEG = 5.0, 88.0
-
-
-def check_shadows(capture: Capture, found: FoundBalls) -> tuple[str, ...]:
-    """Check that images, lights and shadows belong together; :func:`measure_balls` does this on its way.
-
-    Returns
-    -------
-    tuple of str
-        What is doubtful.
-
-    Raises
-    ------
-    InputError
-        An image that is there twice.
-    CalibrationError
-        An image whose shadows say clearly that it belongs to another light, or that it is shifted.
-    """
-    refuse_repeated(capture)
-    problem = make_problem(capture, found)
-    if not len(problem.table):
-        return ()
-    table = problem.table.copy()
-    neighbours = [problem.neighbours(index) for index in range(len(table))]
-    gains = problem.irradiance.mean(axis=0)
-    heights, steps = first_heights(problem.radiance, table, problem.vectors, problem.near, Board(), gains, neighbours)
-    table[:, 2] = heights
-    return explain_dark_steps(problem, table, steps)
 
 
 def refuse_repeated(capture: Capture) -> None:
@@ -85,7 +62,15 @@ def refuse_repeated(capture: Capture) -> None:
                 raise InputError(msg)
 
 
-def explain_dark_steps(problem: Problem, table: Array, steps: Array) -> tuple[str, ...]:
+class Complaint(NamedTuple):
+    """What is wrong with the image of a light, or seems so; `serious` when another explanation is much better."""
+
+    light: int
+    text: str
+    serious: bool
+
+
+def explain_dark_steps(problem: Problem, table: Array, steps: Array) -> tuple[Complaint, ...]:
     """Explain images whose predicted shadow edges are no edges.
 
     Parameters
@@ -98,13 +83,8 @@ def explain_dark_steps(problem: Problem, table: Array, steps: Array) -> tuple[st
 
     Returns
     -------
-    tuple of str
-        Images that nothing explains.
-
-    Raises
-    ------
-    CalibrationError
-        Another direction or a shift explains an image much better than what the capture says.
+    tuple of Complaint
+        Not the last word: where shadows merge (low lights, dense balls) a first look sees little. See `refuse_misfits`.
     """
     known = np.isfinite(steps)
     mean = np.where(known, steps, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
@@ -112,23 +92,59 @@ def explain_dark_steps(problem: Problem, table: Array, steps: Array) -> tuple[st
     if not doubtful.size or not known.any():
         return ()
     chosen = np.sort(np.argsort(np.hypot(table[:, 0], table[:, 1]))[:MOST_BALLS])
-    warnings, errors, answers = [], [], {}
+    complaints: list[Complaint] = []
+    answers: dict[int, Array] = {}
     for light in (int(each) for each in doubtful):
         turned, direction = _best_direction(problem, table, chosen, light)
         moved, dx, dy = _best_shift(problem, table, chosen, light)
-        best = max(turned, moved)
-        if best < GOOD_STEP or best < mean[light] + MUCH_BETTER:
-            warnings.append(f"image {light}: its shadows are not where light {light} of the rig casts them")
-        elif moved > turned - MUCH_BETTER and _balls_moved(problem, chosen, light, dx, dy):
-            errors.append(f"image {light} is shifted by about ({dx:+.0f}, {dy:+.0f}) pixels (x right, y up)")
-        elif turned < GOOD_STEP or turned < mean[light] + MUCH_BETTER:
-            warnings.append(f"image {light}: its shadows are not where light {light} of the rig casts them")
-        else:
+        needed = max(GOOD_STEP, mean[light] + MUCH_BETTER)
+        if moved >= needed and moved > turned - MUCH_BETTER and _balls_moved(problem, chosen, light, dx, dy):
+            text = f"image {light} is shifted by about ({dx:+.0f}, {dy:+.0f}) pixels (x right, y up)"
+            complaints.append(Complaint(light, text, serious=True))
+        elif turned >= needed:
             answers[light] = direction
-    named, doubts = _name_lights(problem, answers)
-    if errors or named:
-        raise CalibrationError("images and lights do not belong together: " + "; ".join(errors + named))
-    return tuple(warnings + doubts)
+        else:
+            text = f"image {light}: its shadows are not where light {light} of the rig casts them"
+            complaints.append(Complaint(light, text, serious=False))
+    return tuple(complaints + _name_lights(problem, answers))
+
+
+def refuse_misfits(
+    complaints: tuple[Complaint, ...], edges: Edges, weight: Array | None, moved_deg: Array
+) -> tuple[str, ...]:
+    """Confront complaints with the fit: a light whose shadows fit after all is none.
+
+    Parameters
+    ----------
+    complaints : tuple of Complaint
+    edges : Edges
+        Of the balls in the fit.
+    weight : (N, L, S) float64 or None
+        Weights of the stretches of edge in the fit; None without a fit.
+    moved_deg : (L,) float64
+        How far the fit moved each light.
+
+    Returns
+    -------
+    tuple of str
+        Complaints that are left and not serious.
+
+    Raises
+    ------
+    CalibrationError
+        Complaints that are left and serious.
+    """
+    if weight is not None:
+        strong = edges.contrast_levels > STRONG * np.nanmedian(edges.contrast_levels)
+        looked_at = edges.looked_at.sum(axis=(0, 2))
+        fitting = ((weight > FITTING_WEIGHT) & strong).sum(axis=(0, 2))
+        fine = (fitting >= FITTING_SHARE * looked_at) & (looked_at >= MIN_STRETCHES) & (moved_deg < FAR_DEG)
+        complaints = tuple(complaint for complaint in complaints if not fine[complaint.light])
+    serious = [complaint.text for complaint in complaints if complaint.serious]
+    few = weight is None or len(weight) < MIN_WITNESSES
+    if serious and not few:
+        raise CalibrationError("images and lights do not belong together: " + "; ".join(serious))
+    return tuple(complaint.text for complaint in complaints)
 
 
 def _balls_moved(problem: Problem, chosen: NDArray[np.intp], light: int, dx: float, dy: float) -> bool:
@@ -150,38 +166,36 @@ def _balls_moved(problem: Problem, chosen: NDArray[np.intp], light: int, dx: flo
     return contrast[1] > SHARPER * contrast[0]
 
 
-def _name_lights(problem: Problem, answers: dict[int, Array]) -> tuple[list[str], list[str]]:
-    """Say what directions mean: swapped images, another light, a wrong rig; and lights that are only a little off."""
+def _name_lights(problem: Problem, answers: dict[int, Array]) -> list[Complaint]:
+    """Say what directions mean: swapped images, another light, a wrong rig."""
     unit = problem.vectors / np.linalg.norm(problem.vectors, axis=1, keepdims=True)
-    like: dict[int, int] = {}
-    messages: list[str] = []
-    doubts: list[str] = []
     turns = [_turn_deg(unit[light], direction) for light, direction in answers.items()]
     if len(answers) == len(unit) and np.ptp(turns) < SAME_LIGHT_DEG and abs(np.mean(turns)) > SAME_LIGHT_DEG:
-        return [f"all lights stand {np.mean(turns):+.0f} degrees counter-clockwise of where the rig says"], []
+        text = f"all lights stand {np.mean(turns):+.0f} degrees counter-clockwise of where the rig says"
+        return [Complaint(light, text, serious=True) for light in (0,)]
+    like: dict[int, int] = {}
     for light, direction in answers.items():
         angles = np.degrees(np.arccos(np.clip(unit @ direction, -1.0, 1.0)))
         nearest = int(np.argmin(angles))
         if nearest != light and angles[nearest] < SAME_LIGHT_DEG:
             like[light] = nearest
-    for light, other in like.items():
-        if like.get(other) == light:
-            if light < other:
-                messages.append(f"images {light} and {other} are swapped")
-        else:
-            messages.append(f"image {light} has the shadows of light {other}")
+    complaints = []
     for light, direction in answers.items():
-        if light not in like:
-            azimuth, elevation = (
-                np.degrees(np.arctan2(direction[1], direction[0])) % 360.0,
-                np.degrees(np.arcsin(direction[2])),
-            )
+        other = like.get(light)
+        if other is None:
+            azimuth = np.degrees(np.arctan2(direction[1], direction[0])) % 360.0
+            elevation = np.degrees(np.arcsin(direction[2]))
             off = np.degrees(np.arccos(np.clip(unit[light] @ direction, -1.0, 1.0)))
-            (messages if off > NEAR_DEG else doubts).append(
+            text = (
                 f"light {light} stands about {off:.0f} degrees from where the rig says: its shadows point to azimuth "
                 f"{azimuth:.0f}, elevation {elevation:.0f} degrees"
             )
-    return messages, doubts
+            complaints.append(Complaint(light, text, serious=bool(off > NEAR_DEG)))
+        elif like.get(other) != light:
+            complaints.append(Complaint(light, f"image {light} has the shadows of light {other}", serious=True))
+        elif light < other:
+            complaints.append(Complaint(light, f"images {light} and {other} are swapped", serious=True))
+    return complaints
 
 
 def _turn_deg(first: Array, second: Array) -> float:

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from bgars.errors import InputError
 from bgars.inspection.board import SHAPE_TERMS, Board, board_from_normals, outside_balls
 from bgars.inspection.bundle import Priors, Solution, angles_rad, solve_bundle
-from bgars.inspection.checks import check_shifts, explain_dark_steps, refuse_repeated
+from bgars.inspection.checks import check_shifts, explain_dark_steps, refuse_misfits, refuse_repeated
 from bgars.inspection.flat_top import flat_tops
-from bgars.inspection.outline import outline_centres
+from bgars.inspection.highlights import read_highlights
+from bgars.inspection.outline import Outlines, outline_centres
 from bgars.inspection.population import q_spread
 from bgars.inspection.problem import Problem, make_problem, thread_count
 from bgars.inspection.results import Usability, judge_balls, measurement
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from bgars.ball_records import BallMeasurement, FoundBalls
     from bgars.records import Capture, NormalField
 
-__all__ = ["Fit", "fit_shadows", "measure_balls"]
+__all__ = ["Fit", "check_shadows", "fit_shadows", "measure_balls"]
 
 Array = NDArray[np.float64]
 
@@ -152,9 +153,39 @@ def measure_balls(
     refuse_repeated(capture)
     problem = make_problem(capture, found)
     fit = fit_shadows(problem, field, refine_lights=refine_lights, threads=workers, progress=report)
+    highlights = None
+    if fit is not None and fit.solution is not None:
+        solution = fit.solution
+        highlights = read_highlights(problem.radiance, solution.balls, solution.vectors, problem.near)
     flats = None if field is None or fit is None or fit.solution is None else flat_tops(field, fit.solution.balls)
     report(1.0)
-    return measurement(found, problem, fit, flats)
+    return measurement(found, problem, fit, flats, highlights)
+
+
+def check_shadows(capture: Capture, found: FoundBalls, *, threads: int | None = None) -> tuple[str, ...]:
+    """Check that images, lights and shadows belong together.
+
+    The whole measurement is made for it: where shadows merge, only the fit tells a wrong light from a hidden shadow.
+
+    Parameters
+    ----------
+    capture, found, threads
+        As for :func:`measure_balls`.
+
+    Returns
+    -------
+    tuple of str
+        What is doubtful though numbers may still be right: a light some degrees from where the rig says, an image
+        shifted by less than a pixel.
+
+    Raises
+    ------
+    InputError
+        An image that is there twice; see :func:`measure_balls` for others.
+    CalibrationError
+        Images swapped or taken from another light, shifted by a pixel or more; lights far from where the rig says.
+    """
+    return measure_balls(capture, found, threads=threads).warnings
 
 
 def _quiet(_: float) -> None:
@@ -183,7 +214,8 @@ def fit_shadows(
         [problem.neighbours(index) for index in range(len(table))],
     )
     table[:, 2] = heights
-    warnings = explain_dark_steps(problem, table, steps)
+    complaints = explain_dark_steps(problem, table, steps)
+    warnings: tuple[str, ...] = ()
     progress(0.1)
     priors = _priors(problem, table, field, refine_lights)
     spread = EdgeSpread(FIRST_SPREAD_PX, 0.0)
@@ -194,6 +226,7 @@ def fit_shadows(
     passes = len(COARSE) + FINE_PASSES
     result: Fit | None = None
     turn, last, change = 0, False, np.inf
+    wide: Outlines | None = None
     while not last:
         last = turn == passes - 1 or (turn > len(COARSE) and change < SMALL_CHANGE_PX)
         radius = float(np.median(table[:, 3]))
@@ -210,16 +243,14 @@ def fit_shadows(
         )
         if last:
             priors = _with_outlines(problem, priors, shadows, table, spread)
-            few = np.argsort(np.hypot(table[:, 0], table[:, 1]))[:SHIFT_BALLS]
-            azimuths = np.arctan2(vectors[:, 1], vectors[:, 0])
-            wide = outline_centres(problem.radiance, shadows, table[few], azimuths, spread.sharp_px, coarse=True)
-            warnings += check_shifts(wide)
+            wide = _wide_outlines(problem, shadows, table, vectors, spread)
         edges = measure_edges(
             problem.radiance, shadows, table[index], vectors, problem.near, board, gains[index], settings, threads
         )
         usability = judge_balls(edges)
         chosen = index[usability.usable]
         if not len(chosen):
+            warnings = refuse_misfits(complaints, edges, None, np.zeros(len(vectors)))
             return Fit(problem, index, usability, None, edges, spread, warnings)
         used = edges.take(usability.usable)
         start = (table[chosen], vectors, board)
@@ -234,10 +265,20 @@ def fit_shadows(
             spread = _first_spread(problem, shadows, table[chosen], vectors, board, gains[chosen], settings, threads)
         if abs(spread.sharp_px - before.sharp_px) > SMALL_SPREAD_CHANGE * before.sharp_px and turn >= len(COARSE):
             change = np.inf
+        if wide is not None:
+            moved_deg = np.degrees(angles_rad(vectors, problem.vectors))
+            warnings = refuse_misfits(complaints, used, solution.weight, moved_deg) + check_shifts(wide)
         turn += 1
         progress(0.1 + 0.8 * (1.0 if last else turn / passes))
         result = Fit(problem, index, usability, solution, edges, spread, warnings)
     return result
+
+
+def _wide_outlines(problem: Problem, shadows: ShadowMap, table: Array, vectors: Array, spread: EdgeSpread) -> Outlines:
+    """Outlines of some balls in the middle, looked for farther off, to tell whether an image is shifted."""
+    few = np.argsort(np.hypot(table[:, 0], table[:, 1]))[:SHIFT_BALLS]
+    azimuths = np.arctan2(vectors[:, 1], vectors[:, 0])
+    return outline_centres(problem.radiance, shadows, table[few], azimuths, spread.sharp_px, coarse=True)
 
 
 def _first_spread(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -9,11 +10,14 @@ from numpy.typing import NDArray
 
 from bgars.ball_records import BallMeasurement, MeasuredBall
 from bgars.inspection.bundle import angles_rad
+from bgars.inspection.highlights import sharpen_centres
 from bgars.inspection.spread import SHARP_PX
 
 if TYPE_CHECKING:
     from bgars.ball_records import FoundBall, FoundBalls
+    from bgars.inspection.bundle import Solution
     from bgars.inspection.flat_top import FlatTops
+    from bgars.inspection.highlights import Highlights
     from bgars.inspection.measure import Fit
     from bgars.inspection.problem import Problem
     from bgars.inspection.shadow_edges import Edges
@@ -63,7 +67,9 @@ def judge_balls(edges: Edges) -> Usability:
     return Usability(usable, strong.sum(axis=1), np.where(seen.any(axis=1), mean, np.nan))
 
 
-def measurement(found: FoundBalls, problem: Problem, fit: Fit | None, flats: FlatTops | None) -> BallMeasurement:
+def measurement(
+    found: FoundBalls, problem: Problem, fit: Fit | None, flats: FlatTops | None, highlights: Highlights | None
+) -> BallMeasurement:
     """Put everything into records."""
     pitch = problem.pitch_um
     unit = problem.vectors / np.linalg.norm(problem.vectors, axis=1, keepdims=True)
@@ -72,11 +78,13 @@ def measurement(found: FoundBalls, problem: Problem, fit: Fit | None, flats: Fla
     fitted: dict[int, int] = {}
     if fit is not None and solution is not None:
         fitted = {int(ball): place for place, ball in enumerate(fit.index[fit.usability.usable])}
+        fit = _with_highlights(fit, solution, highlights)
     balls = []
     for index, ball in enumerate(found.balls):
         if index in fitted and fit is not None:
             lights = int(fit.usability.lights[looked_at[index]])
-            balls.append(_measured(ball, fit, fitted[index], lights, flats, pitch))
+            missing = highlights is not None and bool(highlights.missing[fitted[index]])
+            balls.append(_measured(ball, fit, fitted[index], lights, flats, missing, pitch))
         else:
             balls.append(_unmeasured(ball, index, problem, fit, looked_at, pitch))
     if solution is None:
@@ -101,6 +109,22 @@ def measurement(found: FoundBalls, problem: Problem, fit: Fit | None, flats: Fla
     )
 
 
+def _with_highlights(fit: Fit, solution: Solution, highlights: Highlights | None) -> Fit:
+    """The fit with centres sharpened by highlights."""
+    if highlights is None:
+        return fit
+    u_centre = np.sqrt(np.stack([solution.covariance[:, 0, 0], solution.covariance[:, 1, 1]], axis=1))
+    here = solution.balls[:, :2]
+    centres, u_sharp = sharpen_centres(highlights, here, here, u_centre)
+    balls, covariance = solution.balls.copy(), solution.covariance.copy()
+    balls[:, :2] = centres
+    for axis in (0, 1):
+        share = u_sharp[:, axis] / u_centre[:, axis]
+        covariance[:, axis, :] *= share[:, None]
+        covariance[:, :, axis] *= share[:, None]
+    return replace(fit, solution=replace(solution, balls=balls, covariance=covariance))
+
+
 def _model_error(sharp_px: float) -> Array:
     """(5, 5) covariance of what no residual shows: blurred texture, pixels that straddle an edge."""
     size = np.sqrt(sharp_px / SHARP_PX)
@@ -110,7 +134,9 @@ def _model_error(sharp_px: float) -> Array:
     return covariance
 
 
-def _measured(ball: FoundBall, fit: Fit, place: int, lights: int, flats: FlatTops | None, pitch: float) -> MeasuredBall:
+def _measured(
+    ball: FoundBall, fit: Fit, place: int, lights: int, flats: FlatTops | None, missing: bool, pitch: float
+) -> MeasuredBall:
     """A ball with its numbers."""
     solution = fit.solution
     assert solution is not None
@@ -128,6 +154,8 @@ def _measured(ball: FoundBall, fit: Fit, place: int, lights: int, flats: FlatTop
             top -= flat
             u_top = float(np.hypot(u_top, u_flat))
             reasons.append(f"flat top: {flat * pitch:.0f} um are missing")
+    elif missing:
+        reasons.append("flat top, or of another material: its highlights are missing")
     known = np.isfinite(solution.residual_px[place])
     outliers = float((solution.weight[place][known] < 0.1).mean()) if known.any() else 1.0  # noqa: PLR2004
     if outliers > MANY_OUTLIERS:

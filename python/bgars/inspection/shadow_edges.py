@@ -93,6 +93,7 @@ class Edges:
     low, high : shadow and lit level over the board's texture
     contrast_levels : high - low in grey levels of 255
     noise_levels : (N, L) residual of the fit in grey levels of 255
+    looked_at : bool, True where enough board was seen on both sides of the predicted edge
     """
 
     x: Array
@@ -106,6 +107,7 @@ class Edges:
     high: Array
     contrast_levels: Array
     noise_levels: Array
+    looked_at: NDArray[np.bool_]
 
     def take(self, balls: NDArray[np.bool_]) -> Edges:
         """Some of the balls."""
@@ -320,6 +322,7 @@ def _solve(
         np.where(bad, np.nan, fit.solution[:, 1].reshape(shape)),
         np.where(bad, np.nan, contrast * texture / radiance.scale),
         fit.noise.reshape(shape[:2]) / radiance.scale,
+        fit.measured.reshape(shape),
     ]
 
 

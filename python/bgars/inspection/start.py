@@ -23,6 +23,8 @@ ANGLES = np.radians(np.linspace(-60.0, 60.0, 13))
 BESIDE = 0.09
 """Points inside and outside lie this share of the radius off the edge."""
 CLIP = (-0.5, 1.0)
+DARK = 0.5
+"""Board darker than this share of its mean over the lights is in a shadow."""
 MIN_POINTS = 5
 WEAK_STEP = 0.08
 TOP_SHARE = 0.7
@@ -72,7 +74,9 @@ def edge_steps(
             near = (hidden.radius[index] + 2.0) ** 2
             seen &= np.square(x - hidden.x[index]) + np.square(y - hidden.y[index]) > near
         sides.append(np.where(seen, own / np.where(texture > 0, texture, 1.0), np.nan))
-    step = np.clip(sides[1] - sides[0], *CLIP)
+    # Dark on both sides: the shadow of a neighbour, which says nothing.
+    dark = (sides[0] < DARK) & (sides[1] < DARK)
+    step = np.where(dark, np.nan, np.clip(sides[1] - sides[0], *CLIP))
     known = np.isfinite(step)
     points = known.sum(axis=-1)
     mean: Array = np.where(
