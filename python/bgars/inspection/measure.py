@@ -42,7 +42,7 @@ FINE_PASSES = 4
 SMALL_CHANGE_PX = 0.5
 FIRST_SPREAD_PX = 0.5
 SPREADS_PX = (0.3, 0.5, 0.8, 1.3, 2.0)
-SPREAD_BALLS = 8
+SPREAD_BALLS = 5
 SMALL_SPREAD_CHANGE = 0.15
 REACH_SIGMAS = 3.2
 REACH_PX = 1.2
@@ -212,6 +212,7 @@ def fit_shadows(
         board,
         problem.irradiance.mean(axis=0),
         [problem.neighbours(index) for index in range(len(table))],
+        threads,
     )
     table[:, 2] = heights
     complaints = explain_dark_steps(problem, table, steps)

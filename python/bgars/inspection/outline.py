@@ -38,7 +38,8 @@ REACH_PX = 3.5
 COARSE_REACH, COARSE_EXTRA_PX = 0.2, 2.0
 MIN_STRETCHES = 12
 MIN_SPREAD_DEG = 200.0
-ROUNDS = 12
+ROUNDS = 8
+BIN_DEG = 20.0
 CAUCHY = 2.5
 NEIGHBOUR_GAP_PX = 5.0
 INV_SQRT_2PI = 0.3989422804014327
@@ -154,22 +155,33 @@ def _across(
 
 def _centres(table: Array, middle: Array, shift: Array, u_shift: Array) -> tuple[Array, Array]:
     """Robust circles through the shifts of outlines: centre moves, radius free."""
-    design = np.column_stack([np.cos(middle), np.sin(middle), np.ones(len(middle))])
-    centres, u_centre = np.full((len(table), 2), np.nan), np.full(len(table), np.inf)
-    for index in range(len(table)):
-        known = np.isfinite(u_shift[index])
-        directions = np.unique(np.floor(np.degrees(middle[known]) % 360.0 / 20.0)).size * 20.0
-        if known.sum() < MIN_STRETCHES or directions < MIN_SPREAD_DEG:
-            continue
-        system, found = design[known], shift[index, known]
-        scale = max(1.4826 * float(np.median(np.abs(found - np.median(found)))), 1e-3)
-        change, weight = np.zeros(3), np.ones(len(found))
-        for _ in range(ROUNDS):
-            residual = found - system @ change
-            weight = 1.0 / (1.0 + (residual / (CAUCHY * scale)) ** 2)
-            change = np.linalg.solve(system.T @ (weight[:, None] * system), system.T @ (weight * found))
-            scale = max(1.4826 * float(np.median(np.abs(found - system @ change))), 1e-3)
-        covariance = np.linalg.inv(system.T @ (weight[:, None] * system)) * scale**2
-        centres[index] = table[index, :2] + change[:2]
-        u_centre[index] = np.sqrt((covariance[0, 0] + covariance[1, 1]) / 2.0)
+    system = np.column_stack([np.cos(middle), np.sin(middle), np.ones(len(middle))])
+    known = np.isfinite(u_shift)
+    bins = np.floor(np.degrees(middle) % 360.0 / BIN_DEG).astype(np.intp)
+    seen = np.zeros((len(table), int(360.0 / BIN_DEG)), dtype=np.bool_)
+    for bin_index in range(seen.shape[1]):
+        seen[:, bin_index] = known[:, bins == bin_index].any(axis=1)
+    good = (known.sum(axis=1) >= MIN_STRETCHES) & (seen.sum(axis=1) * BIN_DEG >= MIN_SPREAD_DEG)
+    change = np.zeros((len(table), 3))
+    change[:, 2] = _median(shift, known)
+    normal = np.repeat(np.eye(3)[None], len(table), axis=0)
+    scale = np.ones(len(table))
+    for _ in range(ROUNDS):
+        residual = np.where(known, shift - change @ system.T, 0.0)
+        scale = np.maximum(1.4826 * _median(np.abs(residual), known), 1e-3)
+        weight = known / (1.0 + (residual / (CAUCHY * scale[:, None])) ** 2)
+        normal = np.einsum("km,mi,mj->kij", weight, system, system, optimize=True)
+        normal[~good] = np.eye(3)
+        right = (weight * residual) @ system
+        change = change + np.where(good[:, None], np.linalg.solve(normal, right[..., None])[..., 0], 0.0)
+    covariance = np.linalg.inv(normal) * np.square(scale)[:, None, None]
+    centres = np.where(good[:, None], table[:, :2] + change[:, :2], np.nan)
+    u_centre = np.where(good, np.sqrt((covariance[:, 0, 0] + covariance[:, 1, 1]) / 2.0), np.inf)
     return centres, u_centre
+
+
+def _median(values: Array, known: NDArray[np.bool_]) -> Array:
+    """(N,) medians of the known values of each row; 0 where there is none."""
+    some: NDArray[np.bool_] = np.asarray(known.any(axis=1))
+    median: Array = np.nanmedian(np.where(known, values, np.where(some[:, None], np.nan, 0.0)), axis=1)
+    return median

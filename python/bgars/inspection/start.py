@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -86,7 +87,14 @@ def edge_steps(
 
 
 def first_heights(
-    radiance: Radiance, table: Array, vectors: Array, near: bool, board: Board, gains: Array, neighbours: list[Array]
+    radiance: Radiance,
+    table: Array,
+    vectors: Array,
+    near: bool,
+    board: Board,
+    gains: Array,
+    neighbours: list[Array],
+    threads: int,
 ) -> tuple[Array, Array]:
     """(N,) heights of the centres, and (N, L) the step of brightness under each light there (NaN: not seen).
 
@@ -101,13 +109,16 @@ def first_heights(
     gains : (L,) float64
     neighbours : list of (m, 5) float64
         Per ball, the balls (itself too) that may hide the board around it.
+    threads : int
     """
     heights, steps = np.zeros(len(table)), np.full((len(table), len(vectors)), np.nan)
     seen = np.full((len(table), len(HEIGHTS), len(vectors)), np.nan)
     lights = Lights.from_table(vectors, near).spread(1, 0)
     images = np.arange(len(vectors))[None, :]
     scores = np.zeros((len(table), len(HEIGHTS)))
-    for index, row in enumerate(table):
+
+    def look(index: int) -> None:
+        row = table[index]
         tried = np.repeat(row[None, :], len(HEIGHTS), axis=0)
         tried[:, 2] = HEIGHTS * row[3]
         step = edge_steps(
@@ -122,6 +133,9 @@ def first_heights(
         seen[index] = step
         known = np.isfinite(step)
         scores[index] = np.where(known, step, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 3.0)
+
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(look, range(len(table))))
     common = _middle(np.median(scores, axis=0))
     for index, row in enumerate(table):
         height = _middle(scores[index]) if scores[index].max() >= WEAK_STEP else common
