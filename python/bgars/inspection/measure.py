@@ -55,6 +55,7 @@ RIG_LIMITS_DEG = (0.003, 2.0)
 FIRST_Q_SPREAD = 0.02
 TILT = 0.003
 BOW_SLOPE = 0.02
+STEEPEST_BOARD = 0.05
 """Prior standard deviations of the board: tilt, and slope by bow at the edge of the image."""
 EMPIRICAL_ROUNDS = 5
 SETTLED = 0.1
@@ -323,8 +324,10 @@ def _priors(problem: Problem, table: Array, field: NormalField | None, refine_li
         outside = outside_balls(radiance.height, radiance.width, table)
         fitted = board_from_normals(field, outside)
         if fitted is not None:
-            board, spread = fitted
-            u_board = np.hypot(spread, u_board / 10.0)
+            # Where few normals are good, the quadratic is anything: a board that steep is none.
+            steepest = np.abs(fitted) * [1.0, 1.0, 2.0 * half, half, 2.0 * half]
+            # Its tilt is that of wrong lights, too; its bow is the board's.
+            board[2:] = fitted[2:] if steepest.max() < STEEPEST_BOARD else 0.0
     u_balls = np.column_stack(
         [problem.u_centre, problem.u_centre, table[:, 3], problem.u_radius, np.full(len(table), FIRST_Q_SPREAD)]
     )

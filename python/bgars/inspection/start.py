@@ -26,7 +26,9 @@ BESIDE = 0.09
 CLIP = (-0.5, 1.0)
 DARK = 0.5
 """Board darker than this share of its mean over the lights is in a shadow."""
-MIN_POINTS = 5
+MIN_POINTS = 3
+USUAL_HEIGHT = 2.0 / 3.0
+"""Height of the centre, in radii, where no ball shows its own."""
 WEAK_STEP = 0.08
 TOP_SHARE = 0.7
 
@@ -136,7 +138,8 @@ def first_heights(
 
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(look, range(len(table))))
-    common = _middle(np.median(scores, axis=0))
+    usual = np.median(scores, axis=0)
+    common = _middle(usual) if usual.max() >= WEAK_STEP else USUAL_HEIGHT
     for index, row in enumerate(table):
         height = _middle(scores[index]) if scores[index].max() >= WEAK_STEP else common
         heights[index] = height * row[3]
