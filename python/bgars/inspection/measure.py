@@ -60,7 +60,7 @@ STEEPEST_BOARD = 0.05
 EMPIRICAL_ROUNDS = 5
 SETTLED = 0.1
 SHORT_ROUNDS, LONG_ROUNDS = 8, 20
-REDESCEND = 3.5
+REDESCEND_FIRST, REDESCEND = 8.0, 3.5
 OUTLINE_SAFETY = 1.5
 SHIFT_BALLS = 24
 OUTLINE_FLOOR_PX = 0.01
@@ -232,7 +232,7 @@ def fit_shadows(
     while not last:
         last = turn == passes - 1 or (turn > len(COARSE) and change < SMALL_CHANGE_PX)
         radius = float(np.median(table[:, 3]))
-        settings = _settings(turn, radius, spread)
+        settings = _settings(turn, radius, spread, last)
         shadows = ShadowMap(
             problem.radiance,
             np.concatenate([table, problem.stand_ins(table)]),
@@ -257,7 +257,7 @@ def fit_shadows(
         used = edges.take(usability.usable)
         start = (table[chosen], vectors, board)
         solution, priors = _solve(used, start, problem.near, priors, chosen, turn, last, refine_lights)
-        change = float(np.percentile(np.abs(solution.balls - table[chosen]).max(axis=1), 90.0))
+        change = float(np.abs(solution.balls - table[chosen]).max())
         table[chosen], vectors, board = solution.balls, solution.vectors, solution.board
         gains[index] = edges.lit_levels(gains[index])
         before = spread
@@ -305,13 +305,13 @@ def _first_spread(
     return EdgeSpread(SPREADS_PX[int(np.argmin(noise))], 0.0)
 
 
-def _settings(turn: int, radius: float, spread: EdgeSpread) -> EdgeSettings:
+def _settings(turn: int, radius: float, spread: EdgeSpread, last: bool) -> EdgeSettings:
     """Coarse first, then as sharp as the edges are."""
     if turn < len(COARSE):
         reach = COARSE[turn] * radius + COARSE_EXTRA_PX
         return EdgeSettings(1.0, 0.0, reach, max(1, int(reach / COARSE_STEPS)), coarse=True)
     widest = float(np.hypot(spread.sharp_px, TYPICAL_WAY * spread.lamp_rad * radius))
-    return EdgeSettings(spread.sharp_px, spread.lamp_rad, REACH_SIGMAS * widest + REACH_PX)
+    return EdgeSettings(spread.sharp_px, spread.lamp_rad, REACH_SIGMAS * widest + REACH_PX, thorough=last)
 
 
 def _priors(problem: Problem, table: Array, field: NormalField | None, refine_lights: bool) -> Priors:
@@ -369,7 +369,7 @@ def _solve(
 ) -> tuple[Solution, Priors]:
     """Bundle; once edges are sharp, the scatter of lights and of q is taken from the result (empirical Bayes)."""
     sharp = turn >= len(COARSE)
-    redescend = REDESCEND if sharp else None
+    redescend = (REDESCEND if turn > len(COARSE) else REDESCEND_FIRST) if sharp else None
 
     def bundle(at: tuple[Array, Array, Board], rounds: int) -> Solution:
         own = priors._replace(balls=priors.balls[chosen], u_balls=priors.u_balls[chosen])

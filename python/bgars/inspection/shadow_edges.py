@@ -49,7 +49,7 @@ WIDEST_RAD = np.radians(100.0)
 LINE_SPACING_PX = 1.45
 """Distance of neighbouring lines along the edge: above sqrt(2), so that no two lines share a pixel."""
 MAX_LINES = 96
-COARSE_LINES = 48
+FEW_LINES = 48
 FEWEST_LINES = 12
 LINES_A_STRETCH = 3
 LINES_AT_ONCE = 6000
@@ -65,6 +65,7 @@ class EdgeSettings(NamedTuple):
 
     Spread of a sharp edge, growth of the spread along the ray, distance to look to on both sides, distance of pixels.
     `coarse`: by area instead, see the head of this file; finds edges up to half of `reach_px` away.
+    `thorough`: more lines across the edges of large balls.
     """
 
     spread_px: float
@@ -72,6 +73,7 @@ class EdgeSettings(NamedTuple):
     reach_px: float
     stride_px: int = 1
     coarse: bool = False
+    thorough: bool = False
 
     @property
     def coarse_px(self) -> float | None:
@@ -152,7 +154,7 @@ def measure_edges(
     threads : int
     """
     radius = float(np.median(table[:, 3]))
-    most = COARSE_LINES if settings.coarse else MAX_LINES
+    most = MAX_LINES if settings.thorough else FEW_LINES
     count = int(np.clip(2.0 * WIDEST_RAD * radius / LINE_SPACING_PX, FEWEST_LINES, most))
     angles = (np.arange(count) + 0.5) / count * 2.0 * WIDEST_RAD - WIDEST_RAD
     step = max(1, LINES_AT_ONCE // (len(vectors) * count))
