@@ -154,7 +154,7 @@ def scene_row(name: str, case: Case) -> str:
         ", ".join(flats) or "-",
         f"{case.seconds:.1f}",
     ]
-    return f"| {' | '.join(cells)} |"
+    return f"| {' | '.join('-' if 'nan' in cell else cell for cell in cells)} |"
 
 
 def _flat(ball: bgars.ball_records.MeasuredBall) -> bool:
