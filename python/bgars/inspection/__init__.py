@@ -1,5 +1,5 @@
 """Solder balls measured from the shadows that they cast."""
 
-from bgars.inspection.measure import measure_balls
+from bgars.inspection.measure import check_shadows, measure_balls
 
-__all__ = ["measure_balls"]
+__all__ = ["check_shadows", "measure_balls"]

@@ -75,7 +75,7 @@ def outside_balls(height: int, width: int, table: Array) -> NDArray[np.bool_]:
     return outside
 
 
-def board_from_normals(field: NormalField, outside: NDArray[np.bool_]) -> tuple[Array, Array] | None:
+def board_from_normals(field: NormalField, outside: NDArray[np.bool_]) -> Array | None:
     """Fit the quadratic board to the normals of board pixels, trimmed.
 
     Parameters
@@ -87,9 +87,8 @@ def board_from_normals(field: NormalField, outside: NDArray[np.bool_]) -> tuple[
 
     Returns
     -------
-    (coefficients, uncertainty) : ((5,), (5,)) or None
-        In pixels; the uncertainty is that of the scatter of 25 blocks' worth of pixels, because normals of neighbouring
-        pixels err together. None where there are too few board pixels.
+    (5,) float64 or None
+        Coefficients in pixels; None where there are too few board pixels.
     """
     rows, cols = np.nonzero(field.mask & outside)
     if rows.size < MIN_BOARD_PIXELS:
@@ -102,14 +101,10 @@ def board_from_normals(field: NormalField, outside: NDArray[np.bool_]) -> tuple[
     slopes = np.concatenate([-normals[:, 0] / normals[:, 2], -normals[:, 1] / normals[:, 2]])
     system = np.concatenate(slope_terms(x, y))
     keep = np.isfinite(slopes)
-    coefficients = np.zeros(SHAPE_TERMS)
-    spread = 0.0
+    coefficients: Array = np.zeros(SHAPE_TERMS)
     for _ in range(ROUNDS):
         coefficients = np.linalg.lstsq(system[keep], slopes[keep], rcond=None)[0]
         residuals = np.abs(slopes - system @ coefficients)
         spread = max(1.4826 * float(np.median(residuals[keep])), 1e-6)
         keep = residuals < TRIM * spread
-    scatter = np.linalg.inv(system[keep].T @ system[keep]) * spread**2
-    correlated = keep.sum() / 25.0
-    uncertainty: Array = np.sqrt(np.diag(scatter) * correlated)
-    return coefficients, uncertainty
+    return coefficients

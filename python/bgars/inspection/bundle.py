@@ -1,10 +1,12 @@
 """All balls, all lights and the board from measured points of shadow edges: robust Gauss-Newton with Schur complement.
 
-Unknowns: of each ball x, y, z, radius, q; of each light two small turns; five coefficients of the board. Balls meet only
+Unknowns: of each ball x, y, z, radius, q; of each light two small turns; five coefficients of the board. Balls meet
+only
 through lights and board, so the normal matrix is an arrow: blocks of 5 x 5, a border of 2 L + 5 (Triggs et al., "Bundle
 adjustment - a modern synthesis", 2000, section 6.1).
 
-Gaussian priors: the lights stand as the rig says, the board is nearly flat, balls are where their silhouettes are, q is 1.
+Gaussian priors: the lights stand as the rig says, the board is nearly flat, balls are where their silhouettes are, q
+is 1.
 Heights, elevations and q trade against each other (with all q raised and all lights lowered the shadows stay the same),
 and a population of solder balls is round on the whole; which balls are not, the caller decides (`population`).
 """
@@ -89,8 +91,9 @@ def tangents(vectors: Array) -> Array:
 def turned(vectors: Array, turns: Array) -> Array:
     """Lights after small turns (L, 2); their length stays."""
     moved = vectors + np.einsum("lk,lkc->lc", turns, tangents(vectors))
-    lengths: Array = np.linalg.norm(vectors, axis=1, keepdims=True) / np.linalg.norm(moved, axis=1, keepdims=True)
-    return moved * lengths
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True) / np.linalg.norm(moved, axis=1, keepdims=True)
+    scaled: Array = moved * lengths
+    return scaled
 
 
 def angles_rad(first: Array, second: Array) -> Array:
@@ -123,16 +126,18 @@ def solve_bundle(
     board : Board
     priors : Priors
     redescend : float or None
-        Points this many standard deviations off count a quarter, those far off nothing (Geman & McClure 1985): relief of
+        Points this many standard deviations off count a quarter, those far off nothing (Geman & McClure 1985): relief
+        of
         the board puts whole stretches of edge elsewhere. None for Cauchy weights, which find the way from farther off.
     rounds : int
         Most steps.
     """
     table, vectors, coefficients = start.copy(), vectors.copy(), board.coefficients.copy()
-    count, lights, _ = edges.x.shape
+    lights = edges.x.shape[1]
     excess = 0.0
     iterations = 0
-    for iterations in range(1, rounds + 1):
+    for iteration in range(1, rounds + 1):
+        iterations = iteration
         board = Board(coefficients)
         residual, blocks = _linearise(edges, table, vectors, near, board)
         known = np.isfinite(edges.u_px)
@@ -143,7 +148,9 @@ def solve_bundle(
         else:
             loss = (1.0 + residual**2 / (redescend**2 * variance)) ** 2
         weight = np.where(known, 1.0 / (variance * loss), 0.0)
-        normal, cross, corner, right, right_border = _normal(blocks, residual, weight, table, vectors, coefficients, priors)
+        normal, cross, corner, right, right_border = _normal(
+            blocks, residual, weight, table, vectors, coefficients, priors
+        )
         inverse = np.linalg.inv(normal)
         lever = inverse @ cross
         reduced = corner - np.tensordot(cross, lever, axes=((0, 1), (0, 1)))
@@ -156,7 +163,10 @@ def solve_bundle(
         table[:, 4] = np.clip(table[:, 4], MIN_Q, MAX_Q)
         vectors = turned(vectors, np.clip(step_border[: 2 * lights].reshape(lights, 2), -0.1, 0.1))
         coefficients = coefficients + step_border[2 * lights :]
-        if np.abs(step[:, :4]).max(initial=0.0) < STEP_TOLERANCE_PX and np.abs(step[:, 4]).max(initial=0.0) < Q_TOLERANCE:
+        if (
+            np.abs(step[:, :4]).max(initial=0.0) < STEP_TOLERANCE_PX
+            and np.abs(step[:, 4]).max(initial=0.0) < Q_TOLERANCE
+        ):
             break
     board = Board(coefficients)
     residual, blocks = _linearise(edges, table, vectors, near, board)
@@ -181,7 +191,7 @@ def solve_bundle(
 
 
 def _honest_weights(residual: Array, variance: Array, known: NDArray[np.bool_], redescend: float | None) -> Array:
-    """Weights that give the covariance of the robust estimate: E[psi^2] / E[psi']^2 of Huber (1981), equation 6.5.
+    """Weights that give the covariance of the robust estimate: E[psi^2] / E[psi']^2 of Huber (1981), section 7.6.
 
     Points that were rejected count as little as they did in the fit.
     """
@@ -211,7 +221,7 @@ def _excess(residual: Array, u_px: Array) -> float:
 def _linearise(
     edges: Edges, table: Array, vectors: Array, near: bool, board: Board
 ) -> tuple[Array, tuple[Array, Array, Array]]:
-    """Distance of every point to its predicted edge, and derivatives by ball (..., 5), light (..., 2), board (..., 5)."""
+    """Distance of every point to its predicted edge, and derivatives by ball, light and board."""
     balls = Balls.from_table(table).spread(2)
     lamps = Lights.from_table(vectors, near).spread(1, 1)
     beam = rays(edges.x, edges.y, balls, lamps, board)
@@ -233,7 +243,7 @@ def _normal(
     coefficients: Array,
     priors: Priors,
 ) -> tuple[Array, Array, Array, Array, Array]:
-    """Blocks of the normal equations: (N, 5, 5), (N, 5, B), (B, B) and their right sides, priors in."""
+    """Blocks of the normal equations: (N, 5, 5), (N, 5, B), (B, B), and their right sides; priors in."""
     by_ball, by_light, by_board = blocks
     count, lights = residual.shape[:2]
     border = 2 * lights + SHAPE_TERMS
@@ -253,7 +263,9 @@ def _normal(
         corner[part, part] = own[light]
         corner[part, 2 * lights :] = mixed[light]
         corner[2 * lights :, part] = mixed[light].T
-    corner[2 * lights :, 2 * lights :] = np.einsum("nlsi,nlsk->ik", by_board * weight[..., None], by_board, optimize=True)
+    corner[2 * lights :, 2 * lights :] = np.einsum(
+        "nlsi,nlsk->ik", by_board * weight[..., None], by_board, optimize=True
+    )
     right_border[: 2 * lights] = -np.einsum("nlsi,nls->li", light_weighted, residual).reshape(-1)
     right_border[2 * lights :] = -np.einsum("nlsi,nls->i", by_board, weight * residual)
 

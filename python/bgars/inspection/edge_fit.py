@@ -15,8 +15,9 @@ Index = NDArray[np.intp]
 ROUNDS = 2
 CAUCHY = 2.5
 CAUCHY_FACTOR = 1.10
-"""What weights at 2.5 standard deviations make the formula of least squares too small by, for Gaussian noise: the square
-root of (E[psi^2] / E[psi']^2) over (E[w r^2] / E[w]^2) (Huber 1981, equation 6.5).
+"""What weights at 2.5 standard deviations make the formula of least squares too small by, for Gaussian noise: the
+square
+root of (E[psi^2] / E[psi']^2) over (E[w r^2] / E[w]^2) (Huber 1981, section 7.6).
 """
 MIN_PIXELS = 12.0
 RIDGE = 1e-9
@@ -31,8 +32,11 @@ class Group(NamedTuple):
 
 
 class StretchFit(NamedTuple):
-    """Coefficients (G, C) of every stretch, their standard uncertainties, weights of the pixels (O, M), noise of each
-    set of stretches that share it, and whether a stretch has pixels enough.
+    """What was fitted.
+
+    Coefficients (G, C) of every stretch, their standard uncertainties, weights of the pixels (O, M), noise of each
+    set of
+    stretches that share it, and whether a stretch has pixels enough.
     """
 
     solution: Array
@@ -44,7 +48,8 @@ class StretchFit(NamedTuple):
 
 def group_sum(values: Array, group: Index, groups: int) -> Array:
     """Sum of values (M,) by group."""
-    return np.bincount(group, weights=values, minlength=groups)
+    total: Array = np.bincount(group, weights=values, minlength=groups).astype(np.float64)
+    return total
 
 
 def fit_stretches(

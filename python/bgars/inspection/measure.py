@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bgars.inspection.board import SHAPE_TERMS, Board, board_from_normals, outside_balls
 from bgars.errors import InputError
+from bgars.inspection.board import SHAPE_TERMS, Board, board_from_normals, outside_balls
 from bgars.inspection.bundle import Priors, Solution, angles_rad, solve_bundle
+from bgars.inspection.checks import check_shifts, explain_dark_steps, refuse_misfits, refuse_repeated
 from bgars.inspection.flat_top import flat_tops
-from bgars.inspection.outline import outline_centres
+from bgars.inspection.highlights import read_highlights
+from bgars.inspection.outline import Outlines, outline_centres
 from bgars.inspection.population import q_spread
 from bgars.inspection.problem import Problem, make_problem, thread_count
 from bgars.inspection.results import Usability, judge_balls, measurement
@@ -27,7 +29,7 @@ if TYPE_CHECKING:
     from bgars.ball_records import BallMeasurement, FoundBalls
     from bgars.records import Capture, NormalField
 
-__all__ = ["Fit", "fit_shadows", "measure_balls"]
+__all__ = ["Fit", "check_shadows", "fit_shadows", "measure_balls"]
 
 Array = NDArray[np.float64]
 
@@ -39,6 +41,9 @@ FINE_PASSES = 4
 """Most passes with sharp edges; two where the first leaves little to do."""
 SMALL_CHANGE_PX = 0.5
 FIRST_SPREAD_PX = 0.5
+SPREADS_PX = (0.3, 0.5, 0.8, 1.3, 2.0)
+SPREAD_BALLS = 5
+SMALL_SPREAD_CHANGE = 0.15
 REACH_SIGMAS = 3.2
 REACH_PX = 1.2
 TYPICAL_WAY = 2.0
@@ -50,12 +55,14 @@ RIG_LIMITS_DEG = (0.003, 2.0)
 FIRST_Q_SPREAD = 0.02
 TILT = 0.003
 BOW_SLOPE = 0.02
+STEEPEST_BOARD = 0.05
 """Prior standard deviations of the board: tilt, and slope by bow at the edge of the image."""
 EMPIRICAL_ROUNDS = 5
 SETTLED = 0.1
 SHORT_ROUNDS, LONG_ROUNDS = 8, 20
-REDESCEND = 3.5
-OUTLINE_SAFETY = 4.0
+REDESCEND_FIRST, REDESCEND = 8.0, 3.5
+OUTLINE_SAFETY = 1.5
+SHIFT_BALLS = 24
 OUTLINE_FLOOR_PX = 0.01
 
 
@@ -63,7 +70,8 @@ OUTLINE_FLOOR_PX = 0.01
 class Fit:
     """Everything the shadows gave, in pixels.
 
-    `index` (n,) balls whose shadows were looked at (no bridges); `solution` only of those that `usability` calls usable.
+    `index` (n,) balls whose shadows were looked at (no bridges); `solution` only of those that `usability` calls
+    usable.
     """
 
     problem: Problem
@@ -72,6 +80,7 @@ class Fit:
     solution: Solution | None
     edges: Edges
     spread: EdgeSpread
+    warnings: tuple[str, ...]
 
 
 def measure_balls(
@@ -109,13 +118,16 @@ def measure_balls(
     -------
     BallMeasurement
         Balls in the order of `found`. What could not be measured is NaN, with reasons. Heights are above the smooth
-        board under the ball. They rest on two assumptions, which no image can replace: errors of the rig are independent
+        board under the ball. They rest on two assumptions, which no image can replace: errors of the rig are
+        independent
         from light to light, and the balls are round on the whole (one ball may well be flattened).
 
     Raises
     ------
     InputError
-        A capture without a pixel pitch, balls outside the image, a field of another size.
+        A capture without a pixel pitch, balls outside the image, a field of another size, an image twice.
+    CalibrationError
+        An image whose shadows say clearly that it belongs to another light, or that it is shifted.
 
     References
     ----------
@@ -139,11 +151,42 @@ def measure_balls(
         raise InputError(msg)
     workers = thread_count(threads)
     report = progress or _quiet
+    refuse_repeated(capture)
     problem = make_problem(capture, found)
     fit = fit_shadows(problem, field, refine_lights=refine_lights, threads=workers, progress=report)
+    highlights = None
+    if fit is not None and fit.solution is not None:
+        solution = fit.solution
+        highlights = read_highlights(problem.radiance, solution.balls, solution.vectors, problem.near)
     flats = None if field is None or fit is None or fit.solution is None else flat_tops(field, fit.solution.balls)
     report(1.0)
-    return measurement(found, problem, fit, flats)
+    return measurement(found, problem, fit, flats, highlights)
+
+
+def check_shadows(capture: Capture, found: FoundBalls, *, threads: int | None = None) -> tuple[str, ...]:
+    """Check that images, lights and shadows belong together.
+
+    The whole measurement is made for it: where shadows merge, only the fit tells a wrong light from a hidden shadow.
+
+    Parameters
+    ----------
+    capture, found, threads
+        As for :func:`measure_balls`.
+
+    Returns
+    -------
+    tuple of str
+        What is doubtful though numbers may still be right: a light some degrees from where the rig says, an image
+        shifted by less than a pixel.
+
+    Raises
+    ------
+    InputError
+        An image that is there twice; see :func:`measure_balls` for others.
+    CalibrationError
+        Images swapped or taken from another light, shifted by a pixel or more; lights far from where the rig says.
+    """
+    return measure_balls(capture, found, threads=threads).warnings
 
 
 def _quiet(_: float) -> None:
@@ -162,7 +205,7 @@ def fit_shadows(
     if not len(problem.table):
         return None
     table, vectors, board = problem.table.copy(), problem.vectors.copy(), Board()
-    heights, _ = first_heights(
+    heights, steps = first_heights(
         problem.radiance,
         table,
         vectors,
@@ -170,8 +213,11 @@ def fit_shadows(
         board,
         problem.irradiance.mean(axis=0),
         [problem.neighbours(index) for index in range(len(table))],
+        threads,
     )
     table[:, 2] = heights
+    complaints = explain_dark_steps(problem, table, steps)
+    warnings: tuple[str, ...] = ()
     progress(0.1)
     priors = _priors(problem, table, field, refine_lights)
     spread = EdgeSpread(FIRST_SPREAD_PX, 0.0)
@@ -182,10 +228,11 @@ def fit_shadows(
     passes = len(COARSE) + FINE_PASSES
     result: Fit | None = None
     turn, last, change = 0, False, np.inf
+    wide: Outlines | None = None
     while not last:
         last = turn == passes - 1 or (turn > len(COARSE) and change < SMALL_CHANGE_PX)
         radius = float(np.median(table[:, 3]))
-        settings = _settings(turn, radius, spread)
+        settings = _settings(turn, radius, spread, last)
         shadows = ShadowMap(
             problem.radiance,
             np.concatenate([table, problem.stand_ins(table)]),
@@ -198,34 +245,73 @@ def fit_shadows(
         )
         if last:
             priors = _with_outlines(problem, priors, shadows, table, spread)
+            wide = _wide_outlines(problem, shadows, table, vectors, spread)
         edges = measure_edges(
             problem.radiance, shadows, table[index], vectors, problem.near, board, gains[index], settings, threads
         )
         usability = judge_balls(edges)
         chosen = index[usability.usable]
         if not len(chosen):
-            return Fit(problem, index, usability, None, edges, spread)
+            warnings = refuse_misfits(complaints, edges, None, np.zeros(len(vectors)))
+            return Fit(problem, index, usability, None, edges, spread, warnings)
         used = edges.take(usability.usable)
         start = (table[chosen], vectors, board)
         solution, priors = _solve(used, start, problem.near, priors, chosen, turn, last, refine_lights)
-        change = float(np.percentile(np.abs(solution.balls - table[chosen]).max(axis=1), 90.0))
+        change = float(np.abs(solution.balls - table[chosen]).max())
         table[chosen], vectors, board = solution.balls, solution.vectors, solution.board
         gains[index] = edges.lit_levels(gains[index])
+        before = spread
         if turn >= len(COARSE):
             spread = fit_spread(used)
+        elif turn == len(COARSE) - 1:
+            spread = _first_spread(problem, shadows, table[chosen], vectors, board, gains[chosen], settings, threads)
+        if abs(spread.sharp_px - before.sharp_px) > SMALL_SPREAD_CHANGE * before.sharp_px and turn >= len(COARSE):
+            change = np.inf
+        if wide is not None:
+            moved_deg = np.degrees(angles_rad(vectors, problem.vectors))
+            warnings = refuse_misfits(complaints, used, solution.weight, moved_deg) + check_shifts(wide)
         turn += 1
         progress(0.1 + 0.8 * (1.0 if last else turn / passes))
-        result = Fit(problem, index, usability, solution, edges, spread)
+        result = Fit(problem, index, usability, solution, edges, spread, warnings)
     return result
 
 
-def _settings(turn: int, radius: float, spread: EdgeSpread) -> EdgeSettings:
+def _wide_outlines(problem: Problem, shadows: ShadowMap, table: Array, vectors: Array, spread: EdgeSpread) -> Outlines:
+    """Outlines of some balls in the middle, looked for farther off, to tell whether an image is shifted."""
+    few = np.argsort(np.hypot(table[:, 0], table[:, 1]))[:SHIFT_BALLS]
+    azimuths = np.arctan2(vectors[:, 1], vectors[:, 0])
+    return outline_centres(problem.radiance, shadows, table[few], azimuths, spread.sharp_px, coarse=True)
+
+
+def _first_spread(
+    problem: Problem,
+    shadows: ShadowMap,
+    table: Array,
+    vectors: Array,
+    board: Board,
+    gains: Array,
+    settings: EdgeSettings,
+    threads: int,
+) -> EdgeSpread:
+    """The spread, of a few, that leaves the least noise on a few balls."""
+    few = slice(0, None, max(1, len(table) // SPREAD_BALLS))
+    noise = []
+    for spread_px in SPREADS_PX:
+        tried = EdgeSettings(spread_px, 0.0, settings.reach_px)
+        edges = measure_edges(
+            problem.radiance, shadows, table[few], vectors, problem.near, board, gains[few], tried, threads
+        )
+        noise.append(float(np.median(edges.noise_levels)))
+    return EdgeSpread(SPREADS_PX[int(np.argmin(noise))], 0.0)
+
+
+def _settings(turn: int, radius: float, spread: EdgeSpread, last: bool) -> EdgeSettings:
     """Coarse first, then as sharp as the edges are."""
     if turn < len(COARSE):
         reach = COARSE[turn] * radius + COARSE_EXTRA_PX
         return EdgeSettings(1.0, 0.0, reach, max(1, int(reach / COARSE_STEPS)), coarse=True)
     widest = float(np.hypot(spread.sharp_px, TYPICAL_WAY * spread.lamp_rad * radius))
-    return EdgeSettings(spread.sharp_px, spread.lamp_rad, REACH_SIGMAS * widest + REACH_PX)
+    return EdgeSettings(spread.sharp_px, spread.lamp_rad, REACH_SIGMAS * widest + REACH_PX, thorough=last)
 
 
 def _priors(problem: Problem, table: Array, field: NormalField | None, refine_lights: bool) -> Priors:
@@ -238,8 +324,10 @@ def _priors(problem: Problem, table: Array, field: NormalField | None, refine_li
         outside = outside_balls(radiance.height, radiance.width, table)
         fitted = board_from_normals(field, outside)
         if fitted is not None:
-            board, spread = fitted
-            u_board = np.hypot(spread, u_board / 10.0)
+            # Where few normals are good, the quadratic is anything: a board that steep is none.
+            steepest = np.abs(fitted) * [1.0, 1.0, 2.0 * half, half, 2.0 * half]
+            # Its tilt is that of wrong lights, too; its bow is the board's.
+            board[2:] = fitted[2:] if steepest.max() < STEEPEST_BOARD else 0.0
     u_balls = np.column_stack(
         [problem.u_centre, problem.u_centre, table[:, 3], problem.u_radius, np.full(len(table), FIRST_Q_SPREAD)]
     )
@@ -250,9 +338,15 @@ def _priors(problem: Problem, table: Array, field: NormalField | None, refine_li
 def _with_outlines(problem: Problem, priors: Priors, shadows: ShadowMap, table: Array, spread: EdgeSpread) -> Priors:
     """Centres of the priors: the finder's and the outlines', weighted."""
     azimuths = np.arctan2(problem.vectors[:, 1], problem.vectors[:, 0])
-    centres, u_outline = outline_centres(problem.radiance, shadows, table, azimuths, spread.sharp_px)
+    outlines = outline_centres(problem.radiance, shadows, table, azimuths, spread.sharp_px)
+    centres, u_outline = outlines.centres, outlines.u_centre
     known = np.isfinite(u_outline) & ~problem.bridged
-    by_outline = np.where(known, 1.0 / (OUTLINE_FLOOR_PX**2 + np.square(OUTLINE_SAFETY * np.where(known, u_outline, 1.0))), 0.0)
+    # What outlines scatter beyond their own word shows against the shadows' centres, but for a common shift.
+    u_outline = np.where(known, u_outline, 1.0)
+    off = (centres - table[:, :2])[known]
+    scatter = 1.4826 * np.median(np.abs(off - np.median(off, axis=0)) / u_outline[known, None]) if known.any() else 1.0
+    u_outline = OUTLINE_SAFETY * max(float(scatter), 1.0) * u_outline
+    by_outline = np.where(known, 1.0 / (OUTLINE_FLOOR_PX**2 + u_outline**2), 0.0)
     by_finder = 1.0 / problem.u_centre**2
     balls, u_balls = priors.balls.copy(), priors.u_balls.copy()
     weight = by_outline + by_finder
@@ -275,7 +369,7 @@ def _solve(
 ) -> tuple[Solution, Priors]:
     """Bundle; once edges are sharp, the scatter of lights and of q is taken from the result (empirical Bayes)."""
     sharp = turn >= len(COARSE)
-    redescend = REDESCEND if sharp else None
+    redescend = (REDESCEND if turn > len(COARSE) else REDESCEND_FIRST) if sharp else None
 
     def bundle(at: tuple[Array, Array, Board], rounds: int) -> Solution:
         own = priors._replace(balls=priors.balls[chosen], u_balls=priors.u_balls[chosen])

@@ -1,7 +1,9 @@
 r"""Centres of balls from their outlines, each light on the side that it shines on.
 
-There ball and board are both lit and their edge is sharp, while the board's shape and the light's direction do not enter:
-what shadows cannot tell apart (a tilt of all lights and of the board, and a shift of all balls) outlines can. With r the
+There ball and board are both lit and their edge is sharp, while the board's shape and the light's direction do not
+enter:
+what shadows cannot tell apart (a tilt of all lights and of the board, and a shift of all balls) outlines can. With r
+the
 distance to the centre, along the outline
 
     I = outside Phi(d / s) + (inside + bend sqrt(1 - r^2 / R^2)) (1 - Phi(d / s)) + move phi(d / s) / s,   d = r - R.
@@ -12,7 +14,7 @@ radius only, which is left free.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
     from bgars.inspection.radiance import Radiance
     from bgars.inspection.shadow_map import ShadowMap
 
-__all__ = ["outline_centres"]
+__all__ = ["Outlines", "outline_centres"]
 
 Array = NDArray[np.float64]
 
@@ -33,18 +35,35 @@ WIDEST_RAD = np.radians(64.0)
 LINE_SPACING_PX = 1.45
 MAX_LINES = 48
 REACH_PX = 3.5
+COARSE_REACH, COARSE_EXTRA_PX = 0.2, 2.0
 MIN_STRETCHES = 12
 MIN_SPREAD_DEG = 200.0
-ROUNDS = 12
+ROUNDS = 8
+BIN_DEG = 20.0
 CAUCHY = 2.5
 NEIGHBOUR_GAP_PX = 5.0
 INV_SQRT_2PI = 0.3989422804014327
 
 
-def outline_centres(
-    radiance: Radiance, shadows: ShadowMap, table: Array, azimuths_rad: Array, spread_px: float
-) -> tuple[Array, Array]:
+class Outlines(NamedTuple):
     """Centres (N, 2) and their standard uncertainty (N,); NaN and inf where too little of an outline is seen.
+
+    `shift_px` (N, L, S) how far each stretch lies outside the predicted circle, `u_shift_px` its uncertainty (inf:
+    unknown), `offset_rad` (S,) its place against the direction of its light, `azimuths_rad` (L,).
+    """
+
+    centres: Array
+    u_centre: Array
+    shift_px: Array
+    u_shift_px: Array
+    offset_rad: Array
+    azimuths_rad: Array
+
+
+def outline_centres(
+    radiance: Radiance, shadows: ShadowMap, table: Array, azimuths_rad: Array, spread_px: float, *, coarse: bool = False
+) -> Outlines:
+    """Measure the outlines of balls.
 
     Parameters
     ----------
@@ -57,6 +76,8 @@ def outline_centres(
         Of the lights.
     spread_px : float
         Of sharp edges in these images.
+    coarse : bool
+        By area, as in :mod:`bgars.inspection.shadow_edges`: finds outlines a tenth of a radius and a pixel off.
     """
     count, lights = len(table), len(azimuths_rad)
     radius = float(np.median(table[:, 3]))
@@ -74,22 +95,35 @@ def outline_centres(
                 free[other] &= gap > NEIGHBOUR_GAP_PX
     ball, light, place = np.nonzero(free)
     pick = (ball, light, place)
-    value, distance, usable = _across(radiance, shadows, table, pick, angle, edge_x[pick], edge_y[pick])
+    wide = COARSE_REACH * radius + COARSE_EXTRA_PX if coarse else REACH_PX
+    value, distance, usable = _across(radiance, shadows, table, pick, angle, (edge_x[pick], edge_y[pick]), wide)
+    if coarse:
+        outside = (distance >= 0.0).astype(np.float64)
+        columns = [1.0 - outside, outside, (np.abs(distance) < 0.5 * wide) / wide]
+    else:
+        columns = _profile(distance, spread_px, table[ball, 3])
+    stretch = (ball * lights + light) * SECTORS + place * SECTORS // lines
+    group = Group(stretch, count * lights * SECTORS, SECTORS)
+    fit = fit_stretches(columns, value, usable, group, robust=not coarse)
+    step = fit.solution[:, 0] - fit.solution[:, 1]
+    known = fit.measured & (np.abs(step) > 3.0 * fit.deviation[:, 2] / wide)
+    shift = np.where(known, fit.solution[:, 2] / np.where(known, step, 1.0), 0.0).reshape(count, -1)
+    u_shift = np.where(known, fit.deviation[:, 2] / np.abs(np.where(known, step, 1.0)), np.inf).reshape(count, -1)
+    u_shift = np.where(np.abs(shift) < (0.5 * wide if coarse else wide), u_shift, np.inf)
+    places = WIDEST_RAD * ((np.arange(SECTORS) + 0.5) / SECTORS * 2.0 - 1.0)
+    middle = (azimuths_rad[:, None] + places[None, :]).reshape(-1)
+    centres, u_centre = _centres(table, middle, shift, u_shift)
+    shape = (count, lights, SECTORS)
+    return Outlines(centres, u_centre, shift.reshape(shape), u_shift.reshape(shape), places, azimuths_rad)
+
+
+def _profile(distance: Array, spread_px: float, radius: Array) -> list[Array]:
+    """Columns of the fit: inside, outside, move, bend of the shading towards the rim."""
     scaled = distance / spread_px
     outside = ndtr(scaled)
     inside = 1.0 - outside
-    depth = np.sqrt(np.maximum(1.0 - np.square(1.0 + distance / table[ball, 3]), 0.0))
-    bell = INV_SQRT_2PI * np.exp(-0.5 * scaled**2) / spread_px
-    stretch = (ball * lights + light) * SECTORS + place * SECTORS // lines
-    group = Group(stretch, count * lights * SECTORS, SECTORS)
-    fit = fit_stretches([inside, outside, bell, inside * depth], value, usable, group)
-    step = fit.solution[:, 0] - fit.solution[:, 1]
-    known = fit.measured & (np.abs(step) > 3.0 * fit.deviation[:, 2] / REACH_PX)
-    shift = np.where(known, fit.solution[:, 2] / np.where(known, step, 1.0), 0.0).reshape(count, -1)
-    u_shift = np.where(known, fit.deviation[:, 2] / np.abs(np.where(known, step, 1.0)), np.inf).reshape(count, -1)
-    usable_shift = np.abs(shift) < REACH_PX
-    middle = azimuths_rad[:, None] + WIDEST_RAD * ((np.arange(SECTORS) + 0.5) / SECTORS * 2.0 - 1.0)[None, :]
-    return _centres(table, middle.reshape(-1), shift, np.where(usable_shift, u_shift, np.inf))
+    depth = np.sqrt(np.maximum(1.0 - np.square(1.0 + distance / radius), 0.0))
+    return [inside, outside, INV_SQRT_2PI * np.exp(-0.5 * scaled**2) / spread_px, inside * depth]
 
 
 def _across(
@@ -98,45 +132,56 @@ def _across(
     table: Array,
     pick: tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]],
     angle: Array,
-    edge_x: Array,
-    edge_y: Array,
+    edge: tuple[Array, Array],
+    reach_px: float,
 ) -> tuple[Array, Array, Array]:
     """Values, distances to the outline and 1 or 0 for usable, (O, M), on lines across it."""
     ball, light, place = pick
     toward = angle[0, light, place]
-    steps = int(np.ceil(REACH_PX))
+    steps = int(np.ceil(reach_px))
     offsets = np.arange(-steps, steps + 1)[:, None]
     along_cols = np.abs(np.cos(toward)) >= np.abs(np.sin(toward))
-    rows = np.rint(radiance.row(edge_y)).astype(np.intp)[None, :] + np.where(along_cols[None, :], 0, offsets)
-    cols = np.rint(radiance.col(edge_x)).astype(np.intp)[None, :] + np.where(along_cols[None, :], offsets, 0)
+    rows = np.rint(radiance.row(edge[1])).astype(np.intp)[None, :] + np.where(along_cols[None, :], 0, offsets)
+    cols = np.rint(radiance.col(edge[0])).astype(np.intp)[None, :] + np.where(along_cols[None, :], offsets, 0)
     usable = (rows >= 0) & (rows < radiance.height) & (cols >= 0) & (cols < radiance.width)
     rows, cols = np.clip(rows, 0, radiance.height - 1), np.clip(cols, 0, radiance.width - 1)
     distance = np.hypot(radiance.x(cols) - table[ball, 0], radiance.y(rows) - table[ball, 1]) - table[ball, 3]
     value = radiance.under(np.broadcast_to(light, rows.shape), rows * radiance.width + cols).astype(np.float64)
     at = shadows.pixels(rows, cols)
     shadowed = shadows.count.reshape(len(shadows.count), -1)[np.broadcast_to(light, rows.shape), at] > 0
-    usable &= np.isfinite(value) & (np.abs(distance) <= REACH_PX) & ~(shadowed & (distance > 0))
+    usable &= np.isfinite(value) & (np.abs(distance) <= reach_px) & ~(shadowed & (distance > 0))
     return np.where(usable, value, 0.0), distance, usable.astype(np.float64)
 
 
 def _centres(table: Array, middle: Array, shift: Array, u_shift: Array) -> tuple[Array, Array]:
     """Robust circles through the shifts of outlines: centre moves, radius free."""
-    design = np.column_stack([np.cos(middle), np.sin(middle), np.ones(len(middle))])
-    centres, u_centre = np.full((len(table), 2), np.nan), np.full(len(table), np.inf)
-    for index in range(len(table)):
-        known = np.isfinite(u_shift[index])
-        directions = np.unique(np.floor(np.degrees(middle[known]) % 360.0 / 20.0)).size * 20.0
-        if known.sum() < MIN_STRETCHES or directions < MIN_SPREAD_DEG:
-            continue
-        system, found = design[known], shift[index, known]
-        scale = max(1.4826 * float(np.median(np.abs(found - np.median(found)))), 1e-3)
-        change, weight = np.zeros(3), np.ones(len(found))
-        for _ in range(ROUNDS):
-            residual = found - system @ change
-            weight = 1.0 / (1.0 + (residual / (CAUCHY * scale)) ** 2)
-            change = np.linalg.solve(system.T @ (weight[:, None] * system), system.T @ (weight * found))
-            scale = max(1.4826 * float(np.median(np.abs(found - system @ change))), 1e-3)
-        covariance = np.linalg.inv(system.T @ (weight[:, None] * system)) * scale**2
-        centres[index] = table[index, :2] + change[:2]
-        u_centre[index] = np.sqrt((covariance[0, 0] + covariance[1, 1]) / 2.0)
+    system = np.column_stack([np.cos(middle), np.sin(middle), np.ones(len(middle))])
+    known = np.isfinite(u_shift)
+    bins = np.floor(np.degrees(middle) % 360.0 / BIN_DEG).astype(np.intp)
+    seen = np.zeros((len(table), int(360.0 / BIN_DEG)), dtype=np.bool_)
+    for bin_index in range(seen.shape[1]):
+        seen[:, bin_index] = known[:, bins == bin_index].any(axis=1)
+    good = (known.sum(axis=1) >= MIN_STRETCHES) & (seen.sum(axis=1) * BIN_DEG >= MIN_SPREAD_DEG)
+    change = np.zeros((len(table), 3))
+    change[:, 2] = _median(shift, known)
+    normal = np.repeat(np.eye(3)[None], len(table), axis=0)
+    scale = np.ones(len(table))
+    for _ in range(ROUNDS):
+        residual = np.where(known, shift - change @ system.T, 0.0)
+        scale = np.maximum(1.4826 * _median(np.abs(residual), known), 1e-3)
+        weight = known / (1.0 + (residual / (CAUCHY * scale[:, None])) ** 2)
+        normal = np.einsum("km,mi,mj->kij", weight, system, system, optimize=True)
+        normal[~good] = np.eye(3)
+        right = (weight * residual) @ system
+        change = change + np.where(good[:, None], np.linalg.solve(normal, right[..., None])[..., 0], 0.0)
+    covariance = np.linalg.inv(normal) * np.square(scale)[:, None, None]
+    centres = np.where(good[:, None], table[:, :2] + change[:, :2], np.nan)
+    u_centre = np.where(good, np.sqrt((covariance[:, 0, 0] + covariance[:, 1, 1]) / 2.0), np.inf)
     return centres, u_centre
+
+
+def _median(values: Array, known: NDArray[np.bool_]) -> Array:
+    """(N,) medians of the known values of each row; 0 where there is none."""
+    some: NDArray[np.bool_] = np.asarray(known.any(axis=1))
+    median: Array = np.nanmedian(np.where(known, values, np.where(some[:, None], np.nan, 0.0)), axis=1)
+    return median

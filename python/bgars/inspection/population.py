@@ -14,12 +14,13 @@ __all__ = ["q_spread"]
 
 Array = NDArray[np.float64]
 
-LIMITS = (0.0005, 0.02)
+LIMITS = (0.0003, 0.02)
 UNKNOWN = 0.003
 """Scatter of q among round balls: bounds, and what is taken where too few balls are seen."""
 MIN_POPULATION = 5
-OUTLIER = 4.0
+OUTLIER = 3.5
 FREE = 0.2
+MEDIAN_CHI_SQUARE = 0.455
 ROUNDS = 10
 
 
@@ -40,7 +41,8 @@ def q_spread(solution: Solution, u_prior: Array) -> Array:
     by_shadow = np.maximum(information - 1.0 / u_prior**2, 1e-3 * information)
     off = (solution.balls[:, 4] - 1.0) * information / by_shadow
     variance = 1.0 / by_shadow
-    scatter = UNKNOWN
+    excess_square = np.median(np.square(off) - variance * MEDIAN_CHI_SQUARE) / MEDIAN_CHI_SQUARE
+    scatter = float(np.clip(np.sqrt(max(float(excess_square), 0.0)), *LIMITS))
     for _ in range(ROUNDS):
         total = variance + scatter**2
         round_ones = np.square(off) < OUTLIER**2 * total

@@ -71,7 +71,8 @@ class Problem:
         everything = np.concatenate([self.table, self.extra])
         x, y, _, radius, _ = self.table[index]
         reach = NEARBY_RADII * max(radius, float(np.median(self.table[:, 3])))
-        return everything[np.hypot(everything[:, 0] - x, everything[:, 1] - y) < reach + everything[:, 3]]
+        near: Array = everything[np.hypot(everything[:, 0] - x, everything[:, 1] - y) < reach + everything[:, 3]]
+        return near
 
 
 def make_problem(capture: Capture, found: FoundBalls) -> Problem:

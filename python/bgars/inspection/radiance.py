@@ -65,16 +65,20 @@ class Radiance:
 
     def x(self, col: NDArray[np.generic]) -> Array:
         """World x in pixels of a column."""
-        return col + (0.5 - self.width / 2.0)
+        x: Array = col + (0.5 - self.width / 2.0)
+        return x
 
     def y(self, row: NDArray[np.generic]) -> Array:
         """World y in pixels of a row."""
-        return (self.height / 2.0 - 0.5) - row
+        y: Array = (self.height / 2.0 - 0.5) - row
+        return y
 
     def col(self, x: Array) -> Array:
         """Column, with fraction, of a world x in pixels."""
-        return x + (self.width / 2.0 - 0.5)
+        col: Array = x + (self.width / 2.0 - 0.5)
+        return col
 
     def row(self, y: Array) -> Array:
         """Row, with fraction, of a world y in pixels."""
-        return (self.height / 2.0 - 0.5) - y
+        row: Array = (self.height / 2.0 - 0.5) - y
+        return row

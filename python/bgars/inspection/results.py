@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -9,11 +10,14 @@ from numpy.typing import NDArray
 
 from bgars.ball_records import BallMeasurement, MeasuredBall
 from bgars.inspection.bundle import angles_rad
+from bgars.inspection.highlights import sharpen_centres
 from bgars.inspection.spread import SHARP_PX
 
 if TYPE_CHECKING:
     from bgars.ball_records import FoundBall, FoundBalls
+    from bgars.inspection.bundle import Solution
     from bgars.inspection.flat_top import FlatTops
+    from bgars.inspection.highlights import Highlights
     from bgars.inspection.measure import Fit
     from bgars.inspection.problem import Problem
     from bgars.inspection.shadow_edges import Edges
@@ -33,7 +37,7 @@ FLAT_SHARE = 0.01
 """A flat top is taken off the height where it is significant and more than this share of the radius."""
 POOR_SHARE = 0.02
 MANY_OUTLIERS = 0.4
-MODEL_CENTRE_PX, MODEL_RADIUS_PX = 0.0022, 0.0035
+MODEL_CENTRE_PX, MODEL_RADIUS_PX = 0.0018, 0.0030
 MODEL_HEIGHT_PER_RADIUS = -1.2
 """Scatter of simulated balls beyond the fit's own uncertainty (docs/make_inspection_accuracy.py prints both), for sharp
 edges; it grows with the root of their spread. Height and radius err against each other: the tip of the shadow stays.
@@ -63,7 +67,9 @@ def judge_balls(edges: Edges) -> Usability:
     return Usability(usable, strong.sum(axis=1), np.where(seen.any(axis=1), mean, np.nan))
 
 
-def measurement(found: FoundBalls, problem: Problem, fit: Fit | None, flats: FlatTops | None) -> BallMeasurement:
+def measurement(
+    found: FoundBalls, problem: Problem, fit: Fit | None, flats: FlatTops | None, highlights: Highlights | None
+) -> BallMeasurement:
     """Put everything into records."""
     pitch = problem.pitch_um
     unit = problem.vectors / np.linalg.norm(problem.vectors, axis=1, keepdims=True)
@@ -72,11 +78,13 @@ def measurement(found: FoundBalls, problem: Problem, fit: Fit | None, flats: Fla
     fitted: dict[int, int] = {}
     if fit is not None and solution is not None:
         fitted = {int(ball): place for place, ball in enumerate(fit.index[fit.usability.usable])}
+        fit = _with_highlights(fit, solution, highlights)
     balls = []
     for index, ball in enumerate(found.balls):
         if index in fitted and fit is not None:
             lights = int(fit.usability.lights[looked_at[index]])
-            balls.append(_measured(ball, fit, fitted[index], lights, flats, pitch))
+            missing = highlights is not None and bool(highlights.missing[fitted[index]])
+            balls.append(_measured(ball, fit, fitted[index], lights, flats, missing, pitch))
         else:
             balls.append(_unmeasured(ball, index, problem, fit, looked_at, pitch))
     if solution is None:
@@ -84,7 +92,8 @@ def measurement(found: FoundBalls, problem: Problem, fit: Fit | None, flats: Fla
     c1, c2, c3, c4, c5 = solution.board.coefficients
     moved = np.degrees(angles_rad(solution.vectors, problem.vectors))
     refined = solution.vectors / np.linalg.norm(solution.vectors, axis=1, keepdims=True)
-    warnings = tuple(
+    warnings = fit.warnings if fit is not None else ()
+    warnings += tuple(
         f"light {light}: its shadows say that it stands {moved[light]:.1f} degrees from where the rig says"
         for light in np.flatnonzero(moved > LIGHT_WARNING_DEG)
     )
@@ -100,8 +109,24 @@ def measurement(found: FoundBalls, problem: Problem, fit: Fit | None, flats: Fla
     )
 
 
+def _with_highlights(fit: Fit, solution: Solution, highlights: Highlights | None) -> Fit:
+    """The fit with centres sharpened by highlights."""
+    if highlights is None:
+        return fit
+    u_centre = np.sqrt(np.stack([solution.covariance[:, 0, 0], solution.covariance[:, 1, 1]], axis=1))
+    here = solution.balls[:, :2]
+    centres, u_sharp = sharpen_centres(highlights, here, here, u_centre)
+    balls, covariance = solution.balls.copy(), solution.covariance.copy()
+    balls[:, :2] = centres
+    for axis in (0, 1):
+        share = u_sharp[:, axis] / u_centre[:, axis]
+        covariance[:, axis, :] *= share[:, None]
+        covariance[:, :, axis] *= share[:, None]
+    return replace(fit, solution=replace(solution, balls=balls, covariance=covariance))
+
+
 def _model_error(sharp_px: float) -> Array:
-    """(5, 5) covariance of what no residual shows: texture and shadow blurred together, pixels that straddle an edge."""
+    """(5, 5) covariance of what no residual shows: blurred texture, pixels that straddle an edge."""
     size = np.sqrt(sharp_px / SHARP_PX)
     centre, radius = size * MODEL_CENTRE_PX, size * MODEL_RADIUS_PX
     together = radius * np.array([0.0, 0.0, MODEL_HEIGHT_PER_RADIUS, 1.0, 0.0])
@@ -110,11 +135,11 @@ def _model_error(sharp_px: float) -> Array:
 
 
 def _measured(
-    ball: FoundBall, fit: Fit, place: int, lights: int, flats: FlatTops | None, pitch: float
+    ball: FoundBall, fit: Fit, place: int, lights: int, flats: FlatTops | None, missing: bool, pitch: float
 ) -> MeasuredBall:
     """A ball with its numbers."""
     solution = fit.solution
-    assert solution is not None  # noqa: S101 - the caller looked
+    assert solution is not None
     x, y, z, radius, q = solution.balls[place]
     covariance = solution.covariance[place] + _model_error(fit.spread.sharp_px)
     u = np.sqrt(np.diag(covariance))
@@ -129,6 +154,8 @@ def _measured(
             top -= flat
             u_top = float(np.hypot(u_top, u_flat))
             reasons.append(f"flat top: {flat * pitch:.0f} um are missing")
+    elif missing:
+        reasons.append("flat top, or of another material: its highlights are missing")
     known = np.isfinite(solution.residual_px[place])
     outliers = float((solution.weight[place][known] < 0.1).mean()) if known.any() else 1.0  # noqa: PLR2004
     if outliers > MANY_OUTLIERS:

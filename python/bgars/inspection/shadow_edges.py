@@ -5,7 +5,8 @@ Near the predicted edge of a shadow, at signed distance d, the board reads
     I = T [lo + (hi - lo) Phi(d / s)] + e,
 
 T the board's own texture (mean of the lights that reach the pixel, each divided by its gain), s the spread of the edge
-by pixel, lens and size of the lamp. A stretch of edge has its own lo and hi (light from neighbouring balls differs along
+by pixel, lens and size of the lamp. A stretch of edge has its own lo and hi (light from neighbouring balls differs
+along
 the edge), and to first order a displacement a and a change b of the spread:
 
     I = lo T (1 - Phi) + hi T Phi - (hi - lo) [a T phi / s + b T (d / s) phi / s],
@@ -43,12 +44,14 @@ __all__ = ["EdgeSettings", "Edges", "measure_edges"]
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-SECTORS = 20
+SECTORS, FEWEST_SECTORS = 20, 4
 WIDEST_RAD = np.radians(100.0)
 LINE_SPACING_PX = 1.45
 """Distance of neighbouring lines along the edge: above sqrt(2), so that no two lines share a pixel."""
 MAX_LINES = 96
-COARSE_LINES = 48
+FEW_LINES = 48
+FEWEST_LINES = 12
+LINES_A_STRETCH = 3
 LINES_AT_ONCE = 6000
 MIN_LIGHTS_LIT = 2
 LOWEST_TANGENT = 0.08
@@ -62,6 +65,7 @@ class EdgeSettings(NamedTuple):
 
     Spread of a sharp edge, growth of the spread along the ray, distance to look to on both sides, distance of pixels.
     `coarse`: by area instead, see the head of this file; finds edges up to half of `reach_px` away.
+    `thorough`: more lines across the edges of large balls.
     """
 
     spread_px: float
@@ -69,6 +73,7 @@ class EdgeSettings(NamedTuple):
     reach_px: float
     stride_px: int = 1
     coarse: bool = False
+    thorough: bool = False
 
     @property
     def coarse_px(self) -> float | None:
@@ -90,6 +95,7 @@ class Edges:
     low, high : shadow and lit level over the board's texture
     contrast_levels : high - low in grey levels of 255
     noise_levels : (N, L) residual of the fit in grey levels of 255
+    looked_at : bool, True where enough board was seen on both sides of the predicted edge
     """
 
     x: Array
@@ -103,6 +109,7 @@ class Edges:
     high: Array
     contrast_levels: Array
     noise_levels: Array
+    looked_at: NDArray[np.bool_]
 
     def take(self, balls: NDArray[np.bool_]) -> Edges:
         """Some of the balls."""
@@ -111,8 +118,9 @@ class Edges:
     def lit_levels(self, otherwise: Array) -> Array:
         """(N, L) median lit level over the board's texture, `otherwise` where unknown: the gains as they really are."""
         known = np.isfinite(self.high)
-        some = known.any(axis=2)
-        levels: Array = np.where(some, np.nanmedian(np.where(some[:, :, None], self.high, 1.0), axis=2), otherwise)
+        some: NDArray[np.bool_] = np.asarray(known.any(axis=2))
+        high = np.where(some[:, :, None], self.high, 1.0)
+        levels: Array = np.where(some, np.nanmedian(high, axis=2), otherwise)
         return np.where(levels > 0, levels, otherwise)
 
 
@@ -146,8 +154,8 @@ def measure_edges(
     threads : int
     """
     radius = float(np.median(table[:, 3]))
-    most = COARSE_LINES if settings.coarse else MAX_LINES
-    count = int(np.clip(2.0 * WIDEST_RAD * radius / LINE_SPACING_PX, 2 * SECTORS, most))
+    most = MAX_LINES if settings.thorough else FEW_LINES
+    count = int(np.clip(2.0 * WIDEST_RAD * radius / LINE_SPACING_PX, FEWEST_LINES, most))
     angles = (np.arange(count) + 0.5) / count * 2.0 * WIDEST_RAD - WIDEST_RAD
     step = max(1, LINES_AT_ONCE // (len(vectors) * count))
     parts = [slice(first, first + step) for first in range(0, len(table), step)]
@@ -173,7 +181,8 @@ def _measure(
 ) -> list[Array]:
     """The same for some of the balls."""
     balls, lights = Balls.from_table(table), Lights.from_table(vectors, near)
-    shape = (len(table), len(vectors), SECTORS)
+    sectors = int(np.clip(len(angles) // LINES_A_STRETCH, FEWEST_SECTORS, SECTORS))
+    shape = (len(table), len(vectors), sectors)
     wide_balls, wide_lights = balls.spread(2), lights.spread(1, 1)
     edge = edge_at(angles[None, None, :], wide_balls, wide_lights, board)
     beam = rays(edge.x, edge.y, wide_balls, wide_lights, board)
@@ -190,7 +199,7 @@ def _measure(
     spread = np.sqrt(settings.spread_px**2 + (settings.lamp_spread_rad * way) ** 2)
     point = (edge.x[pick], edge.y[pick])
     pixels = _pixels(radiance, shadows, balls, board, gains, settings, here, point, ball, light, spread)
-    sector = ball * len(vectors) * SECTORS + light * SECTORS + place * SECTORS // len(angles)
+    sector = (ball * len(vectors) + light) * sectors + place * sectors // len(angles)
     return _solve(radiance, pixels, sector, angles[place], way, spread, shape, wide_balls, wide_lights, board, settings)
 
 
@@ -296,8 +305,12 @@ def _solve(
     tangent_along = (beam.toward_y * beam.gradient_x - beam.toward_x * beam.gradient_y) / beam.slope
     curvature = (1.0 - tangent_along**2) / (beam.distance * beam.slope)
     # And texture that grows outward by g a pixel, blurred with the shadow, moves its edge inward by g s^2.
-    blurred = 0.0 if coarse_px is not None else sharp_px**2 * _texture_growth(pixels, spread, sector, size).reshape(shape)
-    shift = blurred + 0.5 * mean_spread**2 * curvature - np.where(measured, fit.solution[:, 2].reshape(shape) / safe, 0.0)
+    blurred = (
+        0.0 if coarse_px is not None else sharp_px**2 * _texture_growth(pixels, spread, sector, size).reshape(shape)
+    )
+    shift = (
+        blurred + 0.5 * mean_spread**2 * curvature - np.where(measured, fit.solution[:, 2].reshape(shape) / safe, 0.0)
+    )
     bad = ~measured
     return [
         np.where(bad, 0.0, edge.x + shift * beam.gradient_x / beam.slope),
@@ -311,6 +324,7 @@ def _solve(
         np.where(bad, np.nan, fit.solution[:, 1].reshape(shape)),
         np.where(bad, np.nan, contrast * texture / radiance.scale),
         fit.noise.reshape(shape[:2]) / radiance.scale,
+        fit.measured.reshape(shape),
     ]
 
 

@@ -78,8 +78,10 @@ class ShadowMap:
     def pixels(self, row: Index, col: Index) -> Index:
         """Flat index into a map of image pixels."""
         if self.step == 1:
-            return row * self.cols + col
-        return (row // self.step) * self.cols + col // self.step
+            index: Index = row * self.cols + col
+        else:
+            index = (row // self.step) * self.cols + col // self.step
+        return index
 
     def _window(self, x0: float, x1: float, y0: float, y1: float) -> tuple[slice, slice]:
         """Rows and columns of the map between two corners; slices may be empty."""
@@ -91,7 +93,7 @@ class ShadowMap:
         self, light: int, balls: Balls, vector: NDArray[np.float64], near: bool, board: Board, margin_px: float
     ) -> None:
         """Count the shadows of all balls under one light."""
-        lamp = Lights(*(np.full((1, 1), part) for part in vector), near)
+        lamp = Lights.from_table(vector[None], near).spread(0, 1)
         edges = edge_at(OUTLINE[None, :], balls.spread(1), lamp, board)
         for index in range(len(balls.x)):
             own = balls.take(np.array([index])).spread(1)

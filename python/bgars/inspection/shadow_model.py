@@ -1,12 +1,14 @@
 r"""The shadow of a spheroid on the board: signed distance to its edge, derivatives, points on the edge.
 
 A ray from the board point P to the light meets the spheroid with horizontal semi-axis R and vertical semi-axis q R when
-it passes its centre closer than R, in a space where heights are divided by q (the spheroid becomes a sphere there). With
+it passes its centre closer than R, in a space where heights are divided by q (the spheroid becomes a sphere there).
+With
 w = P - C and u the unit vector to the light,
 
     D = |w - (w . u) u|,    d = (D - R) / |grad D|
 
-is the distance of P to the edge of the shadow on the board, positive outside, exact at the edge. On a flat board and for
+is the distance of P to the edge of the shadow on the board, positive outside, exact at the edge. On a flat board and
+for
 a distant light, D = R is an ellipse with centre c_xy - c_z l_xy / l_z and semi-axes R and R / l_z (DESIGN, section 8).
 For a near light u points from P to the lamp, and the edge is the cut of its tangent cone with the board.
 """
@@ -21,7 +23,19 @@ from numpy.typing import NDArray
 
 from bgars.inspection.board import SHAPE_TERMS, Board, height_terms
 
-__all__ = ["Balls", "Edge", "Lights", "Nearby", "Rays", "ball_derivatives", "board_derivatives", "edge_at", "light_derivatives", "near_edge", "rays"]
+__all__ = [
+    "Balls",
+    "Edge",
+    "Lights",
+    "Nearby",
+    "Rays",
+    "ball_derivatives",
+    "board_derivatives",
+    "edge_at",
+    "light_derivatives",
+    "near_edge",
+    "rays",
+]
 
 Array = NDArray[np.float64]
 
@@ -77,7 +91,8 @@ class Lights:
     @classmethod
     def from_table(cls, table: Array, near: bool) -> Lights:
         """(L, 3) rows."""
-        return cls(*np.ascontiguousarray(table.T), near)
+        x, y, z = np.ascontiguousarray(table.T)
+        return cls(x, y, z, near)
 
     def spread(self, before: int, after: int) -> Lights:
         """The same with leading and trailing axes of length 1."""
@@ -93,8 +108,10 @@ class Rays(NamedTuple):
     """The rays from board points to a light, as they pass a ball (scaled space).
 
     `distance` D to the centre; `outward` unit vector from the centre to the closest point; `along` the way from the
-    board to that point; `lever` = 1 - along / (way to the lamp), 1 for distant lights; `turn` how far that point moves when
-    the light's vector changes by 1; `gradient_x`, `gradient_y` of D on the board; `toward_x`, `toward_y`, `toward_z` of u.
+    board to that point; `lever` = 1 - along / (way to the lamp), 1 for distant lights; `turn` how far that point
+    moves when
+    the light's vector changes by 1; `gradient_x`, `gradient_y` of D on the board; `toward_x`, `toward_y`, `toward_z`
+    of u.
     """
 
     distance: Array
@@ -191,7 +208,14 @@ def near_edge(beam: Rays, x: Array, y: Array, balls: Balls, board: Board) -> Nea
     bend = (across - slope**2) / beam.distance
     double = 2.0 * beam.distance
     return Nearby(
-        beam.distance, double * beam.gradient_x, double * beam.gradient_y, xx, 2.0 * xy, yy, 1.0 / slope, 0.5 * bend / slope
+        beam.distance,
+        double * beam.gradient_x,
+        double * beam.gradient_y,
+        xx,
+        2.0 * xy,
+        yy,
+        1.0 / slope,
+        0.5 * bend / slope,
     )
 
 
@@ -237,7 +261,9 @@ def edge_at(angle: Array, balls: Balls, lights: Lights, board: Board) -> Edge:
     way = tangent_z / ray_z
     if not board.is_flat:
         for _ in range(DESCENTS):
-            way = way + (tangent_z - way * ray_z - board.height(tangent_x - way * ray_x, tangent_y - way * ray_y)) / ray_z
+            way = (
+                way + (tangent_z - way * ray_z - board.height(tangent_x - way * ray_x, tangent_y - way * ray_y)) / ray_z
+            )
     ground = 0.0 if board.is_flat else board.height(tangent_x, tangent_y)
     return Edge(tangent_x - way * ray_x, tangent_y - way * ray_y, tangent_z - ground)
 
@@ -261,7 +287,8 @@ def light_derivatives(beam: Rays, balls: Balls, tangents: tuple[Array, Array]) -
     `tangents`: two arrays (..., 3), the change of direction (distant) or position (near) per radian.
     """
     parts = [
-        beam.turn * (beam.outward_x * way[..., 0] + beam.outward_y * way[..., 1] + beam.outward_z * way[..., 2] / balls.q)
+        beam.turn
+        * (beam.outward_x * way[..., 0] + beam.outward_y * way[..., 1] + beam.outward_z * way[..., 2] / balls.q)
         for way in tangents
     ]
     return np.stack(parts, axis=-1)

@@ -1,4 +1,4 @@
-"""How sharp shadow edges are: pixel and lens everywhere alike, the lamp's size more, the longer the way of its light."""
+"""How sharp shadow edges are: pixel and lens alike everywhere, the lamp's size by the way of its light."""
 
 from __future__ import annotations
 

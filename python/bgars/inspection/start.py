@@ -1,7 +1,8 @@
-"""A first height for every ball: the one whose predicted shadow edges are the darkest inside and the brightest outside."""
+"""A first height for every ball: where predicted shadow edges are darkest inside and brightest outside."""
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,12 +24,23 @@ ANGLES = np.radians(np.linspace(-60.0, 60.0, 13))
 BESIDE = 0.09
 """Points inside and outside lie this share of the radius off the edge."""
 CLIP = (-0.5, 1.0)
+DARK = 0.5
+"""Board darker than this share of its mean over the lights is in a shadow."""
+MIN_POINTS = 3
+USUAL_HEIGHT = 2.0 / 3.0
+"""Height of the centre, in radii, where no ball shows its own."""
 WEAK_STEP = 0.08
 TOP_SHARE = 0.7
 
 
 def edge_steps(
-    radiance: Radiance, balls: Balls, lights: Lights, images: NDArray[np.intp], hidden: Balls, board: Board, gains: Array
+    radiance: Radiance,
+    balls: Balls,
+    lights: Lights,
+    images: NDArray[np.intp],
+    hidden: Balls,
+    board: Board,
+    gains: Array,
 ) -> Array:
     """Mean relative step of brightness from inside to outside of predicted edges, clipped; NaN where nothing is seen.
 
@@ -65,17 +77,28 @@ def edge_steps(
             near = (hidden.radius[index] + 2.0) ** 2
             seen &= np.square(x - hidden.x[index]) + np.square(y - hidden.y[index]) > near
         sides.append(np.where(seen, own / np.where(texture > 0, texture, 1.0), np.nan))
-    step = np.clip(sides[1] - sides[0], *CLIP)
+    # Dark on both sides: the shadow of a neighbour, which says nothing.
+    dark = (sides[0] < DARK) & (sides[1] < DARK)
+    step = np.where(dark, np.nan, np.clip(sides[1] - sides[0], *CLIP))
     known = np.isfinite(step)
     points = known.sum(axis=-1)
-    mean: Array = np.where(points >= 3, np.where(known, step, 0.0).sum(axis=-1) / np.maximum(points, 1), np.nan)  # noqa: PLR2004
+    mean: Array = np.where(
+        points >= MIN_POINTS, np.where(known, step, 0.0).sum(axis=-1) / np.maximum(points, 1), np.nan
+    )
     return mean
 
 
 def first_heights(
-    radiance: Radiance, table: Array, vectors: Array, near: bool, board: Board, gains: Array, neighbours: list[Array]
+    radiance: Radiance,
+    table: Array,
+    vectors: Array,
+    near: bool,
+    board: Board,
+    gains: Array,
+    neighbours: list[Array],
+    threads: int,
 ) -> tuple[Array, Array]:
-    """(N,) heights of the centres, and the step of brightness that each was found by.
+    """(N,) heights of the centres, and (N, L) the step of brightness under each light there (NaN: not seen).
 
     Parameters
     ----------
@@ -88,23 +111,39 @@ def first_heights(
     gains : (L,) float64
     neighbours : list of (m, 5) float64
         Per ball, the balls (itself too) that may hide the board around it.
+    threads : int
     """
-    heights, steps = np.zeros(len(table)), np.zeros(len(table))
+    heights, steps = np.zeros(len(table)), np.full((len(table), len(vectors)), np.nan)
+    seen = np.full((len(table), len(HEIGHTS), len(vectors)), np.nan)
     lights = Lights.from_table(vectors, near).spread(1, 0)
     images = np.arange(len(vectors))[None, :]
     scores = np.zeros((len(table), len(HEIGHTS)))
-    for index, row in enumerate(table):
+
+    def look(index: int) -> None:
+        row = table[index]
         tried = np.repeat(row[None, :], len(HEIGHTS), axis=0)
         tried[:, 2] = HEIGHTS * row[3]
         step = edge_steps(
-            radiance, Balls.from_table(tried).spread(1), lights, images, Balls.from_table(neighbours[index]), board, gains
+            radiance,
+            Balls.from_table(tried).spread(1),
+            lights,
+            images,
+            Balls.from_table(neighbours[index]),
+            board,
+            gains,
         )
+        seen[index] = step
         known = np.isfinite(step)
         scores[index] = np.where(known, step, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 3.0)
-    common = _middle(np.median(scores, axis=0))
+
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(look, range(len(table))))
+    usual = np.median(scores, axis=0)
+    common = _middle(usual) if usual.max() >= WEAK_STEP else USUAL_HEIGHT
     for index, row in enumerate(table):
-        steps[index] = scores[index].max()
-        heights[index] = (_middle(scores[index]) if steps[index] >= WEAK_STEP else common) * row[3]
+        height = _middle(scores[index]) if scores[index].max() >= WEAK_STEP else common
+        heights[index] = height * row[3]
+        steps[index] = seen[index, int(np.argmin(np.abs(HEIGHTS - height)))]
     return heights, steps
 
 

@@ -1,0 +1,365 @@
+"""Balls, lights and board from cast shadows, on simulated captures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bgars
+import numpy as np
+import pytest
+from bgars.ball_records import BallMeasurement, FoundBall, FoundBalls
+from bgars.inspection import check_shadows, measure_balls
+from numpy.typing import NDArray
+
+PITCH_UM = 11.0
+MATTE = bgars.Material(i_d=0.5, i_s=1.0, hardness=40)
+
+
+def board(bow_um: float = 0.0, i_d: float = 0.12) -> bgars.Board:
+    tilt_deg = 0.15 if bow_um else 0.0
+    return bgars.Board(
+        bgars.Material.matte(i_d), tilt_x_deg=tilt_deg, bow_um=bow_um, bow_radius_um=3000.0, texture=bgars.Texture(0.25)
+    )
+
+
+def array(rows: int, cols: int, seed: int, *, bow_um: float = 0.0, **options: object) -> bgars.Scene:
+    jitter = bgars.Jitter(height_um=8.0, radius_um=3.0, position_um=5.0)
+    return bgars.Scene.ball_array(
+        rows,
+        cols,
+        rotation_deg=0.3,
+        jitter=jitter,
+        seed=seed,
+        board=board(bow_um),
+        **options,  # type: ignore[arg-type]
+    )
+
+
+def circles(truth: bgars.SimulatedTruth, pitch_um: float, seed: int) -> FoundBalls:
+    """What a rough finder would say: half a pixel off in the centre, 1 % in the radius."""
+    random = np.random.default_rng(seed)
+    balls = []
+    for ball in truth.balls:
+        if ball.x_um is None or ball.y_um is None or ball.diameter_um is None:
+            continue
+        off = random.standard_normal(3)
+        radius_px = ball.diameter_um / 2.0 / pitch_um
+        balls.append(
+            FoundBall(
+                ball.name,
+                ball.row - 1,
+                ball.col - 1,
+                ball.x_um / pitch_um + 0.5 * off[0],
+                ball.y_um / pitch_um + 0.5 * off[1],
+                radius_px * (1.0 + 0.01 * off[2]),
+                u_centre_px=0.5,
+                u_radius_px=0.01 * radius_px,
+            )
+        )
+    return FoundBalls(tuple(balls), (), (), 1, 1, None, 0.0, (0.0, 0.0))
+
+
+def photograph(
+    scene: bgars.Scene, rig: bgars.LightRig, seed: int = 1, *, pitch_um: float = PITCH_UM, **camera: object
+) -> tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]:
+    options = {"supersample": 4, "full_well_e": 15000.0, "read_noise_levels": 0.15} | camera
+    capture, truth = bgars.simulate(
+        scene,
+        rig,
+        MATTE,
+        bgars.Camera(pixel_pitch_um=pitch_um, **options),
+        seed=seed,  # type: ignore[arg-type]
+    )
+    return capture, truth, circles(truth, pitch_um, seed)
+
+
+def errors(measured: BallMeasurement, truth: bgars.SimulatedTruth, name: str) -> NDArray[np.float64]:
+    by_name = {ball.name: getattr(ball, name) for ball in truth.balls}
+    return np.array([getattr(ball, name) - by_name[ball.name] for ball in measured.balls])
+
+
+def rms(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def wrong_rig(rig: bgars.LightRig, off_deg: float, seed: int) -> bgars.LightRig:
+    """The same rig as somebody measured it, each light `off_deg` away."""
+    turn = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, len(rig))
+    level = np.cos(np.radians(rig.elevations_deg))
+    angles = np.column_stack(
+        [rig.azimuths_deg + off_deg * np.cos(turn) / level, rig.elevations_deg + off_deg * np.sin(turn)]
+    )
+    return bgars.LightRig.from_angles(angles)
+
+
+@pytest.fixture(scope="module")
+def part() -> tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]:
+    return photograph(array(4, 4, 1), bgars.LightRig.ring(8))
+
+
+def test_balls_are_measured_to_a_fraction_of_a_micrometre(
+    part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls],
+) -> None:
+    capture, truth, found = part
+    measured = measure_balls(capture, found)
+    assert [ball.name for ball in measured.balls] == [ball.name for ball in found.balls]
+    assert all(ball.reasons == () and ball.lights_used == 8 for ball in measured.balls)
+    assert max(rms(errors(measured, truth, name)) for name in ("x_um", "y_um")) < 0.2
+    assert rms(errors(measured, truth, "diameter_um")) < 0.6
+    assert rms(errors(measured, truth, "top_um")) < 0.4
+    assert measured.light_change_deg.max() < 0.02
+    assert 0.0 < measured.shadow_residual_rms < 0.1
+
+
+def test_result_does_not_depend_on_threads(part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]) -> None:
+    capture, _, found = part
+    one, three = (measure_balls(capture, found, threads=count) for count in (1, 3))
+    assert repr(one.balls) == repr(three.balls)
+
+
+def test_progress_grows_to_1(part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]) -> None:
+    said: list[float] = []
+    measure_balls(part[0], part[2], progress=said.append)
+    assert said == sorted(said)
+    assert said[-1] == 1.0
+
+
+def test_uncertainties_cover_the_truth_as_often_as_they_should() -> None:
+    settings = [
+        {"elevation_deg": 45.0, "pitch_um": 11.0, "off_deg": 0.0},
+        {"elevation_deg": 45.0, "pitch_um": 13.0, "off_deg": 1.0},
+        {"elevation_deg": 38.0, "pitch_um": 12.0, "off_deg": 0.0},
+        {"elevation_deg": 55.0, "pitch_um": 12.0, "off_deg": 0.5},
+        {"elevation_deg": 45.0, "pitch_um": 12.0, "off_deg": 0.0, "blur_px": 0.6},
+        {"elevation_deg": 50.0, "pitch_um": 15.0, "off_deg": 0.3},
+    ]
+    covered: dict[str, list[bool]] = {name: [] for name in ("x_um", "y_um", "diameter_um", "centre_z_um", "top_um")}
+    for seed, setting in enumerate(settings):
+        rig = bgars.LightRig.ring(8, elevation_deg=setting["elevation_deg"])
+        scene = array(6, 6, 10 + seed)
+        blur_px = setting.get("blur_px", 0.0)
+        capture, truth, found = photograph(scene, rig, seed, pitch_um=setting["pitch_um"], blur_px=blur_px)
+        measured = measure_balls(replace(capture, rig=wrong_rig(rig, setting["off_deg"], seed)), found)
+        for name, hits in covered.items():
+            u = np.array([getattr(ball, f"u_{name}") for ball in measured.balls])
+            hits.extend(np.abs(errors(measured, truth, name)) < u)
+    count = len(covered["x_um"])
+    assert count >= 200
+    shares = {name: float(np.mean(hits)) for name, hits in covered.items()}
+    assert all(0.58 <= share <= 0.86 for share in shares.values()), shares
+    assert 0.61 <= float(np.mean(list(shares.values()))) <= 0.75, shares
+
+
+def test_lights_are_found_from_a_rig_one_degree_off() -> None:
+    rig = bgars.LightRig.ring(8)
+    capture, truth, found = photograph(array(4, 5, 3), rig)
+    measured = measure_balls(replace(capture, rig=wrong_rig(rig, 1.0, 3)), found)
+    off_deg = np.degrees(np.arccos(np.clip((measured.light_directions * rig.directions).sum(axis=1), -1.0, 1.0)))
+    assert off_deg.max() < 0.1
+    assert np.allclose(measured.light_change_deg, 1.0, atol=0.1)
+    assert rms(errors(measured, truth, "top_um")) < 0.8
+
+
+def test_a_rig_that_is_exact_may_be_kept(part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]) -> None:
+    capture, truth, found = part
+    measured = measure_balls(capture, found, refine_lights=False)
+    assert measured.light_change_deg.max() < 1e-3
+    assert rms(errors(measured, truth, "top_um")) < 0.4
+
+
+def test_bowed_and_tilted_boards() -> None:
+    capture, truth, found = photograph(array(4, 4, 5, bow_um=25.0), bgars.LightRig.ring(8))
+    measured = measure_balls(capture, found)
+    assert rms(errors(measured, truth, "top_um")) < 0.5
+    places = np.array([(ball.x_um, ball.y_um) for ball in truth.balls])
+    x, y = places.T
+    found_z = np.column_stack([np.ones(len(x)), x, y, x * x, x * y, y * y]) @ measured.board_coefficients_um
+    true_z = np.array([ball.board_z_um for ball in truth.balls])
+    assert np.std(found_z - true_z) < 1.0 < np.std(true_z)
+
+
+def test_near_lights() -> None:
+    positions_um = bgars.LightRig.ring(8).directions * 40_000.0
+    capture, truth, found = photograph(array(4, 4, 6), bgars.LightRig.from_positions(positions_um))
+    assert rms(errors(measure_balls(capture, found), truth, "top_um")) < 0.5
+
+
+def test_a_flattened_ball_among_round_ones() -> None:
+    scene = array(4, 4, 7)
+    balls = list(scene.balls)
+    balls[5] = replace(balls[5], q=0.7, centre_z_um=0.65 * balls[5].radius_um)
+    balls[10] = replace(balls[10], q=0.98)
+    scene = bgars.Scene(tuple(balls), (), scene.board, scene.size_um)
+    capture, truth, found = photograph(scene, bgars.LightRig.ring(8))
+    measured = measure_balls(capture, found)
+    assert measured.balls[5].q == pytest.approx(0.7, abs=0.006)
+    assert measured.balls[10].q == pytest.approx(0.98, abs=0.004)
+    assert rms(errors(measured, truth, "top_um")) < 0.7
+
+
+def test_a_flat_top_is_found_by_normals() -> None:
+    scene = array(3, 4, 8, defects={"B2": bgars.Defect.clipped(40.0)})
+    capture, truth, found = photograph(scene, bgars.LightRig.ring(8))
+    blind = measure_balls(capture, found)
+    assert all(np.isnan(ball.flat_um) for ball in blind.balls)
+    measured = measure_balls(capture, found, field=bgars.estimate_normals(capture))
+    clipped = next(ball for ball in measured.balls if ball.name == "B2")
+    assert clipped.flat_um == pytest.approx(40.0, abs=max(3.0, 3.0 * clipped.u_flat_um))
+    assert any("flat top" in reason for reason in clipped.reasons)
+    others = [ball for ball in measured.balls if ball.name != "B2"]
+    assert all(ball.reasons == () for ball in others)
+    assert np.abs(errors(measured, truth, "top_um")).max() < 5.0
+
+
+def test_response_dark_frame_and_intensities_are_honoured() -> None:
+    intensities = [1.0, 0.8, 1.2, 0.9, 1.1, 1.0, 0.7, 1.3]
+    rig = bgars.LightRig.ring(8, intensities=intensities)
+    capture, truth, found = photograph(array(3, 3, 9), rig, gamma=2.2, black_level=6.0)
+    assert capture.response is not None
+    assert rms(errors(measure_balls(capture, found), truth, "top_um")) < 0.5
+
+
+def test_bridged_balls_have_no_height(part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]) -> None:
+    capture, truth, found = part
+    joined = replace(found, bridges=((found.balls[0].name, found.balls[1].name),))
+    measured = measure_balls(capture, joined)
+    for ball in measured.balls[:2]:
+        assert np.isnan(ball.top_um)
+        assert "bridged" in ball.reasons[0]
+        assert np.isfinite(ball.diameter_um)
+    assert rms(errors(measured, truth, "top_um")[2:]) < 0.5
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (np.zeros_like, "too little contrast"),
+        (lambda images: np.full_like(images, 255), "saturated"),
+        (lambda images: images // 20, "too little contrast"),
+    ],
+    ids=["black", "saturated", "faint"],
+)
+def test_what_cannot_be_measured_is_a_reason_and_not_a_number(
+    part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls], change: object, reason: str
+) -> None:
+    capture, _, found = part
+    measured = measure_balls(replace(capture, images=change(capture.images)), found)  # type: ignore[operator]
+    assert all(np.isnan(ball.top_um) and np.isnan(ball.u_top_um) for ball in measured.balls)
+    assert all(reason in ball.reasons[0] for ball in measured.balls)
+
+
+def test_no_balls_no_numbers(part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]) -> None:
+    measured = measure_balls(part[0], replace(part[2], balls=()))
+    assert measured.balls == ()
+    assert np.isnan(measured.shadow_residual_rms)
+
+
+def swapped(images: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    return images[[0, 1, 5, 3, 4, 2, 6, 7]]
+
+
+def doubled(images: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    return images[[0, 1, 2, 2, 4, 5, 6, 7]]
+
+
+def noisily_doubled(images: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    again = doubled(images)
+    again[3] = np.clip(again[3].astype(int) + np.random.default_rng(0).integers(-1, 2, again[3].shape), 0, 255)
+    return again
+
+
+def far_shifted(images: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    moved = images.copy()
+    moved[4] = np.roll(images[4], 12, axis=1)
+    return moved
+
+
+def shifted(images: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    moved = images.copy()
+    moved[4] = np.roll(images[4], 2, axis=1)
+    return moved
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "text"),
+    [
+        (swapped, bgars.CalibrationError, "images 2 and 5 are swapped"),
+        (doubled, bgars.InputError, "same picture"),
+        (noisily_doubled, bgars.CalibrationError, "image 3 has the shadows of light 2"),
+        (far_shifted, bgars.CalibrationError, "image 4 is shifted"),
+    ],
+)
+def test_images_that_do_not_belong_are_refused(
+    part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls],
+    change: object,
+    error: type[Exception],
+    text: str,
+) -> None:
+    capture, _, found = part
+    wrong = replace(capture, images=change(capture.images))  # type: ignore[operator]
+    with pytest.raises(error, match=text):
+        check_shadows(wrong, found)
+    with pytest.raises(error, match=text):
+        measure_balls(wrong, found)
+
+
+def test_a_shift_of_two_pixels_is_refused(part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]) -> None:
+    capture, _, found = part
+    with pytest.raises(bgars.CalibrationError, match="image 4 is shifted by"):
+        measure_balls(replace(capture, images=shifted(capture.images)), found)
+
+
+def test_a_light_six_degrees_off_is_named_and_measured(
+    part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls],
+) -> None:
+    capture, truth, found = part
+    angles = np.column_stack([capture.rig.azimuths_deg, capture.rig.elevations_deg])
+    angles[1, 1] += 6.0
+    measured = measure_balls(replace(capture, rig=bgars.LightRig.from_angles(angles)), found)
+    assert any("light 1" in warning for warning in measured.warnings)
+    assert measured.light_change_deg[1] == pytest.approx(6.0, abs=0.1)
+    assert rms(errors(measured, truth, "top_um")) < 0.8
+
+
+def test_a_light_twenty_degrees_off_is_refused(part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]) -> None:
+    capture, _, found = part
+    angles = np.column_stack([capture.rig.azimuths_deg, capture.rig.elevations_deg])
+    angles[1, 0] += 25.0
+    with pytest.raises(bgars.CalibrationError, match="light 1 stands about"):
+        check_shadows(replace(capture, rig=bgars.LightRig.from_angles(angles)), found)
+
+
+def test_a_sound_capture_has_no_warnings(part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]) -> None:
+    assert check_shadows(part[0], part[2]) == ()
+    assert measure_balls(part[0], part[2]).warnings == ()
+
+
+@pytest.mark.parametrize("elevation_deg", [22.0, 65.0])
+def test_low_and_high_lights_raise_no_false_alarm(elevation_deg: float) -> None:
+    capture, truth, found = photograph(array(4, 5, 11), bgars.LightRig.ring(8, elevation_deg=elevation_deg))
+    measured = measure_balls(capture, found)
+    assert measured.warnings == ()
+    assert rms(errors(measured, truth, "top_um")) < 0.8
+
+
+def test_small_balls_and_blurred_images() -> None:
+    capture, truth, found = photograph(array(4, 4, 12), bgars.LightRig.ring(8), pitch_um=25.0)
+    assert rms(errors(measure_balls(capture, found), truth, "top_um")) < 1.0
+    capture, truth, found = photograph(array(3, 3, 12), bgars.LightRig.ring(8), pitch_um=10.0, blur_px=2.0)
+    assert rms(errors(measure_balls(capture, found), truth, "top_um")) < 1.0
+
+
+def test_bad_arguments_are_named(part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]) -> None:
+    capture, _, found = part
+    with pytest.raises(bgars.InputError, match="pixel_pitch_um"):
+        measure_balls(replace(capture, pixel_pitch_um=None), found)
+    with pytest.raises(bgars.InputError, match="threads"):
+        measure_balls(capture, found, threads=0)
+    outside = replace(found, balls=(replace(found.balls[0], x_px=1e4),))
+    with pytest.raises(bgars.InputError, match=found.balls[0].name):
+        measure_balls(capture, outside)
+    with pytest.raises(bgars.InputError, match="u_centre_px"):
+        measure_balls(capture, replace(found, balls=(replace(found.balls[0], u_centre_px=0.0),)))
+    field = bgars.estimate_normals(capture.images[:, :50, :50], capture.rig.directions)
+    with pytest.raises(bgars.InputError, match="field"):
+        measure_balls(capture, found, field=field)
