@@ -63,8 +63,8 @@ __version__ = version("bgars")
 
 __all__ = [
     "Ball",
-    "BallResult",
     "BallLayout",
+    "BallResult",
     "BallTruth",
     "BgarsError",
     "Board",
@@ -101,8 +101,8 @@ __all__ = [
     "angular_error_deg",
     "estimate_normals",
     "evaluate",
-    "inspect",
     "find_balls",
+    "inspect",
     "integrate_normals",
     "mesh_from_height",
     "named_recipes",

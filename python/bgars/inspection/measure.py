@@ -131,7 +131,7 @@ def measure_balls(
 
     References
     ----------
-    DESIGN section 8; B. Triggs et al., "Bundle adjustment - a modern synthesis" (2000); S. Geman and D. McClure,
+    docs/method.md; B. Triggs et al., "Bundle adjustment - a modern synthesis" (2000); S. Geman and D. McClure,
     "Bayesian image analysis" (1985), for the weights.
 
     Examples

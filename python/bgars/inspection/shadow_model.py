@@ -9,7 +9,7 @@ w = P - C and u the unit vector to the light,
 
 is the distance of P to the edge of the shadow on the board, positive outside, exact at the edge. On a flat board and
 for
-a distant light, D = R is an ellipse with centre c_xy - c_z l_xy / l_z and semi-axes R and R / l_z (DESIGN, section 8).
+a distant light, D = R is an ellipse with centre c_xy - c_z l_xy / l_z and semi-axes R and R / l_z.
 For a near light u points from P to the lamp, and the edge is the cut of its tangent cone with the board.
 """
 
