@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Literal
+
+import numpy as np
 
 from bgars.balls import find_balls
 from bgars.inspection import measure_balls
@@ -20,11 +23,13 @@ if TYPE_CHECKING:
 
     from bgars.ball_records import BallMeasurement, FoundBalls
     from bgars.part_result import PartResult
-    from bgars.records import Capture, NormalField
+    from bgars.records import BoolArray, Capture
 
 __all__ = ["inspect"]
 
-InspectionStage = Literal["find", "normals", "measure", "judge"]
+InspectionStage = Literal["find", "measure", "judge"]
+BOARD_STEP = 4
+"""Every so many rows and columns of the board give it its first shape."""
 MATERIAL_UNUSED = "material.file of the recipe is not used by method {method}"
 
 
@@ -76,16 +81,7 @@ def inspect(
     report("find", 0.0)
     found = _found(capture, recipe, threads)
     report("find", 1.0)
-    field = estimate_normals(
-        capture,
-        # Without balls there is nothing to measure; the cheapest estimate will do.
-        method=method if found.balls else "lambertian",
-        anchors=found if found.balls and method == "reflectance" else None,
-        threads=threads,
-        progress=lambda fraction: report("normals", fraction),
-    )
-    report("normals", 1.0)
-    measurement = _measured(capture, found, field, threads, lambda fraction: report("measure", fraction))
+    measurement = _measured(capture, found, method, threads, report)
     report("measure", 1.0)
     files = capture_files(capture) + (() if recipe is None or recipe.file is None else (recipe.file,))
     result = judge_part(
@@ -116,8 +112,45 @@ def _found(capture: Capture, recipe: PartRecipe | None, threads: int | None) -> 
 def _measured(
     capture: Capture,
     found: FoundBalls,
-    field: NormalField,
+    method: Method,
     threads: int | None,
-    progress: Callable[[float], object],
+    report: Callable[[InspectionStage, float], None],
 ) -> BallMeasurement:
-    return measure_balls(capture, found, field=field, threads=threads, progress=progress)
+    """Measure the balls; their normals are made beside the fit of the shadows, which needs only some of the board."""
+    if not found.balls:
+        return measure_balls(capture, found, threads=threads)
+    balls = _ball_pixels(found, capture.mask.shape)
+    sparse = np.zeros_like(balls)
+    sparse[::BOARD_STEP, ::BOARD_STEP] = True
+    board = sparse & ~balls & capture.mask
+    field = estimate_normals(capture, method="robust-filter", mask=board, threads=threads) if board.any() else None
+    if not (balls & capture.mask).any():
+        return measure_balls(capture, found, field=field, threads=threads)
+    anchors = found if method == "reflectance" else None
+    with ThreadPoolExecutor(1) as background:
+        normals = background.submit(
+            estimate_normals, capture, method=method, mask=balls, anchors=anchors, threads=threads
+        )
+        return measure_balls(
+            capture,
+            found,
+            field=field,
+            ball_field=normals.result,
+            threads=threads,
+            progress=lambda fraction: report("measure", fraction),
+        )
+
+
+def _ball_pixels(found: FoundBalls, shape: tuple[int, ...]) -> BoolArray:
+    """True inside the silhouettes, a pixel of the rim more."""
+    height, width = shape
+    inside: BoolArray = np.zeros(shape, np.bool_)
+    for ball in found.balls:
+        col, row = ball.x_px + width / 2 - 0.5, height / 2 - ball.y_px - 0.5
+        reach = ball.radius_px + 1.0
+        rows = slice(max(int(row - reach), 0), max(int(row + reach) + 2, 0))
+        cols = slice(max(int(col - reach), 0), max(int(col + reach) + 2, 0))
+        part = inside[rows, cols]
+        down = (np.arange(part.shape[0]) + rows.start - row)[:, None]
+        part |= down**2 + (np.arange(part.shape[1]) + cols.start - col) ** 2 < reach * reach
+    return inside

@@ -36,6 +36,7 @@ DEFAULT_METHOD: Method = "reflectance"
 
 BLIND_LIGHTS = 5
 CIRCLE_VALUES = 3
+RIM_PX = 0.01
 BRIDGE_WIDTH = 0.8
 """Half width of the strip between two joined balls that is looked at, in radii of the smaller."""
 
@@ -139,11 +140,15 @@ def estimate_normals(
     use = combined_mask(capture, mask)
     part = _part_of(progress, method == "reflectance")
 
-    def pixelwise(name: PixelwiseMethod, share: tuple[float, float] = (0.0, 1.0)) -> NormalField:
+    def pixelwise(
+        name: PixelwiseMethod,
+        share: tuple[float, float] = (0.0, 1.0),
+        pixels: NDArray[np.bool_] | None = use,
+    ) -> NormalField:
         return pixelwise_normals(
             capture,
             method=name,
-            mask=use,
+            mask=pixels,
             threshold=threshold,
             keep_sets=keep_sets,
             out=out,
@@ -164,7 +169,7 @@ def estimate_normals(
         return _because(pixelwise(fallback, (0.3, 1.0)), f"no balls {given} to fit a material on, and none given")
     free = _free_pixels(found, capture.mask.shape) if len(circles_px) else np.ones(capture.mask.shape, np.bool_)
     field = add_reflectance(
-        pixelwise("robust-filter", (0.3, 0.5)),
+        pixelwise("robust-filter", (0.3, 0.5), _outside(circles_px, use, capture.mask.shape)),
         capture,
         circles_px,
         mask=use,
@@ -224,6 +229,24 @@ def _circles(anchors: FoundBalls | ArrayLike, shape: tuple[int, ...]) -> NDArray
         msg = "anchors: circles must be finite, with radii above 0 px"
         raise InputError(msg)
     return given.astype(np.float64)
+
+
+def _outside(
+    circles_px: NDArray[np.float64], use: NDArray[np.bool_] | None, shape: tuple[int, ...]
+) -> NDArray[np.bool_] | None:
+    """The pixels to use outside all circles, or all of them where none is outside."""
+    height, width = shape
+    outside = np.ones(shape, np.bool_) if use is None else use.copy()
+    for x_px, y_px, radius_px in circles_px:
+        col, row = x_px + width / 2 - 0.5, height / 2 - y_px - 0.5
+        rows = slice(max(int(row - radius_px), 0), max(int(row + radius_px) + 2, 0))
+        cols = slice(max(int(col - radius_px), 0), max(int(col + radius_px) + 2, 0))
+        part = outside[rows, cols]
+        down = (np.arange(part.shape[0]) + rows.start - row)[:, None]
+        across = np.arange(part.shape[1]) + cols.start - col
+        # Strictly inside, so that no pixel at the rim falls between both methods.
+        part &= down**2 + across**2 >= (radius_px - RIM_PX) ** 2
+    return outside if outside.any() else use
 
 
 def _free_pixels(anchors: FoundBalls | ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:

@@ -88,6 +88,7 @@ def measure_balls(
     found: FoundBalls,
     *,
     field: NormalField | None = None,
+    ball_field: Callable[[], NormalField] | None = None,
     refine_lights: bool = True,
     threads: int | None = None,
     progress: Callable[[float], object] | None = None,
@@ -106,6 +107,9 @@ def measure_balls(
         Balls in the image.
     field : NormalField, optional
         Normals of the same capture: flat tops, which no shadow shows, and a first shape of the board come from it.
+    ball_field : callable, optional
+        Returns the normals that flat tops are looked for in, instead of `field`; called when the shadows are done, so
+        that these normals may be made meanwhile.
     refine_lights : bool
         Also fit where the lights are; the rig is the prior. Otherwise the rig is taken as exact.
     threads : int, optional
@@ -158,7 +162,8 @@ def measure_balls(
     if fit is not None and fit.solution is not None:
         solution = fit.solution
         highlights = read_highlights(problem.radiance, solution.balls, solution.vectors, problem.near)
-    flats = None if field is None or fit is None or fit.solution is None else flat_tops(field, fit.solution.balls)
+    tops = field if ball_field is None else ball_field()
+    flats = None if tops is None or fit is None or fit.solution is None else flat_tops(tops, fit.solution.balls)
     report(1.0)
     return measurement(found, problem, fit, flats, highlights)
 
