@@ -9,6 +9,9 @@ use super::samples::Samples;
 /// Own materials must lower the mean cost by this share.
 const EVIDENCE: f64 = 0.15;
 
+/// Balls that tell whether the others need to be looked at, about.
+const PILOTS: usize = 12;
+
 /// Pixels of a ball that its material is fitted on.
 const BALL_PIXELS: usize = 250;
 
@@ -20,6 +23,19 @@ const GUARD: f64 = 4.0;
 
 /// Deviations smaller than this are believed in any case (natural logarithm; ambient light in units of diffuse light).
 const MIN_DEVIATION: f64 = 0.02;
+
+/// A ball's own material, and the cost with that of all and with its own.
+struct Fitted {
+    material: Material,
+    before: f64,
+    after: f64,
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
 
 /// One material a ball: its own where the balls differ and its fit is believable, else that of all.
 #[must_use]
@@ -33,37 +49,30 @@ pub fn ball_materials(samples: &Samples, common: &Material, balls: usize) -> Vec
     for &ball in &samples.balls {
         counts[ball] += 1;
     }
-    let fits: Vec<(Material, f64, f64)> = (0..balls)
-        .into_par_iter()
-        .map(|ball| {
-            let own = samples.of_ball(ball, counts[ball].div_ceil(BALL_PIXELS).max(1));
-            let before = fit_from(&own, common, free, 0).cost;
-            let fit = fit_from(&own, common, free, STEPS);
-            (fit.material, before, fit.cost)
-        })
-        .collect();
-    let median_of = |values: &mut Vec<f64>| {
-        values.sort_by(f64::total_cmp);
-        values[values.len() / 2]
+    let fitted = |ball: usize| {
+        let own = samples.of_ball(ball, counts[ball].div_ceil(BALL_PIXELS).max(1));
+        let before = fit_from(&own, common, free, 0).cost;
+        let fit = fit_from(&own, common, free, STEPS);
+        Fitted { material: fit.material, before, after: fit.cost }
     };
-    let mut before: Vec<f64> = fits.iter().map(|fit| fit.1).collect();
-    let mut after: Vec<f64> = fits.iter().map(|fit| fit.2).collect();
-    if median_of(&mut after) > (1.0 - EVIDENCE) * median_of(&mut before) {
+    let pilots: Vec<usize> = (0..balls).step_by(balls.div_ceil(PILOTS)).collect();
+    let pilots: Vec<Fitted> = pilots.into_par_iter().map(fitted).collect();
+    if median(pilots.iter().map(|fit| fit.after)) > (1.0 - EVIDENCE) * median(pilots.iter().map(|fit| fit.before)) {
         return alike();
     }
-    let parameters: Vec<Vec<f64>> = fits.iter().map(|fit| logarithms(&fit.0, common)).collect();
+    let fits: Vec<Fitted> = (0..balls).into_par_iter().map(fitted).collect();
+    let parameters: Vec<Vec<f64>> = fits.iter().map(|fit| logarithms(&fit.material, common)).collect();
     let believed: Vec<bool> = (0..balls)
         .map(|ball| {
             (0..parameters[ball].len()).all(|parameter| {
-                let mut values: Vec<f64> = parameters.iter().map(|ball| ball[parameter]).collect();
-                let middle = median_of(&mut values);
-                let mut deviations: Vec<f64> = values.iter().map(|value| (value - middle).abs()).collect();
-                let limit = GUARD * median_of(&mut deviations).max(MIN_DEVIATION);
+                let values = || parameters.iter().map(|ball| ball[parameter]);
+                let middle = median(values());
+                let limit = GUARD * median(values().map(|value| (value - middle).abs())).max(MIN_DEVIATION);
                 (parameters[ball][parameter] - middle).abs() <= limit
             })
         })
         .collect();
-    fits.into_iter().zip(believed).map(|((own, _, _), believed)| if believed { own } else { common.clone() }).collect()
+    fits.into_iter().zip(believed).map(|(own, believed)| if believed { own.material } else { common.clone() }).collect()
 }
 
 /// What is free of a ball's material, as it is compared between balls.
