@@ -46,7 +46,7 @@ def estimate_normals(
     mask: ArrayLike | None = None,
     light_intensities: ArrayLike | None = None,
     saturation: float | None = None,
-    threshold: float = DEFAULT_THRESHOLD,
+    threshold: float | None = None,
     anchors: FoundBalls | ArrayLike | None = None,
     material: SurfaceMaterial | None = None,
     keep_sets: bool = False,
@@ -78,8 +78,8 @@ def estimate_normals(
     saturation : float, optional
         Grey level that counts as clipped; only with plain arrays. Full scale of an integer dtype by default, none for
         floats.
-    threshold : float
-        Gap of ``specular-filter`` in grey levels of 255; scaled with the bit depth.
+    threshold : float, optional
+        Gap of ``specular-filter`` in grey levels of 255, scaled with the bit depth; 50, as published, by default.
     anchors : FoundBalls, (N, 3) array_like, or (H, W) array_like of bool, optional
         Balls for ``reflectance``: from :func:`bgars.find_balls`, or circles (x right and y up from the image centre,
         radius, in pixels), or the mask of one ball. By default they are looked for.
@@ -107,8 +107,8 @@ def estimate_normals(
     Raises
     ------
     InputError
-        Counts or shapes that do not fit, fewer than 3 or coplanar lights, an empty mask, NaN inside the mask; anchors
-        or a material with a method that uses none.
+        Counts or shapes that do not fit, fewer than 3 or coplanar lights, an empty mask, NaN inside the mask; anchors,
+        a material or a threshold with a method that uses none.
 
     References
     ----------
@@ -126,11 +126,14 @@ def estimate_normals(
     if method not in METHODS:
         msg = f"method: must be one of {', '.join(METHODS)}; got {method!r}"
         raise InputError(msg)
-    if method in LEAST_SQUARES_METHODS:
-        for name, value in (("anchors", anchors), ("material", material)):
-            if value is not None:
-                msg = f"{name}: only the method reflectance uses it, got method {method!r}"
-                raise InputError(msg)
+    for name, value, user in (
+        ("threshold", threshold, "specular-filter"),
+        ("anchors", anchors, "reflectance"),
+        ("material", material, "reflectance"),
+    ):
+        if value is not None and method != user:
+            msg = f"{name}: only the method {user} uses it, got method {method!r}"
+            raise InputError(msg)
     capture = capture_of(images, light_directions, light_intensities, saturation)
     use = combined_mask(capture, mask)
     base = "robust-filter" if method == "reflectance" else method
@@ -139,7 +142,7 @@ def estimate_normals(
         capture,
         method=base,
         mask=use,
-        threshold=threshold,
+        threshold=DEFAULT_THRESHOLD if threshold is None else threshold,
         keep_sets=keep_sets,
         out=out,
         threads=threads,

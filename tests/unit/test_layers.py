@@ -11,10 +11,17 @@ import pytest
 PACKAGE = Path(bgars.__file__).parent
 RECORDS = {"ball_records": 1, "material_records": 1, "records": 3, "kernel_capture": 3.5}
 BASE = {"errors": 0, "light_files": 1, "rig": 2, **RECORDS}
-STAGES = dict.fromkeys(
-    ("io", "calibrate", "least_squares", "reflectance", "integrate", "mesh", "balls", "inspection"), 4
-)
-LATER = {"normals": 4.5, "pipeline": 5, "evaluate": 5, "recipes": 5, "batch": 6, "report": 6, "experiments": 6}
+STAGES = dict.fromkeys(("io", "least_squares", "reflectance", "integrate", "mesh", "balls", "inspection"), 4)
+LATER = {
+    "normals": 4.5,
+    "calibrate": 5,
+    "pipeline": 5,
+    "evaluate": 5,
+    "recipes": 5,
+    "batch": 6,
+    "report": 6,
+    "experiments": 6,
+}
 LEVEL = {**BASE, **STAGES, **LATER, "samples": 0, "cli": 7, "simulate": 4}
 
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from bgars.evaluate import angular_error_deg
 from bgars.integrate import integrate_normals
-from bgars.least_squares import DEFAULT_THRESHOLD
 from bgars.normals import METHODS, estimate_normals
 
 if TYPE_CHECKING:
@@ -95,7 +94,7 @@ def measure(
     setting: Setting,
     *,
     method: Method,
-    threshold: float = DEFAULT_THRESHOLD,
+    threshold: float | None = None,
 ) -> Measurement:
     """Estimate and integrate the normals of a hemisphere, and compare both with the truth.
 
