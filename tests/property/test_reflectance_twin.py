@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 RADIUS_PX = 24.0
 SIZE_PX = 52
-ELEVATIONS_DEG = (35.0, 45.0, 60.0)
+ELEVATIONS_DEG = (35.0, 60.0)
 
 
 def distribution(cos_half: NDArray[np.float64], lobe: bgars.SurfaceLobe) -> NDArray[np.float64]:

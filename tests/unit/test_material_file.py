@@ -44,6 +44,15 @@ def test_the_file_names_units_and_where_the_material_comes_from(tmp_path: Path) 
         assert words in text
 
 
+def test_the_documented_file_is_read(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "conventions.md").read_text(encoding="utf-8")
+    path = tmp_path / "solder.toml"
+    path.write_text(page.split("## Material files")[1].split("```toml")[1].split("```")[0], encoding="utf-8")
+    material = bgars.read_material(path)
+    assert (material.diffuse_level, len(material.gains), len(material.lobes)) == (76.5, 8, 1)
+    assert material.standard_errors == {"diffuse": 0.5, "strength_1": 2.1, "roughness_1": 0.0012, "gain_0": 0.003}
+
+
 BROKEN = [
     ("diffuse_level = 127.3", "", "diffuse_level: Field required"),
     ("diffuse_level = 127.3", "diffuse_level = -1.0", "diffuse_level: .*greater than or equal to 0, got -1.0"),
