@@ -13,6 +13,7 @@ from importlib.metadata import version
 
 from bgars.ball_records import BallLayout, FoundBall, FoundBalls
 from bgars.balls import find_balls
+from bgars.calibrate import calibrate_material
 from bgars.errors import (
     BgarsError,
     CalibrationError,
@@ -26,10 +27,12 @@ from bgars.inspection_pipeline import inspect
 from bgars.integrate import integrate_normals
 from bgars.io.capture import read_capture
 from bgars.io.height import read_height, write_height
+from bgars.io.material_file import read_material, write_material
 from bgars.io.mesh_files import write_mesh
 from bgars.io.normal_map import read_normal_map, write_normal_map
 from bgars.io.part_recipe import read_part_recipe
 from bgars.io.truth import read_truth
+from bgars.material_records import ReflectanceFit, SurfaceLobe, SurfaceMaterial
 from bgars.mesh import mesh_from_height
 from bgars.normals import estimate_normals
 from bgars.part_recipe import Limits, PartRecipe
@@ -90,15 +93,19 @@ __all__ = [
     "PartRecipe",
     "PartResult",
     "Reconstruction",
+    "ReflectanceFit",
     "Scene",
     "SimulatedTruth",
     "SimulationSetup",
+    "SurfaceLobe",
+    "SurfaceMaterial",
     "Texture",
     "Truth",
     "UnsupportedImageError",
     "Variation",
     "__version__",
     "angular_error_deg",
+    "calibrate_material",
     "estimate_normals",
     "evaluate",
     "find_balls",
@@ -108,6 +115,7 @@ __all__ = [
     "named_recipes",
     "read_capture",
     "read_height",
+    "read_material",
     "read_normal_map",
     "read_part_recipe",
     "read_scene",
@@ -117,6 +125,7 @@ __all__ = [
     "sample_part_recipe",
     "simulate",
     "write_height",
+    "write_material",
     "write_mesh",
     "write_normal_map",
     "write_overview",

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from bgars.material_records import SurfaceMaterial
     from bgars.records import BoolArray, Capture, FloatArray, NormalField, Truth
 
 __all__ = ["AngularErrors", "Evaluation", "angular_error_deg", "evaluate"]
@@ -90,6 +91,7 @@ def evaluate(
     capture: Capture,
     *,
     method: Method = DEFAULT_METHOD,
+    material: SurfaceMaterial | None = None,
     truth: Truth | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Evaluation:
@@ -101,6 +103,8 @@ def evaluate(
         From :func:`bgars.read_capture`.
     method : str
         See :func:`bgars.estimate_normals`.
+    material : SurfaceMaterial, optional
+        Fitted before, for the method ``reflectance``.
     truth : Truth, optional
         By default read from the capture's folder.
     progress : callable, optional
@@ -128,7 +132,7 @@ def evaluate(
     if truth.mask.shape != capture.mask.shape:
         msg = f"truth: has shape {truth.mask.shape}, but the images have {capture.mask.shape}"
         raise InputError(msg)
-    field = estimate_normals(capture, method=method, progress=progress)
+    field = estimate_normals(capture, method=method, material=material, progress=progress)
     judged = truth.mask & capture.mask
     board = None
     if truth.ball_ids is not None:

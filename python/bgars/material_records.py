@@ -65,7 +65,7 @@ class SurfaceMaterial:
     gains : tuple of float
         Brightness of each light against what the rig says.
     standard_errors : dict
-        Of ``diffuse``, ``grazing``, ``ambient``, ``strength_1``, ... as far as they were fitted; empty when read.
+        Of ``diffuse``, ``grazing``, ``ambient``, ``strength_1``, ... as far as they were fitted.
     """
 
     diffuse_level: float

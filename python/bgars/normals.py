@@ -10,7 +10,7 @@ import numpy as np
 from bgars.ball_records import FoundBalls
 from bgars.balls import find_balls
 from bgars.errors import InputError
-from bgars.least_squares import (
+from bgars.pixelwise import (
     DEFAULT_THRESHOLD,
     PixelwiseMethod,
     capture_of,
@@ -49,7 +49,7 @@ def estimate_normals(
     mask: ArrayLike | None = None,
     light_intensities: ArrayLike | None = None,
     saturation: float | None = None,
-    threshold: float = DEFAULT_THRESHOLD,
+    threshold: float | None = None,
     anchors: FoundBalls | ArrayLike | None = None,
     material: SurfaceMaterial | None = None,
     keep_sets: bool = False,
@@ -83,8 +83,8 @@ def estimate_normals(
     saturation : float, optional
         Grey level that counts as clipped; only with plain arrays. Full scale of an integer dtype by default, none for
         floats.
-    threshold : float
-        Gap of ``specular-filter`` in grey levels of 255; scaled with the bit depth.
+    threshold : float, optional
+        Gap of ``specular-filter`` in grey levels of 255, scaled with the bit depth; 50, as published, by default.
     anchors : FoundBalls, (N, 3) array_like, or (H, W) array_like of bool, optional
         Balls for ``reflectance``: from :func:`bgars.find_balls`, or circles (x right and y up from the image centre,
         radius, in pixels), or the mask of one ball. By default they are looked for.
@@ -112,8 +112,8 @@ def estimate_normals(
     Raises
     ------
     InputError
-        Counts or shapes that do not fit, fewer than 3 or coplanar lights, an empty mask, NaN inside the mask; anchors
-        or a material with a method that uses none.
+        Counts or shapes that do not fit, fewer than 3 or coplanar lights, an empty mask, NaN inside the mask; anchors,
+        a material or a threshold with a method that uses none.
 
     References
     ----------
@@ -131,11 +131,14 @@ def estimate_normals(
     if method not in get_args(Method):
         msg = f"method: must be one of {', '.join(get_args(Method))}; got {method!r}"
         raise InputError(msg)
-    if method != "reflectance":
-        for name, value in (("anchors", anchors), ("material", material)):
-            if value is not None:
-                msg = f"{name}: only the method reflectance uses it, got method {method!r}"
-                raise InputError(msg)
+    for name, value, user in (
+        ("threshold", threshold, "specular-filter"),
+        ("anchors", anchors, "reflectance"),
+        ("material", material, "reflectance"),
+    ):
+        if value is not None and method != user:
+            msg = f"{name}: only the method {user} uses it, got method {method!r}"
+            raise InputError(msg)
     capture = capture_of(images, light_directions, light_intensities, saturation)
     use = combined_mask(capture, mask)
     part = _part_of(progress, method == "reflectance")
@@ -149,7 +152,7 @@ def estimate_normals(
             capture,
             method=name,
             mask=pixels,
-            threshold=threshold,
+            threshold=DEFAULT_THRESHOLD if threshold is None else threshold,
             keep_sets=keep_sets,
             out=out,
             threads=threads,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -16,9 +16,10 @@ if TYPE_CHECKING:
 
     import trimesh
 
+    from bgars.material_records import ReflectanceFit, SurfaceMaterial
     from bgars.records import Capture, HeightMap, NormalField
 
-__all__ = ["Reconstruction", "reconstruct", "solver_fraction", "summarise_field"]
+__all__ = ["Reconstruction", "reconstruct", "solver_fraction", "summarise_field", "summarise_fit"]
 
 Stage = Literal["normals", "height", "mesh"]
 
@@ -55,11 +56,27 @@ class Reconstruction:
 
 def summarise_field(field: NormalField) -> dict[str, Any]:
     """Return the scalars of a normal field as plain Python values."""
+    valid = int(field.mask.sum())
     return {
         "method": field.method,
-        "valid_pixels": int(field.mask.sum()),
+        "choice": field.choice,
+        "valid_pixels": valid,
+        "measured_share": float((field.measured & field.mask).sum() / valid) if valid else 0.0,
         "mean_confidence": float(field.confidence[field.mask].mean()) if field.mask.any() else 0.0,
         "mean_lights_kept": float(field.lights_kept[field.mask].mean()) if field.mask.any() else 0.0,
+        "reflectance": None if field.reflectance is None else summarise_fit(field.reflectance),
+    }
+
+
+def summarise_fit(fit: ReflectanceFit) -> dict[str, Any]:
+    """Return a material and how it was fitted as plain Python values."""
+    return {
+        "accepted": fit.accepted,
+        "loss": fit.loss,
+        "balls": len(fit.circles_px),
+        "own_material": sum(fit.own_material),
+        "residuals_learnt": fit.residuals_learnt,
+        "material": asdict(fit.material),
     }
 
 
@@ -67,7 +84,8 @@ def reconstruct(
     capture: Capture,
     *,
     method: Method = DEFAULT_METHOD,
-    threshold: float = 50.0,
+    threshold: float | None = None,
+    material: SurfaceMaterial | None = None,
     difference: Difference = "trapezoid",
     weights: Literal["confidence"] | None = None,
     threads: int | None = None,
@@ -79,7 +97,7 @@ def reconstruct(
     ----------
     capture : Capture
         From :func:`bgars.read_capture`.
-    method, threshold
+    method, threshold, material
         See :func:`bgars.estimate_normals`.
     difference, weights
         See :func:`bgars.integrate_normals`.
@@ -112,6 +130,7 @@ def reconstruct(
         capture,
         method=method,
         threshold=threshold,
+        material=material,
         threads=threads,
         progress=lambda fraction: report("normals", fraction),
     )

@@ -69,14 +69,14 @@ def add_reflectance(
         progress=progress,
         out=field,
     )
-    fitted = SurfaceMaterial(
+    fitted = material or SurfaceMaterial(
         diffuse_level=found["diffuse_level"],
         grazing=found["grazing"],
         ambient_level=found["ambient_level"],
         lobes=tuple(SurfaceLobe(*lobe) for lobe in found["lobes"]),
         masking=found["masking"],
         gains=tuple(found["gains"]),
-        standard_errors=dict(found["standard_errors"] or {}),
+        standard_errors={name: error for name, error in found["standard_errors"] or () if error > 0},
     )
     fit = ReflectanceFit(
         material=fitted,

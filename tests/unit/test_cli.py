@@ -54,7 +54,12 @@ def test_reconstruct_keeps_foreign_files_of_the_output_folder(tmp_path: Path) ->
 def test_normals_then_mesh(tmp_path: Path) -> None:
     run = bgars_command("normals", bgars.sample_capture(), "-o", tmp_path / "n", "--json")
     assert run.returncode == 0, run.stderr
-    assert json.loads(run.stdout)["method"] == "reflectance"
+    facts = json.loads(run.stdout)
+    assert facts["method"] == "reflectance"
+    assert facts["choice"].startswith("reflectance on balls, robust-filter elsewhere: material fitted on 1 ball found")
+    assert 0.3 < facts["measured_share"] <= 1.0
+    assert facts["reflectance"]["accepted"]
+    assert set(facts["files"]) == {path.name for path in (tmp_path / "n").iterdir()}
     mesh = tmp_path / "part.ply"
     run = bgars_command("mesh", tmp_path / "n" / "normals.png", "-o", mesh, "--pixel-pitch-um", 3.4, "--json")
     assert run.returncode == 0, run.stderr
@@ -90,11 +95,18 @@ def test_evaluate_on_the_sample() -> None:
     assert results["lambertian"]["normals"]["mean_deg"] == pytest.approx(9.34, abs=0.05)
     assert results["specular-filter"]["normals"]["mean_deg"] == pytest.approx(6.76, abs=0.05)
     assert results["robust-filter"]["normals"]["mean_deg"] <= 1.35
+    assert results["reflectance"]["normals"]["mean_deg"] <= 0.15
+    assert results["reflectance"]["measured"]["pixels"] <= results["reflectance"]["normals"]["pixels"]
+    assert 0 < results["reflectance"]["coverage"] < 1
     assert results["robust-filter"]["ball_height_rmse_um"] < results["lambertian"]["ball_height_rmse_um"]
 
 
 @pytest.mark.parametrize(
-    "command", ["", "demo", "reconstruct", "normals", "mesh", "info", "evaluate", "inspect", "simulate", "experiment"]
+    "command",
+    [
+        *("", "demo", "reconstruct", "normals", "mesh", "info", "evaluate", "inspect", "calibrate material"),
+        *("simulate", "experiment"),
+    ],
 )
 def test_every_command_has_help(command: str) -> None:
     run = bgars_command(*command.split(), "--help")

@@ -24,7 +24,8 @@ from bgars.normals import METHODS
 
 RADIUS_PX = 20
 ERROR_COLUMNS = (
-    "method,i_d,i_s,hardness,elevation_deg,mean_deg_nz03,median_deg_nz03,p95_deg_nz03,mean_deg_nz01,height_rmse_px"
+    "method,i_d,i_s,hardness,elevation_deg,mean_deg_nz03,median_deg_nz03,p95_deg_nz03,mean_deg_nz01,height_rmse_px,"
+    "measured_percent_nz03"
 )
 
 

@@ -61,11 +61,13 @@ def write_normals(field: NormalField, output: Path, *, directx: bool) -> tuple[d
         "normals.png": _normals_meaning(directx),
         "albedo.tif": "diffuse reflectance times light, float32, 1 = full scale",
         "confidence.tif": "trust in each normal, float32, 0 to 1",
+        "measured.png": "white: the pixel's own light fixes its normal",
         "lights_kept.png": "number of lights in each fit",
     }
     with atomic_folder(output) as folder:
         bgars.write_normal_map(field, folder / "normals.png", directx=directx)
         tifffile.imwrite(folder / "albedo.tif", field.albedo)
         tifffile.imwrite(folder / "confidence.tif", field.confidence)
+        iio.imwrite(folder / "measured.png", np.where(field.measured, 255, 0).astype(np.uint8))
         iio.imwrite(folder / "lights_kept.png", np.minimum(field.lights_kept, 255).astype(np.uint8))
     return {**summarise_field(field), "files": list(files)}, files

@@ -14,7 +14,10 @@ if TYPE_CHECKING:
 
     from bgars.experiments.measure import Measurement
 
-__all__ = ["draw_errors"]
+__all__ = ["draw_errors", "marks_in_words"]
+
+NEARLY_ALL_PERCENT = 95.0
+"""Below this share of measured pixels a mark is drawn open."""
 
 
 def draw_errors(
@@ -25,7 +28,9 @@ def draw_errors(
     *,
     log: bool = False,
 ) -> None:
-    """Draw the mean angular error (left) and the height RMSE (right) of every method.
+    """Draw the mean angular error (left) and the height RMSE (right) of every method, on logarithmic axes.
+
+    An open mark: a good part of the normals is not measured but drawn to the sphere of the ball's circle.
 
     Parameters
     ----------
@@ -47,15 +52,31 @@ def draw_errors(
     ):
         for method in dict.fromkeys(one.method for one in measurements):
             own = of_method(measurements, method)
-            axes.plot([value(one) for one in own], [getattr(one, name) for one in own], **method_style(method))
+            style = method_style(method)
+            axes.plot([value(one) for one in own], [getattr(one, name) for one in own], **style)
+            partly = [one for one in own if one.measured_percent_nz03 < NEARLY_ALL_PERCENT]
+            marks = style | {"linestyle": "none", "markerfacecolor": "white", "label": "_open"}
+            axes.plot([value(one) for one in partly], [getattr(one, name) for one in partly], **marks)
         if log:
             axes.set_xscale("log")
             ticks = sorted({value(one) for one in measurements})
             axes.xaxis.set_major_locator(FixedLocator(ticks))
             axes.xaxis.set_minor_locator(NullLocator())
             axes.xaxis.set_major_formatter("{x:g}")
-        axes.set_ylim(bottom=0.0)
+        # A hundredfold lies between the methods.
+        axes.set_yscale("log")
+        axes.yaxis.set_major_formatter("{x:g}")
         axes.set_xlabel(label)
         axes.set_ylabel(title)
         tidy(axes)
     figure.legend(*line[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+
+
+def marks_in_words(measurements: Sequence[Measurement]) -> str:
+    """What an open mark means, where there is one; to be put behind a caption."""
+    if all(one.measured_percent_nz03 >= NEARLY_ALL_PERCENT for one in measurements):
+        return ""
+    return (
+        f" Open marks: less than {NEARLY_ALL_PERCENT:g} % of the pixels are measured, the others have no solution or "
+        "are drawn to the sphere of the ball's circle."
+    )

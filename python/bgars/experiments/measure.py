@@ -9,7 +9,6 @@ import numpy as np
 
 from bgars.evaluate import angular_error_deg
 from bgars.integrate import integrate_normals
-from bgars.least_squares import DEFAULT_THRESHOLD
 from bgars.normals import METHODS, estimate_normals
 
 if TYPE_CHECKING:
@@ -37,6 +36,7 @@ COLUMNS = (
     "p95_deg_nz03",
     "mean_deg_nz01",
     "height_rmse_px",
+    "measured_percent_nz03",
 )
 """Of every CSV with errors; nz03: over the pixels whose true n_z is above 0.3, nz01: above 0.1."""
 
@@ -57,6 +57,8 @@ class Measurement:
         The same mean over n_z > 0.1.
     height_rmse_px : float
         Root mean square height error over all hemisphere pixels, the mean difference removed.
+    measured_percent_nz03 : float
+        Share of the hemisphere pixels with true n_z > 0.3 whose own light fixes the normal.
     unsolved : int
         Hemisphere pixels without a solution.
     height_px : (H, W) float32
@@ -70,6 +72,7 @@ class Measurement:
     p95_deg_nz03: float
     mean_deg_nz01: float
     height_rmse_px: float
+    measured_percent_nz03: float
     unsolved: int
     height_px: FloatArray
 
@@ -95,7 +98,7 @@ def measure(
     setting: Setting,
     *,
     method: Method,
-    threshold: float = DEFAULT_THRESHOLD,
+    threshold: float | None = None,
 ) -> Measurement:
     """Estimate and integrate the normals of a hemisphere, and compare both with the truth.
 
@@ -118,6 +121,7 @@ def measure(
         p95_deg_nz03=float(np.percentile(judged, 95)),
         mean_deg_nz01=float(wider.mean()),
         height_rmse_px=float(difference_px.std()),
+        measured_percent_nz03=100.0 * float(field.measured[truth.mask & (n_z > 0.3)].mean()),  # noqa: PLR2004
         unsolved=int((truth.mask & ~field.mask).sum()),
         height_px=height_px - np.nanmin(height_px),
     )

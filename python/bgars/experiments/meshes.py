@@ -141,7 +141,9 @@ def draw(measurements: list[Measurement], methods: Sequence[Method], true_height
         shown = [one for one in measurements if one.method == method]
         for axes, one in zip(line[1:], shown, strict=True):
             draw_surface(axes, one.height_px, heights)
-            axes.set_title(f"{method}, I_d = {one.setting.i_d:g}\nrise {one.rise_px:.0f} px", y=TITLE)
+            # A normal drawn to the sphere of the circle proves nothing, however well it looks.
+            measured = f"\n{one.measured_percent_nz03:.0f} % measured" if method == "reflectance" else ""
+            axes.set_title(f"{method}, I_d = {one.setting.i_d:g}\nrise {one.rise_px:.0f} px{measured}", y=TITLE)
     figure.colorbar(ScalarMappable(heights, COLORS), ax=grid, label="height (px)", shrink=0.75, pad=0.01)
     return figure
 

@@ -19,7 +19,7 @@ SCENE = (
     "A hemisphere of R = {radius_px} px on a dark board, 8 distant lights on a ring at 45 deg, 8-bit images without "
     "noise, I_d = 0.5, I_s = 1, h = 40 (Beckmann, Cook-Torrance masking), point sampled, unless a section says "
     "otherwise. *Naive* is `lambertian`, plain least squares; *the filter* is `specular-filter`, the paper's, taken "
-    "literally."
+    "literally; `reflectance` looks for the ball in the images and fits its material on it."
 )
 MEASURES = (
     "* **Angular error:** mean over the hemisphere pixels whose true n_z is above 0.3; a pixel without a solution "
@@ -27,10 +27,14 @@ MEASURES = (
     "* **Height RMSE:** the estimated normals are integrated over the whole silhouette of the hemisphere by the "
     "default integrator (pixels without a solution as (0, 0, 1) again); root mean square difference to the true height "
     "over all those pixels, the mean difference removed.",
+    "* **Measured:** share of the pixels of n_z > 0.3 whose own light fixes the normal (`measured_percent_nz03` of the "
+    "CSV files). Others `reflectance` draws to the sphere of the ball's circle.",
 )
 LIMITS = (
     "* **One scene.** A sphere alone, ideal lights and camera, one reflection: these numbers compare methods under the "
     "paper's conditions and say little about a real part.",
+    "* **A sphere flatters `reflectance`.** It takes balls for spheres until their light says otherwise, and here they "
+    "are: where little is measured, its small errors are those of the circle it found.",
     "* **The exposure does not adapt.** Grey level 255 means I = 1 in every image, as in the paper's sweeps; at I_d = "
     "{least:g} the diffuse light is worth {levels:.1f} grey levels, and 8 bits lose most of it.",
     "* **The paper is known here by its equations,** not by its images or data: a figure agrees where it shows the "

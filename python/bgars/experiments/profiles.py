@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bgars.experiments.curves import draw_errors
+from bgars.experiments.curves import draw_errors, marks_in_words
 from bgars.experiments.measure import COLUMNS, Measurement, measure_all, profile_px
 from bgars.experiments.outcome import Experiment, Outcome, Picture
 from bgars.experiments.setting import DIFFUSE, HARDNESS, SPECULAR, Setting
@@ -52,7 +52,7 @@ def run(how: Run, *, name: str, field: str, symbol: str, values: tuple[float, ..
             Picture(
                 name,
                 draw(measurements, symbol, field, values, true_px),
-                f"Profiles through the centre over {symbol}, and both errors.",
+                f"Profiles through the centre over {symbol}, and both errors.{marks_in_words(measurements)}",
             ),
         ),
         columns=COLUMNS,
@@ -77,7 +77,9 @@ def _facts(measurements: list[Measurement], method: str) -> str:
     mean_deg = span((one.mean_deg_nz03 for one in own), 1)
     rmse_px = span((one.height_rmse_px for one in own), 2)
     rise_px = span((float(np.nanmax(one.profile_px)) for one in own), 0)
-    return f"{method}: mean error {mean_deg} deg, height RMSE {rmse_px} px, rise {rise_px} px."
+    measured = span((one.measured_percent_nz03 for one in own), 0)
+    share = "" if measured == "100" else f", measured {measured} %"
+    return f"{method}: mean error {mean_deg} deg, height RMSE {rmse_px} px, rise {rise_px} px{share}."
 
 
 def draw(

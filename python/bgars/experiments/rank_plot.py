@@ -13,8 +13,8 @@ from bgars.experiments.outcome import Experiment, Outcome, Picture
 from bgars.experiments.setting import Setting
 from bgars.experiments.style import new_figure, panels, tidy
 from bgars.experiments.words import markdown_table
-from bgars.least_squares import DEFAULT_THRESHOLD
 from bgars.normals import estimate_normals
+from bgars.pixelwise import DEFAULT_THRESHOLD
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from bgars.experiments.curves import draw_errors
+from bgars.experiments.curves import draw_errors, marks_in_words
 from bgars.experiments.measure import COLUMNS, FILTER, NAIVE, Measurement, measure_all
 from bgars.experiments.outcome import Experiment, Outcome, Picture
 from bgars.experiments.setting import Setting
 from bgars.experiments.style import new_figure
 from bgars.experiments.words import method_table, of_method, ranges, split_by_gain
 from bgars.normals import METHODS
+from bgars.reflectance import MIN_LIGHTS
 
 if TYPE_CHECKING:
     from bgars.experiments.outcome import Run
@@ -73,7 +74,13 @@ def run(how: Run, *, sweep: Sweep) -> Outcome:
     filtered = of_method(measurements, FILTER)
     best = min(filtered, key=lambda one: one.mean_deg_nz03)
     return Outcome(
-        pictures=(Picture(sweep.name, figure, f"Errors of every method over the {sweep.title.lower()}."),),
+        pictures=(
+            Picture(
+                sweep.name,
+                figure,
+                f"Errors of every method over the {sweep.title.lower()}.{marks_in_words(measurements)}",
+            ),
+        ),
         columns=(*COLUMNS, *extra),
         rows=[one.row | {name: getattr(one.setting, name) for name in extra} for one in measurements],
         table=method_table(sweep.label, measurements, value_of),
@@ -111,7 +118,10 @@ SWEEPS = (
         unit=" lights",
         field="lights",
         values=tuple(float(count) for count in range(3, 17)),
-        note="With 3 lights nothing can be dropped: all methods are one.",
+        note=(
+            "With 3 lights nothing can be dropped: all methods are one. "
+            f"reflectance needs {MIN_LIGHTS} lights and is robust-filter with fewer."
+        ),
     ),
     Sweep(
         name="elevation",

@@ -9,7 +9,7 @@ from bgars.experiments.outcome import Experiment, Outcome, Picture
 from bgars.experiments.setting import Setting
 from bgars.experiments.style import MARKERS, OKABE_ITO, new_figure, panels, tidy
 from bgars.experiments.words import listed, markdown_table
-from bgars.least_squares import DEFAULT_THRESHOLD
+from bgars.pixelwise import DEFAULT_THRESHOLD
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

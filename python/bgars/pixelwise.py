@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -21,16 +21,12 @@ if TYPE_CHECKING:
     from bgars.records import PixelArray
 
 __all__ = [
-    "LEAST_SQUARES_METHODS",
-    "LeastSquaresMethod",
     "PixelwiseMethod",
     "capture_of",
     "combined_mask",
     "pixelwise_normals",
 ]
 
-LeastSquaresMethod = Literal["lambertian", "specular-filter", "robust-filter"]
-LEAST_SQUARES_METHODS: tuple[LeastSquaresMethod, ...] = get_args(LeastSquaresMethod)
 PixelwiseMethod = Literal["lambertian", "specular-filter", "robust-filter", "blind"]
 """What needs nothing but images and lights: ``blind`` fits a material of its own (docs/method.md)."""
 DEFAULT_THRESHOLD = 50.0

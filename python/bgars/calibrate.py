@@ -1,0 +1,89 @@
+"""Calibration: a surface's material, fitted where its shape is known."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bgars.errors import CalibrationError
+from bgars.normals import estimate_normals
+from bgars.reflectance import MIN_LIGHTS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike
+
+    from bgars.ball_records import FoundBalls
+    from bgars.material_records import ReflectanceFit
+    from bgars.records import Capture
+
+__all__ = ["calibrate_material", "loss_in_words"]
+
+VERY_WELL = 0.1
+WELL = 0.5
+
+
+def calibrate_material(
+    capture: Capture,
+    *,
+    anchors: FoundBalls | ArrayLike | None = None,
+    threads: int | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> ReflectanceFit:
+    """Fit the material of a part on its balls, or of a reference sphere, to be used on other captures.
+
+    Parameters
+    ----------
+    capture : Capture
+        At least 6 lights; the lights and the exposure of the captures that the material will be used on.
+    anchors : FoundBalls, (N, 3) array_like, or (H, W) array_like of bool, optional
+        Balls, circles, or the mask of one ball, as of :func:`bgars.estimate_normals`. By default balls are looked for.
+    threads, progress
+        See :func:`bgars.estimate_normals`.
+
+    Returns
+    -------
+    ReflectanceFit
+        The material, how well it explains the balls, and which those are.
+
+    Raises
+    ------
+    CalibrationError
+        No ball, too few lights, or no material that explains the balls.
+    InputError
+        Anchors that do not fit the images.
+
+    Examples
+    --------
+    >>> import bgars
+    >>> fit = bgars.calibrate_material(bgars.read_capture(bgars.sample_capture()))
+    >>> len(fit.circles_px), len(fit.material.gains), fit.loss < 0.1
+    (1, 8, True)
+    """
+    if len(capture.rig) < MIN_LIGHTS:
+        msg = f"{capture.name}: a material needs {MIN_LIGHTS} lights or more, the capture has {len(capture.rig)}"
+        raise CalibrationError(msg)
+    fit = estimate_normals(
+        capture, method="reflectance", anchors=anchors, threads=threads, progress=progress
+    ).reflectance
+    if fit is None:
+        msg = (
+            f"{capture.name}: no ball {'found' if anchors is None else 'given'}, so no known shape to fit a material on"
+        )
+        raise CalibrationError(msg)
+    if not fit.accepted:
+        msg = f"{capture.name}: no material explains the balls (loss {fit.loss:.2f}, at most 2 is accepted)"
+        raise CalibrationError(msg)
+    return fit
+
+
+def loss_in_words(fit: ReflectanceFit) -> str:
+    """How well a material explains the balls it was fitted on.
+
+    `ReflectanceFit.loss` 0.1 is a residual of 1 grey level, 0.5 of 2.4 levels, 2 of 7.6 levels, as if all were alike.
+    """
+    if not fit.accepted:
+        return "badly: not usable"
+    if fit.loss < VERY_WELL:
+        return "very well"
+    return "well" if fit.loss < WELL else "roughly: expect larger errors, and read each normal's standard error"
