@@ -166,7 +166,7 @@ def test_a_material_without_balls_is_used_where_it_explains_the_pixel() -> None:
     fit = anchored(capture).reflectance
     assert fit is not None
     field = bgars.estimate_normals(capture, anchors=np.zeros((0, 3)), material=fit.material)
-    assert field.choice.startswith("reflectance everywhere it explains the pixel: material given")
+    assert field.choice.startswith("reflectance where it explains the pixel, robust-filter elsewhere: material given")
     robust = bgars.estimate_normals(capture, method="robust-filter")
     assert mean_deg(field, truth) < 0.5 * mean_deg(robust, truth)
 
