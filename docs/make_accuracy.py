@@ -18,7 +18,7 @@ IN_README = {
     "scenes/B_one_ball_paper_id050": "one ball, strong highlights (B id050)",
     "scenes/C_grid_4x4_paper": "4 x 4 balls (C)",
     "scenes/C2_grid_4x4_gamma": "4 x 4 balls, gamma and noise (C2)",
-    "scenes/E_grid_5x5_metal": "bare metal (E): no method here helps",
+    "scenes/E_grid_5x5_metal": "bare metal (E)",
     "real/dil_cat": "photograph, cat, 24 lights",
     "real/dil_bear": "photograph, bear, 24 lights",
 }
@@ -92,9 +92,11 @@ def table(chosen: list[Case]) -> list[str]:
         cells = []
         for result in results:
             errors = result.normals
-            cells.append(
-                f"**{errors.mean_deg:.2f}** / {errors.median_deg:.2f} / {errors.p95_deg:.1f} ({errors.invalid})"
-            )
+            cell = f"**{errors.mean_deg:.2f}** / {errors.median_deg:.2f} / {errors.p95_deg:.1f} ({errors.invalid})"
+            if result.method == "reflectance" and result.measured is not None:
+                share = 100 * result.measured.pixels / errors.pixels
+                cell += f"; measured {share:.0f} %: {result.measured.mean_deg:.2f}"
+            cells.append(cell)
         rmse = " / ".join(
             "-" if result.ball_height_rmse_um is None else f"{result.ball_height_rmse_um:.1f}" for result in results
         )

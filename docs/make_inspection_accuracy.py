@@ -1,7 +1,8 @@
-"""Measure balls from their shadows in open scenes and simulated captures; rewrite a part of docs/accuracy.md.
+"""Inspect open scenes and measure simulated captures; rewrite a part of docs/accuracy.md, or print lines of scenes.
 
-Finding balls is another stage: here every ball starts from its true circle, half a pixel off in the centre and 1 % in
-the radius. Command: ``BGARS_DATA=... python docs/make_inspection_accuracy.py``.
+Scenes go the whole way: balls are found, normals estimated, shadows measured. Balls of simulated captures, which tell
+whether uncertainties are right, start from their true circles, half a pixel off in the centre and 1 % in the radius.
+Commands: ``make inspection`` for the page, ``BGARS_DATA=... python docs/make_inspection_accuracy.py SCENE`` for a line.
 """
 
 from __future__ import annotations
@@ -85,33 +86,31 @@ class Case(NamedTuple):
 
     measured: BallMeasurement
     rows: list[dict[str, str]]
+    present: int
     lights_deg: float
     seconds: float
     pitch_um: float
 
 
 def measure_scene(folder: Path) -> Case:
-    """Measure one scene with normals by the robust filter."""
+    """Find and measure the balls of one scene."""
     capture = bgars.read_capture(folder)
     pitch_um = float(capture.pixel_pitch_um or 1.0)
     top = folder if (folder / "balls.csv").exists() else folder.parent
     with (top / "balls.csv").open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["present"] == "1"]
-    random = np.random.default_rng(0)
-    balls = []
-    for row in rows:
-        x_px, y_px, radius_px = (1000.0 * float(row[key]) / pitch_um for key in ("x_mm", "y_mm", "radius_mm"))
-        balls.append(rough(row["name"], x_px, y_px, radius_px, random))
     scene = json.loads((top / "scene.json").read_text(encoding="utf-8"))
-    bridge = scene.get("bridge")
-    circles = found(balls, ((bridge["names"][0], bridge["names"][1]),) if bridge else ())
-    field = bgars.estimate_normals(capture)
     start = time.process_time()
+    circles = bgars.find_balls(capture)
+    field = bgars.estimate_normals(capture, anchors=circles)
     measured = measure_balls(capture, circles, field=field)
     seconds = time.process_time() - start
+    by_name = {ball.name: ball for ball in measured.balls}
+    expected = [row for row in rows if row["name"] in by_name]
+    measured = replace(measured, balls=tuple(by_name[row["name"]] for row in expected))
     lights = np.array((scene.get("truth") or {}).get("light_directions", capture.rig.directions))
     angles = np.degrees(np.arccos(np.clip((measured.light_directions * lights).sum(axis=1), -1.0, 1.0)))
-    return Case(measured, rows, float(angles.max()), seconds, pitch_um)
+    return Case(measured, expected, len(rows), float(angles.max()), seconds, pitch_um)
 
 
 def coplanarity_error_um(case: Case, known: NDArray[np.bool_]) -> float | None:
@@ -142,7 +141,7 @@ def scene_row(name: str, case: Case) -> str:
     flats = [f"{ball.name} {ball.flat_um:.0f} +- {ball.u_flat_um:.0f}" for ball in case.measured.balls if _flat(ball)]
     cells = [
         name,
-        f"{known.sum()} of {len(known)}",
+        f"{known.sum()} of {case.present}",
         f"{case.pitch_um:g}",
         f"{np.sqrt(np.mean(centre**2)):.2f}",
         f"{radius.mean():+.2f} / {radius.std():.2f}",
@@ -237,7 +236,11 @@ def tables(data: Path) -> list[str]:
 
 
 def main() -> None:
-    """Rewrite the part of the page between the marks."""
+    """Rewrite the part of the page between the marks, or print the lines of the scenes that are named."""
+    for name in sys.argv[1:]:
+        print(scene_row(name, measure_scene(Path(os.environ["BGARS_DATA"]) / "scenes" / name)))  # noqa: T201
+    if sys.argv[1:]:
+        return
     head, rest = PAGE.read_text(encoding="utf-8").split(START)
     tail = rest.split(END)[1]
     body = "\n".join(tables(Path(os.environ["BGARS_DATA"])))
