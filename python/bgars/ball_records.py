@@ -10,12 +10,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars.ball_names import ball_name
 from bgars.errors import InputError
 
-__all__ = ["BallLayout", "BallMeasurement", "FoundBall", "FoundBalls", "MeasuredBall", "place_name"]
+__all__ = ["BallLayout", "BallMeasurement", "FoundBall", "FoundBalls", "MeasuredBall"]
 
 BallKind = Literal["ball", "extra", "bridged"]
-ROW_LETTERS = "ABCDEFGHJKLMNPRTUVWY"
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class BallLayout:
                     msg = f"layout.{name}: must be above 0 (or positions must be given), got {value}"
                     raise InputError(msg)
             names = list(self.depopulated)
-            known = {place_name(row, col) for row in range(self.rows or 0) for col in range(self.cols or 0)}
+            known = {ball_name(row, col) for row in range(self.rows or 0) for col in range(self.cols or 0)}
             unknown = [name for name in names if name not in known]
             if unknown:
                 msg = f"layout.depopulated: must name places of the {self.rows} x {self.cols} grid, got {unknown[0]!r}"
@@ -82,27 +82,11 @@ class BallLayout:
             return _listed_places(self.positions)
         pitch_um = self.pitch_um or 0.0
         return tuple(
-            (place_name(row, col), row, col, col * pitch_um, -row * pitch_um)
+            (ball_name(row, col), row, col, col * pitch_um, -row * pitch_um)
             for row in range(self.rows or 0)
             for col in range(self.cols or 0)
-            if place_name(row, col) not in self.depopulated
+            if ball_name(row, col) not in self.depopulated
         )
-
-
-def place_name(row: int, col: int) -> str:
-    """JEDEC name of a place counted from 0: rows are letters without I, O, Q, S, X, Z; AA comes after Y.
-
-    Examples
-    --------
-    >>> place_name(0, 0), place_name(8, 11), place_name(20, 0)
-    ('A1', 'J12', 'AA1')
-    """
-    count = len(ROW_LETTERS)
-    letters = ROW_LETTERS[row % count]
-    while row >= count:
-        row = row // count - 1
-        letters = ROW_LETTERS[row % count] + letters
-    return f"{letters}{col + 1}"
 
 
 def _listed_places(positions: tuple[tuple[str, float, float], ...]) -> tuple[tuple[str, int, int, float, float], ...]:

@@ -12,6 +12,7 @@ from bgars.balls import find_balls
 from bgars.inspection import measure_balls
 from bgars.inspection.exposure import check_capture
 from bgars.inspection.judge import judge_part
+from bgars.io.material_file import read_material
 from bgars.io.part_recipe import read_part_recipe
 from bgars.io.provenance import capture_files, checksums
 from bgars.normals import DEFAULT_METHOD, Method, estimate_normals
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from os import PathLike
 
     from bgars.ball_records import BallMeasurement, FoundBalls
+    from bgars.material_records import SurfaceMaterial
     from bgars.part_result import PartResult
     from bgars.records import BoolArray, Capture
 
@@ -78,10 +80,11 @@ def inspect(
             progress(stage, fraction)
 
     check_capture(capture)
+    material, warnings = _material(recipe, method)
     report("find", 0.0)
     found = _found(capture, recipe, threads)
     report("find", 1.0)
-    measurement = _measured(capture, found, method, threads, report)
+    measurement = _measured(capture, found, method, material, threads, report)
     report("measure", 1.0)
     files = capture_files(capture) + (() if recipe is None or recipe.file is None else (recipe.file,))
     result = judge_part(
@@ -92,16 +95,19 @@ def inspect(
         pixel_pitch_um=float(capture.pixel_pitch_um or 0.0),
         files=checksums(files),
         version=version("bgars"),
-        warnings=_unused(recipe, method),
+        warnings=warnings,
     )
     report("judge", 1.0)
     return result
 
 
-def _unused(recipe: PartRecipe | None, method: Method) -> tuple[str, ...]:
+def _material(recipe: PartRecipe | None, method: Method) -> tuple[SurfaceMaterial | None, tuple[str, ...]]:
+    """The recipe's material, where the method uses one; a warning where it does not."""
     if recipe is None or recipe.material_file is None:
-        return ()
-    return (MATERIAL_UNUSED.format(method=method),)
+        return None, ()
+    if method != "reflectance":
+        return None, (MATERIAL_UNUSED.format(method=method),)
+    return read_material(recipe.material_file), ()
 
 
 def _found(capture: Capture, recipe: PartRecipe | None, threads: int | None) -> FoundBalls:
@@ -113,6 +119,7 @@ def _measured(
     capture: Capture,
     found: FoundBalls,
     method: Method,
+    material: SurfaceMaterial | None,
     threads: int | None,
     report: Callable[[InspectionStage, float], None],
 ) -> BallMeasurement:
@@ -129,7 +136,13 @@ def _measured(
     anchors = found if method == "reflectance" else None
     with ThreadPoolExecutor(1) as background:
         normals = background.submit(
-            estimate_normals, capture, method=method, mask=balls, anchors=anchors, threads=threads
+            estimate_normals,
+            capture,
+            method=method,
+            mask=balls,
+            anchors=anchors,
+            material=material,
+            threads=threads,
         )
         return measure_balls(
             capture,

@@ -7,7 +7,7 @@ from dataclasses import replace
 import bgars
 import numpy as np
 import pytest
-from bgars.ball_records import place_name
+from bgars import ball_names
 from bgars.balls.highlights import highlight_circles
 from bgars.balls.levels import Levels
 from bgars.simulate import ball_name
@@ -188,4 +188,4 @@ def test_the_result_does_not_depend_on_threads() -> None:
 
 
 def test_names_are_those_of_the_simulator() -> None:
-    assert all(place_name(row, col) == ball_name(row + 1, col + 1) for row in range(60) for col in range(3))
+    assert all(ball_names.ball_name(row, col) == ball_name(row + 1, col + 1) for row in range(60) for col in range(3))

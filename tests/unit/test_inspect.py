@@ -228,9 +228,15 @@ def test_the_finder_gets_the_layout_as_the_camera_sees_it(quick: Path, monkeypat
     assert result.balls[-1].kind == "extra"
 
 
-def test_a_material_that_nothing_uses_is_said(quick: Path) -> None:
-    (quick.parent / "solder.json").touch()
-    result = bgars.inspect(
-        bgars.read_capture(quick), recipe(quick, PART + LIMITS + '[material]\nfile = "solder.json"\n')
-    )
-    assert any("material.file" in warning for warning in result.warnings)
+def test_the_material_of_the_recipe_is_used_or_said_to_be_unused(quick: Path) -> None:
+    capture = bgars.read_capture(quick)
+    lobe = bgars.SurfaceLobe(strength_level=255.0, roughness=0.22, tail=0.0)
+    material = bgars.SurfaceMaterial(127.0, 0.0, 0.0, (lobe,), "cook-torrance", (1.0,) * len(capture.rig))
+    bgars.write_material(material, quick.parent / "solder.toml")
+    part = recipe(quick, PART + LIMITS + '[material]\nfile = "solder.toml"\n')
+    assert not any("material.file" in warning for warning in bgars.inspect(capture, part).warnings)
+    unused = bgars.inspect(capture, part, method="robust-filter")
+    assert any("material.file" in warning for warning in unused.warnings)
+    (quick.parent / "solder.toml").write_text("diffuse_level = -1\n", encoding="utf-8")
+    with pytest.raises(bgars.BgarsError, match=r"solder\.toml"):
+        bgars.inspect(capture, part)

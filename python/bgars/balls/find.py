@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from bgars.ball_records import FoundBall, FoundBalls, place_name
+from bgars.ball_names import ball_name
+from bgars.ball_records import FoundBall, FoundBalls
 from bgars.balls.bridges import joined_pairs
 from bgars.balls.circles import Detection, find_circles
 from bgars.balls.lattice import fit_lattice
@@ -164,10 +165,10 @@ def _inferred(x_px: NDArray[np.float64], y_px: NDArray[np.float64]) -> _Grid:
     taken = set(zip(row, col, strict=True))
     free = [(r, c) for r in range(rows) for c in range(cols) if (r, c) not in taken]
     return _Grid(
-        names=[place_name(r, c) if r >= 0 else "" for r, c in zip(row, col, strict=True)],
+        names=[ball_name(r, c) if r >= 0 else "" for r, c in zip(row, col, strict=True)],
         row=row,
         col=col,
-        missing=[(place_name(r, c), r, c) for r, c in free],
+        missing=[(ball_name(r, c), r, c) for r, c in free],
         rows=rows,
         cols=cols,
         pitch_px=lattice.pitch_px,
