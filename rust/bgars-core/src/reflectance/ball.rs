@@ -23,8 +23,11 @@ const COMPONENTS: f32 = 2.0;
 /// Radian for one unit of the disc, near its centre.
 const DISC_RADIAN: f32 = std::f32::consts::SQRT_2;
 
-/// Uncertainty of the edge of a flat top, in pixels.
-const FLAT_EDGE_PX: f64 = 0.5;
+/// Pixels this near to the edge of a flat top show two normals at once: they are not looked at.
+const FLAT_EDGE_PX: f64 = 1.5;
+
+/// Share of the expected angle between normal and circle that a pixel not looked at is allowed.
+const UNSEEN_SHARE: f32 = 0.1;
 
 /// Information that keeps a direction without data finite: a standard deviation of a radian.
 const MIN_INFORMATION: f64 = 1.0;
@@ -91,6 +94,15 @@ pub struct BallPixel {
     pub cost: f32,
 }
 
+/// What is expected of a pixel, on the disc.
+#[derive(Clone, Copy)]
+enum Expected {
+    /// Its normal is near this, and its light tells more.
+    At([f32; 2]),
+    /// Its light is a mixture that tells nothing.
+    Unseen([f32; 2]),
+}
+
 /// One ball's pixels, ready to be estimated.
 pub struct BallWork<'a, 'b, 'c, P> {
     reader: &'a Reader<'b, 'c, P>,
@@ -139,9 +151,13 @@ impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
         // The disc is 1 / sqrt 2 of a radian at its centre.
         let weight = COMPONENTS.sqrt() * DISC_RADIAN / self.ball.prior_rad;
         let mut best: Option<Minimum> = None;
-        for point in scratch.anchor.map(|point| self.expected(point)).into_iter().flatten().flatten() {
-            let prior = Prior { point, weight };
-            let found = deepest(self.table, &scratch.seen, lights, prior, &mut scratch.distances);
+        for expected in scratch.anchor.map(|point| self.expected(point)).into_iter().flatten().flatten() {
+            let found = match expected {
+                Expected::Unseen(point) => Minimum::unseen(point, weight / UNSEEN_SHARE),
+                Expected::At(point) => {
+                    deepest(self.table, &scratch.seen, lights, Prior { point, weight }, &mut scratch.distances)
+                }
+            };
             if best.is_none_or(|best| found.cost < best.cost) {
                 best = Some(found);
             }
@@ -153,20 +169,20 @@ impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
     }
 
     /// Where a normal may be expected: on the sphere of the circle, on a flat top, or where many pixels of an odd ball
-    /// agree; near the edge of a flat both are possible.
-    fn expected(&self, circle_point: [f32; 2]) -> [Option<[f32; 2]>; 2] {
+    /// agree.
+    fn expected(&self, circle_point: [f32; 2]) -> [Option<Expected>; 2] {
         if let Some(flat) = self.ball.flat {
             let normal = from_disc(circle_point.map(f64::from));
             let inside = flat.radius - normal.x.hypot(normal.y) as f32;
             let edge = (FLAT_EDGE_PX / self.ball.circle.radius_px) as f32;
-            if inside > -edge {
-                return [Some(flat.point), (inside < edge).then_some(circle_point)];
-            }
+            let point = if inside > 0.0 { flat.point } else { circle_point };
+            return [Some(if inside.abs() < edge { Expected::Unseen(point) } else { Expected::At(point) }), None];
         }
         let shift: Option<[f32; 2]> = (self.ball.odd.as_ref())
             .map(|odd| std::array::from_fn(|axis| odd.at(circle_point.map(f64::from), axis).0))
             .filter(|[a, b]| a.hypot(*b) > 0.0);
-        [Some(circle_point), shift.map(|shift| std::array::from_fn(|axis| circle_point[axis] + shift[axis]))]
+        let moved = |shift: [f32; 2]| Expected::At(std::array::from_fn(|axis| circle_point[axis] + shift[axis]));
+        [Some(Expected::At(circle_point)), shift.map(moved)]
     }
 
     fn observe(&self, pixel: usize, scratch: &mut Scratch) {

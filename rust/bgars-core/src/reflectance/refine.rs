@@ -60,6 +60,14 @@ pub struct Minimum {
     pub prior_information: f32,
 }
 
+impl Minimum {
+    /// The expected normal of a pixel that is not looked at.
+    #[must_use]
+    pub fn unseen(point: [f32; 2], weight: f32) -> Self {
+        Self { point, cost: 0.0, data_cost: 0.0, information: [0.0; 3], prior_information: weight * weight }
+    }
+}
+
 /// Cost and its derivatives at one place.
 #[derive(Clone, Copy)]
 struct State {
