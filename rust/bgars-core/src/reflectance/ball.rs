@@ -8,7 +8,7 @@ use super::disc::{from_disc, metric, to_disc};
 use super::flat_top::FlatTop;
 use super::material::Material;
 use super::observe::Reader;
-use super::refine::{Minimum, Observation, Prior, deepest};
+use super::refine::{Minimum, Observation, Prior, deepest, nearest};
 use super::scale::bend;
 use super::spread::{Residual, Spread};
 use super::table::{GROUP, Signatures};
@@ -94,6 +94,13 @@ pub struct BallPixel {
     pub cost: f32,
 }
 
+/// Which minimum of a pixel is wanted.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Search {
+    Deepest,
+    Nearest,
+}
+
 /// What is expected of a pixel, on the disc.
 #[derive(Clone, Copy)]
 enum Expected {
@@ -126,7 +133,17 @@ impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
 
     /// The normal of a pixel, and why it may be trusted.
     pub fn estimate(&self, pixel: usize, scratch: &mut Scratch) -> BallPixel {
-        let best = self.minimum(pixel, scratch);
+        let best = self.minimum(pixel, Search::Deepest, scratch);
+        self.described(pixel, &best, scratch)
+    }
+
+    /// The same, by the minimum nearest to what is expected: for pixels whose deepest minimum no neighbour shares.
+    pub fn estimate_near(&self, pixel: usize, scratch: &mut Scratch) -> BallPixel {
+        let best = self.minimum(pixel, Search::Nearest, scratch);
+        self.described(pixel, &best, scratch)
+    }
+
+    fn described(&self, pixel: usize, best: &Minimum, scratch: &Scratch) -> BallPixel {
         let normal = from_disc(best.point.map(f64::from));
         let deviation = self.ball.deviation_rad / DISC_RADIAN;
         let off = scratch.anchor.map_or(0.0, |anchor| angle(&from_disc(anchor.map(f64::from)), &normal));
@@ -135,14 +152,14 @@ impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
             normal: [normal.x as f32, normal.y as f32, normal.z as f32],
             point: best.point,
             circle_point: scratch.anchor.unwrap_or([f32::NAN; 2]),
-            error_rad: direction_error(&best, best.prior_information, deviation * deviation / COMPONENTS),
-            data_error_rad: direction_error(&best, 0.0, 0.0),
+            error_rad: direction_error(best, best.prior_information, deviation * deviation / COMPONENTS),
+            data_error_rad: direction_error(best, 0.0, 0.0),
             off_circle_rad: off as f32,
             cost: best.data_cost / self.reader.lights() as f32,
         }
     }
 
-    fn minimum(&self, pixel: usize, scratch: &mut Scratch) -> Minimum {
+    fn minimum(&self, pixel: usize, search: Search, scratch: &mut Scratch) -> Minimum {
         let (height, width) = self.reader.size();
         let (x, y) = pixel_centre(pixel / width, pixel % width, height, width);
         scratch.anchor = self.ball.circle.normal(x, y).map(|normal| to_disc(&normal).map(|v| v as f32));
@@ -154,6 +171,9 @@ impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
         for expected in scratch.anchor.map(|point| self.expected(point)).into_iter().flatten().flatten() {
             let found = match expected {
                 Expected::Unseen(point) => Minimum::unseen(point, weight / UNSEEN_SHARE),
+                Expected::At(point) if search == Search::Nearest => {
+                    nearest(self.table, &scratch.seen, Prior { point, weight })
+                }
                 Expected::At(point) => {
                     deepest(self.table, &scratch.seen, lights, Prior { point, weight }, &mut scratch.distances)
                 }
@@ -210,7 +230,7 @@ impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
 
     /// Residuals at the minimum of a pixel, each divided by what the fit leaves of it: sqrt(1 - leverage).
     pub fn residuals(&self, pixel: usize, scratch: &mut Scratch, residuals: &mut Vec<Residual>) {
-        let best = self.minimum(pixel, scratch);
+        let best = self.minimum(pixel, Search::Deepest, scratch);
         let [haa, hab, hbb] = best.information;
         let (haa, hbb) = (haa + best.prior_information, hbb + best.prior_information);
         let determinant = (haa * hbb - hab * hab).max(1e-12);

@@ -145,6 +145,12 @@ pub fn deepest(
     best
 }
 
+/// The minimum nearest to the expected normal.
+#[multiversion(targets("x86_64+avx2+fma"))]
+pub fn nearest(table: &Signatures, pixel: &Observation, prior: Prior) -> Minimum {
+    minimise(table, pixel, prior, prior.point)
+}
+
 /// Levenberg-Marquardt from one start.
 #[inline(always)]
 fn minimise(table: &Signatures, pixel: &Observation, prior: Prior, start: [f32; 2]) -> Minimum {

@@ -46,6 +46,10 @@ const MEASURED_DEG: f32 = 2.0;
 /// Free pixels are of the material where their mean loss of a light is below this.
 const FREE_LOSS: f32 = 2.0;
 
+/// A normal this far from its circle's, in radian (10 degrees), must be shared by so many of its eight neighbours.
+const LONE_RAD: f32 = 0.175;
+const FRIENDS: usize = 5;
+
 /// Regions between two calls of the progress callback.
 const BATCH: usize = 16;
 
@@ -172,8 +176,17 @@ impl<'a, 'b, 'c, P: Pixel> Regions<'a, 'b, 'c, P> {
                 .par_iter()
                 .map(|&index| {
                     let work = self.work(index, spread);
-                    let pixels = self.all[index].pixels.par_iter();
-                    pixels.map_init(|| self.scratch(), |scratch, &pixel| work.estimate(pixel, scratch)).collect()
+                    let region = &self.all[index];
+                    let pixels = region.pixels.par_iter();
+                    let mut found: Vec<BallPixel> =
+                        pixels.map_init(|| self.scratch(), |scratch, &pixel| work.estimate(pixel, scratch)).collect();
+                    if !region.free {
+                        let mut scratch = self.scratch();
+                        for lone in lone_pixels(&found, self.reader.size().1) {
+                            found[lone] = work.estimate_near(found[lone].pixel, &mut scratch);
+                        }
+                    }
+                    found
                 })
                 .collect();
             for (&index, found) in batch.iter().zip(&found) {
@@ -187,6 +200,35 @@ impl<'a, 'b, 'c, P: Pixel> Regions<'a, 'b, 'c, P> {
         }
         Ok(())
     }
+}
+
+/// Pixels far from their circle's normal with whom too few neighbours agree: a reflection of another ball, a speck.
+fn lone_pixels(found: &[BallPixel], width: usize) -> Vec<usize> {
+    let far = |pixel: &BallPixel| pixel.off_circle_rad > LONE_RAD;
+    let agree = |a: &BallPixel, b: &BallPixel| {
+        let dot: f32 = a.normal.iter().zip(&b.normal).map(|(a, b)| a * b).sum();
+        dot > LONE_RAD.cos()
+    };
+    let at = |pixel: usize| found.binary_search_by_key(&pixel, |found| found.pixel).ok().map(|index| &found[index]);
+    (0..found.len())
+        .filter(|&index| far(&found[index]))
+        .filter(|&index| {
+            let pixel = found[index].pixel;
+            let neighbours = [
+                pixel.wrapping_sub(width + 1),
+                pixel.wrapping_sub(width),
+                pixel.wrapping_sub(width - 1),
+                pixel.wrapping_sub(1),
+                pixel + 1,
+                pixel + width - 1,
+                pixel + width,
+                pixel + width + 1,
+            ];
+            let friends =
+                neighbours.into_iter().filter_map(at).filter(|other| far(other) && agree(&found[index], other)).count();
+            friends < FRIENDS
+        })
+        .collect()
 }
 
 /// Writes a pixel's normal.
