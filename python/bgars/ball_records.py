@@ -237,6 +237,8 @@ class BallMeasurement:
         RMS residual of the shadow fit over the contrast of lit and shadowed board.
     board_covariance : (6, 6) float64 or None
         Covariance of `board_coefficients_um`, in their units; None when unknown.
+    doubts : tuple of str
+        Why the numbers may be wrong by more than they say: with any, nothing passes.
     """
 
     balls: tuple[MeasuredBall, ...]
@@ -246,3 +248,4 @@ class BallMeasurement:
     shadow_residual_rms: float
     warnings: tuple[str, ...] = field(default=())
     board_covariance: NDArray[np.float64] | None = None
+    doubts: tuple[str, ...] = field(default=())

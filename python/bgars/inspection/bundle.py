@@ -64,7 +64,8 @@ class Solution:
     """Balls (N, 5), lights (L, 3), board and what is known of their uncertainty.
 
     `covariance` (N, 5, 5) of each ball, lights and board included; `u_light_rad` (L,); `residual_px` (N, L, S) distance
-    of each point to its edge, NaN where none; `weight` (N, L, S); `iterations`; `light_turn_rad` (L, 2).
+    of each point to its edge, NaN where none; `weight` (N, L, S); `iterations`; `board_covariance` (5, 5) of the
+    coefficients of `board`.
     """
 
     balls: Array
@@ -76,6 +77,7 @@ class Solution:
     weight: Array
     excess_px: float
     iterations: int
+    board_covariance: Array
 
 
 def tangents(vectors: Array) -> Array:
@@ -176,6 +178,7 @@ def solve_bundle(
     lever = inverse @ cross
     border_covariance = np.linalg.inv(corner - np.tensordot(cross, lever, axes=((0, 1), (0, 1))))
     covariance = inverse + lever @ border_covariance @ lever.transpose(0, 2, 1)
+    board_covariance: Array = border_covariance[2 * lights :, 2 * lights :].astype(np.float64)
     u_light = np.sqrt(np.diag(border_covariance)[: 2 * lights].reshape(lights, 2).sum(axis=1))
     return Solution(
         table,
@@ -187,6 +190,7 @@ def solve_bundle(
         np.where(known, weight * variance, 0.0),
         excess,
         iterations,
+        board_covariance,
     )
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from bgars.inspection.shadow_edges import Edges
     from bgars.records import Capture
 
-__all__ = ["Complaint", "check_shifts", "explain_dark_steps", "refuse_misfits", "refuse_repeated"]
+__all__ = ["Complaint", "check_shifts", "displaced_images", "explain_dark_steps", "refuse_misfits", "refuse_repeated"]
 
 Array = NDArray[np.float64]
 
@@ -44,6 +44,8 @@ SHARPER = 1.15
 SHIFT_WARNING_PX, SHIFT_ERROR_PX = 0.4, 1.0
 SHIFT_SIGMAS = 6.0
 MIN_STRETCHES = 20
+FEW_OUTLINES = 0.25
+"""An image that shows less than this share of the outlines that the others show, where they show them, is displaced."""
 LOWEST_DEG, HIGHEST_DEG = 5.0, 88.0
 
 
@@ -263,7 +265,10 @@ def check_shifts(outlines: Outlines) -> tuple[str, ...]:
     shift = np.where(weight > 0, outlines.shift_px, np.nan)
     if weight.sum() < MIN_STRETCHES * len(outlines.azimuths_rad):
         return ()
-    usual = np.nanmedian(shift, axis=(0, 1))
+    # A place of the outline that no light shows has no usual shift.
+    shown: NDArray[np.bool_] = np.asarray(np.isfinite(shift).any(axis=(0, 1)))
+    usual = np.full(len(shown), np.nan)
+    usual[shown] = np.nanmedian(shift[:, :, shown], axis=(0, 1))
     warnings = []
     for light, azimuth in enumerate(outlines.azimuths_rad):
         off = shift[:, light] - usual[None, :]
@@ -284,3 +289,20 @@ def check_shifts(outlines: Outlines) -> tuple[str, ...]:
             raise CalibrationError(text)
         warnings.append(text)
     return tuple(warnings)
+
+
+def displaced_images(outlines: Outlines) -> tuple[str, ...]:
+    """Name images whose balls have no outline where the others have one.
+
+    A shift of some pixels along the light's azimuth is taken for another elevation by the fit, and is too far for
+    `check_shifts`: then outlines are not merely moved, they are not found.
+    """
+    known = np.isfinite(outlines.u_shift_px).sum(axis=(0, 2))
+    usual = float(np.median(known))
+    if usual < MIN_STRETCHES:
+        return ()
+    return tuple(
+        f"image {light} shows {known[light]} stretches of outline where other images show {usual:.0f}: it is "
+        "shifted, or shows something else"
+        for light in np.flatnonzero(known < FEW_OUTLINES * usual)
+    )

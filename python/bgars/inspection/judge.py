@@ -106,14 +106,14 @@ def judge_part(
     verdicts = [ball.verdict for ball in balls] + [check.verdict for check in checks if check.verdict is not None]
     if bridges or not any(ball.present for ball in balls):
         verdicts.append("fail")
-    strayed = _strayed_lights(measurement.light_change_deg)
-    if strayed or not limits:
+    doubts = (*_strayed_lights(measurement.light_change_deg), *measurement.doubts)
+    if doubts or not limits:
         verdicts.append("undecided")
     return PartResult(
         name=name if recipe is None else recipe.name,
         balls=tuple(balls),
         verdict=worst(verdicts),
-        reasons=(*part_reasons(balls, checks, bridges, has_limits=bool(limits)), *strayed),
+        reasons=(*part_reasons(balls, checks, bridges, has_limits=bool(limits)), *doubts),
         pitch_um=pitch_um,
         u_pitch_um=u_pitch_um,
         grid_angle_deg=math.nan if fit is None else math.degrees(fit.angle_rad),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bgars.errors import InputError
 from bgars.inspection.board import SHAPE_TERMS, Board, board_from_normals, outside_balls
 from bgars.inspection.bundle import Priors, Solution, angles_rad, solve_bundle
-from bgars.inspection.checks import check_shifts, explain_dark_steps, refuse_misfits, refuse_repeated
+from bgars.inspection.checks import check_shifts, displaced_images, explain_dark_steps, refuse_misfits, refuse_repeated
 from bgars.inspection.flat_top import flat_tops
 from bgars.inspection.highlights import read_highlights
 from bgars.inspection.outline import Outlines, outline_centres
@@ -81,6 +81,7 @@ class Fit:
     edges: Edges
     spread: EdgeSpread
     warnings: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
 
 
 def measure_balls(
@@ -277,7 +278,8 @@ def fit_shadows(
             warnings = refuse_misfits(complaints, used, solution.weight, moved_deg) + check_shifts(wide)
         turn += 1
         progress(0.1 + 0.8 * (1.0 if last else turn / passes))
-        result = Fit(problem, index, usability, solution, edges, spread, warnings)
+        doubts = () if wide is None else displaced_images(wide)
+        result = Fit(problem, index, usability, solution, edges, spread, warnings, doubts)
     return result
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bgars.ball_records import BallMeasurement, MeasuredBall
 from bgars.inspection.bundle import angles_rad
 from bgars.inspection.highlights import sharpen_centres
+from bgars.inspection.shape_or_lights import shape_or_lights
 from bgars.inspection.spread import SHARP_PX
 
 if TYPE_CHECKING:
@@ -93,6 +94,8 @@ def measurement(
     moved = np.degrees(angles_rad(solution.vectors, problem.vectors))
     refined = solution.vectors / np.linalg.norm(solution.vectors, axis=1, keepdims=True)
     warnings = fit.warnings if fit is not None else ()
+    doubts = fit.doubts if fit is not None else ()
+    doubts += shape_or_lights(solution.balls[:, 4], problem.vectors, solution.vectors)
     warnings += tuple(
         f"light {light}: its shadows say that it stands {moved[light]:.1f} degrees from where the rig says"
         for light in np.flatnonzero(moved > LIGHT_WARNING_DEG)
@@ -106,7 +109,17 @@ def measurement(
         moved,
         noise / contrast,
         warnings,
+        board_covariance_um(solution.board_covariance, pitch),
+        doubts,
     )
+
+
+def board_covariance_um(covariance_px: Array, pitch_um: float) -> Array:
+    """(6, 6) covariance of the board's coefficients over um; the constant is 0 by definition."""
+    scale = np.array([1.0, 1.0, 1.0 / pitch_um, 1.0 / pitch_um, 1.0 / pitch_um])
+    covariance = np.zeros((6, 6))
+    covariance[1:, 1:] = covariance_px * np.outer(scale, scale)
+    return covariance
 
 
 def _with_highlights(fit: Fit, solution: Solution, highlights: Highlights | None) -> Fit:
