@@ -43,7 +43,7 @@ simulator: $(VENV)/.installed ## Rewrite the tables of docs/simulator.md (needs 
 experiments: $(VENV)/.installed ## Run the paper's experiments again and rewrite docs/experiments.md
 	$(BIN)/bgars experiment all -o docs/images/experiments --page docs/experiments.md
 
-method: $(VENV)/.installed ## Draw the pictures of docs/reflectance.md again
+method: $(VENV)/.installed ## Draw the pictures of docs/reflectance.md and one of docs/inspection.md again
 	$(BIN)/python docs/make_method_pictures.py
 
 instructions: ## Instructions a pixel of each kernel against the kept counts (needs valgrind)

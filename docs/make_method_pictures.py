@@ -1,4 +1,7 @@
-"""Draw the pictures of docs/reflectance.md from simulated captures. Command: ``make method``."""
+"""Draw the pictures of docs/reflectance.md, and one of docs/inspection.md, from simulated captures.
+
+Command: ``make method``.
+"""
 
 from __future__ import annotations
 
@@ -463,7 +466,40 @@ def failure() -> None:
     save(figure, FOLDER / "failure.png")
 
 
-PICTURES = (ring_ambiguity, fit_profile, residual_table, measured_prior, flat_top, failure)
+# --- 7: the same part inspected
+
+
+def inspected_alike() -> None:
+    """Heights of a part whose balls are all flattened alike: true errors and stated uncertainties."""
+    q_values, errors_um, stated_um, moved_deg = (1.0, 0.98, 0.95, 0.9), [], [], []
+    for q in q_values:
+        scene = bgars.Scene.ball_array(4, 4, board=bgars.Board(material=bgars.Material.matte(0.3)))
+        scene = replace(scene, balls=tuple(replace(ball, q=q) for ball in scene.balls))
+        capture, truth = bgars.simulate(scene, RIG, PAINT, NOISY)
+        result = bgars.inspect(capture)
+        pairs = list(zip(result.balls, truth.balls, strict=True))
+        errors_um.append(float(np.median([found.top_um - true.top_um for found, true in pairs])))
+        stated_um.append(float(np.median([2 * found.u_top_um for found, _ in pairs])))
+        elevation_deg = np.degrees(np.arcsin(np.array(result.light_directions)[:, 2]))
+        moved_deg.append(float(np.mean(elevation_deg - RIG.elevations_deg)))
+        say("inspected", q, errors_um[-1], stated_um[-1], moved_deg[-1], float(np.median([b.q for b in result.balls])))
+    figure = new_figure(11.5, 3.9)
+    left, right = panels(figure, 1, 2)[0]
+    left.plot(q_values, errors_um, "o-", color=OKABE_ITO[0], label="true error of the heights (median)")
+    left.plot(q_values, stated_um, "s:", color=OKABE_ITO[1], markerfacecolor="none", label="stated, U = 2 u")
+    left.set(xlabel="q of all balls (vertical over horizontal radius)", ylabel="height above the board (µm)")
+    left.set_title("Every ball of a part flattened alike")
+    left.legend()
+    right.plot(q_values, moved_deg, "o-", color=OKABE_ITO[0])
+    right.set(xlabel="q of all balls (vertical over horizontal radius)", ylabel="mean move of the elevations (°)")
+    right.set_title("What the fit blames instead: the lights")
+    for axes in (left, right):
+        axes.invert_xaxis()
+        tidy(axes)
+    save(figure, FOLDER.parent / "inspection" / "flattened_alike.png")
+
+
+PICTURES = (ring_ambiguity, fit_profile, residual_table, measured_prior, flat_top, failure, inspected_alike)
 
 
 def main() -> None:
