@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-rust test-python lint format accuracy inspection simulator experiments performance instructions clean
+.PHONY: demo test test-rust test-python lint format accuracy inspection simulator experiments method performance instructions clean
 
 demo: $(VENV)/.installed ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
@@ -42,6 +42,9 @@ simulator: $(VENV)/.installed ## Rewrite the tables of docs/simulator.md (needs 
 
 experiments: $(VENV)/.installed ## Run the paper's experiments again and rewrite docs/experiments.md
 	$(BIN)/bgars experiment all -o docs/images/experiments --page docs/experiments.md
+
+method: $(VENV)/.installed ## Draw the pictures of docs/reflectance.md and one of docs/inspection.md again
+	$(BIN)/python docs/make_method_pictures.py
 
 instructions: ## Instructions a pixel of each kernel against the kept counts (needs valgrind)
 	python3 benches/count_instructions.py

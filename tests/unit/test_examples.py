@@ -16,15 +16,27 @@ ROOT = Path(__file__).parents[2]
 MODULES = [name for _, name, _ in pkgutil.walk_packages(bgars.__path__, "bgars.") if not name.endswith("__main__")]
 
 
-def test_the_readme_example_is_the_quick_start() -> None:
+def test_the_readme_shows_the_examples() -> None:
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
-    assert blocks == [(ROOT / "examples" / "quickstart.py").read_text(encoding="utf-8")]
+    examples = [ROOT / "examples" / name for name in ("quickstart.py", "inspect_part.py")]
+    assert blocks == [example.read_text(encoding="utf-8") for example in examples]
 
 
 def test_the_quick_start_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     runpy.run_path(str(ROOT / "examples" / "quickstart.py"))
     assert {path.suffix for path in tmp_path.iterdir()} >= {".ply"}
+
+
+def test_the_inspection_example_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    setup = bgars.read_scene("defects-5x5")
+    capture, truth = bgars.simulate(setup.scene, setup.rig, setup.material, setup.camera, seed=setup.seed)
+    bgars.write_simulation(capture, truth, tmp_path / "part")
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(ROOT / "examples" / "inspect_part.py"))
+    assert capsys.readouterr().out.startswith("fail")
 
 
 @pytest.mark.parametrize("name", MODULES)

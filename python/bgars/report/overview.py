@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
 from bgars.io.atomic import atomic_file
+from bgars.report.prior import prior_label, prior_pixels, show_prior, stripes
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -32,10 +35,19 @@ AMBIENT = 0.25
 PICTURE_LIGHT = (-0.55, -0.4, 0.73)
 LINE_COLOR = "#1f4e79"
 MARK_COLOR = "#d1495b"
+PRIOR_COLOR = "#e69f00"
+WEIGHING_METHODS = ("reflectance", "blind")
+ERROR_LIMITS_DEG = (0.05, 20.0)
+ERROR_TICKS_DEG = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
+TITLE_WIDTH = 150
+SURFACE_STRIPES = 45
 
 
 def write_overview(result: Reconstruction, path: str | PathLike[str]) -> None:
     """Write a PNG with an input image, normals, kept lights, height, a shaded 3-D view and a profile.
+
+    Stripes lie over normals that are a prior, not a measurement, and over what was made of them. Where a method weighs
+    all lights instead of choosing some, the standard error of the normals is shown in place of the kept lights.
 
     Parameters
     ----------
@@ -51,7 +63,7 @@ def write_overview(result: Reconstruction, path: str | PathLike[str]) -> None:
     """
     figure = Figure(figsize=(15.0, 9.4), dpi=DPI, layout="constrained", facecolor="white")
     height = result.height
-    figure.suptitle(_title(result), fontsize=14)
+    figure.suptitle(_title(result), fontsize=12)
     axes = figure.subplot_mosaic(
         [["input", "normals", "kept"], ["height", "surface", "profile"]],
         per_subplot_kw={"surface": {"projection": "3d"}},
@@ -59,10 +71,13 @@ def write_overview(result: Reconstruction, path: str | PathLike[str]) -> None:
     row = _profile_row(height)
     _show_input(figure, axes["input"], result)
     _show_normals(axes["normals"], result)
-    _show_kept_lights(figure, axes["kept"], result)
-    _show_height(figure, axes["height"], height, row)
-    _show_surface(axes["surface"], height)
-    _show_profile(axes["profile"], height, row)
+    if result.field.method in WEIGHING_METHODS:
+        _show_standard_error(figure, axes["kept"], result)
+    else:
+        _show_kept_lights(figure, axes["kept"], result)
+    _show_height(figure, axes["height"], result, row)
+    _show_surface(axes["surface"], result)
+    _show_profile(axes["profile"], result, row)
     with atomic_file(path) as temporary:
         figure.savefig(temporary, format="png")
 
@@ -71,11 +86,13 @@ def _title(result: Reconstruction) -> str:
     capture, height = result.capture, result.height
     scale = "pixel pitch unknown" if capture.pixel_pitch_um is None else f"{capture.pixel_pitch_um:g} µm per pixel"
     parts = len(height.components)
-    return (
+    title = (
         f"{capture.name}: {len(capture.rig)} lights, {capture.images.shape[2]} x {capture.images.shape[1]} px, "
         f"{scale}; "
         f"method {result.field.method}; {parts} connected part{'s' if parts != 1 else ''}"
     )
+    choice = textwrap.wrap(f"Normals: {result.field.choice}", TITLE_WIDTH) if result.field.choice else []
+    return "\n".join([title, *choice])
 
 
 def _unit(height: HeightMap) -> str:
@@ -129,6 +146,7 @@ def _show_normals(axes: Axes, result: Reconstruction) -> None:
     normals = result.field.normals
     colors = np.where(np.isfinite(normals), (normals + 1.0) / 2.0, 1.0)
     _picture(axes, colors, result.height, "Normals: red = x right, green = y up, blue = z to the camera")
+    show_prior(axes, result.field, _extent(result.height), legend=True)
 
 
 def _show_kept_lights(figure: Figure, axes: Axes, result: Reconstruction) -> None:
@@ -139,18 +157,34 @@ def _show_kept_lights(figure: Figure, axes: Axes, result: Reconstruction) -> Non
     figure.colorbar(picture, ax=axes, label="lights", shrink=0.85, ticks=MaxNLocator(6, integer=True))
 
 
-def _show_height(figure: Figure, axes: Axes, height: HeightMap, row: int) -> None:
+def _show_standard_error(figure: Figure, axes: Axes, result: Reconstruction) -> None:
+    field = result.field
+    error_deg = np.where(field.mask, np.maximum(field.standard_error_deg, ERROR_LIMITS_DEG[0]), np.nan)
+    picture = _picture(
+        axes, error_deg, result.height, "Standard error of the normals (white: no normal)", cmap="viridis_r"
+    )
+    picture.set_norm(LogNorm(*ERROR_LIMITS_DEG))
+    bar = figure.colorbar(picture, ax=axes, label="standard error (°)", shrink=0.85, ticks=ERROR_TICKS_DEG)
+    bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    bar.ax.yaxis.set_minor_formatter(NullFormatter())
+    show_prior(axes, field, _extent(result.height), legend=False)
+
+
+def _show_height(figure: Figure, axes: Axes, result: Reconstruction, row: int) -> None:
+    height = result.height
     values = height.height
     low, high = (float(level) for level in np.nanpercentile(values, [0.5, 99.5]))
     title = "Height" if len(height.components) == 1 else "Height (each connected part has mean 0)"
     picture = _picture(axes, values, height, title, cmap="cividis", span=(low, high))
     figure.colorbar(picture, ax=axes, label=f"height ({_unit(height)})", shrink=0.85)
     y = (height.mask.shape[0] / 2 - row - 0.5) * (height.pixel_pitch_um or 1.0)
+    show_prior(axes, result.field, _extent(height), legend=False)
     axes.axhline(y, color=MARK_COLOR, linewidth=1.2, linestyle="--")
 
 
-def _show_surface(axes: Axes3D, height: HeightMap) -> None:
+def _show_surface(axes: Axes3D, result: Reconstruction) -> None:
     """Shaded relief of the largest part, thinned to a drawable number of points."""
+    height = result.height
     largest = int(np.argmax([part.pixels for part in height.components]))
     inside = height.labels == largest
     rows, cols = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
@@ -164,6 +198,7 @@ def _show_surface(axes: Axes3D, height: HeightMap) -> None:
     y = (shape[0] / 2 - np.arange(rows[0], rows[-1] + 1)[::step] - 0.5) * pitch
     grid_x, grid_y = np.meshgrid(x, y)
     colors = _shaded_colors(z, pitch * step)
+    colors[..., :3] *= 1.0 - stripes(prior_pixels(result.field)[window][::step, ::step], SURFACE_STRIPES)[..., None]
     axes.plot_surface(
         grid_x, grid_y, z, facecolors=colors, rstride=1, cstride=1, linewidth=0, antialiased=False, shade=False
     )
@@ -176,7 +211,7 @@ def _show_surface(axes: Axes3D, height: HeightMap) -> None:
     axes.set_ylabel(f"y ({_unit(height)})", labelpad=8)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(4))
-    axes.zaxis.set_major_locator(MaxNLocator(3))
+    axes.zaxis.set_major_locator(MaxNLocator(3 if rise > FLAT_PROFILE * max(width, depth) else 1))
     axes.tick_params(labelsize=8)
 
 
@@ -200,11 +235,17 @@ def _profile_row(height: HeightMap) -> int:
     return highest // int(height.mask.shape[1])
 
 
-def _show_profile(axes: Axes, height: HeightMap, row: int) -> None:
+def _show_profile(axes: Axes, result: Reconstruction, row: int) -> None:
+    height = result.height
     pitch = height.pixel_pitch_um or 1.0
     cols = height.mask.shape[1]
     x = (np.arange(cols) + 0.5 - cols / 2) * pitch
-    axes.plot(x, height.height[row], color=LINE_COLOR, linewidth=1.6)
+    axes.plot(x, height.height[row], color=LINE_COLOR, linewidth=1.6, label="measured")
+    prior = prior_pixels(result.field)[row]
+    if prior.any():
+        drawn = np.where(prior, height.height[row], np.nan)
+        axes.plot(x, drawn, color=PRIOR_COLOR, linewidth=2.4, marker=".", markersize=3, label=prior_label(result.field))
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), frameon=False, fontsize=9, ncols=2)
     rise = float(np.ptp(height.height[row][height.mask[row]]))
     flat = rise < FLAT_PROFILE * cols * pitch
     if flat:

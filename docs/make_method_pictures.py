@@ -1,0 +1,515 @@
+"""Draw the pictures of docs/reflectance.md, and one of docs/inspection.md, from simulated captures.
+
+Command: ``make method``.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import bgars
+import numpy as np
+from bgars.experiments.style import OKABE_ITO, TRUTH_STYLE, figure_style, new_figure, panels, save, tidy
+from bgars.material_records import SurfaceLobe, SurfaceMaterial
+from bgars.report.prior import prior_share, show_prior
+from bgars.simulate import Defect
+from matplotlib.colors import LogNorm
+from matplotlib.patches import Circle
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+FOLDER = Path(__file__).parent / "images" / "method"
+Floats = NDArray[np.float64]
+PAINT = bgars.Material(i_d=0.5, i_s=1.0, hardness=40)
+METAL = bgars.Material(i_d=0.0, i_s=1.0, hardness=40)
+NOISY = bgars.Camera(supersample=2, full_well_e=20_000.0, read_noise_levels=0.3)
+BOARD = bgars.Board(material=bgars.Material.matte(0.12))
+RIG = bgars.LightRig.ring(8)
+GREY_LEVELS = 255.0
+ERROR_LIMITS_DEG = (0.02, 20.0)
+
+
+def say(*values: object) -> None:
+    """Print the numbers behind a picture."""
+    sys.stdout.write(" ".join(f"{value:.3f}" if isinstance(value, float) else str(value) for value in values) + "\n")
+
+
+class Part(NamedTuple):
+    """A simulated part with its estimate."""
+
+    capture: bgars.Capture
+    truth: bgars.SimulatedTruth
+    field: bgars.NormalField
+
+    def error_deg(self) -> Floats:
+        """(H, W) angle between estimate and truth on balls; NaN elsewhere."""
+        error: Floats = np.where(
+            self.truth.mask, bgars.angular_error_deg(self.field.normals, self.truth.normals), np.nan
+        )
+        return error
+
+
+def made(scene: bgars.Scene, material: bgars.Material, camera: bgars.Camera = NOISY) -> Part:
+    """Simulate and estimate with the default method."""
+    capture, truth = bgars.simulate(scene, RIG, material, camera)
+    return Part(capture, truth, bgars.estimate_normals(capture))
+
+
+def levels(material: SurfaceMaterial, normals: Floats, directions: Floats) -> Floats:
+    """(..., L) grey levels of normals (..., 3) under lights (L, 3): the equation of docs/reflectance.md."""
+    half = directions + np.array([0.0, 0.0, 1.0])
+    half /= np.linalg.norm(half, axis=1, keepdims=True)
+    n_v = np.maximum(normals[..., 2:], 0.02)
+    n_l, n_h, v_h = normals @ directions.T, normals @ half.T, half[:, 2]
+    lit = np.maximum(n_l, 0.0)
+    ashikhmin = 1.35 * (1 - (1 - lit / 2) ** 5) * (1 - (1 - n_v / 2) ** 5)
+    total = material.diffuse_level * lit * (1 + material.grazing * (ashikhmin - 1))
+    for lobe in material.lobes:
+        cos2 = np.clip(n_h, 1e-3, 1.0) ** 2
+        t = (1 / cos2 - 1) / lobe.roughness**2
+        tail = max(lobe.tail, 1e-4)
+        peak = np.exp(-(1 + 1 / tail) * np.log1p(tail * t)) / cos2**2
+        if material.masking == "smith":
+            g = _smith(lobe, n_v) * _smith(lobe, np.maximum(n_l, 1e-6))
+        else:
+            g = np.minimum(1.0, 2 * n_h / v_h * np.minimum(n_v, n_l))
+        total = total + np.where(n_l > 0, lobe.strength_level * peak * g / n_v, 0.0)
+    return np.asarray(material.gains) * total + material.ambient_level
+
+
+def _smith(lobe: SurfaceLobe, cos: Floats) -> Floats:
+    slope = np.maximum(lobe.roughness * np.sqrt(np.maximum(1 - cos**2, 0)) / cos, 1e-9)
+    c = 1 / slope
+    beckmann = np.where(c < 1.6, (3.535 * c + 2.181 * c**2) / (1 + 2.276 * c + 2.577 * c**2), 1.0)  # noqa: PLR2004
+    ggx = 2 / (1 + np.sqrt(1 + slope**2))
+    result: Floats = beckmann + lobe.tail * (ggx - beckmann)
+    return result
+
+
+def bent(level: Floats) -> Floats:
+    """Return the scale on which levels are compared."""
+    result: Floats = np.arcsinh(0.03 * level) / 0.03
+    return result
+
+
+def circle_normals(shape: tuple[int, ...], circle: tuple[float, float, float]) -> tuple[Floats, NDArray[np.bool_]]:
+    """(H, W, 3) normals that a silhouette circle gives, and (H, W) where."""
+    height, width = shape
+    x = (np.arange(width) + 0.5 - width / 2 - circle[0])[None, :] / circle[2]
+    y = (height / 2 - np.arange(height) - 0.5 - circle[1])[:, None] / circle[2]
+    x, y = np.broadcast_arrays(x, y)
+    squared = x**2 + y**2
+    return np.stack([x, y, np.sqrt(np.maximum(1 - squared, 0))], axis=-1), squared < 1
+
+
+ROUGHNESSES = (0.2, 0.225, 0.25, 0.275, 0.3, 0.325, 0.35, 0.375, 0.4)
+SHARED = 3
+"""Parameters of the material that all pixels share."""
+
+# --- 1: a ring of lights trades slant against the lobe
+
+
+class Blind(NamedTuple):
+    """What is left, and how wrong the normals are, with an assumed roughness."""
+
+    roughness: float
+    residual_anchored: float
+    residual_blind: float
+    error_deg: float
+
+
+def simple_material(strength: float, roughness: float, diffuse: float, tail: float = 0.0) -> SurfaceMaterial:
+    """One lobe on Lambertian paint."""
+    return SurfaceMaterial(diffuse, 0.0, 0.0, (SurfaceLobe(strength, roughness, tail),), "cook-torrance", (1.0,) * 8)
+
+
+def ring_ambiguity() -> None:
+    """Residuals against an assumed roughness, with normals known and with normals free."""
+    slants = np.radians(np.linspace(4.0, 60.0, 12))
+    azimuths = np.radians(np.linspace(0.0, 330.0, 12) * 1.07)
+    true = np.stack([np.sin(slants) * np.cos(azimuths), np.sin(slants) * np.sin(azimuths), np.cos(slants)], axis=1)
+    true_material = simple_material(150.0, 0.3, 20.0)
+    seen = bent(levels(true_material, true, RIG.directions))
+
+    def predicted(parameters: Floats, roughness: float) -> tuple[Floats, Floats]:
+        """Levels and normals; parameters: ln strength, ln diffuse, tail, then n_x, n_y and ln albedo of each pixel."""
+        strength, diffuse = np.exp(parameters[:2])
+        material = simple_material(float(strength), roughness, float(diffuse), float(np.clip(parameters[2], 0, 1)))
+        if len(parameters) == SHARED:
+            return levels(material, true, RIG.directions), true
+        pixels = parameters[SHARED:].reshape(-1, 3)
+        z = np.sqrt(np.maximum(1 - (pixels[:, :2] ** 2).sum(1), 1e-4))
+        normals = np.column_stack([pixels[:, :2], z])
+        return levels(material, normals, RIG.directions) * np.exp(pixels[:, 2:]), normals
+
+    found: list[Blind] = []
+    example: dict[float, Floats] = {}
+    for roughness in ROUGHNESSES:
+
+        def residuals(parameters: Floats, roughness: float = roughness) -> Floats:
+            rest: Floats = (bent(predicted(parameters, roughness)[0]) - seen).ravel()
+            return rest
+
+        known = least_squares(residuals, [*np.log([150.0, 20.0]), 0.05])
+        pixels = np.column_stack([true[:, :2], np.zeros(len(true))])
+        free = least_squares(residuals, np.concatenate([known.x, pixels.ravel()]))
+        example[roughness], normals = predicted(free.x, roughness)
+        error = np.degrees(np.arccos(np.clip((normals * true).sum(1), -1, 1)))
+        rms = [float(np.sqrt((fit.fun**2).mean())) for fit in (known, free)]
+        found.append(Blind(roughness, rms[0], rms[1], float(error.mean())))
+    figure = new_figure(11.5, 3.7)
+    left, middle, right = panels(figure, 1, 3)[0]
+    m = [entry.roughness for entry in found]
+    left.plot(
+        m, [entry.residual_anchored for entry in found], "o-", color=OKABE_ITO[1], label="normals known (circles)"
+    )
+    left.plot(m, [entry.residual_blind for entry in found], "s--", color=OKABE_ITO[0], label="normals free (blind)")
+    left.set(xlabel="roughness m that is assumed (true: 0.3)", ylabel="residual left, RMS (grey levels, bent)")
+    left.set_title("What the data say of the lobe")
+    left.legend()
+    middle.plot(m, [entry.error_deg for entry in found], "s--", color=OKABE_ITO[0])
+    middle.set(xlabel="roughness m that is assumed (true: 0.3)", ylabel="mean error of the free normals (°)")
+    middle.set_title("What a wrong lobe does to the normals")
+    pixel = 5
+    azimuth = np.degrees(np.arctan2(RIG.directions[:, 1], RIG.directions[:, 0])) % 360
+    order = np.argsort(azimuth)
+    observed = levels(true_material, true, RIG.directions)[pixel]
+    right.plot(azimuth[order], observed[order], "o", color="black", markersize=8, markerfacecolor="none", label="seen")
+    for roughness, style, color in ((0.25, "--", OKABE_ITO[0]), (0.35, ":", OKABE_ITO[4])):
+        right.plot(
+            azimuth[order],
+            example[roughness][pixel][order],
+            style,
+            color=color,
+            marker=".",
+            label=f"fit, m = {roughness}",
+        )
+    right.set(xlabel="azimuth of the light (°)", ylabel="grey level of 255", xticks=range(0, 361, 90))
+    right.set_title(f"One pixel, true slant {np.degrees(slants[pixel]):.0f}°")
+    right.legend()
+    for axes in (left, middle, right):
+        tidy(axes)
+        axes.set_ylim(bottom=0)
+    save(figure, FOLDER / "ring_ambiguity.png")
+    for entry in found:
+        say("ring", entry)
+
+
+# --- 2: what the fitted material predicts
+
+
+def fit_profile() -> None:
+    """Observed and predicted levels along the middle row of a ball, a panel a light."""
+    material = bgars.Material(i_d=0.35, i_s=0.7, roughness=0.2, distribution="ggx")
+    part = made(bgars.Scene.ball(board=BOARD), material)
+    fit = fitted(part)
+    circle = fit.circles_px[0]
+    normals, inside = circle_normals(part.capture.mask.shape, circle)
+    row = int(part.capture.mask.shape[0] / 2 - circle[1])
+    cols = np.flatnonzero(inside[row])
+    predicted = levels(fit.material, normals[row, cols], part.capture.rig.directions)
+    x = normals[row, cols, 0]
+    figure = new_figure(11.5, 5.2)
+    for light, axes in enumerate(axes for line in panels(figure, 2, 4, sharex=True, sharey=True) for axes in line):
+        seen = part.capture.images[light, row, cols].astype(float)
+        axes.plot(x, seen, "o", color="black", markersize=3, markerfacecolor="none", label="camera")
+        axes.plot(
+            x, np.minimum(predicted[:, light], GREY_LEVELS), color=OKABE_ITO[0], linewidth=1.4, label="fitted material"
+        )
+        axes.set_title(f"light {light + 1}, azimuth {part.capture.rig.azimuths_deg[light] % 360:.0f}°")
+        axes.axhline(GREY_LEVELS, color="0.6", linewidth=0.8, linestyle=":")
+        tidy(axes)
+        if light % 4 == 0:
+            axes.set_ylabel("grey level of 255")
+        if light >= 4:  # noqa: PLR2004
+            axes.set_xlabel("x from the centre (ball radii) = n_x")
+        if light == 0:
+            axes.legend(loc="upper left")
+    save(figure, FOLDER / "fit_profile.png")
+    lobe = fit.material.lobes[0]
+    say("fit", fit.loss, fit.material.diffuse_level, lobe, fit.material.masking, fit.material.standard_errors)
+
+
+def fitted(part: Part) -> bgars.material_records.ReflectanceFit:
+    """What the estimator learnt of a part."""
+    fit = part.field.reflectance
+    if fit is None or not fit.accepted:
+        sys.exit(f"no material was fitted: {part.field.choice}")
+    return fit
+
+
+# --- 3: residuals that the balls share
+
+
+def residual_table() -> None:
+    """A part whose balls mirror the board: what the material leaves, what the other balls say, what is left then."""
+    board = bgars.Board(material=bgars.Material.matte(0.35))
+    scene = bgars.Scene.ball_array(3, 3, board=board)
+    capture, truth = bgars.simulate(scene, RIG, PAINT, NOISY)
+    normal = np.where(truth.mask[..., None], truth.normals, [0.0, 0.0, 1.0]).astype(float)
+    board_level = GREY_LEVELS * 0.35 * RIG.directions[:, 2]
+    # One bounce of a wide board: a facet sees (1 - n_z) / 2 of it; the camera sees it mirrored where the ray goes down.
+    diffuse = PAINT.i_d * (1 - normal[..., 2]) / 2
+    mirrored = 0.25 * np.clip((1 - 2 * normal[..., 2] ** 2) / 0.2, 0.0, 1.0)
+    extra = np.where(truth.mask, diffuse + mirrored, 0.0) * board_level[:, None, None]
+    images = np.clip(np.rint(capture.images + extra), 0, 255).astype(np.uint8)
+    capture = replace(capture, images=images)
+    part = Part(capture, truth, bgars.estimate_normals(capture))
+    fit = fitted(part)
+    side = 41
+    rest = []
+    for circle in fit.circles_px:
+        normals, inside = circle_normals(capture.mask.shape, circle)
+        seen = bent(np.minimum(capture.images[:, inside].T.astype(float), GREY_LEVELS))
+        predicted = bent(np.minimum(levels(fit.material, normals[inside], RIG.directions), GREY_LEVELS))
+        difference = (seen - predicted)[:, 0]
+        cells = np.round((normals[inside][:, :2] + 1) / 2 * (side - 1)).astype(int)
+        sums, counts = np.zeros((side, side)), np.zeros((side, side))
+        np.add.at(sums, (cells[:, 1], cells[:, 0]), difference)
+        np.add.at(counts, (cells[:, 1], cells[:, 0]), 1)
+        rest.append(np.where(counts > 0, sums / np.maximum(counts, 1), np.nan))
+    one = 4
+    tables = np.array([table for ball, table in enumerate(rest) if ball != one])
+    others = np.full((side, side), np.nan)
+    shown = np.isfinite(tables).any(axis=0)
+    others[shown] = np.nanmedian(tables[:, shown], axis=0)
+    figure = new_figure(11.5, 3.9)
+    titles = ("This ball: seen less fitted material", "Median of the eight other balls", "What is left of this ball")
+    for axes, table, title in zip(
+        panels(figure, 1, 3)[0], (rest[one], others, rest[one] - others), titles, strict=True
+    ):
+        picture = axes.imshow(table, cmap="RdBu_r", vmin=-15, vmax=15, origin="lower", extent=(-1, 1, -1, 1))
+        axes.set(xlabel="n_x", ylabel="n_y", title=f"{title}\nRMS {np.sqrt(np.nanmean(table**2)):.1f}")
+    figure.colorbar(picture, ax=figure.axes, label="grey levels, bent (light 1)", shrink=0.85)
+    save(figure, FOLDER / "residual_table.png")
+    error = part.error_deg()
+    judged = truth.mask & (truth.normals[..., 2] > 0.3)  # noqa: PLR2004
+    say("residuals", fit.residuals_learnt, fit.loss, np.nanmean(error[judged]))
+
+
+# --- 4: measured and prior
+
+
+def measured_prior() -> None:
+    """Stated and true errors of an easy part and of bare metal, priors striped."""
+    figure = new_figure(11.0, 10.0)
+    rows = panels(figure, 2, 2)
+    for line, (name, material) in zip(
+        rows, (("solder, I_d = 0.5", PAINT), ("bare metal, I_d = 0", METAL)), strict=True
+    ):
+        part = made(bgars.Scene.ball_array(2, 2, board=BOARD), material)
+        height, width = part.capture.mask.shape
+        pitch = part.capture.pixel_pitch_um or 1.0
+        extent = (-width / 2 * pitch, width / 2 * pitch, -height / 2 * pitch, height / 2 * pitch)
+        stated = np.where(part.truth.mask, part.field.standard_error_deg, np.nan)
+        measured = part.truth.mask & part.field.measured
+        error = part.error_deg()
+        prior = part.truth.mask & part.field.mask & ~measured
+        inside = (error <= part.field.standard_error_deg)[measured].mean()
+        inside_prior = (error <= part.field.standard_error_deg)[prior].mean()
+        titles = (
+            f"{name}: stated standard error\nprior (striped): {prior_share(part.field)}",
+            f"{name}: true error\n"
+            f"measured: mean {np.nanmean(error[measured]):.2f}°, {100 * inside:.0f} % within the stated error\n"
+            f"prior: mean {np.nanmean(error[prior]):.2f}°, {100 * inside_prior:.0f} % within",
+        )
+        for axes, values, title in zip(line, (stated, error), titles, strict=True):
+            picture = axes.imshow(
+                np.maximum(values, ERROR_LIMITS_DEG[0]),
+                extent=extent,
+                cmap="viridis_r",
+                norm=LogNorm(*ERROR_LIMITS_DEG),
+            )
+            show_prior(axes, part.field, extent, legend=False)
+            axes.set(xlabel="x (µm)", ylabel="y (µm)", title=title, xlim=(-900, 900), ylim=(-900, 900))
+        bar = figure.colorbar(picture, ax=line, label="angle (°)", shrink=0.85, ticks=(0.02, 0.1, 0.5, 2, 10))
+        bar.ax.set_yticklabels(["0.02", "0.1", "0.5", "2", "10"])
+        say("prior", name, prior_share(part.field), inside, inside_prior, part.field.choice)
+    save(figure, FOLDER / "measured_prior.png")
+
+
+# --- 5: a flat top
+
+
+def flat_top() -> None:
+    """Slants along the middle of a clipped ball: sphere of its circle, truth, estimate."""
+    scene = bgars.Scene.ball_array(3, 3, board=BOARD, defects={"B2": Defect.clipped(40.0)})
+    part = made(scene, PAINT)
+    fit = fitted(part)
+    ball = int(np.argmin([np.hypot(x, y) for x, y, _ in fit.circles_px]))
+    circle, flat = fit.circles_px[ball], fit.flat_radius[ball]
+    height, width = part.capture.mask.shape
+    normals, inside = circle_normals((height, width), circle)
+    row = int(height / 2 - circle[1])
+    cols = np.flatnonzero(inside[row])
+    slant = lambda values: np.degrees(np.arctan2(values[row, cols, 0], values[row, cols, 2]))  # noqa: E731
+    x = normals[row, cols, 0]
+    figure = new_figure(11.5, 4.4)
+    left, right = panels(figure, 1, 2, width_ratios=(1.5, 1))[0]
+    left.plot(x, slant(normals), color=OKABE_ITO[5], linewidth=1.4, label="sphere of its circle")
+    left.plot(x, slant(part.truth.normals), **TRUTH_STYLE)
+    left.plot(x, slant(part.field.normals), "o", color=OKABE_ITO[0], markersize=3.5, label="estimate")
+    if flat is not None:
+        left.axvspan(-flat, flat, color="0.93", label="flat top that was found", zorder=0)
+    left.set(xlabel="x from the centre (ball radii)", ylabel="slant toward +x (°)", ylim=(-75, 75))
+    left.set_title("A ball whose top is cut off, middle row")
+    left.legend(loc="upper left")
+    tidy(left)
+    row0, col0, radius = height / 2 - circle[1] - 0.5, width / 2 + circle[0] - 0.5, circle[2] * 1.1
+    error = part.error_deg()
+    picture = right.imshow(
+        np.maximum(error, ERROR_LIMITS_DEG[0]),
+        extent=(
+            (-col0 - 0.5) / circle[2],
+            (width - 0.5 - col0) / circle[2],
+            (row0 - height + 0.5) / circle[2],
+            (row0 + 0.5) / circle[2],
+        ),
+        cmap="viridis_r",
+        norm=LogNorm(*ERROR_LIMITS_DEG),
+    )
+    if flat is not None:
+        right.add_patch(Circle((0, 0), flat, fill=False, color="black", linewidth=1.2, linestyle="--"))
+    right.set(xlim=(-1.1, 1.1), ylim=(-1.1, 1.1), xlabel="x (ball radii)", ylabel="y (ball radii)")
+    right.set_title("True error of its normals; dashed: the flat's edge")
+    bar = figure.colorbar(picture, ax=right, label="angle (°)", ticks=(0.02, 0.1, 0.5, 2, 10))
+    bar.ax.set_yticklabels(["0.02", "0.1", "0.5", "2", "10"])
+    save(figure, FOLDER / "flat_top.png")
+    judged = inside & part.truth.mask & (part.truth.normals[..., 2] > 0.3)  # noqa: PLR2004
+    say("flat", flat, np.nanmean(error[judged]), radius)
+
+
+# --- 6: where it fails
+
+
+class Squashed(NamedTuple):
+    """All balls of a part flattened alike."""
+
+    q: float
+    error_deg: float
+    circle_deg: float
+    stated_deg: float
+    loss: float
+
+
+def failure() -> None:
+    """All balls flattened alike: the circles are wrong for all, and nothing in view says so."""
+    figure = new_figure(11.5, 4.2)
+    left, right = panels(figure, 1, 2)[0]
+    for material, name, color, marker in (
+        (PAINT, "I_d = 0.5", OKABE_ITO[1], "o"),
+        (METAL, "bare metal", OKABE_ITO[0], "s"),
+    ):
+        found = []
+        for q in (1.0, 0.98, 0.95, 0.9, 0.85):
+            scene = bgars.Scene.ball_array(2, 2, board=BOARD)
+            scene = replace(scene, balls=tuple(replace(ball, q=q) for ball in scene.balls))
+            part = made(scene, material)
+            error, fit = part.error_deg(), part.field.reflectance
+            judged = part.truth.mask & (part.truth.normals[..., 2] > 0.3)  # noqa: PLR2004
+            circle = np.full(error.shape, np.nan)
+            for place in fit.circles_px if fit is not None else ():
+                normals, inside = circle_normals(error.shape, place)
+                off = bgars.angular_error_deg(normals.astype(np.float32), part.truth.normals)
+                circle[inside] = off[inside]
+            stated = float(np.median(part.field.standard_error_deg[judged]))
+            found.append(
+                Squashed(
+                    q,
+                    float(np.nanmean(error[judged])),
+                    float(np.nanmean(circle[judged])),
+                    stated,
+                    fit.loss if fit else np.nan,
+                )
+            )
+            say("failure", name, found[-1], part.field.choice)
+        q_values = [entry.q for entry in found]
+        left.plot(
+            q_values, [entry.error_deg for entry in found], marker=marker, color=color, label=f"true error, {name}"
+        )
+        left.plot(
+            q_values,
+            [entry.stated_deg for entry in found],
+            marker=marker,
+            color=color,
+            linestyle=":",
+            markerfacecolor="none",
+            label=f"stated (median), {name}",
+        )
+        right.plot(q_values, [entry.loss for entry in found], marker=marker, color=color, label=name)
+        if material is PAINT:
+            left.plot(
+                q_values,
+                [entry.circle_deg for entry in found],
+                **{**TRUTH_STYLE, "label": "error of the circles' spheres"},
+            )
+    left.set(
+        xlabel="q of all balls (vertical over horizontal radius)",
+        ylabel="angle (°)",
+        title="Every ball flattened alike",
+    )
+    left.invert_xaxis()
+    left.legend()
+    right.set(
+        xlabel="q of all balls (vertical over horizontal radius)",
+        ylabel="loss of the material (above 2: refused)",
+        title="What the fit itself says",
+    )
+    right.invert_xaxis()
+    right.legend()
+    for axes in (left, right):
+        tidy(axes)
+        axes.set_ylim(bottom=0)
+    save(figure, FOLDER / "failure.png")
+
+
+# --- 7: the same part inspected
+
+
+def inspected_alike() -> None:
+    """Heights of a part whose balls are all flattened alike: true errors and stated uncertainties."""
+    q_values, errors_um, stated_um, moved_deg = (1.0, 0.98, 0.95, 0.9), [], [], []
+    for q in q_values:
+        scene = bgars.Scene.ball_array(4, 4, board=bgars.Board(material=bgars.Material.matte(0.3)))
+        scene = replace(scene, balls=tuple(replace(ball, q=q) for ball in scene.balls))
+        capture, truth = bgars.simulate(scene, RIG, PAINT, NOISY)
+        result = bgars.inspect(capture)
+        pairs = list(zip(result.balls, truth.balls, strict=True))
+        errors_um.append(float(np.median([found.top_um - true.top_um for found, true in pairs])))
+        stated_um.append(float(np.median([2 * found.u_top_um for found, _ in pairs])))
+        elevation_deg = np.degrees(np.arcsin(np.array(result.light_directions)[:, 2]))
+        moved_deg.append(float(np.mean(elevation_deg - RIG.elevations_deg)))
+        say("inspected", q, errors_um[-1], stated_um[-1], moved_deg[-1], float(np.median([b.q for b in result.balls])))
+    figure = new_figure(11.5, 3.9)
+    left, right = panels(figure, 1, 2)[0]
+    left.plot(q_values, errors_um, "o-", color=OKABE_ITO[0], label="true error of the heights (median)")
+    left.plot(q_values, stated_um, "s:", color=OKABE_ITO[1], markerfacecolor="none", label="stated, U = 2 u")
+    left.set(xlabel="q of all balls (vertical over horizontal radius)", ylabel="height above the board (µm)")
+    left.set_title("Every ball of a part flattened alike")
+    left.legend()
+    right.plot(q_values, moved_deg, "o-", color=OKABE_ITO[0])
+    right.set(xlabel="q of all balls (vertical over horizontal radius)", ylabel="mean move of the elevations (°)")
+    right.set_title("What the fit blames instead: the lights")
+    for axes in (left, right):
+        axes.invert_xaxis()
+        tidy(axes)
+    save(figure, FOLDER.parent / "inspection" / "flattened_alike.png")
+
+
+PICTURES = (ring_ambiguity, fit_profile, residual_table, measured_prior, flat_top, failure, inspected_alike)
+
+
+def main() -> None:
+    """Draw all, or those named."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    with figure_style():
+        for picture in PICTURES:
+            if picture.__name__ in sys.argv[1:] or len(sys.argv) == 1:
+                picture()
+
+
+if __name__ == "__main__":
+    main()
