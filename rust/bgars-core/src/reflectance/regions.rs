@@ -193,7 +193,7 @@ impl<'a, 'b, 'c, P: Pixel> Regions<'a, 'b, 'c, P> {
                 let region = &self.all[index];
                 let albedo = (region.ball.material.diffuse / 255.0) as f32;
                 for pixel in found.iter().filter(|pixel| !region.free || pixel.cost < FREE_LOSS) {
-                    write(pixel, albedo, self.reader.lights(), out);
+                    write(pixel, region.ball.prior_rad, albedo, self.reader.lights(), out);
                 }
             }
             report((batch[batch.len() - 1] + 1) as f64 / indices.len() as f64)?;
@@ -231,14 +231,16 @@ fn lone_pixels(found: &[BallPixel], width: usize) -> Vec<usize> {
         .collect()
 }
 
-/// Writes a pixel's normal.
-fn write(found: &BallPixel, albedo: f32, lights: usize, out: &mut NormalMapMut<'_>) {
+/// Writes a pixel's normal. A prior is trusted no more than the estimate allows balls to differ from their spheres.
+fn write(found: &BallPixel, prior_rad: f32, albedo: f32, lights: usize, out: &mut NormalMapMut<'_>) {
     let pixel = found.pixel;
+    let measured = found.data_error_rad.to_degrees() < MEASURED_DEG;
+    let error_rad = if measured { found.error_rad } else { found.error_rad.max(prior_rad) };
     out.normals[3 * pixel..3 * pixel + 3].copy_from_slice(&found.normal);
     out.albedo[pixel] = albedo;
     out.mask[pixel] = true;
-    out.confidence[pixel] = confidence_of(f64::from(found.error_rad.to_degrees()));
-    out.measured[pixel] = found.data_error_rad.to_degrees() < MEASURED_DEG;
+    out.confidence[pixel] = confidence_of(f64::from(error_rad.to_degrees()));
+    out.measured[pixel] = measured;
     out.lights_kept[pixel] = lights as u16;
     if !out.kept_sets.is_empty() {
         out.kept_sets[pixel * lights..(pixel + 1) * lights].fill(true);
