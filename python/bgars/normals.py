@@ -188,8 +188,8 @@ def estimate_normals(
         reason = f"the material {source} does not explain the balls: loss {fit.loss:.2f}, at most 2 is accepted"
         return replace(_because(pixelwise(fallback, (0.5, 1.0)), reason), reflectance=fit)
     where = "on balls, robust-filter elsewhere" if balls else "where it explains the pixel, robust-filter elsewhere"
-    loss = 0.0 if fit is None else fit.loss
-    return replace(field, choice=f"reflectance {where}: material {source}, loss {loss:.3f}")
+    checked = f"loss {0.0 if fit is None else fit.loss:.3f}" if balls else "no balls to check it by"
+    return replace(field, choice=f"reflectance {where}: material {source}, {checked}")
 
 
 def _because(field: NormalField, reason: str) -> NormalField:
