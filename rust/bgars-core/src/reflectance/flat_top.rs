@@ -27,7 +27,7 @@ const TOLERANCE_RAD: f32 = 0.0087;
 const MAX_DEVIATION2: f32 = 9.0;
 
 /// A flat top must explain the normals better than the sphere by so much a pixel of it, and in all, in variances.
-const MIN_MEAN_GAIN: f32 = 1.5;
+const MIN_MEAN_GAIN: f32 = 4.0;
 const MIN_GAIN: f32 = 60.0;
 
 /// Looks for a flat top in normals that were found without an expectation.
