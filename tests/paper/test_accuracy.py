@@ -31,7 +31,7 @@ def mean_deg(capture: bgars.Capture, method: str) -> float:
     return bgars.evaluate(capture, method=method).normals.mean_deg  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("scene", "pixelwise", "published", "robust_limit"), SCENES)
+@pytest.mark.parametrize(("scene", "least_squares", "published", "robust_limit"), SCENES)
 def test_rendered_scenes(
     data_folder: Path, scene: str, least_squares: float, published: float, robust_limit: float | None
 ) -> None:
