@@ -48,7 +48,7 @@ const FREE_LOSS: f32 = 2.0;
 
 /// A normal this far from its circle's, in radian (10 degrees), must be shared by so many of its eight neighbours.
 const LONE_RAD: f32 = 0.175;
-const FRIENDS: usize = 5;
+const FRIENDS: usize = 3;
 
 /// Regions between two calls of the progress callback.
 const BATCH: usize = 16;
