@@ -12,7 +12,10 @@ from bgars.material_records import SurfaceMaterial
 from bgars.records import NormalField
 
 __all__ = [
+    "BLIND_MIN_LIGHTS",
     "DEBUG_BUILD",
+    "REFLECTANCE_MAX_LOSS",
+    "REFLECTANCE_MIN_LIGHTS",
     "decode_stack",
     "estimate_normals",
     "estimate_reflectance",
@@ -27,7 +30,10 @@ __all__ = [
     "write_png16",
 ]
 
+BLIND_MIN_LIGHTS: Final[int]
 DEBUG_BUILD: Final[bool]
+REFLECTANCE_MAX_LOSS: Final[float]
+REFLECTANCE_MIN_LIGHTS: Final[int]
 
 def decode_stack(
     paths: Sequence[str | PathLike[str]],

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from bgars import _bgars
 from bgars.errors import CalibrationError
 from bgars.normals import estimate_normals
-from bgars.reflectance import MIN_LIGHTS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -60,8 +60,9 @@ def calibrate_material(
     >>> len(fit.circles_px), len(fit.material.gains), fit.loss < 0.1
     (1, 8, True)
     """
-    if len(capture.rig) < MIN_LIGHTS:
-        msg = f"{capture.name}: a material needs {MIN_LIGHTS} lights or more, the capture has {len(capture.rig)}"
+    if len(capture.rig) < _bgars.REFLECTANCE_MIN_LIGHTS:
+        least = _bgars.REFLECTANCE_MIN_LIGHTS
+        msg = f"{capture.name}: a material needs {least} lights or more, the capture has {len(capture.rig)}"
         raise CalibrationError(msg)
     fit = estimate_normals(
         capture, method="reflectance", anchors=anchors, threads=threads, progress=progress

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from bgars.balls import find_balls
+from bgars.circle_pixels import inside_circles
 from bgars.inspection import measure_balls
 from bgars.inspection.exposure import check_capture
 from bgars.inspection.judge import judge_part
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from bgars.ball_records import BallMeasurement, FoundBalls
     from bgars.material_records import SurfaceMaterial
     from bgars.part_result import PartResult
-    from bgars.records import BoolArray, Capture
+    from bgars.records import Capture
 
 __all__ = ["inspect"]
 
@@ -82,7 +83,7 @@ def inspect(
     check_capture(capture)
     material, warnings = _material(recipe, method)
     report("find", 0.0)
-    found = _found(capture, recipe, threads)
+    found = _found(capture, recipe, threads, report)
     report("find", 1.0)
     measurement = _measured(capture, found, method, material, threads, report)
     report("measure", 1.0)
@@ -110,9 +111,14 @@ def _material(recipe: PartRecipe | None, method: Method) -> tuple[SurfaceMateria
     return read_material(recipe.material_file), ()
 
 
-def _found(capture: Capture, recipe: PartRecipe | None, threads: int | None) -> FoundBalls:
+def _found(
+    capture: Capture,
+    recipe: PartRecipe | None,
+    threads: int | None,
+    report: Callable[[InspectionStage, float], None],
+) -> FoundBalls:
     layout = None if recipe is None else recipe.image_layout
-    return find_balls(capture, layout=layout, threads=threads)
+    return find_balls(capture, layout=layout, threads=threads, progress=lambda fraction: report("find", fraction))
 
 
 def _measured(
@@ -126,7 +132,7 @@ def _measured(
     """Measure the balls; their normals are made beside the fit of the shadows, which needs only some of the board."""
     if not found.balls:
         return measure_balls(capture, found, threads=threads)
-    balls = _ball_pixels(found, capture.mask.shape)
+    balls = inside_circles(((ball.x_px, ball.y_px, ball.radius_px + 1.0) for ball in found.balls), capture.mask.shape)
     sparse = np.zeros_like(balls)
     sparse[::BOARD_STEP, ::BOARD_STEP] = True
     board = sparse & ~balls & capture.mask
@@ -152,18 +158,3 @@ def _measured(
             threads=threads,
             progress=lambda fraction: report("measure", fraction),
         )
-
-
-def _ball_pixels(found: FoundBalls, shape: tuple[int, ...]) -> BoolArray:
-    """True inside the silhouettes, a pixel of the rim more."""
-    height, width = shape
-    inside: BoolArray = np.zeros(shape, np.bool_)
-    for ball in found.balls:
-        col, row = ball.x_px + width / 2 - 0.5, height / 2 - ball.y_px - 0.5
-        reach = ball.radius_px + 1.0
-        rows = slice(max(int(row - reach), 0), max(int(row + reach) + 2, 0))
-        cols = slice(max(int(col - reach), 0), max(int(col + reach) + 2, 0))
-        part = inside[rows, cols]
-        down = (np.arange(part.shape[0]) + rows.start - row)[:, None]
-        part |= down**2 + (np.arange(part.shape[1]) + cols.start - col) ** 2 < reach * reach
-    return inside

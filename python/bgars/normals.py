@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
+from bgars import _bgars
 from bgars.ball_records import FoundBalls
 from bgars.balls import find_balls
+from bgars.circle_pixels import inside_circles
 from bgars.errors import InputError
 from bgars.pixelwise import (
     DEFAULT_THRESHOLD,
@@ -17,7 +19,7 @@ from bgars.pixelwise import (
     combined_mask,
     pixelwise_normals,
 )
-from bgars.reflectance import MIN_LIGHTS, add_reflectance
+from bgars.reflectance import add_reflectance
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -34,7 +36,6 @@ METHODS: tuple[Method, ...] = ("lambertian", "specular-filter", "robust-filter",
 """The methods that are compared; ``blind`` is what ``reflectance`` does without balls."""
 DEFAULT_METHOD: Method = "reflectance"
 
-BLIND_LIGHTS = 5
 CIRCLE_VALUES = 3
 RIM_PX = 0.01
 BRIDGE_WIDTH = 0.8
@@ -162,9 +163,10 @@ def estimate_normals(
     if method != "reflectance":
         return pixelwise(method)
     lights = len(capture.rig)
-    fallback: PixelwiseMethod = "blind" if lights >= BLIND_LIGHTS else "robust-filter"
-    if lights < MIN_LIGHTS:
-        return _because(pixelwise(fallback), f"reflectance needs {MIN_LIGHTS} lights, the capture has {lights}")
+    fallback: PixelwiseMethod = "blind" if lights >= _bgars.BLIND_MIN_LIGHTS else "robust-filter"
+    least = _bgars.REFLECTANCE_MIN_LIGHTS
+    if lights < least:
+        return _because(pixelwise(fallback), f"reflectance needs {least} lights, the capture has {lights}")
     given = "found" if anchors is None else "given"
     found = anchors if anchors is not None else find_balls(capture, threads=threads, progress=part(0.0, 0.3))
     circles_px = _circles(found, capture.mask.shape)
@@ -185,7 +187,8 @@ def estimate_normals(
     source = "given" if material is not None else f"fitted on {balls} ball{'s' if balls != 1 else ''} {given}"
     fit = field.reflectance
     if fit is not None and not fit.accepted:
-        reason = f"the material {source} does not explain the balls: loss {fit.loss:.2f}, at most 2 is accepted"
+        most = _bgars.REFLECTANCE_MAX_LOSS
+        reason = f"the material {source} does not explain the balls: loss {fit.loss:.2f}, at most {most:g} is accepted"
         return replace(_because(pixelwise(fallback, (0.5, 1.0)), reason), reflectance=fit)
     where = "on balls, robust-filter elsewhere" if balls else "where it explains the pixel, robust-filter elsewhere"
     checked = f"loss {0.0 if fit is None else fit.loss:.3f}" if balls else "no balls to check it by"
@@ -238,17 +241,10 @@ def _outside(
     circles_px: NDArray[np.float64], use: NDArray[np.bool_] | None, shape: tuple[int, ...]
 ) -> NDArray[np.bool_] | None:
     """The pixels to use outside all circles, or all of them where none is outside."""
-    height, width = shape
-    outside = np.ones(shape, np.bool_) if use is None else use.copy()
-    for x_px, y_px, radius_px in circles_px:
-        col, row = x_px + width / 2 - 0.5, height / 2 - y_px - 0.5
-        rows = slice(max(int(row - radius_px), 0), max(int(row + radius_px) + 2, 0))
-        cols = slice(max(int(col - radius_px), 0), max(int(col + radius_px) + 2, 0))
-        part = outside[rows, cols]
-        down = (np.arange(part.shape[0]) + rows.start - row)[:, None]
-        across = np.arange(part.shape[1]) + cols.start - col
-        # Strictly inside, so that no pixel at the rim falls between both methods.
-        part &= down**2 + across**2 >= (radius_px - RIM_PX) ** 2
+    # A little smaller, so that no pixel at a rim falls between both methods.
+    outside = ~inside_circles(((x, y, radius - RIM_PX) for x, y, radius in circles_px), shape)
+    if use is not None:
+        outside &= use
     return outside if outside.any() else use
 
 

@@ -18,10 +18,7 @@ if TYPE_CHECKING:
 
     from bgars.records import Capture, NormalField
 
-__all__ = ["MIN_LIGHTS", "add_reflectance"]
-
-MIN_LIGHTS = 6
-"""Two unknowns a pixel, and enough lights beyond them to see that one is wrong."""
+__all__ = ["add_reflectance"]
 
 
 def add_reflectance(

@@ -11,9 +11,6 @@ import pytest
 from bgars.ball_records import BallLayout
 from bgars.part_recipe import Limits, PartRecipe
 
-pytest.importorskip("bgars.balls.find", reason="the finder is not there yet")
-pytest.importorskip("bgars.inspection.measure", reason="the measurement is not there yet")
-
 pytestmark = pytest.mark.data
 LIMITS = Limits(
     true_position_um=50.0, diameter_um=(560.0, 640.0), height_um=(460.0, 540.0), seating_coplanarity_um=60.0

@@ -215,7 +215,7 @@ def test_the_finder_gets_the_layout_as_the_camera_sees_it(quick: Path, monkeypat
     _, truth = bgars.simulate(setup.scene, setup.rig, setup.material, setup.camera)
     found, measurement = measured_part(truth)
 
-    def find(_: object, part: bgars.PartRecipe, __: object) -> FoundBalls:
+    def find(_: object, part: bgars.PartRecipe, *__: object) -> FoundBalls:
         seen.append(part.image_layout)
         return found
 

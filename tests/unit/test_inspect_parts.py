@@ -7,9 +7,6 @@ import pytest
 from bgars.ball_records import BallLayout
 from bgars.part_recipe import Limits, PartRecipe
 
-pytest.importorskip("bgars.balls.find", reason="the finder is not there yet")
-pytest.importorskip("bgars.inspection.measure", reason="the measurement is not there yet")
-
 LIMITS = Limits(
     true_position_um=30.0, diameter_um=(570.0, 630.0), height_um=(465.0, 535.0), seating_coplanarity_um=60.0
 )

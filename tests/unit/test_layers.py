@@ -11,6 +11,7 @@ import pytest
 PACKAGE = Path(bgars.__file__).parent
 RECORDS = {
     "ball_names": 0.5,
+    "circle_pixels": 0,
     "ball_records": 1,
     "material_records": 1,
     "part_recipe": 2,

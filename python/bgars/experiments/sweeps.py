@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
+from bgars import _bgars
 from bgars.experiments.curves import draw_errors, marks_in_words
 from bgars.experiments.measure import COLUMNS, FILTER, NAIVE, Measurement, measure_all
 from bgars.experiments.outcome import Experiment, Outcome, Picture
@@ -13,7 +14,6 @@ from bgars.experiments.setting import Setting
 from bgars.experiments.style import new_figure
 from bgars.experiments.words import method_table, of_method, ranges, split_by_gain
 from bgars.normals import METHODS
-from bgars.reflectance import MIN_LIGHTS
 
 if TYPE_CHECKING:
     from bgars.experiments.outcome import Run
@@ -120,7 +120,8 @@ SWEEPS = (
         values=tuple(float(count) for count in range(3, 17)),
         note=(
             "With 3 lights nothing can be dropped: all methods are one. "
-            f"reflectance needs {MIN_LIGHTS} lights and is robust-filter with fewer."
+            f"reflectance needs {_bgars.REFLECTANCE_MIN_LIGHTS} lights; with fewer its guard stands in "
+            "(docs/reflectance.md)."
         ),
     ),
     Sweep(

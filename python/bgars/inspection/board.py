@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars.circle_pixels import inside_circles
+
 if TYPE_CHECKING:
     from bgars.records import NormalField
 
@@ -65,14 +67,7 @@ def slope_terms(x: Array, y: Array) -> tuple[Array, Array]:
 
 def outside_balls(height: int, width: int, table: Array) -> NDArray[np.bool_]:
     """(H, W) True where no ball is, with a margin; `table` (N, 5) as x, y, z, radius, q in pixels."""
-    x, y = np.arange(width) + 0.5 - width / 2.0, height / 2.0 - 0.5 - np.arange(height)
-    outside = np.ones((height, width), dtype=np.bool_)
-    for centre_x, centre_y, _, radius, _ in table:
-        reach = OUTSIDE * radius + 2.0
-        cols = slice(*np.searchsorted(x, [centre_x - reach, centre_x + reach]))
-        rows = slice(*np.searchsorted(-y, [-centre_y - reach, -centre_y + reach]))
-        outside[rows, cols] &= (x[cols] - centre_x)[None, :] ** 2 + (y[rows] - centre_y)[:, None] ** 2 > reach * reach
-    return outside
+    return ~inside_circles(((x, y, OUTSIDE * radius + 2.0) for x, y, _, radius, _ in table), (height, width))
 
 
 def board_from_normals(field: NormalField, outside: NDArray[np.bool_]) -> Array | None:

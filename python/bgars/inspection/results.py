@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from bgars.inspection.bundle import Solution
     from bgars.inspection.flat_top import FlatTops
     from bgars.inspection.highlights import Highlights
-    from bgars.inspection.measure import Fit
     from bgars.inspection.problem import Problem
     from bgars.inspection.shadow_edges import Edges
+    from bgars.inspection.shadow_fit import Fit
 
 __all__ = ["Usability", "judge_balls", "measurement"]
 

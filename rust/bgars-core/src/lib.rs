@@ -12,6 +12,7 @@ pub mod integrate;
 pub mod io;
 mod key;
 pub mod lights;
+mod median;
 mod memory;
 pub mod mesh;
 pub mod normals;

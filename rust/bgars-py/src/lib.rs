@@ -39,5 +39,11 @@ mod _bgars {
     use crate::reflectance::estimate_reflectance;
 
     #[pymodule_export]
+    const REFLECTANCE_MIN_LIGHTS: usize = bgars_core::reflectance::MIN_LIGHTS;
+    #[pymodule_export]
+    const REFLECTANCE_MAX_LOSS: f64 = bgars_core::reflectance::MAX_LOSS;
+    #[pymodule_export]
+    const BLIND_MIN_LIGHTS: usize = bgars_core::blind::MIN_LIGHTS;
+    #[pymodule_export]
     const DEBUG_BUILD: bool = cfg!(debug_assertions);
 }

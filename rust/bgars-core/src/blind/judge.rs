@@ -13,7 +13,7 @@ use crate::normals::{RobustParams, robust_filter};
 const MAX_LEFT_OUT: usize = 8;
 
 /// Fewest lights for a prediction: four remain.
-pub(super) const MIN_LIGHTS: usize = 5;
+pub const MIN_LIGHTS: usize = 5;
 
 /// Mean cost of a left-out light under each method; lower is better.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,7 +81,7 @@ fn of_pixel(specimen: &Specimen, material: &Material) -> ([f64; 3], f64) {
 }
 
 fn cost_of(observation: &Observation, light: usize, predicted: f64) -> f64 {
-    let ratio = observation.residual(light, predicted) / (SCALE);
+    let ratio = observation.residual(light, predicted) / SCALE;
     observation.share(light) * (ratio * ratio).ln_1p()
 }
 

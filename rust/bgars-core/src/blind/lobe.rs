@@ -8,8 +8,8 @@ const MIN_HALF_COSINE: f64 = 0.05;
 /// Lowest `n_z` that the lobe is divided by.
 const MIN_N_Z: f64 = 0.02;
 
-/// Lobe shapes below this are Beckmann's.
-const MIN_SHAPE: f64 = 1e-3;
+/// Tails below this are Beckmann's.
+const MIN_TAIL: f64 = 1e-3;
 
 /// A material relative to its diffuse albedo.
 ///
@@ -24,7 +24,7 @@ pub struct Material {
     /// Root mean square slope of the facets, `m`.
     pub roughness: f64,
     /// Tail of the lobe, `u`: 0 Beckmann, 1 GGX.
-    pub shape: f64,
+    pub tail: f64,
 }
 
 /// One light as a pixel sees it: direction and half vector, both of length 1.
@@ -42,7 +42,7 @@ impl Light {
 
 impl Material {
     /// A Lambertian surface.
-    pub const MATTE: Self = Self { strength: 0.0, roughness: 0.3, shape: 0.5 };
+    pub const MATTE: Self = Self { strength: 0.0, roughness: 0.3, tail: 0.5 };
 
     /// Value at unit albedo.
     pub(super) fn shade(&self, normal: &Vector3<f64>, light: &Light) -> f64 {
@@ -65,11 +65,11 @@ impl Material {
         let squared = cosine * cosine;
         let t = (1.0 - squared) / squared * inverse_variance;
         // D without its 1 / cos^4, and d ln D / dt.
-        let (facets, log_slope) = if self.shape < MIN_SHAPE {
+        let (facets, log_slope) = if self.tail < MIN_TAIL {
             ((-t).exp(), -1.0)
         } else {
-            let base = 1.0 + self.shape * t;
-            (base.powf(-(1.0 + 1.0 / self.shape)), -(1.0 + self.shape) / base)
+            let base = 1.0 + self.tail * t;
+            (base.powf(-(1.0 + 1.0 / self.tail)), -(1.0 + self.tail) / base)
         };
         let view_half = light.half.z;
         let (toward_view, away) = (2.0 * cosine * n_z / view_half, 2.0 * cosine * toward_light / view_half);
@@ -99,8 +99,8 @@ mod tests {
     #[test]
     fn the_slope_is_that_of_finite_differences() {
         let light = Light::new(Vector3::new(0.5, 0.2, 0.8).normalize());
-        for shape in [0.0, 0.5, 1.5] {
-            let material = Material { strength: 1.3, roughness: 0.3, shape };
+        for tail in [0.0, 0.5, 1.5] {
+            let material = Material { strength: 1.3, roughness: 0.3, tail };
             for normal in [Vector3::new(0.1, 0.3, 0.9), Vector3::new(-0.5, 0.2, 0.4), Vector3::new(0.9, 0.3, 0.2)] {
                 let normal = normal.normalize();
                 let (_, slope) = material.shade_and_slope(&normal, &light);

@@ -22,7 +22,7 @@ const RESTART_EVERY: usize = 5;
 /// Pixels of one task; fixed, so that sums are the same for any number of threads.
 const TASK_PIXELS: usize = 64;
 
-/// Largest change of a parameter (logarithms of strength and roughness; shape) in a step.
+/// Largest change of a parameter (logarithms of strength and roughness; tail) in a step.
 const MAX_CHANGE: f64 = 0.4;
 
 /// Step of the derivatives over the parameters.
@@ -31,7 +31,7 @@ const DIFFERENCE: f64 = 1e-3;
 /// Lower bound of the roughness: a narrower lobe is seen by too few pixels to be told from noise on free normals.
 const LEAST_ROUGHNESS: f64 = 0.1;
 
-/// Bounds of strength, roughness and shape. A lobe of more than ten times the diffuse part is not told from a missing
+/// Bounds of strength, roughness and tail. A lobe of more than ten times the diffuse part is not told from a missing
 /// diffuse part on free normals: the fit would fall into that hole (a metal explains everything by mirrors).
 const BOUNDS: [(f64, f64); 3] = [(0.007, 10.0), (LEAST_ROUGHNESS, 1.0), (0.0, 1.0)];
 
@@ -61,14 +61,14 @@ struct Fitted {
 
 /// Fits the material to a sample: to a part of it from several starts, to all of it from the one of least cost.
 ///
-/// Gauss-Newton over (ln strength, ln roughness, shape) with the three unknowns of each pixel eliminated (Schur complement,
+/// Gauss-Newton over (ln strength, ln roughness, tail) with the three unknowns of each pixel eliminated (Schur complement,
 /// as in bundle adjustment: Triggs et al. 2000, section 6.1), robustly weighted; after each step the pixels are fitted anew.
 pub(super) fn fit(sample: &[Specimen]) -> Material {
     let step = sample.len().div_ceil(SCREENED_PIXELS).max(1);
     let screened: Vec<Specimen> = sample.iter().step_by(step).cloned().collect();
     let mut best: Option<Fitted> = None;
     for (strength, roughness) in STARTS {
-        let fitted = fit_from(&screened, Material { strength, roughness, shape: 0.5 });
+        let fitted = fit_from(&screened, Material { strength, roughness, tail: 0.5 });
         if best.is_none_or(|best| fitted.mean_cost < best.mean_cost) {
             best = Some(fitted);
         }
@@ -145,19 +145,19 @@ fn clamp_change(change: f64) -> f64 {
 }
 
 fn to_parameters(material: Material) -> Vector3<f64> {
-    Vector3::new(material.strength.ln(), material.roughness.ln(), material.shape)
+    Vector3::new(material.strength.ln(), material.roughness.ln(), material.tail)
 }
 
 fn to_material(parameters: &Vector3<f64>) -> Material {
-    Material { strength: parameters.x.exp(), roughness: parameters.y.exp(), shape: parameters.z }
+    Material { strength: parameters.x.exp(), roughness: parameters.y.exp(), tail: parameters.z }
 }
 
 fn bounded(parameters: Vector3<f64>) -> Vector3<f64> {
-    let [strength, roughness, shape] = BOUNDS;
+    let [strength, roughness, tail] = BOUNDS;
     Vector3::new(
         parameters.x.clamp(strength.0.ln(), strength.1.ln()),
         parameters.y.clamp(roughness.0.ln(), roughness.1.ln()),
-        parameters.z.clamp(shape.0, shape.1),
+        parameters.z.clamp(tail.0, tail.1),
     )
 }
 

@@ -23,8 +23,7 @@ use rayon::prelude::*;
 use crate::normals::{self, Method, NormalMap, NormalMapMut, RobustParams};
 use crate::{ImageStack, Lights, Pixel, Radiometry, Result};
 
-use judge::MIN_LIGHTS;
-pub use judge::Predictions;
+pub use judge::{MIN_LIGHTS, Predictions};
 pub use lobe::Material;
 use material::Specimen;
 use observation::Reader;
@@ -83,8 +82,8 @@ impl fmt::Display for Report {
             f,
             "{name}: mean cost of a left-out light {lambertian:.3} (least squares), {robust_filter:.3} (robust filter), \
              {reflectance:.3} (reflectance, taken up to {MARGIN} times the better of these); lobe of strength {:.2}, \
-             roughness {:.2}, shape {:.2}",
-            material.strength, material.roughness, material.shape
+             roughness {:.2}, tail {:.2}",
+            material.strength, material.roughness, material.tail
         )?;
         if self.choice == Choice::Reflectance {
             let [glossy, matte, filtered] = self.pixels;

@@ -2,6 +2,8 @@
 
 use nalgebra::Vector3;
 
+use crate::median::median;
+
 /// Neighbours up to so many rows and columns away: a window of 5 x 5 pixels.
 const REACH: usize = 2;
 
@@ -27,17 +29,9 @@ pub(super) fn median_normal(normals: &[f32], (height, width): (usize, usize), pi
             count += 1;
         }
     }
-    let median = Vector3::from_fn(|axis, _| f64::from(median(&mut components[axis][..count])));
+    let median = Vector3::from_fn(|axis, _| f64::from(median(&mut components[axis][..count], f32::total_cmp)));
     let length = median.norm();
     (length > 1e-6).then(|| median / length)
-}
-
-fn median(values: &mut [f32]) -> f32 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f32::total_cmp).1
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::lobe::Light;
 use super::pixel::start;
+use crate::median::median;
 use crate::normals::NormalMap;
 use crate::{ImageStack, Lights, Pixel, Radiometry};
 
@@ -165,8 +166,6 @@ impl<P: Pixel> Reader<'_, P> {
         if differences.is_empty() {
             return;
         }
-        let middle = differences.len() / 2;
-        let median = *differences.select_nth_unstable_by(middle, f64::total_cmp).1;
-        self.noise = f64::max(NOISE, NOISE_FACTOR * median / spread);
+        self.noise = f64::max(NOISE, NOISE_FACTOR * median(&mut differences, f64::total_cmp) / spread);
     }
 }

@@ -6,15 +6,13 @@ use super::facet::{self, Facet, Pull, equations, tangents};
 use super::lobe::Material;
 use super::material::turning_variance;
 use super::observation::{Kind, Observation, SCALE};
+use crate::normals::confidence_of;
 
 /// Fewest lights within the noise that speak for the robust filter, whatever the number of lights.
 const MIN_MATCHED: usize = 4;
 
 /// Differences up to so many noise levels count as a match.
 const MATCH_LEVELS: f64 = 1.5;
-
-/// Standard error of the direction at which the confidence is one half, degrees.
-const HALF_DEG: f64 = 5.0;
 
 /// Standard error of the direction from which on a normal is the neighbours', not measured, degrees.
 const MAX_ERROR_DEG: f64 = 30.0;
@@ -117,8 +115,7 @@ pub(super) fn trust(observation: &Observation, material: &Material, facet: &Face
     let variance = squares / f64::max(lights - 2.0, 0.2);
     let Some(turning) = turning_variance(&information) else { return Trust { confidence: 0.0, measured: false } };
     let error_deg = (variance * turning).sqrt().to_degrees();
-    let ratio = error_deg / HALF_DEG;
     // Never quite 0: that is what a pixel without a normal has.
-    let confidence = ((1.0 / (1.0 + ratio * ratio)) as f32).max(f32::MIN_POSITIVE);
+    let confidence = confidence_of(error_deg).max(f32::MIN_POSITIVE);
     Trust { confidence, measured: error_deg <= MAX_ERROR_DEG }
 }

@@ -152,7 +152,7 @@ fn check<P: Pixel>(
 }
 
 /// Refuses NaN and infinity in pixels that are to be used.
-fn check_finite<P: Pixel>(stack: &ImageStack<'_, P>, mask: Option<&[bool]>) -> Result<()> {
+pub(crate) fn check_finite<P: Pixel>(stack: &ImageStack<'_, P>, mask: Option<&[bool]>) -> Result<()> {
     for image in 0..stack.lights() {
         let plane = stack.plane(image);
         // Nearly always all is well, and that shows quickly.

@@ -18,6 +18,7 @@ use crate::memory::zeros;
 use crate::{Error, Result};
 
 pub(crate) use confidence::confidence_of;
+pub(crate) use kernel::check_finite;
 pub use kernel::{estimate, estimate_into};
 pub use robust::{RobustParams, robust_filter};
 pub use specular::specular_filter;

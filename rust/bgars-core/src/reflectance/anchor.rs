@@ -28,7 +28,7 @@ impl Circle {
     pub fn normal(&self, x_px: f64, y_px: f64) -> Option<Vector3<f64>> {
         let (x, y) = ((x_px - self.x_px) / self.radius_px, (y_px - self.y_px) / self.radius_px);
         let z2 = 1.0 - x * x - y * y;
-        // False for a circle without a radius, where z2 is not a number.
+        // False for a circle without a radius: z2 is then minus infinity, or not a number at its centre.
         (z2 > 0.0).then(|| Vector3::new(x, y, z2.sqrt()))
     }
 

@@ -1,5 +1,7 @@
 //! Smooth tables on the disc of normals: what each ball shows there, and what the other balls say about one.
 
+use crate::median::median;
+
 /// Cells along the diameter of the disc.
 pub const SIDE: usize = 41;
 
@@ -95,21 +97,16 @@ impl Population {
                 values.iter().enumerate().filter(|(other, value)| *other != ball && value.is_finite()).map(|(_, &v)| v),
             );
             if others.len() >= MIN_BALLS {
-                let middle = median(&mut others);
+                let middle = median(&mut others, f32::total_cmp);
                 for value in &mut others {
                     *value = (*value - middle).abs();
                 }
                 table.middle[cell] = middle;
-                table.sigma[cell] = 1.4826 * median(&mut others);
+                table.sigma[cell] = 1.4826 * median(&mut others, f32::total_cmp);
             }
         }
         table
     }
-}
-
-fn median(values: &mut [f32]) -> f32 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f32::total_cmp).1
 }
 
 /// A table on the disc with a spread, `channels` values a cell.

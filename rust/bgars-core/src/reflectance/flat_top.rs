@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::ball::BallPixel;
 use super::disc::{from_disc, to_disc};
+use crate::median::median;
 
 /// A flat top.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,7 +65,7 @@ fn mean_point(found: &[BallPixel], radius: f32) -> Option<[f32; 2]> {
     }
     let middle = |axis: usize| {
         let mut values: Vec<f32> = inside.iter().map(|pixel| pixel.normal[axis]).collect();
-        f64::from(*values.select_nth_unstable_by(inside.len() / 2, f32::total_cmp).1)
+        f64::from(median(&mut values, f32::total_cmp))
     };
     let (x, y) = (middle(0), middle(1));
     Some(to_disc(&Vector3::new(x, y, (1.0 - x * x - y * y).max(0.0).sqrt())).map(|v| v as f32))

@@ -21,7 +21,7 @@ mod table;
 mod variation;
 
 pub use anchor::Circle;
-pub use estimate::{Findings, MIN_LIGHTS, Request, estimate_into};
+pub use estimate::{Findings, MAX_LOSS, MIN_LIGHTS, Request, estimate_into};
 pub use fit::{MaterialFit, parameter_names};
 pub use flat_top::FlatTop;
 pub use material::{Facet, Lobe, Masking, Material};

@@ -1,10 +1,14 @@
 //! Pixels as the reflectance estimator sees them: linear, at unit light intensity, in grey levels of 255, bent.
 
 use super::scale::bend;
+use crate::median::median;
 use crate::{ImageStack, Pixel, Radiometry};
 
 /// Grey level of a camera that never clips.
 const NO_CLIP: f64 = 1e6;
+
+/// Pixels that the usual offset is taken from, about.
+const OFFSET_PIXELS: usize = 1000;
 
 /// Reads pixels of a stack on the scale of [`bend`].
 #[derive(Debug)]
@@ -41,9 +45,12 @@ impl<'a, 'b, P: Pixel> Reader<'a, 'b, P> {
         self.stack.lights()
     }
 
-    /// Linear grey level of 255 at which each light clips, the offset of the first pixel taken off.
+    /// Linear grey level of 255 at which each light clips, a usual pixel's offset taken off.
     pub fn clip_levels(&self) -> Vec<f64> {
-        let offset = self.radiometry.offset(0);
+        let pixels = self.stack.pixels();
+        let step = (pixels / OFFSET_PIXELS).max(1);
+        let mut offsets: Vec<f32> = (0..pixels).step_by(step).map(|pixel| self.radiometry.offset(pixel)).collect();
+        let offset = median(&mut offsets, f32::total_cmp);
         self.scales.iter().map(|&scale| f64::from((self.clip_level - offset) * scale).min(NO_CLIP)).collect()
     }
 

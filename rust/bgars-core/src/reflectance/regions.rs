@@ -9,6 +9,7 @@ use super::odd::odd_places;
 use super::samples::{FIT_MIN_N_Z, spaced};
 use super::spread::{Residual, Spread};
 use super::table::Signatures;
+use crate::median::median;
 use crate::normals::{NormalMapMut, confidence_of};
 use crate::{Lights, Pixel, Result};
 
@@ -267,10 +268,8 @@ fn deviation(found: &[BallPixel], factor: f32) -> Option<(f32, f32)> {
     if found.len() < ENOUGH_PIXELS {
         return None;
     }
-    let middle = |value: &dyn Fn(&BallPixel) -> f32| {
-        let mut values: Vec<f32> = found.iter().map(value).collect();
-        *values.select_nth_unstable_by(found.len() / 2, f32::total_cmp).1
-    };
+    let middle =
+        |value: &dyn Fn(&BallPixel) -> f32| median(&mut found.iter().map(value).collect::<Vec<f32>>(), f32::total_cmp);
     let off2 = middle(&|p| p.off_circle_rad.powi(2));
     let error2 = middle(&|p| p.data_error_rad.powi(2)) * factor * factor;
     // The median of the squared length of a normal vector with two components is ln 2 of its mean.

@@ -1,5 +1,7 @@
 //! How far observations lie from a fitted model, by their level.
 
+use crate::median::median;
+
 /// Bins of bent levels.
 const BINS: usize = 16;
 
@@ -37,10 +39,11 @@ impl Spread {
         for residual in residuals {
             bins[bin(residual.level, top)].push(residual.size.abs());
         }
-        let overall = median(residuals.iter().map(|residual| residual.size.abs()).collect());
+        let mut sizes: Vec<f32> = residuals.iter().map(|residual| residual.size.abs()).collect();
+        let overall = median(&mut sizes, f32::total_cmp);
         let mut sigma = [0.0; BINS];
-        for (sigma, sizes) in sigma.iter_mut().zip(bins) {
-            let middle = if sizes.len() >= ENOUGH { median(sizes) } else { overall };
+        for (sigma, mut sizes) in sigma.iter_mut().zip(bins) {
+            let middle = if sizes.len() >= ENOUGH { median(&mut sizes, f32::total_cmp) } else { overall };
             *sigma = (1.4826 * middle).max(floor);
         }
         Self { top, sigma }
@@ -65,12 +68,4 @@ impl Spread {
 
 fn bin(level: f32, top: f32) -> usize {
     ((level / top * BINS as f32) as usize).min(BINS - 1)
-}
-
-fn median(mut values: Vec<f32>) -> f32 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f32::total_cmp).1
 }

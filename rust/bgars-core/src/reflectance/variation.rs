@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::fit::{Free, fit_from};
 use super::material::Material;
 use super::samples::Samples;
+use crate::median::median;
 
 /// Own materials must lower the mean cost by this share.
 const EVIDENCE: f64 = 0.15;
@@ -31,10 +32,8 @@ struct Fitted {
     after: f64,
 }
 
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+fn median_of(values: impl Iterator<Item = f64>) -> f64 {
+    median(&mut values.collect::<Vec<f64>>(), f64::total_cmp)
 }
 
 /// One material a ball: its own where the balls differ and its fit is believable, else that of all.
@@ -44,20 +43,20 @@ pub fn ball_materials(samples: &Samples, common: &Material, balls: usize) -> Vec
     if balls < 3 {
         return alike();
     }
-    let free = Free::NOTHING;
     let mut counts = vec![0usize; balls];
     for &ball in &samples.balls {
         counts[ball] += 1;
     }
     let fitted = |ball: usize| {
         let own = samples.of_ball(ball, counts[ball].div_ceil(BALL_PIXELS).max(1));
-        let before = fit_from(&own, common, free, 0).cost;
-        let fit = fit_from(&own, common, free, STEPS);
+        let before = fit_from(&own, common, Free::NOTHING, 0).cost;
+        let fit = fit_from(&own, common, Free::NOTHING, STEPS);
         Fitted { material: fit.material, before, after: fit.cost }
     };
     let pilots: Vec<usize> = (0..balls).step_by(balls.div_ceil(PILOTS)).collect();
     let pilots: Vec<Fitted> = pilots.into_par_iter().map(fitted).collect();
-    if median(pilots.iter().map(|fit| fit.after)) > (1.0 - EVIDENCE) * median(pilots.iter().map(|fit| fit.before)) {
+    if median_of(pilots.iter().map(|fit| fit.after)) > (1.0 - EVIDENCE) * median_of(pilots.iter().map(|fit| fit.before))
+    {
         return alike();
     }
     let fits: Vec<Fitted> = (0..balls).into_par_iter().map(fitted).collect();
@@ -66,8 +65,8 @@ pub fn ball_materials(samples: &Samples, common: &Material, balls: usize) -> Vec
         .map(|ball| {
             (0..parameters[ball].len()).all(|parameter| {
                 let values = || parameters.iter().map(|ball| ball[parameter]);
-                let middle = median(values());
-                let limit = GUARD * median(values().map(|value| (value - middle).abs())).max(MIN_DEVIATION);
+                let middle = median_of(values());
+                let limit = GUARD * median_of(values().map(|value| (value - middle).abs())).max(MIN_DEVIATION);
                 (parameters[ball][parameter] - middle).abs() <= limit
             })
         })

@@ -1,0 +1,283 @@
+"""The fit of balls, lights and board to all shadows at once, from coarse to fine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bgars.inspection.board import SHAPE_TERMS, Board, board_from_normals, outside_balls
+from bgars.inspection.bundle import Priors, Solution, angles_rad, solve_bundle
+from bgars.inspection.checks import check_shifts, displaced_images, explain_dark_steps, refuse_misfits
+from bgars.inspection.outline import Outlines, outline_centres
+from bgars.inspection.population import q_spread
+from bgars.inspection.results import Usability, judge_balls
+from bgars.inspection.shadow_edges import Edges, EdgeSettings, measure_edges
+from bgars.inspection.shadow_map import ShadowMap
+from bgars.inspection.spread import EdgeSpread, fit_spread
+from bgars.inspection.start import first_heights
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from bgars.inspection.problem import Problem
+    from bgars.records import NormalField
+
+__all__ = ["Fit", "fit_shadows"]
+
+Array = NDArray[np.float64]
+
+COARSE = (0.24, 0.08)
+"""Distances, in radii, that edges are first looked for in."""
+COARSE_EXTRA_PX = 1.5
+COARSE_STEPS = 6.0
+FINE_PASSES = 4
+"""Most passes with sharp edges; two where the first leaves little to do."""
+SMALL_CHANGE_PX = 0.5
+FIRST_SPREAD_PX = 0.5
+SPREADS_PX = (0.3, 0.5, 0.8, 1.3, 2.0)
+SPREAD_BALLS = 5
+SMALL_SPREAD_CHANGE = 0.15
+REACH_SIGMAS = 3.2
+REACH_PX = 1.2
+TYPICAL_WAY = 2.0
+"""Way of the light from a ball to the edge of its shadow, in radii."""
+RIG_DEG = 0.3
+"""Lights may be this far from where the rig says (standard deviation of each axis), before their scatter says more."""
+CERTAIN_RIG_DEG = 1e-4
+RIG_LIMITS_DEG = (0.003, 2.0)
+FIRST_Q_SPREAD = 0.02
+TILT = 0.003
+BOW_SLOPE = 0.02
+STEEPEST_BOARD = 0.05
+"""Prior standard deviations of the board: tilt, and slope by bow at the edge of the image."""
+EMPIRICAL_ROUNDS = 5
+SETTLED = 0.1
+SHORT_ROUNDS, LONG_ROUNDS = 8, 20
+REDESCEND_FIRST, REDESCEND = 8.0, 3.5
+OUTLINE_SAFETY = 1.5
+SHIFT_BALLS = 24
+OUTLINE_FLOOR_PX = 0.01
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Everything the shadows gave, in pixels.
+
+    `index` (n,) balls whose shadows were looked at (no bridges); `solution` only of those that `usability` calls
+    usable.
+    """
+
+    problem: Problem
+    index: NDArray[np.intp]
+    usability: Usability
+    solution: Solution | None
+    edges: Edges
+    spread: EdgeSpread
+    warnings: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
+
+
+def fit_shadows(
+    problem: Problem,
+    field: NormalField | None,
+    *,
+    refine_lights: bool,
+    threads: int,
+    progress: Callable[[float], object],
+) -> Fit | None:
+    """Fit shadows in passes, from coarse to fine; None where there is nothing to fit."""
+    if not len(problem.table):
+        return None
+    table, vectors, board = problem.table.copy(), problem.vectors.copy(), Board()
+    heights, steps = first_heights(
+        problem.radiance,
+        table,
+        vectors,
+        problem.near,
+        board,
+        problem.irradiance.mean(axis=0),
+        [problem.neighbours(index) for index in range(len(table))],
+        threads,
+    )
+    table[:, 2] = heights
+    complaints = explain_dark_steps(problem, table, steps)
+    warnings: tuple[str, ...] = ()
+    progress(0.1)
+    priors = _priors(problem, table, field, refine_lights)
+    spread = EdgeSpread(FIRST_SPREAD_PX, 0.0)
+    gains = problem.irradiance.copy()
+    index = np.flatnonzero(~problem.bridged)
+    if not len(index):
+        return None
+    passes = len(COARSE) + FINE_PASSES
+    result: Fit | None = None
+    turn, last, change = 0, False, np.inf
+    wide: Outlines | None = None
+    while not last:
+        last = turn == passes - 1 or (turn > len(COARSE) and change < SMALL_CHANGE_PX)
+        radius = float(np.median(table[:, 3]))
+        settings = _settings(turn, radius, spread, last)
+        shadows = ShadowMap(
+            problem.radiance,
+            np.concatenate([table, problem.stand_ins(table)]),
+            vectors,
+            problem.near,
+            board,
+            silhouette_margin_px=min(settings.reach_px, 0.1 * radius + 2.0),
+            shadow_margin_px=settings.reach_px + 1.0,
+            threads=threads,
+        )
+        if last:
+            priors = _with_outlines(problem, priors, shadows, table, spread)
+            wide = _wide_outlines(problem, shadows, table, vectors, spread)
+        edges = measure_edges(
+            problem.radiance, shadows, table[index], vectors, problem.near, board, gains[index], settings, threads
+        )
+        usability = judge_balls(edges)
+        chosen = index[usability.usable]
+        if not len(chosen):
+            warnings = refuse_misfits(complaints, edges, None, np.zeros(len(vectors)))
+            return Fit(problem, index, usability, None, edges, spread, warnings)
+        used = edges.take(usability.usable)
+        start = (table[chosen], vectors, board)
+        solution, priors = _solve(used, start, problem.near, priors, chosen, turn, last, refine_lights)
+        change = float(np.abs(solution.balls - table[chosen]).max())
+        table[chosen], vectors, board = solution.balls, solution.vectors, solution.board
+        gains[index] = edges.lit_levels(gains[index])
+        before = spread
+        if turn >= len(COARSE):
+            spread = fit_spread(used)
+        elif turn == len(COARSE) - 1:
+            spread = _first_spread(problem, shadows, table[chosen], vectors, board, gains[chosen], settings, threads)
+        if abs(spread.sharp_px - before.sharp_px) > SMALL_SPREAD_CHANGE * before.sharp_px and turn >= len(COARSE):
+            change = np.inf
+        if wide is not None:
+            moved_deg = np.degrees(angles_rad(vectors, problem.vectors))
+            warnings = refuse_misfits(complaints, used, solution.weight, moved_deg) + check_shifts(wide)
+        turn += 1
+        progress(0.1 + 0.8 * (1.0 if last else turn / passes))
+        doubts = () if wide is None else displaced_images(wide)
+        result = Fit(problem, index, usability, solution, edges, spread, warnings, doubts)
+    return result
+
+
+def _wide_outlines(problem: Problem, shadows: ShadowMap, table: Array, vectors: Array, spread: EdgeSpread) -> Outlines:
+    """Outlines of some balls in the middle, looked for farther off, to tell whether an image is shifted."""
+    few = np.argsort(np.hypot(table[:, 0], table[:, 1]))[:SHIFT_BALLS]
+    azimuths = np.arctan2(vectors[:, 1], vectors[:, 0])
+    return outline_centres(problem.radiance, shadows, table[few], azimuths, spread.sharp_px, coarse=True)
+
+
+def _first_spread(
+    problem: Problem,
+    shadows: ShadowMap,
+    table: Array,
+    vectors: Array,
+    board: Board,
+    gains: Array,
+    settings: EdgeSettings,
+    threads: int,
+) -> EdgeSpread:
+    """The spread, of a few, that leaves the least noise on a few balls."""
+    few = slice(0, None, max(1, len(table) // SPREAD_BALLS))
+    noise = []
+    for spread_px in SPREADS_PX:
+        tried = EdgeSettings(spread_px, 0.0, settings.reach_px)
+        edges = measure_edges(
+            problem.radiance, shadows, table[few], vectors, problem.near, board, gains[few], tried, threads
+        )
+        noise.append(float(np.median(edges.noise_levels)))
+    return EdgeSpread(SPREADS_PX[int(np.argmin(noise))], 0.0)
+
+
+def _settings(turn: int, radius: float, spread: EdgeSpread, last: bool) -> EdgeSettings:
+    """Coarse first, then as sharp as the edges are."""
+    if turn < len(COARSE):
+        reach = COARSE[turn] * radius + COARSE_EXTRA_PX
+        return EdgeSettings(1.0, 0.0, reach, max(1, int(reach / COARSE_STEPS)), coarse=True)
+    widest = float(np.hypot(spread.sharp_px, TYPICAL_WAY * spread.lamp_rad * radius))
+    return EdgeSettings(spread.sharp_px, spread.lamp_rad, REACH_SIGMAS * widest + REACH_PX, thorough=last)
+
+
+def _priors(problem: Problem, table: Array, field: NormalField | None, refine_lights: bool) -> Priors:
+    """What is known before: the finder's circles, the rig, a board that is nearly flat."""
+    radiance = problem.radiance
+    half = max(radiance.height, radiance.width) / 2.0
+    u_board = np.array([TILT, TILT, BOW_SLOPE / half, BOW_SLOPE / half, BOW_SLOPE / half])
+    board = np.zeros(SHAPE_TERMS)
+    if field is not None:
+        outside = outside_balls(radiance.height, radiance.width, table)
+        fitted = board_from_normals(field, outside)
+        if fitted is not None:
+            # Where few normals are good, the quadratic is anything: a board that steep is none.
+            steepest = np.abs(fitted) * [1.0, 1.0, 2.0 * half, half, 2.0 * half]
+            # Its tilt is that of wrong lights, too; its bow is the board's.
+            board[2:] = fitted[2:] if steepest.max() < STEEPEST_BOARD else 0.0
+    u_balls = np.column_stack(
+        [problem.u_centre, problem.u_centre, table[:, 3], problem.u_radius, np.full(len(table), FIRST_Q_SPREAD)]
+    )
+    rig = np.radians(RIG_DEG if refine_lights else CERTAIN_RIG_DEG)
+    return Priors(table.copy(), u_balls, problem.vectors.copy(), float(rig), board, u_board)
+
+
+def _with_outlines(problem: Problem, priors: Priors, shadows: ShadowMap, table: Array, spread: EdgeSpread) -> Priors:
+    """Centres of the priors: the finder's and the outlines', weighted."""
+    azimuths = np.arctan2(problem.vectors[:, 1], problem.vectors[:, 0])
+    outlines = outline_centres(problem.radiance, shadows, table, azimuths, spread.sharp_px)
+    centres, u_outline = outlines.centres, outlines.u_centre
+    known = np.isfinite(u_outline) & ~problem.bridged
+    # What outlines scatter beyond their own word shows against the shadows' centres, but for a common shift.
+    u_outline = np.where(known, u_outline, 1.0)
+    off = (centres - table[:, :2])[known]
+    scatter = 1.4826 * np.median(np.abs(off - np.median(off, axis=0)) / u_outline[known, None]) if known.any() else 1.0
+    u_outline = OUTLINE_SAFETY * max(float(scatter), 1.0) * u_outline
+    by_outline = np.where(known, 1.0 / (OUTLINE_FLOOR_PX**2 + u_outline**2), 0.0)
+    by_finder = 1.0 / problem.u_centre**2
+    balls, u_balls = priors.balls.copy(), priors.u_balls.copy()
+    weight = by_outline + by_finder
+    for axis in (0, 1):
+        outline = np.where(known, centres[:, axis], 0.0)
+        balls[:, axis] = (by_outline * outline + by_finder * problem.table[:, axis]) / weight
+        u_balls[:, axis] = 1.0 / np.sqrt(weight)
+    return priors._replace(balls=balls, u_balls=u_balls)
+
+
+def _solve(
+    edges: Edges,
+    start: tuple[Array, Array, Board],
+    near: bool,
+    priors: Priors,
+    chosen: NDArray[np.intp],
+    turn: int,
+    last: bool,
+    refine_lights: bool,
+) -> tuple[Solution, Priors]:
+    """Bundle; once edges are sharp, the scatter of lights and of q is taken from the result (empirical Bayes)."""
+    sharp = turn >= len(COARSE)
+    redescend = (REDESCEND if turn > len(COARSE) else REDESCEND_FIRST) if sharp else None
+
+    def bundle(at: tuple[Array, Array, Board], rounds: int) -> Solution:
+        own = priors._replace(balls=priors.balls[chosen], u_balls=priors.u_balls[chosen])
+        return solve_bundle(edges, *at[:2], near, at[2], own, redescend=redescend, rounds=rounds)
+
+    solution = bundle(start, LONG_ROUNDS if last else SHORT_ROUNDS)
+    for _ in range(EMPIRICAL_ROUNDS if last else 1):
+        before = priors
+        u_balls = priors.u_balls.copy()
+        u_balls[chosen, 4] = q_spread(solution, priors.u_balls[chosen, 4])
+        priors = priors._replace(u_balls=u_balls)
+        if refine_lights:
+            turns = np.square(angles_rad(solution.vectors, priors.vectors)) + np.square(solution.u_light_rad)
+            scatter = float(np.clip(np.sqrt(turns.mean() / 2.0), *np.radians(RIG_LIMITS_DEG)))
+            priors = priors._replace(u_light_rad=scatter)
+        if not last:
+            break
+        solution = bundle((solution.balls, solution.vectors, solution.board), SHORT_ROUNDS)
+        if np.isclose(before.u_light_rad, priors.u_light_rad, rtol=SETTLED) and np.allclose(
+            before.u_balls[:, 4], priors.u_balls[:, 4], rtol=SETTLED
+        ):
+            break
+    return solution, priors
