@@ -290,8 +290,9 @@ def test_bits_do_not_depend_on_threads_or_on_reused_memory() -> None:
 
 
 def test_progress_rises_and_ctrl_c_in_it_stops_the_work() -> None:
-    scene = bgars.Scene.ball_array(3, 3)
-    capture, truth = bgars.simulate(scene, RING, SOLDER, bgars.Camera(pixel_pitch_um=5.0))
+    # Much work: what is done within a tenth of a second tells no progress.
+    scene = bgars.Scene.ball_array(6, 6)
+    capture, truth = bgars.simulate(scene, RING, SOLDER, bgars.Camera(pixel_pitch_um=3.0))
     seen: list[float] = []
     bgars.estimate_normals(capture, anchors=circles_px(capture, truth), progress=seen.append)
     assert seen == sorted(seen)

@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 
 /// The middle of some values by `order`, the upper one of an even number; zero without values. Reorders them.
-pub(crate) fn median<T: Copy + Default>(values: &mut [T], order: fn(&T, &T) -> Ordering) -> T {
+pub(crate) fn median<T: Copy + Default>(values: &mut [T], order: impl Fn(&T, &T) -> Ordering) -> T {
     if values.is_empty() {
         return T::default();
     }

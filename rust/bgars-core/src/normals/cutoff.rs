@@ -21,7 +21,16 @@ pub(super) fn cutoffs<K: Key>(keys: &[&Lanes<K>], gap: K) -> Lanes<K> {
     }
 }
 
-/// Eight lights: a sorting network of 19 exchanges (Knuth, The Art of Computer Programming 3, section 5.3.4), then the steps.
+/// Calls a macro with the pairs of places that sort eight values: a network of 19 exchanges (Knuth, The Art of Computer
+/// Programming 3, section 5.3.4).
+macro_rules! sort_eight {
+    ($exchange:ident) => {
+        $exchange!(0 1, 2 3, 4 5, 6 7, 0 2, 1 3, 4 6, 5 7, 1 2, 5 6, 0 4, 1 5, 2 6, 3 7, 2 4, 3 5, 1 2, 3 4, 5 6)
+    };
+}
+pub(super) use sort_eight;
+
+/// Eight lights: a sorting network, then the steps.
 #[inline(always)]
 fn sorted_cutoffs<K: Key>(keys: &[&Lanes<K>; 8], gap: K) -> Lanes<K> {
     // One array instead of eight places, or the compiler does not vectorise floats.
@@ -34,7 +43,7 @@ fn sorted_cutoffs<K: Key>(keys: &[&Lanes<K>; 8], gap: K) -> Lanes<K> {
                 (s[$a], s[$b]) = (s[$a].least(s[$b]), s[$a].largest(s[$b]));
             )*};
         }
-        exchange!(0 1, 2 3, 4 5, 6 7, 0 2, 1 3, 4 6, 5 7, 1 2, 5 6, 0 4, 1 5, 2 6, 3 7, 2 4, 3 5, 1 2, 3 4, 5 6);
+        sort_eight!(exchange);
         let mut cutoff = s[7];
         for kept in (3..8).rev() {
             cutoff = if s[kept].is_over(s[kept - 1], gap) { s[kept - 1] } else { cutoff };

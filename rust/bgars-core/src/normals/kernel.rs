@@ -9,6 +9,7 @@ use super::confidence::confidence;
 use super::lane_solve::{Choice, LaneSolver};
 use super::lanes::{self, Input, Sink};
 use super::robust::{self, RobustFilter, RobustScratch};
+use super::robust_lanes::RobustLanes;
 use super::solve::{Solution, SubsetSolver};
 use super::specular::specular_filter;
 use super::{Method, NormalMap, NormalMapMut};
@@ -298,7 +299,10 @@ impl<'a, P: Pixel> Kernel<'a, P> {
         let choice = match method {
             Method::Lambertian => Some(Choice::All),
             Method::SpecularFilter { threshold } => Some(Choice::UpToGap(gap(threshold, radiometry.full_scale))),
-            Method::RobustFilter(_) => None,
+            Method::RobustFilter(_) => robust
+                .as_ref()
+                .and_then(|robust| RobustLanes::new(robust, lights.len(), full_scale))
+                .map(Choice::Window),
         };
         let lanes = choice.and_then(|choice| LaneSolver::new(lights, choice));
         let planes = (0..stack.lights()).map(|light| stack.plane(light)).collect();

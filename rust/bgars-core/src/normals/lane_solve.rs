@@ -6,6 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::cutoff::{LANES, Lanes, cutoffs};
 use super::gram::{BYTE_LIGHTS, ENTRIES, GramTables};
+use super::robust_lanes::RobustLanes;
 use crate::lights::conditioning;
 use crate::{Lights, Pixel};
 
@@ -20,12 +21,14 @@ const MIN_ROUGH_CONDITIONING: f32 = 0.1;
 pub(super) type Careful = u64;
 
 /// Which lights a block keeps.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub(super) enum Choice {
     /// All of them.
     All,
     /// Up to the first gap of the sorted values, in linear grey levels.
     UpToGap(f32),
+    /// The window that a Lambertian facet explains best.
+    Window(RobustLanes),
 }
 
 /// What does not change from pixel to pixel.
@@ -66,13 +69,13 @@ impl LaneSolver {
 pub(super) struct Kept<K> {
     /// The keys; of a light that is dropped, zero.
     keys: Vec<Lanes<K>>,
-    /// A bit a light, a byte for every eight.
+    /// A bit a light, a byte for every eight; set where nothing was chosen.
     bits: Vec<Lanes<u8>>,
 }
 
 impl<K: Pixel> Kept<K> {
     pub fn new(lights: usize) -> Self {
-        Self { keys: vec![[K::ZERO; LANES]; lights], bits: vec![[0; LANES]; lights.div_ceil(BYTE_LIGHTS)] }
+        Self { keys: vec![[K::ZERO; LANES]; lights], bits: vec![[u8::MAX; LANES]; lights.div_ceil(BYTE_LIGHTS)] }
     }
 
     /// Takes the keys up to the cutoffs; true when these are all.
@@ -94,10 +97,28 @@ impl<K: Pixel> Kept<K> {
                 *kept_key = kept;
             }
             *bits = wide.map(K::byte);
-            let everywhere = bits.iter().fold(u8::MAX, |everywhere, bits| everywhere & bits);
-            all &= everywhere == u8::MAX >> (BYTE_LIGHTS - keys.len());
+            all &= are_all(bits, keys.len());
         }
         all
+    }
+
+    /// Takes the keys of up to eight lights whose bits are set; true when these are all.
+    #[inline(always)]
+    fn choose_bits(&mut self, keys: &[&Lanes<K>], bits: &Lanes<u8>) -> bool {
+        for (light, (&&key, kept_key)) in keys.iter().zip(&mut self.keys).enumerate() {
+            let mut kept = key;
+            for lane in 0..LANES {
+                kept[lane] = if bits[lane] >> light & 1 == 1 { key[lane] } else { K::ZERO };
+            }
+            *kept_key = kept;
+        }
+        self.bits[0] = *bits;
+        are_all(bits, keys.len())
+    }
+
+    /// True where a lane keeps a light.
+    pub fn holds(&self, light: usize, lane: usize) -> bool {
+        self.bits[light / BYTE_LIGHTS][lane] >> (light % BYTE_LIGHTS) & 1 == 1
     }
 
     /// How many they are.
@@ -111,6 +132,12 @@ impl<K: Pixel> Kept<K> {
         }
         counts
     }
+}
+
+/// True when every lane keeps all of up to eight lights.
+#[inline(always)]
+fn are_all(bits: &Lanes<u8>, lights: usize) -> bool {
+    bits.iter().fold(u8::MAX, |everywhere, bits| everywhere & bits) == u8::MAX >> (BYTE_LIGHTS - lights)
 }
 
 /// The least squares of a block.
@@ -134,21 +161,35 @@ impl Solutions {
 }
 
 /// Chooses and solves; with `FMA`, products are added without rounding between, for processors that do so in one step.
+///
+/// `clipped` has a bit a light.
 #[inline(always)]
 pub(super) fn solve<K: Pixel, const FMA: bool>(
     solver: &LaneSolver,
     keys: &[&Lanes<K>],
+    clipped: &Lanes<u8>,
     kept: &mut Kept<K>,
     offset: Option<&Lanes<f32>>,
     out: &mut Solutions,
 ) {
-    if let Choice::UpToGap(gap) = solver.choice {
-        let cutoffs = cutoffs(keys, K::gap(gap));
-        if !kept.choose(keys, &cutoffs) {
-            return solve_kept::<K, FMA>(solver, kept, offset, out);
+    let mut careful = 0;
+    let all = match &solver.choice {
+        Choice::All => true,
+        Choice::UpToGap(gap) => kept.choose(keys, &cutoffs(keys, K::gap(*gap))),
+        Choice::Window(robust) => {
+            let mut bits = [0; LANES];
+            let value_of =
+                |light: usize, lane: usize| keys[light][lane].to_f32() - offset.map_or(0.0, |offset| offset[lane]);
+            careful = robust.choose::<FMA>(&solver.directions, value_of, clipped, &mut bits);
+            kept.choose_bits(keys, &bits)
         }
+    };
+    if all {
+        solve_all::<K, FMA>(solver, keys, offset, out);
+    } else {
+        solve_kept::<K, FMA>(solver, kept, offset, out);
     }
-    solve_all::<K, FMA>(solver, keys, offset, out);
+    out.careful |= careful;
 }
 
 /// Calls `$body` for the lights by eights, then fours, then one by one: `$keys`, `$vectors` are arrays of that size, over
@@ -281,7 +322,7 @@ fn refine<K: Pixel, const FMA: bool>(
 
 /// True for a light that is kept.
 #[inline(always)]
-pub(super) fn is_kept<K: Pixel>(key: K, cutoff: K) -> bool {
+fn is_kept<K: Pixel>(key: K, cutoff: K) -> bool {
     !key.is_over(cutoff, K::gap(0.0))
 }
 
@@ -307,12 +348,12 @@ fn add_products<const FMA: bool, const C: usize>(
 
 /// `sum + a b`.
 #[inline(always)]
-fn add_product<const FMA: bool>(sum: f32, a: f32, b: f32) -> f32 {
+pub(super) fn add_product<const FMA: bool>(sum: f32, a: f32, b: f32) -> f32 {
     if FMA { a.mul_add(b, sum) } else { sum + a * b }
 }
 
 #[inline(always)]
-fn dot<const FMA: bool>([a, b, c]: [f32; 3], [x, y, z]: [f32; 3]) -> f32 {
+pub(super) fn dot<const FMA: bool>([a, b, c]: [f32; 3], [x, y, z]: [f32; 3]) -> f32 {
     add_product::<FMA>(add_product::<FMA>(a * x, b, y), c, z)
 }
 

@@ -8,9 +8,9 @@ use bytemuck::NoUninit;
 use multiversion::{multiversion, target::target_cfg_f};
 
 use super::confidence::{HALF_DEG, PRIOR_RESIDUAL};
-use super::cutoff::{LANES, Lanes, cutoffs};
+use super::cutoff::{LANES, Lanes};
 use super::kernel::Out;
-use super::lane_solve::{Careful, Choice, Kept, LaneSolver, Solutions, is_kept, solve};
+use super::lane_solve::{Careful, Choice, Kept, LaneSolver, Solutions, solve};
 use crate::{Pixel, Radiometry, stream};
 
 /// How far ahead the images are fetched: as many streams as lights are more than processors follow by themselves.
@@ -57,6 +57,18 @@ type Make<'a, K> = dyn Fn(&Range<usize>, &mut [Lanes<K>]) + 'a;
 /// What is to be subtracted from the keys of a block.
 type Offsets<'a> = dyn Fn(&Range<usize>, &mut Lanes<f32>) + 'a;
 
+/// Marks the clipped lights of a block, a bit a light.
+type Clips<'a> = dyn Fn(&Range<usize>, &mut Lanes<u8>) + 'a;
+
+/// What is asked beside the keys.
+#[derive(Clone, Copy)]
+struct Common<'a> {
+    mask: Option<&'a [bool]>,
+    full_scale: f32,
+    /// `None` where clipped lights are as good as others.
+    clips: Option<&'a Clips<'a>>,
+}
+
 /// Works on `pixels` (of the whole image).
 #[allow(clippy::float_cmp)] // intensities that are 1 by default
 pub(super) fn run<P: Pixel>(solver: &LaneSolver, input: &Input<'_, P>, pixels: Range<usize>, sink: &mut Sink<'_, '_>) {
@@ -68,7 +80,16 @@ pub(super) fn run<P: Pixel>(solver: &LaneSolver, input: &Input<'_, P>, pixels: R
             *offset = radiometry.offset(pixel);
         }
     };
-    let common = (mask, radiometry.full_scale);
+    let mark_clipped = |block: &Range<usize>, clipped: &mut Lanes<u8>| {
+        *clipped = [0; LANES];
+        for (light, plane) in planes.iter().enumerate() {
+            for (clipped, code) in clipped.iter_mut().zip(&plane[block.clone()]) {
+                *clipped |= u8::from(code.to_f32() >= radiometry.saturation) << light;
+            }
+        }
+    };
+    let clips: Option<&Clips<'_>> = if let Choice::Window(_) = solver.choice { Some(&mark_clipped) } else { None };
+    let common = Common { mask, full_scale: radiometry.full_scale, clips };
     if plain {
         let offsets: Option<&Offsets<'_>> = if has_offsets { Some(&load_offsets) } else { None };
         run_blocks(solver, &Source::Images(planes), offsets, common, pixels, sink);
@@ -92,7 +113,7 @@ fn run_blocks<K: Pixel>(
     solver: &LaneSolver,
     source: &Source<'_, K>,
     offsets: Option<&Offsets<'_>>,
-    common: (Option<&[bool]>, f32),
+    common: Common<'_>,
     pixels: Range<usize>,
     sink: &mut Sink<'_, '_>,
 ) {
@@ -108,7 +129,7 @@ fn run_blocks_with<K: Pixel, const FMA: bool>(
     solver: &LaneSolver,
     source: &Source<'_, K>,
     offsets: Option<&Offsets<'_>>,
-    (mask, full_scale): (Option<&[bool]>, f32),
+    Common { mask, full_scale, clips }: Common<'_>,
     pixels: Range<usize>,
     sink: &mut Sink<'_, '_>,
 ) {
@@ -116,6 +137,7 @@ fn run_blocks_with<K: Pixel, const FMA: bool>(
     let mut copies = vec![[K::ZERO; LANES]; solver.lights()];
     let mut in_place = Vec::with_capacity(solver.lights());
     let mut offset = [0.0; LANES];
+    let mut clipped = [0; LANES];
     let mut solutions = Solutions::new();
     for first in pixels.clone().step_by(LANES) {
         let block = first..(first + LANES).min(pixels.end);
@@ -156,10 +178,13 @@ fn run_blocks_with<K: Pixel, const FMA: bool>(
         if let Some(load) = offsets {
             load(&block, &mut offset);
         }
-        solve::<K, FMA>(solver, keys, &mut kept, offsets.map(|_| &offset), &mut solutions);
+        if let Some(mark) = clips {
+            mark(&block, &mut clipped);
+        }
+        solve::<K, FMA>(solver, keys, &clipped, &mut kept, offsets.map(|_| &offset), &mut solutions);
         write(full_scale, &mut solutions, used, span.clone(), sink.out);
         if !sink.out.kept_sets.is_empty() {
-            write_sets(solver.choice, keys, used, span, sink.out);
+            write_sets(&kept, used, span, sink.out);
         }
         if solutions.careful != 0 {
             for lane in (0..block.len()).filter(|lane| solutions.careful >> lane & 1 == 1) {
@@ -249,24 +274,14 @@ fn store<T: NoUninit, const N: usize>(block: &[T; N], out: &mut [T], streamed: b
     }
 }
 
-/// The kept lights themselves; asked for seldom, so they are found once more.
+/// The kept lights themselves; asked for seldom.
 #[inline(never)]
-fn write_sets<K: Pixel>(
-    choice: Choice,
-    keys: &[&Lanes<K>],
-    used: Option<&[bool]>,
-    span: Range<usize>,
-    out: &mut Out<'_>,
-) {
-    let cutoffs = match choice {
-        Choice::All => [K::LARGEST; LANES],
-        Choice::UpToGap(gap) => cutoffs(keys, K::gap(gap)),
-    };
+fn write_sets<K: Pixel>(kept: &Kept<K>, used: Option<&[bool]>, span: Range<usize>, out: &mut Out<'_>) {
+    let lights = out.kept_sets.len() / out.albedo.len();
     for (lane, pixel) in span.enumerate() {
-        let sets = &mut out.kept_sets[pixel * keys.len()..(pixel + 1) * keys.len()];
         let here = used.is_none_or(|used| used[lane]);
-        for (kept, key) in sets.iter_mut().zip(keys) {
-            *kept = here && is_kept(key[lane], cutoffs[lane]);
+        for (light, set) in out.kept_sets[pixel * lights..(pixel + 1) * lights].iter_mut().enumerate() {
+            *set = here && kept.holds(light, lane);
         }
     }
 }

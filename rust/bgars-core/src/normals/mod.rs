@@ -11,6 +11,7 @@ mod kernel;
 mod lane_solve;
 mod lanes;
 mod robust;
+mod robust_lanes;
 mod solve;
 mod specular;
 

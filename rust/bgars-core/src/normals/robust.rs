@@ -17,10 +17,10 @@ const MIN_KEPT: usize = 3;
 const MIN_SHARE: usize = 3;
 
 /// Smallest `det(L^T L)` of a window: three neighbours of a ring of eight at 65 degrees just pass.
-const MIN_DETERMINANT: f64 = 3e-3;
+pub(super) const MIN_DETERMINANT: f64 = 3e-3;
 
 /// Cost of a dropped light that the fit cannot explain, relative to a kept light's.
-const DROPPED_WEIGHT: f64 = 0.1;
+pub(super) const DROPPED_WEIGHT: f64 = 0.1;
 
 /// Fits that the noise level is worth: keeps a fit of three lights, which has no residual, from looking perfect.
 const PRIOR_FITS: f64 = 0.7;
@@ -138,7 +138,6 @@ struct Ranked {
 /// What does not change from pixel to pixel.
 #[derive(Debug)]
 pub(super) struct RobustFilter {
-    /// First and one-past-last rank of each window, the larger windows first.
     windows: Vec<(usize, usize)>,
     noise_level: f64,
 }
@@ -149,13 +148,23 @@ impl RobustFilter {
         Self { windows: windows(lights), noise_level: f64::from(params.noise_level) / 255.0 }
     }
 
+    /// First and one-past-last rank of each window, the larger windows first.
+    pub fn windows(&self) -> &[(usize, usize)] {
+        &self.windows
+    }
+
+    /// Standard deviation of a value at this full scale.
+    pub fn noise(&self, full_scale: f64) -> f64 {
+        self.noise_level * full_scale
+    }
+
     /// Writes the kept lights of a pixel to `kept`; see [`robust_filter`].
     pub fn choose(&self, pixel: &Pixel<'_>, solver: &SubsetSolver, scratch: &mut RobustScratch, kept: &mut [bool]) {
         sort_lights(pixel.values, &mut scratch.order);
         let median = median(pixel.values, &scratch.order);
         put_clipped_last(pixel.clipped, &mut scratch.order);
         rank(pixel, scratch);
-        let noise = self.noise_level * pixel.full_scale;
+        let noise = self.noise(pixel.full_scale);
         let mut best: Option<(bool, f64, (usize, usize))> = None;
         for &window in &self.windows {
             let Some(facet) = fit(window, solver, scratch) else { continue };
@@ -248,10 +257,18 @@ fn cost((first, end): (usize, usize), facet: &Vector3<f64>, ranked: &[Ranked], n
             unexplained += difference * difference;
         }
     }
-    let kept = (end - first) as f64;
-    let freedom = kept - MIN_KEPT as f64 + PRIOR_FITS;
-    let mean = (residuals + DROPPED_WEIGHT * unexplained + PRIOR_FITS * noise * noise) / freedom;
-    mean * (ranked.len() as f64 / kept).powi(DROPPING_POWER)
+    (residuals + DROPPED_WEIGHT * unexplained + prior_squares(noise)) * cost_factor(end - first, ranked.len())
+}
+
+/// Cost of a squared residual in a window: (lights / kept)^4 a degree of freedom.
+pub(super) fn cost_factor(kept: usize, lights: usize) -> f64 {
+    let freedom = kept as f64 - MIN_KEPT as f64 + PRIOR_FITS;
+    (lights as f64 / kept as f64).powi(DROPPING_POWER) / freedom
+}
+
+/// Squared residuals that every fit is taken to have.
+pub(super) fn prior_squares(noise: f64) -> f64 {
+    PRIOR_FITS * noise * noise
 }
 
 #[cfg(test)]

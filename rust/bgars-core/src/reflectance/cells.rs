@@ -1,6 +1,6 @@
 //! Smooth tables on the disc of normals: what each ball shows there, and what the other balls say about one.
 
-use crate::median::median;
+use rayon::prelude::*;
 
 /// Cells along the diameter of the disc.
 pub const SIDE: usize = 41;
@@ -86,27 +86,68 @@ impl Population {
         Self { channels, balls: balls.len(), values }
     }
 
-    /// Median and spread of the balls but one; zero where too few have seen a cell.
-    pub fn without(&self, ball: usize) -> CellTable {
-        let cells = SIDE * SIDE * self.channels;
-        let mut table = CellTable { channels: self.channels, middle: vec![0.0; cells], sigma: vec![0.0; cells] };
-        let mut others = Vec::with_capacity(self.balls);
-        for (cell, values) in self.values.chunks_exact(self.balls).enumerate() {
-            others.clear();
-            others.extend(
-                values.iter().enumerate().filter(|(other, value)| *other != ball && value.is_finite()).map(|(_, &v)| v),
-            );
-            if others.len() >= MIN_BALLS {
-                let middle = median(&mut others, f32::total_cmp);
-                for value in &mut others {
-                    *value = (*value - middle).abs();
-                }
-                table.middle[cell] = middle;
-                table.sigma[cell] = 1.4826 * median(&mut others, f32::total_cmp);
-            }
+    /// For each ball median and spread of all others; zero where too few have seen a cell.
+    pub fn left_out(&self) -> Vec<CellTable> {
+        if self.balls == 0 {
+            return Vec::new();
         }
-        table
+        let cells = SIDE * SIDE * self.channels;
+        let mut others = vec![(0.0, 0.0); cells * self.balls];
+        let each_cell = others.par_chunks_mut(self.balls).zip(self.values.par_chunks(self.balls));
+        each_cell.for_each_init(Sorted::default, |sorted, (others, values)| sorted.write(values, others));
+        (0..self.balls)
+            .into_par_iter()
+            .map(|ball| {
+                let (middle, sigma) = others[ball..].iter().step_by(self.balls).copied().unzip();
+                CellTable { channels: self.channels, middle, sigma }
+            })
+            .collect()
     }
+}
+
+/// What the balls show in one cell, sorted once for all.
+#[derive(Default)]
+struct Sorted {
+    values: Vec<f32>,
+    /// Distances of the values to the two that can be the median when one is left out.
+    distances: [Vec<f32>; 2],
+}
+
+impl Sorted {
+    /// Writes for each of `values` the median of all others and 1.4826 times their median absolute deviation.
+    fn write(&mut self, values: &[f32], others: &mut [(f32, f32)]) {
+        let seen = |value: &f32| value.is_finite();
+        self.values.clear();
+        self.values.extend(values.iter().copied().filter(seen));
+        if self.values.len() < MIN_BALLS {
+            return;
+        }
+        self.values.sort_unstable_by(f32::total_cmp);
+        let lower = (self.values.len() - 1) / 2;
+        for (distances, &middle) in self.distances.iter_mut().zip(&self.values[lower..]) {
+            distances.clear();
+            distances.extend(self.values.iter().map(|value| (value - middle).abs()));
+            distances.sort_unstable_by(f32::total_cmp);
+        }
+        for (value, other) in values.iter().zip(others) {
+            let own = Some(*value).filter(seen);
+            if self.values.len() - usize::from(own.is_some()) < MIN_BALLS {
+                continue;
+            }
+            let at = median_without(&self.values, own);
+            let (middle, distances) = (self.values[at], &self.distances[at - lower]);
+            let sigma = distances[median_without(distances, own.map(|own| (own - middle).abs()))];
+            *other = (middle, 1.4826 * sigma);
+        }
+    }
+}
+
+/// Place of the median of sorted values, one of them left out if given; the upper of two middle ones.
+fn median_without(sorted: &[f32], left_out: Option<f32>) -> usize {
+    let Some(left_out) = left_out else { return sorted.len() / 2 };
+    let middle = (sorted.len() - 1) / 2;
+    let rank = sorted.partition_point(|&value| value < left_out);
+    if middle < rank { middle } else { middle + 1 }
 }
 
 /// A table on the disc with a spread, `channels` values a cell.
@@ -135,5 +176,39 @@ impl CellTable {
             }
         }
         sums
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::float_cmp)]
+mod tests {
+    use super::*;
+    use crate::median::median;
+
+    #[test]
+    fn what_is_left_out_is_not_counted() {
+        assert!(Population::new(1, &[]).left_out().is_empty());
+        for balls in 1..20usize {
+            // Repeated values, some far off, and some balls that have seen nothing.
+            let of_ball = |ball: usize| match ball * ball % 7 {
+                3 => f32::NAN,
+                5 => 40.0,
+                other => other as f32 - 0.25 * (ball % 3) as f32,
+            };
+            let tables: Vec<Vec<f32>> = (0..balls).map(|ball| vec![of_ball(ball); SIDE * SIDE]).collect();
+            for (ball, table) in Population::new(1, &tables).left_out().into_iter().enumerate() {
+                let others = (0..balls).filter(|&other| other != ball).map(of_ball);
+                let mut others: Vec<f32> = others.filter(|value| value.is_finite()).collect();
+                let (mut middle, mut sigma) = (0.0, 0.0);
+                if others.len() >= MIN_BALLS {
+                    middle = median(&mut others, f32::total_cmp);
+                    for value in &mut others {
+                        *value = (*value - middle).abs();
+                    }
+                    sigma = 1.4826 * median(&mut others, f32::total_cmp);
+                }
+                assert_eq!((table.middle[0], table.sigma[0]), (middle, sigma), "ball {ball} of {balls}");
+            }
+        }
     }
 }

@@ -1,5 +1,7 @@
 //! Places where a ball is not the sphere of its circle: many pixels agree on another normal, and the other balls do not.
 
+use rayon::prelude::*;
+
 use super::ball::BallPixel;
 use super::cells::{CellSums, CellTable, Population, SIDE};
 
@@ -25,12 +27,11 @@ const LOSS: usize = 2;
 /// For each ball how its normals differ from its circle's, on the disc; zero where nothing is odd, `None` where nothing is
 /// anywhere.
 pub fn odd_places(found: &[Vec<BallPixel>]) -> Vec<Option<CellTable>> {
-    let own: Vec<Vec<f32>> = found.iter().map(|pixels| ball_deviation(pixels)).collect();
-    let population = Population::new(CHANNELS, &own);
-    own.iter()
-        .enumerate()
-        .map(|(ball, own)| {
-            let mut table = population.without(ball);
+    let own: Vec<Vec<f32>> = found.par_iter().map(|pixels| ball_deviation(pixels)).collect();
+    let others = Population::new(CHANNELS, &own).left_out();
+    own.par_iter()
+        .zip(others)
+        .map(|(own, mut table)| {
             let differences: Vec<[f32; 2]> = own
                 .chunks_exact(CHANNELS)
                 .enumerate()

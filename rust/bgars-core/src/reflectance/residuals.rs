@@ -22,8 +22,7 @@ pub fn learnt_corrections(samples: &Samples, materials: &[Material]) -> Option<V
     let balls = materials.len();
     let tables: Vec<Vec<f32>> =
         (0..balls).into_par_iter().map(|ball| ball_residuals(samples, ball, &materials[ball])).collect();
-    let population = Population::new(samples.lights, &tables);
-    let corrections: Vec<CellTable> = (0..balls).into_par_iter().map(|ball| population.without(ball)).collect();
+    let corrections = Population::new(samples.lights, &tables).left_out();
     let (mut without, mut with) = (0.0, 0.0);
     for pixel in (0..samples.len()).step_by((samples.len() / JUDGED_PIXELS).max(1)) {
         let ball = samples.balls[pixel];
