@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import NamedTuple
 
 import bgars
@@ -18,93 +17,26 @@ from bgars.report.prior import prior_share, show_prior
 from bgars.simulate import Defect
 from matplotlib.colors import LogNorm
 from matplotlib.patches import Circle
-from numpy.typing import NDArray
+from method_failures import failure, inspected_alike
+from method_parts import (
+    BOARD,
+    FOLDER,
+    GREY_LEVELS,
+    METAL,
+    NOISY,
+    PAINT,
+    RIG,
+    Floats,
+    Part,
+    bent,
+    circle_normals,
+    levels,
+    made,
+    say,
+)
 from scipy.optimize import least_squares
 
-FOLDER = Path(__file__).parent / "images" / "method"
-Floats = NDArray[np.float64]
-PAINT = bgars.Material(i_d=0.5, i_s=1.0, hardness=40)
-METAL = bgars.Material(i_d=0.0, i_s=1.0, hardness=40)
-NOISY = bgars.Camera(supersample=2, full_well_e=20_000.0, read_noise_levels=0.3)
-BOARD = bgars.Board(material=bgars.Material.matte(0.12))
-RIG = bgars.LightRig.ring(8)
-GREY_LEVELS = 255.0
 ERROR_LIMITS_DEG = (0.02, 20.0)
-
-
-def say(*values: object) -> None:
-    """Print the numbers behind a picture."""
-    sys.stdout.write(" ".join(f"{value:.3f}" if isinstance(value, float) else str(value) for value in values) + "\n")
-
-
-class Part(NamedTuple):
-    """A simulated part with its estimate."""
-
-    capture: bgars.Capture
-    truth: bgars.SimulatedTruth
-    field: bgars.NormalField
-
-    def error_deg(self) -> Floats:
-        """(H, W) angle between estimate and truth on balls; NaN elsewhere."""
-        error: Floats = np.where(
-            self.truth.mask, bgars.angular_error_deg(self.field.normals, self.truth.normals), np.nan
-        )
-        return error
-
-
-def made(scene: bgars.Scene, material: bgars.Material, camera: bgars.Camera = NOISY) -> Part:
-    """Simulate and estimate with the default method."""
-    capture, truth = bgars.simulate(scene, RIG, material, camera)
-    return Part(capture, truth, bgars.estimate_normals(capture))
-
-
-def levels(material: SurfaceMaterial, normals: Floats, directions: Floats) -> Floats:
-    """(..., L) grey levels of normals (..., 3) under lights (L, 3): the equation of docs/reflectance.md."""
-    half = directions + np.array([0.0, 0.0, 1.0])
-    half /= np.linalg.norm(half, axis=1, keepdims=True)
-    n_v = np.maximum(normals[..., 2:], 0.02)
-    n_l, n_h, v_h = normals @ directions.T, normals @ half.T, half[:, 2]
-    lit = np.maximum(n_l, 0.0)
-    ashikhmin = 1.35 * (1 - (1 - lit / 2) ** 5) * (1 - (1 - n_v / 2) ** 5)
-    total = material.diffuse_level * lit * (1 + material.grazing * (ashikhmin - 1))
-    for lobe in material.lobes:
-        cos2 = np.clip(n_h, 1e-3, 1.0) ** 2
-        t = (1 / cos2 - 1) / lobe.roughness**2
-        tail = max(lobe.tail, 1e-4)
-        peak = np.exp(-(1 + 1 / tail) * np.log1p(tail * t)) / cos2**2
-        if material.masking == "smith":
-            g = _smith(lobe, n_v) * _smith(lobe, np.maximum(n_l, 1e-6))
-        else:
-            g = np.minimum(1.0, 2 * n_h / v_h * np.minimum(n_v, n_l))
-        total = total + np.where(n_l > 0, lobe.strength_level * peak * g / n_v, 0.0)
-    return np.asarray(material.gains) * total + material.ambient_level
-
-
-def _smith(lobe: SurfaceLobe, cos: Floats) -> Floats:
-    slope = np.maximum(lobe.roughness * np.sqrt(np.maximum(1 - cos**2, 0)) / cos, 1e-9)
-    c = 1 / slope
-    beckmann = np.where(c < 1.6, (3.535 * c + 2.181 * c**2) / (1 + 2.276 * c + 2.577 * c**2), 1.0)  # noqa: PLR2004
-    ggx = 2 / (1 + np.sqrt(1 + slope**2))
-    result: Floats = beckmann + lobe.tail * (ggx - beckmann)
-    return result
-
-
-def bent(level: Floats) -> Floats:
-    """Return the scale on which levels are compared."""
-    result: Floats = np.arcsinh(0.03 * level) / 0.03
-    return result
-
-
-def circle_normals(shape: tuple[int, ...], circle: tuple[float, float, float]) -> tuple[Floats, NDArray[np.bool_]]:
-    """(H, W, 3) normals that a silhouette circle gives, and (H, W) where."""
-    height, width = shape
-    x = (np.arange(width) + 0.5 - width / 2 - circle[0])[None, :] / circle[2]
-    y = (height / 2 - np.arange(height) - 0.5 - circle[1])[:, None] / circle[2]
-    x, y = np.broadcast_arrays(x, y)
-    squared = x**2 + y**2
-    return np.stack([x, y, np.sqrt(np.maximum(1 - squared, 0))], axis=-1), squared < 1
-
-
 ROUGHNESSES = (0.2, 0.225, 0.25, 0.275, 0.3, 0.325, 0.35, 0.375, 0.4)
 SHARED = 3
 """Parameters of the material that all pixels share."""
@@ -380,123 +312,6 @@ def flat_top() -> None:
     save(figure, FOLDER / "flat_top.png")
     judged = inside & part.truth.mask & (part.truth.normals[..., 2] > 0.3)  # noqa: PLR2004
     say("flat", flat, np.nanmean(error[judged]), radius)
-
-
-# --- 6: where it fails
-
-
-class Squashed(NamedTuple):
-    """All balls of a part flattened alike."""
-
-    q: float
-    error_deg: float
-    circle_deg: float
-    stated_deg: float
-    loss: float
-
-
-def failure() -> None:
-    """All balls flattened alike: the circles are wrong for all, and nothing in view says so."""
-    figure = new_figure(11.5, 4.2)
-    left, right = panels(figure, 1, 2)[0]
-    for material, name, color, marker in (
-        (PAINT, "I_d = 0.5", OKABE_ITO[1], "o"),
-        (METAL, "bare metal", OKABE_ITO[0], "s"),
-    ):
-        found = []
-        for q in (1.0, 0.98, 0.95, 0.9, 0.85):
-            scene = bgars.Scene.ball_array(2, 2, board=BOARD)
-            scene = replace(scene, balls=tuple(replace(ball, q=q) for ball in scene.balls))
-            part = made(scene, material)
-            error, fit = part.error_deg(), part.field.reflectance
-            judged = part.truth.mask & (part.truth.normals[..., 2] > 0.3)  # noqa: PLR2004
-            circle = np.full(error.shape, np.nan)
-            for place in fit.circles_px if fit is not None else ():
-                normals, inside = circle_normals(error.shape, place)
-                off = bgars.angular_error_deg(normals.astype(np.float32), part.truth.normals)
-                circle[inside] = off[inside]
-            stated = float(np.median(part.field.standard_error_deg[judged]))
-            found.append(
-                Squashed(
-                    q,
-                    float(np.nanmean(error[judged])),
-                    float(np.nanmean(circle[judged])),
-                    stated,
-                    fit.loss if fit else np.nan,
-                )
-            )
-            say("failure", name, found[-1], part.field.choice)
-        q_values = [entry.q for entry in found]
-        left.plot(
-            q_values, [entry.error_deg for entry in found], marker=marker, color=color, label=f"true error, {name}"
-        )
-        left.plot(
-            q_values,
-            [entry.stated_deg for entry in found],
-            marker=marker,
-            color=color,
-            linestyle=":",
-            markerfacecolor="none",
-            label=f"stated (median), {name}",
-        )
-        right.plot(q_values, [entry.loss for entry in found], marker=marker, color=color, label=name)
-        if material is PAINT:
-            left.plot(
-                q_values,
-                [entry.circle_deg for entry in found],
-                **{**TRUTH_STYLE, "label": "error of the circles' spheres"},
-            )
-    left.set(
-        xlabel="q of all balls (vertical over horizontal radius)",
-        ylabel="angle (°)",
-        title="Every ball flattened alike",
-    )
-    left.invert_xaxis()
-    left.legend()
-    right.set(
-        xlabel="q of all balls (vertical over horizontal radius)",
-        ylabel="loss of the material (above 2: refused)",
-        title="What the fit itself says",
-    )
-    right.invert_xaxis()
-    right.legend()
-    for axes in (left, right):
-        tidy(axes)
-        axes.set_ylim(bottom=0)
-    save(figure, FOLDER / "failure.png")
-
-
-# --- 7: the same part inspected
-
-
-def inspected_alike() -> None:
-    """Heights of a part whose balls are all flattened alike: true errors and stated uncertainties."""
-    q_values, errors_um, stated_um, moved_deg = (1.0, 0.98, 0.95, 0.9), [], [], []
-    for q in q_values:
-        scene = bgars.Scene.ball_array(4, 4, board=bgars.Board(material=bgars.Material.matte(0.3)))
-        scene = replace(scene, balls=tuple(replace(ball, q=q) for ball in scene.balls))
-        capture, truth = bgars.simulate(scene, RIG, PAINT, NOISY)
-        result = bgars.inspect(capture)
-        pairs = list(zip(result.balls, truth.balls, strict=True))
-        errors_um.append(float(np.median([found.top_um - true.top_um for found, true in pairs])))
-        stated_um.append(float(np.median([2 * found.u_top_um for found, _ in pairs])))
-        elevation_deg = np.degrees(np.arcsin(np.array(result.light_directions)[:, 2]))
-        moved_deg.append(float(np.mean(elevation_deg - RIG.elevations_deg)))
-        say("inspected", q, errors_um[-1], stated_um[-1], moved_deg[-1], float(np.median([b.q for b in result.balls])))
-    figure = new_figure(11.5, 3.9)
-    left, right = panels(figure, 1, 2)[0]
-    left.plot(q_values, errors_um, "o-", color=OKABE_ITO[0], label="true error of the heights (median)")
-    left.plot(q_values, stated_um, "s:", color=OKABE_ITO[1], markerfacecolor="none", label="stated, U = 2 u")
-    left.set(xlabel="q of all balls (vertical over horizontal radius)", ylabel="height above the board (µm)")
-    left.set_title("Every ball of a part flattened alike")
-    left.legend()
-    right.plot(q_values, moved_deg, "o-", color=OKABE_ITO[0])
-    right.set(xlabel="q of all balls (vertical over horizontal radius)", ylabel="mean move of the elevations (°)")
-    right.set_title("What the fit blames instead: the lights")
-    for axes in (left, right):
-        axes.invert_xaxis()
-        tidy(axes)
-    save(figure, FOLDER.parent / "inspection" / "flattened_alike.png")
 
 
 PICTURES = (ring_ambiguity, fit_profile, residual_table, measured_prior, flat_top, failure, inspected_alike)

@@ -179,7 +179,7 @@ fn bad_requests_are_named() {
     let images = vec![0u8; 8 * SIDE * SIDE];
     let lights = ring(8);
     assert!(matches!(run(&images, &lights, anchored(&[])), Err(Error::NoMaterial)));
-    let tiny = [Circle { x_px: 0.0, y_px: 0.0, radius_px: 1.0 }];
+    let tiny = [Circle::exact(0.0, 0.0, 1.0)];
     assert!(matches!(run(&images, &lights, anchored(&tiny)), Err(Error::OutOfRange { argument: "circles", .. })));
     let found = run(&images[..5 * SIDE * SIDE], &ring(5), anchored(&tiny));
     assert!(matches!(found, Err(Error::OutOfRange { argument: "lights", .. })));

@@ -23,7 +23,7 @@ pub fn grid(side: usize, balls_a_row: usize, radius_px: f64) -> Vec<Circle> {
     let pitch = side as f64 / balls_a_row as f64;
     let at = |index: usize| (index as f64 + 0.5) * pitch - side as f64 / 2.0;
     (0..balls_a_row * balls_a_row)
-        .map(|ball| Circle { x_px: at(ball % balls_a_row), y_px: at(ball / balls_a_row), radius_px })
+        .map(|ball| Circle::exact(at(ball % balls_a_row), at(ball / balls_a_row), radius_px))
         .collect()
 }
 

@@ -214,10 +214,10 @@ def _part_of(
 
 
 def _circles(anchors: FoundBalls | ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """(N, 3): x right, y up, radius of each anchor, in pixels."""
+    """(N, 5): x right, y up, radius of each anchor, standard uncertainties of centre and radius, in pixels."""
     if isinstance(anchors, FoundBalls):
-        circles = [(ball.x_px, ball.y_px, ball.radius_px) for ball in anchors.balls]
-        return np.array(circles, np.float64).reshape(-1, CIRCLE_VALUES)
+        circles = [(ball.x_px, ball.y_px, ball.radius_px, ball.u_centre_px, ball.u_radius_px) for ball in anchors.balls]
+        return np.array(circles, np.float64).reshape(-1, CIRCLE_VALUES + 2)
     given = np.asarray(anchors)
     if given.dtype == np.bool_:
         if given.shape != shape or not given.any():
@@ -227,14 +227,19 @@ def _circles(anchors: FoundBalls | ArrayLike, shape: tuple[int, ...]) -> NDArray
             raise InputError(msg)
         rows, cols = np.nonzero(given)
         centre = (cols.mean() + 0.5 - shape[1] / 2, shape[0] / 2 - rows.mean() - 0.5)
-        return np.array([[*centre, np.sqrt(given.sum() / np.pi)]])
+        return _exact([[*centre, np.sqrt(given.sum() / np.pi)]])
     if given.shape[1:] != (CIRCLE_VALUES,) or given.dtype.kind not in "fiu":
         msg = f"anchors: must be balls, circles of shape (N, 3) or a mask of one ball, got {given.dtype} {given.shape}"
         raise InputError(msg)
     if not (np.isfinite(given).all() and (given[:, 2] > 0).all()):
         msg = "anchors: circles must be finite, with radii above 0 px"
         raise InputError(msg)
-    return given.astype(np.float64)
+    return _exact(given)
+
+
+def _exact(circles_px: ArrayLike) -> NDArray[np.float64]:
+    """Circles without uncertainty."""
+    return np.pad(np.asarray(circles_px, np.float64), ((0, 0), (0, 2)))
 
 
 def _outside(
@@ -242,7 +247,7 @@ def _outside(
 ) -> NDArray[np.bool_] | None:
     """The pixels to use outside all circles, or all of them where none is outside."""
     # A little smaller, so that no pixel at a rim falls between both methods.
-    outside = ~inside_circles(((x, y, radius - RIM_PX) for x, y, radius in circles_px), shape)
+    outside = ~inside_circles(((x, y, radius - RIM_PX) for x, y, radius in circles_px[:, :3]), shape)
     if use is not None:
         outside &= use
     return outside if outside.any() else use

@@ -40,8 +40,9 @@ def add_reflectance(
         Another method's estimate; its other pixels stay.
     capture : Capture
         At least 6 lights.
-    circles_px : (N, 3) float64
-        Silhouettes of balls: x right, y up (origin at the image centre), radius.
+    circles_px : (N, 5) float64
+        Silhouettes of balls: x right, y up (origin at the image centre), radius, standard uncertainties of centre and
+        radius.
     mask : (H, W) bool or None
         Pixels to use.
     free : (H, W) bool, optional
@@ -79,7 +80,7 @@ def add_reflectance(
         material=fitted,
         loss=found["loss"],
         accepted=found["accepted"],
-        circles_px=tuple((float(x), float(y), float(radius)) for x, y, radius in circles_px),
+        circles_px=tuple((float(x), float(y), float(radius)) for x, y, radius in circles_px[:, :3]),
         own_material=tuple(found["own_material"]),
         residuals_learnt=found["residuals_learnt"],
         deviation_deg=tuple(found["deviation_deg"]),

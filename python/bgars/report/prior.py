@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.patches import Patch
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
+from bgars.circle_pixels import inside_circles
 
+if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
@@ -73,19 +73,6 @@ def prior_share(field: NormalField) -> str:
     fit = field.reflectance
     where, name = field.mask, "normals"
     if fit is not None and fit.accepted and fit.circles_px:
-        where, name = field.mask & _in_circles(fit.circles_px, field.mask.shape), "normals on balls"
+        where, name = field.mask & inside_circles(fit.circles_px, field.mask.shape), "normals on balls"
     share = (prior & where).sum() / max(int(where.sum()), 1)
     return f"{100 * share:.1f} % of the {name}" if share >= SMALL_SHARE else f"under 0.1 % of the {name}"
-
-
-def _in_circles(circles_px: Sequence[tuple[float, float, float]], shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    height, width = shape
-    inside = np.zeros(shape, np.bool_)
-    for x_px, y_px, radius_px in circles_px:
-        row, col = height / 2 - y_px - 0.5, width / 2 + x_px - 0.5
-        rows = slice(max(0, int(row - radius_px)), max(0, int(row + radius_px) + 2))
-        cols = slice(max(0, int(col - radius_px)), max(0, int(col + radius_px) + 2))
-        down = np.arange(height)[rows, None] - row
-        right = np.arange(width)[None, cols] - col
-        inside[rows, cols] |= down**2 + right**2 < radius_px**2
-    return inside

@@ -38,16 +38,18 @@ pub fn slice_mut<'a, T: Element, D: Dimension>(
     array.as_slice_mut().map_err(|_| InputError::new_err(format!("out.{name}: must be C-contiguous")))
 }
 
-/// Rows of three, shape (N, 3).
-pub fn triples<'a, T: Element + bytemuck::Pod>(
-    array: &'a PyReadonlyArray2<'_, T>,
-    name: &str,
-) -> PyResult<&'a [[T; 3]]> {
-    if array.shape()[1] != 3 {
-        let shape = array.shape();
-        return Err(InputError::new_err(format!("{name}: must have shape (N, 3), got ({}, {})", shape[0], shape[1])));
+/// Rows of `N` values, shape (rows, N).
+pub fn rows<'a, T: Element, const N: usize>(array: &'a PyReadonlyArray2<'_, T>, name: &str) -> PyResult<&'a [[T; N]]> {
+    let (rows, columns) = (array.shape()[0], array.shape()[1]);
+    if columns != N {
+        return Err(InputError::new_err(format!("{name}: must have shape (N, {N}), got ({rows}, {columns})")));
     }
-    Ok(bytemuck::cast_slice(slice2(array, name)?))
+    Ok(slice2(array, name)?.as_chunks().0)
+}
+
+/// Rows of three, shape (N, 3).
+pub fn triples<'a, T: Element>(array: &'a PyReadonlyArray2<'_, T>, name: &str) -> PyResult<&'a [[T; 3]]> {
+    rows(array, name)
 }
 
 /// An array of shape (H, W).

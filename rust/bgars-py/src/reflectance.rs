@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::capture::{Capture, Work};
-use crate::convert::{slice2, triples};
+use crate::convert::{rows, slice2};
 use crate::errors::InputError;
 use crate::normals::Outputs;
 
@@ -89,8 +89,14 @@ pub fn estimate_reflectance<'py>(
     progress: Option<Py<PyAny>>,
     mut out: Outputs<'py>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let circles: Vec<Circle> =
-        triples(&circles, "circles")?.iter().map(|&[x_px, y_px, radius_px]| Circle { x_px, y_px, radius_px }).collect();
+    let circle = |&[x_px, y_px, radius_px, u_centre_px, u_radius_px]: &[f64; 5]| Circle {
+        x_px,
+        y_px,
+        radius_px,
+        u_centre_px,
+        u_radius_px,
+    };
+    let circles: Vec<Circle> = rows(&circles, "circles")?.iter().map(circle).collect();
     let material = material.map(|given| given.material()).transpose()?;
     let request = Request {
         mask: mask.as_ref().map(|mask| slice2(mask, "mask")).transpose()?,

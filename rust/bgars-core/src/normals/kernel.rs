@@ -8,12 +8,13 @@ use rayon::prelude::*;
 use super::confidence::confidence;
 use super::lane_solve::{Choice, LaneSolver};
 use super::lanes::{self, Input, Sink};
+use super::out::{Out, TASK_PIXELS};
 use super::robust::{self, RobustFilter, RobustScratch};
 use super::robust_lanes::RobustLanes;
 use super::solve::{Solution, SubsetSolver};
 use super::specular::specular_filter;
 use super::{Method, NormalMap, NormalMapMut};
-use crate::{Error, ImageStack, Lights, Pixel, Radiometry, Result, stream};
+use crate::{Error, ImageStack, Lights, Pixel, Radiometry, Result};
 
 /// Pixels between two calls of the progress callback.
 const BAND_PIXELS: usize = 1 << 19;
@@ -23,9 +24,6 @@ const LANE_BAND_PIXELS: usize = 1 << 22;
 
 /// Pixels that are looked through for NaN at a time.
 const FINITE_BLOCK: usize = 1 << 14;
-
-/// Pixels of one task.
-const TASK_PIXELS: usize = 1 << 13;
 
 /// Estimates the normal of every pixel that `mask` allows.
 ///
@@ -188,69 +186,6 @@ struct Kernel<'a, P> {
     scales: Vec<f32>,
     /// Full scale in the unit of the scaled values: its mean over the lights.
     full_scale: f64,
-}
-
-/// What a task writes: the pixels from its first one on.
-pub(super) struct Out<'a> {
-    pub normals: &'a mut [f32],
-    pub albedo: &'a mut [f32],
-    pub mask: &'a mut [bool],
-    pub confidence: &'a mut [f32],
-    pub measured: &'a mut [bool],
-    pub lights_kept: &'a mut [u16],
-    /// Empty unless asked for.
-    pub kept_sets: &'a mut [bool],
-    /// Write past the caches.
-    pub streamed: bool,
-}
-
-impl<'a> Out<'a> {
-    /// The tasks of a band of pixels.
-    fn split(map: &'a mut NormalMapMut<'_>, band: &Range<usize>) -> Vec<Self> {
-        let streamed = map.albedo.len() >= stream::MIN_PIXELS;
-        let set_lights = map.kept_sets.len() / map.albedo.len();
-        let mut kept_sets = &mut map.kept_sets[band.start * set_lights..band.end * set_lights];
-        let mut tasks = Vec::with_capacity(band.len().div_ceil(TASK_PIXELS));
-        let scalars = map.normals[band.start * 3..band.end * 3]
-            .chunks_mut(TASK_PIXELS * 3)
-            .zip(map.albedo[band.clone()].chunks_mut(TASK_PIXELS))
-            .zip(map.mask[band.clone()].chunks_mut(TASK_PIXELS))
-            .zip(map.confidence[band.clone()].chunks_mut(TASK_PIXELS))
-            .zip(map.measured[band.clone()].chunks_mut(TASK_PIXELS))
-            .zip(map.lights_kept[band.clone()].chunks_mut(TASK_PIXELS));
-        for (((((normals, albedo), mask), confidence), measured), lights_kept) in scalars {
-            let (task_sets, rest) = std::mem::take(&mut kept_sets).split_at_mut(albedo.len() * set_lights);
-            kept_sets = rest;
-            tasks.push(Self {
-                normals,
-                albedo,
-                mask,
-                confidence,
-                measured,
-                lights_kept,
-                kept_sets: task_sets,
-                streamed,
-            });
-        }
-        tasks
-    }
-
-    /// Marks pixels as not asked for.
-    pub fn clear(&mut self, span: Range<usize>) {
-        self.lights_kept[span.clone()].fill(0);
-        let lights = self.kept_sets.len() / self.albedo.len();
-        self.kept_sets[span.start * lights..span.end * lights].fill(false);
-        self.reject(span);
-    }
-
-    /// Marks pixels as without solution.
-    fn reject(&mut self, span: Range<usize>) {
-        self.normals[span.start * 3..span.end * 3].fill(f32::NAN);
-        self.albedo[span.clone()].fill(f32::NAN);
-        self.confidence[span.clone()].fill(0.0);
-        self.mask[span.clone()].fill(false);
-        self.measured[span].fill(false);
-    }
 }
 
 /// Memory of one thread, reused from pixel to pixel.

@@ -9,8 +9,9 @@ use multiversion::{multiversion, target::target_cfg_f};
 
 use super::confidence::{HALF_DEG, PRIOR_RESIDUAL};
 use super::cutoff::{LANES, Lanes};
-use super::kernel::Out;
-use super::lane_solve::{Careful, Choice, Kept, LaneSolver, Solutions, solve};
+use super::kept::Kept;
+use super::lane_solve::{Careful, Choice, LaneSolver, Solutions, solve};
+use super::out::Out;
 use crate::{Pixel, Radiometry, stream};
 
 /// How far ahead the images are fetched: as many streams as lights are more than processors follow by themselves.

@@ -7,6 +7,9 @@ use nalgebra::Vector3;
 /// Height of a soldered ball's centre over the board, in radii; only the nearness of near lights depends on it.
 const CENTRE_HEIGHT: f64 = 0.7;
 
+/// Smallest n_z that errors are carried over at: linear no more beyond it.
+const MIN_N_Z: f64 = 0.1;
+
 /// The silhouette of a ball. x right, y up, origin at the image centre, pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Circle {
@@ -16,11 +19,31 @@ pub struct Circle {
     pub y_px: f64,
     /// Radius.
     pub radius_px: f64,
+    /// Standard uncertainty of the centre along each axis; 0 for a circle that is right.
+    pub u_centre_px: f64,
+    /// The same of the radius.
+    pub u_radius_px: f64,
 }
 
 impl Circle {
     /// No ball: every pixel is outside, and near lights are taken as the image centre sees them.
-    pub const NOWHERE: Self = Self { x_px: 0.0, y_px: 0.0, radius_px: 0.0 };
+    pub const NOWHERE: Self = Self::exact(0.0, 0.0, 0.0);
+
+    /// A circle that is right.
+    #[must_use]
+    pub const fn exact(x_px: f64, y_px: f64, radius_px: f64) -> Self {
+        Self { x_px, y_px, radius_px, u_centre_px: 0.0, u_radius_px: 0.0 }
+    }
+
+    /// Root mean square angle in radian by which the circle's own error turns a normal of its sphere: `n_xy = (p - c) / R`
+    /// moves by `u_c / R` along both axes and by `n_xy u_R / R` outward, and outward the sphere turns away by `1 / n_z`.
+    #[must_use]
+    #[inline]
+    pub fn error_rad(&self, normal: &Vector3<f64>) -> f64 {
+        let (centre, radius) = (self.u_centre_px / self.radius_px, self.u_radius_px / self.radius_px);
+        let outward2 = centre.powi(2) + (1.0 - normal.z * normal.z) * radius.powi(2);
+        (centre.powi(2) + outward2 / normal.z.max(MIN_N_Z).powi(2)).sqrt()
+    }
 
     /// Normal of the sphere at a point of the image: `n_xy = (p - c) / R`; `None` outside.
     #[must_use]

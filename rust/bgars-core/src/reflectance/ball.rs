@@ -84,7 +84,7 @@ pub struct BallPixel {
     pub point: [f32; 2],
     /// The place of its circle's normal.
     pub circle_point: [f32; 2],
-    /// Standard error of the direction, in radian: data and expectation together.
+    /// Standard error of the direction, in radian: data, expectation and circle together.
     pub error_rad: f32,
     /// The same by the data alone.
     pub data_error_rad: f32,
@@ -147,12 +147,15 @@ impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
         let normal = from_disc(best.point.map(f64::from));
         let deviation = self.ball.deviation_rad / DISC_RADIAN;
         let off = scratch.anchor.map_or(0.0, |anchor| angle(&from_disc(anchor.map(f64::from)), &normal));
+        let error_rad = direction_error(best, best.prior_information, deviation * deviation / COMPONENTS);
+        // The material was fitted on the normals of the circles: data that agree with it are wrong where these are.
+        let circle_rad = scratch.anchor.map_or(0.0, |_| self.ball.circle.error_rad(&normal) as f32);
         BallPixel {
             pixel,
             normal: [normal.x as f32, normal.y as f32, normal.z as f32],
             point: best.point,
             circle_point: scratch.anchor.unwrap_or([f32::NAN; 2]),
-            error_rad: direction_error(best, best.prior_information, deviation * deviation / COMPONENTS),
+            error_rad: error_rad.hypot(circle_rad),
             data_error_rad: direction_error(best, 0.0, 0.0),
             off_circle_rad: off as f32,
             cost: best.data_cost / self.reader.lights() as f32,

@@ -23,7 +23,7 @@ pub const MIN_LIGHTS: usize = 6;
 
 /// Pixels that a material is fitted on, in all and at least of each ball.
 const FIT_PIXELS: usize = 3000;
-const FIT_PIXELS_OF_BALL: usize = 60;
+const FIT_PIXELS_OF_BALL: usize = 20;
 
 /// Pixels that the residuals are learnt on: in all, and of each ball at least and at most.
 const RESIDUAL_PIXELS: usize = 40_000;
@@ -123,7 +123,7 @@ impl Findings {
 /// let lobe = Lobe { strength: 300.0, roughness: 0.3, tail: 0.0 };
 /// let (diffuse, gains) = (120.0, vec![1.0; 6]);
 /// let solder = Material { diffuse, grazing: 0.0, ambient: 0.0, lobes: vec![lobe], masking: Masking::Smith, gains };
-/// let circle = Circle { x_px: 0.0, y_px: 0.0, radius_px: 10.0 };
+/// let circle = Circle::exact(0.0, 0.0, 10.0);
 /// let mut images = vec![0f32; 6 * 24 * 24];
 /// for pixel in 0..24 * 24 {
 ///     let Some(normal) = circle.normal((pixel % 24) as f64 - 11.5, 11.5 - (pixel / 24) as f64) else { continue };
