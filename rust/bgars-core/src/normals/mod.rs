@@ -7,8 +7,8 @@
 mod confidence;
 mod cutoff;
 mod gram;
-mod kernel;
 mod kept;
+mod kernel;
 mod lane_solve;
 mod lanes;
 mod out;
