@@ -30,6 +30,7 @@ START, END = "<!-- tables: make performance -->", "<!-- end of tables -->"
 COMMAND = "python benches/peers/compare.py"
 TITLES = {
     "normals": "Normals: 8 lights of 8 bit, published filter",
+    "glossy": "Normals of glossy balls: 8 lights of 8 bit, I_d 0.25",
     "integrate": "Integration to a relative residual of 1e-6",
     "read": "Files to normals",
     "write": "Height map to mesh file",

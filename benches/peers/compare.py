@@ -1,6 +1,6 @@
 """Measure bgars against its peers, side by side in one run, and print the ratios.
 
-python benches/peers/compare.py [--quick] [--only normals|integrate|read|write] [--json out.json]
+python benches/peers/compare.py [--quick] [--only normals|glossy|integrate|read|write] [--json out.json]
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from machine import describe
 from process import run_script
 from table import group_lines, machine_line
 
-GROUPS = ("normals", "integrate", "read", "write")
+GROUPS = ("normals", "glossy", "integrate", "read", "write")
 THREADS = (1, 2)
 
 
@@ -31,13 +31,23 @@ class Task(NamedTuple):
 
 def tasks(*, quick: bool) -> list[Task]:
     """Everything that is measured; `quick` leaves the large sizes out."""
-    return [*_normals(quick=quick), *_integrate(quick=quick), *_files(quick=quick), *_meshes(quick=quick)]
+    return [
+        *_normals(quick=quick),
+        *_glossy(quick=quick),
+        *_integrate(quick=quick),
+        *_files(quick=quick),
+        *_meshes(quick=quick),
+    ]
 
 
 def _normals(*, quick: bool) -> list[Task]:
     sizes = [("4", "2000", "2000")] if quick else [("4", "2000", "2000"), ("20", "4000", "5000")]
     found = [Task("normals", "normals.py", size, threads) for size in sizes for threads in THREADS]
     return found + [Task("normals", "roofline.py", ("normals", *sizes[-1][1:]), threads) for threads in THREADS]
+
+
+def _glossy(*, quick: bool) -> list[Task]:
+    return [Task("glossy", "glossy.py", ("4" if quick else "10",), threads) for threads in THREADS]
 
 
 def _integrate(*, quick: bool) -> list[Task]:
