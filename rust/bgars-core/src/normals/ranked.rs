@@ -59,6 +59,15 @@ impl Ranked {
         medians
     }
 
+    /// True where every value is zero.
+    #[inline(always)]
+    pub fn is_black(&self) -> Row<bool> {
+        let sizes = self.values[..self.lights].iter();
+        let sums = sizes
+            .fold([0.0; WIDTH], |sums: Row<f32>, values| std::array::from_fn(|lane| sums[lane] + values[lane].abs()));
+        sums.map(|sum| sum == 0.0)
+    }
+
     /// The medians of the values, clipped or not; of an even number the mean of the two in the middle.
     #[inline(always)]
     fn medians(&self) -> Row<f32> {

@@ -16,6 +16,9 @@ const TIE: f32 = 0.02;
 /// The same for a determinant, a median and `n_z` beside their limits.
 const NEAR: f32 = 0.01;
 
+/// Cost of a window that is none.
+const NONE: f32 = f32::INFINITY;
+
 /// Sums of a window: the Gram matrix, then `L^T I`.
 const SUMS: usize = ENTRIES + 3;
 
@@ -45,6 +48,8 @@ struct Window {
     factor: f32,
     /// No facet costs less.
     least: f32,
+    /// The window with the same first rank and one rank less.
+    shorter: Option<usize>,
 }
 
 impl RobustLanes {
@@ -57,9 +62,15 @@ impl RobustLanes {
         let prior = prior_squares(noise);
         let windows = filter.windows().iter().map(|&(first, end)| {
             let factor = cost_factor(end - first, lights);
-            // Brightness b divides by sqrt(b) up to full scale, and multiplies beyond it.
-            let span = (first..end).fold(0, |span, rank| span | 1 << rank);
-            Window { first, end, span, factor: factor as f32, least: (factor * prior / full_scale.sqrt()) as f32 }
+            Window {
+                first,
+                end,
+                span: (first..end).fold(0, |span, rank| span | 1 << rank),
+                factor: factor as f32,
+                // Brightness b divides by sqrt(b) up to full scale, and multiplies beyond it.
+                least: (factor * prior / full_scale.sqrt()) as f32,
+                shorter: filter.windows().iter().position(|&other| other == (first, end - 1)),
+            }
         });
         let black = (2.0 * noise) as f32;
         Some(Self {
@@ -82,6 +93,7 @@ impl RobustLanes {
         bits: &mut Lanes<u8>,
     ) -> Careful {
         let mut careful = 0;
+        let all = u8::MAX >> (BYTE_LIGHTS - directions.len());
         let mut ranked = Ranked::new();
         let mut sums = [[[0.0; WIDTH]; SUMS]; MAX_WINDOWS];
         for first in (0..LANES).step_by(WIDTH) {
@@ -96,9 +108,11 @@ impl RobustLanes {
                 self.judge::<FMA>(window, sums, &ranked, &medians, &mut best);
             }
             let kept = best.kept(&ranked, directions.len());
+            let black = ranked.is_black();
             for lane in 0..WIDTH {
-                bits[first + lane] = kept[lane] as u8;
-                careful |= Careful::from(best.is_close(lane)) << (first + lane);
+                // No window fits nothing: every light is kept.
+                bits[first + lane] = if black[lane] { all } else { kept[lane] as u8 };
+                careful |= Careful::from(best.is_close(lane) && !black[lane]) << (first + lane);
             }
         }
         careful
@@ -108,28 +122,21 @@ impl RobustLanes {
     #[inline(always)]
     fn add_up(&self, ranked: &Ranked, sums: &mut [[Row<f32>; SUMS]; MAX_WINDOWS]) {
         for (index, window) in self.windows.iter().enumerate().rev() {
-            // The window of one rank less with the same first one lies behind this one, or there is none.
-            let shorter = |other: &Window| other.first == window.first && other.end + 1 == window.end;
-            let from = self.windows[index..].iter().position(shorter);
-            let start = if let Some(behind) = from {
-                sums[index] = sums[index + behind];
-                window.end - 1
-            } else {
-                sums[index] = [[0.0; WIDTH]; SUMS];
-                window.first
+            let (mut sum, start) = match window.shorter {
+                Some(shorter) => (sums[shorter], window.end - 1),
+                None => ([[0.0; WIDTH]; SUMS], window.first),
             };
             for rank in start..window.end {
-                let [x, y, z] = ranked.directions[rank];
-                let values = ranked.values[rank];
-                let sums = &mut sums[index];
+                let ([x, y, z], values) = (&ranked.directions[rank], &ranked.values[rank]);
                 for lane in 0..WIDTH {
                     let (x, y, z, value) = (x[lane], y[lane], z[lane], values[lane]);
                     let terms = [x * x, x * y, x * z, y * y, y * z, z * z, x * value, y * value, z * value];
-                    for (sum, term) in sums.iter_mut().zip(terms) {
+                    for (sum, term) in sum.iter_mut().zip(terms) {
                         sum[lane] += term;
                     }
                 }
             }
+            sums[index] = sum;
         }
     }
 
@@ -180,7 +187,9 @@ impl RobustLanes {
                 unexplained[lane] = add_product::<FMA>(unexplained[lane], counted, counted);
             }
         }
-        let per_full_scale = 1.0 / self.full_scale;
+        let (least, per_full_scale) = (MIN_DETERMINANT as f32, 1.0 / self.full_scale);
+        let [mut bright, mut dark, mut close] = [[NONE; WIDTH]; 3];
+        // Choices one after the other, and not `&&`, which would be branches.
         for lane in 0..WIDTH {
             let facet: [f32; 3] = std::array::from_fn(|axis| facets[axis][lane]);
             let brightness = dot::<FMA>(facet, facet).sqrt();
@@ -188,16 +197,21 @@ impl RobustLanes {
             let penalty = if relative > 1.0 { relative * relative } else { 1.0 };
             let squares = residuals[lane] + DROPPED_WEIGHT as f32 * unexplained[lane] + self.prior;
             let cost = squares * window.factor / brightness.sqrt() * penalty;
-            let least = MIN_DETERMINANT as f32;
-            let (determinant, height, median) = (determinants[lane], facet[2], medians[lane]);
+            let cost = if cost >= 0.0 { cost } else { 0.0 };
             let side = NEAR * brightness;
-            // Written so that NaN is neither out nor sure.
-            let out = determinant < least * (1.0 - NEAR) || height < -side;
-            let dark = brightness < median;
-            let off_median = if dark { median - brightness } else { brightness - median };
-            let sure = determinant > least * (1.0 + NEAR) && height > side && off_median > side && cost < f32::INFINITY;
-            best.take(lane, cost, (out, sure, dark), window);
+            let above_median = brightness - medians[lane];
+            // NaN is never sure, and always close.
+            let sure = if determinants[lane] > least * (1.0 + NEAR) { cost } else { NONE };
+            let sure = if facet[2] > side { sure } else { NONE };
+            bright[lane] = if above_median > side { sure } else { NONE };
+            dark[lane] = if above_median < -side { sure } else { NONE };
+            let near = if determinants[lane] < least * (1.0 - NEAR) { NONE } else { cost };
+            let near = if facet[2] < -side { NONE } else { near };
+            let near = if bright[lane] < NONE { NONE } else { near };
+            close[lane] = if dark[lane] < NONE { NONE } else { near };
         }
+        best.bright.take(&bright, &close, window);
+        best.dark.take(&dark, &close, window);
     }
 }
 
@@ -217,34 +231,27 @@ struct Front {
 
 impl Front {
     fn new() -> Self {
-        Self { cost: [f32::INFINITY; WIDTH], next: [f32::INFINITY; WIDTH], span: [0; WIDTH] }
+        Self { cost: [NONE; WIDTH], next: [NONE; WIDTH], span: [0; WIDTH] }
     }
 
-    /// Takes a cost (infinite: none) of a window that is sure, or else one that can only come close.
+    /// Takes the costs of a window (infinite: none) where they are sure, and where they can only come close.
     #[inline(always)]
-    fn take(&mut self, lane: usize, sure: f32, close: f32, window: &Window) {
-        let least = self.cost[lane];
-        let better = sure < least;
-        let behind = if better { least } else { sure };
-        let behind = if close < behind { close } else { behind };
-        self.next[lane] = if behind < self.next[lane] { behind } else { self.next[lane] };
-        self.cost[lane] = if better { sure } else { least };
-        self.span[lane] = if better { window.span } else { self.span[lane] };
+    fn take(&mut self, sure: &Row<f32>, close: &Row<f32>, window: &Window) {
+        for lane in 0..WIDTH {
+            let (least, sure, close) = (self.cost[lane], sure[lane], close[lane]);
+            let better = sure < least;
+            let behind = if better { least } else { sure };
+            let behind = if close < behind { close } else { behind };
+            self.next[lane] = if behind < self.next[lane] { behind } else { self.next[lane] };
+            self.cost[lane] = if better { sure } else { least };
+            self.span[lane] = if better { window.span } else { self.span[lane] };
+        }
     }
 }
 
 impl Best {
     fn new() -> Self {
         Self { bright: Front::new(), dark: Front::new() }
-    }
-
-    #[inline(always)]
-    fn take(&mut self, lane: usize, cost: f32, (out, sure, dark): (bool, bool, bool), window: &Window) {
-        const NONE: f32 = f32::INFINITY;
-        let cost = if cost >= 0.0 { cost } else { 0.0 };
-        let close = if out || sure { NONE } else { cost };
-        self.bright.take(lane, if !out && sure && !dark { cost } else { NONE }, close, window);
-        self.dark.take(lane, if !out && sure && dark { cost } else { NONE }, close, window);
     }
 
     /// True where no window of at least this cost can be the best, or come close, at any pixel.
@@ -256,7 +263,7 @@ impl Best {
     /// True where a second window comes close, or none was found.
     #[inline(always)]
     fn is_close(&self, lane: usize) -> bool {
-        let any_bright = self.bright.next[lane] < f32::INFINITY || self.bright.cost[lane] < f32::INFINITY;
+        let any_bright = self.bright.next[lane] < NONE || self.bright.cost[lane] < NONE;
         let front = if any_bright { &self.bright } else { &self.dark };
         front.next[lane] <= front.cost[lane] * (1.0 + TIE)
     }
@@ -267,7 +274,7 @@ impl Best {
         let mut kept = [0; WIDTH];
         for rank in 0..lights {
             for lane in 0..WIDTH {
-                let bright = self.bright.cost[lane] < f32::INFINITY;
+                let bright = self.bright.cost[lane] < NONE;
                 let span = if bright { self.bright.span[lane] } else { self.dark.span[lane] };
                 kept[lane] |= (span >> rank & 1) << (ranked.codes[rank][lane] & (CLIPPED - 1));
             }
