@@ -22,6 +22,9 @@ __all__ = [
     "integrate_normals",
     "normal_arrays",
     "read_rgb16",
+    "rim_bands",
+    "rim_profiles",
+    "ring_edges",
     "triangulate",
     "usable_normals",
     "vertex_normals",
@@ -90,6 +93,24 @@ def integrate_normals(
     progress: Callable[[int, float], object] | None,
 ) -> tuple[NDArray[np.float32], NDArray[np.int32], list[tuple[int, int, int]], int, float]: ...
 def read_rgb16(path: str | PathLike[str], max_megapixels: float) -> NDArray[np.uint16]: ...
+def rim_bands(
+    circles: NDArray[np.float64],
+    depths: NDArray[np.float64],
+    *,
+    every: int,
+    sectors: int,
+    threads: int | None,
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]: ...
+def rim_profiles(blur_px: float, reach_px: float, *, threads: int | None) -> NDArray[np.float32]: ...
+def ring_edges(
+    images: NDArray[np.float32],
+    centres: NDArray[np.float64],
+    radii_px: NDArray[np.float64],
+    *,
+    directions: int,
+    rank: int,
+    threads: int | None,
+) -> NDArray[np.float32]: ...
 def triangulate(
     height_px: NDArray[np.float32], mask: NDArray[np.bool_], pitch: float, *, threads: int | None
 ) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32]]: ...

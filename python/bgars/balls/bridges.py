@@ -56,22 +56,21 @@ def joined_pairs(
     if not pairs:
         return []
     board = _board_level(x, y, radius, brightest)
+    i, j = np.array(pairs).T
+    apart, gap = apart[i, j], np.maximum(apart[i, j] - radius[i] - radius[j], 1.0)
+    along_x, along_y = (((end[j] - end[i]) / apart)[:, None, None] for end in (x, y))
     across = np.linspace(-0.6, 0.6, 25)
-    ridges, levels = np.zeros(len(pairs)), np.zeros(len(pairs))
-    for index, (i, j) in enumerate(pairs):
-        along_x, along_y = (x[j] - x[i]) / apart[i, j], (y[j] - y[i]) / apart[i, j]
-        gap = max(apart[i, j] - radius[i] - radius[j], 1.0)
-        u = (radius[i] + gap * np.linspace(0.3, 0.7, 9))[:, None]
-        v = across * min(radius[i], radius[j])
-        row = np.rint(height / 2 - 0.5 - (y[i] + along_y * u + along_x * v)).astype(int).clip(0, height - 1)
-        col = np.rint(x[i] + along_x * u - along_y * v + width / 2 - 0.5).astype(int).clip(0, width - 1)
-        away = (along_x * slopes[1][row, col] - along_y * slopes[0][row, col]) * np.sign(v)
-        ridges[index] = max(away[:, np.abs(across) < half].mean() for half in WIDTHS)
-        levels[index] = brightest[row, col][:, 8:17].mean()
+    u = (radius[i, None] + gap[:, None] * np.linspace(0.3, 0.7, 9))[:, :, None]
+    v = (np.minimum(radius[i], radius[j])[:, None] * across)[:, None, :]
+    row = np.rint(height / 2 - 0.5 - (y[i, None, None] + along_y * u + along_x * v)).astype(int).clip(0, height - 1)
+    col = np.rint(x[i, None, None] + along_x * u - along_y * v + width / 2 - 0.5).astype(int).clip(0, width - 1)
+    away = ((along_x * slopes[1][row, col] - along_y * slopes[0][row, col]) * np.sign(v)).mean(axis=1)
+    ridges = np.max([away[:, np.abs(across) < half].mean(axis=1) for half in WIDTHS], axis=0)
+    levels = brightest[row[..., 8:17], col[..., 8:17]].mean(axis=(1, 2))
     usual = float(np.median(ridges)) if len(pairs) >= ENOUGH_PAIRS else USUAL_RIDGE
     joined = (ridges > MIN_RIDGE) & (ridges > usual + ABOVE_OTHERS)
     joined &= (levels > BRIGHTER * board) | (ridges > usual + CLEAR)
-    joined |= np.array([apart[i, j] < radius[i] + radius[j] for i, j in pairs])
+    joined |= apart < radius[i] + radius[j]
     return [pair for pair, is_joined in zip(pairs, joined, strict=True) if is_joined]
 
 

@@ -10,7 +10,8 @@ from bgars.balls.alike import fit_alike
 from bgars.balls.highlights import mirrors_lights
 from bgars.balls.mask_blobs import round_blobs
 from bgars.balls.outward import outward_centres, slope_field
-from bgars.balls.rim_fit import SECTORS, Circles
+from bgars.balls.rim_fit import Circles
+from bgars.balls.rim_pixels import SECTORS
 from bgars.balls.rim_scan import CoarseCircles, scan_rims
 
 if TYPE_CHECKING:
@@ -98,7 +99,7 @@ def find_circles(levels: Levels, progress: Callable[[float], object] | None) -> 
     blobs = None if mask is None else _blobs_that_are_balls(levels, slopes, reduced, factor)
     if blobs is not None and len(blobs.row):
         return Detection(blobs, slopes, brightest, factor)
-    coarse = _coarse_circles(reduced, slopes, mask)
+    coarse = _coarse_circles(reduced, slopes, mask, levels.threads)
     report(0.4)
     row, col = ((column + 0.5) * factor - 0.5 for column in coarse[:2])
     circles = fit_alike(levels, row, col, coarse.radius_px * factor)
@@ -135,17 +136,17 @@ def _no_offsets(count: int) -> NDArray[np.float64]:
 
 
 def _coarse_circles(
-    reduced: FloatArray, slopes: tuple[FloatArray, FloatArray], mask: BoolArray | None
+    reduced: FloatArray, slopes: tuple[FloatArray, FloatArray], mask: BoolArray | None, threads: int
 ) -> CoarseCircles:
     """Circles to a pixel or two, in reduced pixels."""
     centres = np.array(outward_centres(*slopes)).reshape(-1, 4)
     centres = centres[_best_of_place(centres)]
-    coarse = _accepted(scan_rims(reduced, *centres[:, :3].T), slopes, MIN_SHARE, MIN_STRENGTH)
+    coarse = _accepted(scan_rims(reduced, *centres[:, :3].T, threads=threads), slopes, MIN_SHARE, MIN_STRENGTH)
     if len(coarse.row) > 1:
         usual_px = float(np.median(coarse.radius_px))
         rest = centres[_outside(centres, coarse)]
         scale_px = np.full(len(rest), usual_px)
-        more = scan_rims(reduced, rest[:, 0], rest[:, 1], scale_px, span=LIKE_OTHERS, rims=1)
+        more = scan_rims(reduced, rest[:, 0], rest[:, 1], scale_px, span=LIKE_OTHERS, rims=1, threads=threads)
         more = _take(more, np.abs(np.log(more.radius_px / usual_px)) < np.log(LIKE_OTHERS[1]))
         coarse = _merged(coarse, _accepted(more, slopes, MIN_SHARE_LIKE_OTHERS, MIN_STRENGTH_LIKE_OTHERS), usual_px)
     if mask is not None:

@@ -155,34 +155,51 @@ def _peaks(
     every = max(1, round(math.sqrt(4 * (SEARCH * largest) ** 2 / MOST_PIXELS)))
     reach = max(math.ceil(SEARCH * largest / every), 2)
     span = np.arange(-reach, reach + 1) * every
-    dy, dx = (side.ravel() for side in np.meshgrid(span, span, indexing="ij"))
-    x = col[:, None] + radius_px[:, None] * half[..., 0]
-    y = row[:, None] - radius_px[:, None] * half[..., 1]
-    c = np.rint(x).astype(np.int64)[..., None] + dx
-    r = np.rint(y).astype(np.int64)[..., None] + dy
-    inside = (r >= 0) & (r < levels.height) & (c >= 0) & (c < levels.width)
-    value = levels.of_lights(np.moveaxis(np.where(inside, r * levels.width + c, 0), 1, 0))
-    value = np.moveaxis(value, 0, 1)
-    distance = np.hypot(c - col[:, None, None], r - row[:, None, None])
-    inside &= distance < 0.92 * radius_px[:, None, None]
-    enough = inside.sum(axis=2) >= 0.4 * inside.shape[2]
+    middle_col = np.rint(col[:, None] + radius_px[:, None] * half[..., 0]).astype(np.int64)
+    middle_row = np.rint(row[:, None] - radius_px[:, None] * half[..., 1]).astype(np.int64)
+    c, r = middle_col[..., None] + span, middle_row[..., None] + span
+    inside = ((r >= 0) & (r < levels.height))[..., :, None] & ((c >= 0) & (c < levels.width))[..., None, :]
+    pixels = np.where(inside, (r * levels.width)[..., :, None] + c[..., None, :], 0)
+    value = np.moveaxis(levels.of_lights(np.moveaxis(pixels, 1, 0)), 0, 1)
+    reaches = (0.92 * radius_px[:, None, None]) ** 2
+    aside, above = (c - col[:, None, None]) ** 2, (r - row[:, None, None]) ** 2
+    inside &= aside[..., None, :] < (reaches - above)[..., :, None]
+    flat = inside.reshape(*inside.shape[:2], -1)
+    enough = flat.sum(axis=2) >= 0.4 * flat.shape[2]
     # Sorted, brightest first, pixels off the ball last.
-    ranked = -np.sort(np.where(inside, -value, np.float32(np.inf)), axis=2)
-    number = np.maximum(inside.sum(axis=2, keepdims=True), 1)
+    ranked = -np.sort(np.where(flat, -value.reshape(flat.shape), np.float32(np.inf)), axis=2)
+    number = np.maximum(flat.sum(axis=2, keepdims=True), 1)
     base, high = (np.take_along_axis(ranked, (number * part).astype(np.int64), axis=2)[..., 0] for part in (0.5, 0.03))
-    base, high = np.where(enough, base, 0.0), np.where(enough, high, 0.0)
+    base, high = np.where(enough, base, np.float32(0.0)), np.where(enough, high, np.float32(0.0))
     good = enough & (high - base > MIN_CONTRAST) & (high - base > MIN_RATIO * base)
-    above = np.where(inside, np.maximum(value - (base + 0.4 * (high - base))[..., None], 0.0), 0.0)
-    above = np.minimum(above, (high - base)[..., None])
-    width = np.maximum(WINDOW * radius_px, SMALLEST_WINDOW_PX)[:, None, None]
+    size = (high - base)[..., None, None]
+    shine = np.clip(value - (base[..., None, None] + np.float32(0.4) * size), 0.0, size) * inside
+    x, y, total = _mean_shift(shine, span, np.maximum(WINDOW * radius_px, SMALLEST_WINDOW_PX))
+    return middle_col + x, middle_row + y, good & (total > 1e-6)  # noqa: PLR2004 - nothing
+
+
+def _mean_shift(shine: FloatArray, span: NDArray[np.int64], width_px: Array) -> tuple[Array, Array, FloatArray]:
+    """(N, L) columns and rows of the middle of what shines, and how much does, within a taper that follows it.
+
+    Parameters
+    ----------
+    shine : (N, L, S, S) float32
+        Windows of light, in grey levels.
+    span : (S,) int64
+        Places of their rows and columns in pixels.
+    width_px : (N,) float64
+        Half width of the taper of each ball.
+    """
+    place, width = span.astype(np.float32), width_px.astype(np.float32)[:, None, None]
     # From the brightest region, not from where it is expected: the start may be off.
-    taper = above**2
+    taper = shine**2
     for turn in range(SHIFTS + 1):
-        if turn:
-            taper = above * np.maximum(1.0 - ((c - x[..., None]) ** 2 + (r - y[..., None]) ** 2) / width**2, 0.0) ** 2
-        total = np.maximum(taper.sum(axis=2), 1e-9)
-        x, y = (taper * c).sum(axis=2) / total, (taper * r).sum(axis=2) / total
-    return x, y, good & (total > 1e-6)  # noqa: PLR2004 - nothing
+        total = np.maximum(taper.sum(axis=(2, 3)), np.float32(1e-9))
+        x, y = taper.sum(axis=2) @ place / total, taper.sum(axis=3) @ place / total
+        if turn < SHIFTS:
+            across, along = (((place - middle[..., None]) / width) ** 2 for middle in (x, y))
+            taper = shine * np.maximum((1.0 - along)[..., :, None] - across[..., None, :], 0.0) ** 2
+    return x.astype(np.float64), y.astype(np.float64), total
 
 
 def _fit(x: Array, y: Array, good: NDArray[np.bool_], place: Array, radius_px: Array) -> tuple[Array, Array, Array]:

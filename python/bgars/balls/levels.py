@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from bgars.records import Capture, FloatArray
 
-__all__ = ["Levels"]
+__all__ = ["Levels", "block_means"]
 
 MAX_THREADS = 8
 
@@ -92,11 +92,11 @@ class Levels:
         dark = self.capture.dark
         offset: FloatArray | np.float32 = np.float32(self.black)
         if dark is not None:
-            offset = self._linear_mean(_blocks(dark, factor))
+            offset = self._linear_mean(block_means(dark, factor))
         levels = np.zeros((self.lights, self.height // factor, self.width // factor), np.float32)
 
         def one(light: int) -> None:
-            mean = self._linear_mean(_blocks(self.capture.images[light], factor))
+            mean = self._linear_mean(block_means(self.capture.images[light], factor))
             levels[light] = (mean - offset) * self.gains[light]
 
         self.map_lights(one)
@@ -115,8 +115,11 @@ class Levels:
         return np.float32(self.black) if dark is None else self._linear(dark.reshape(-1).take(pixels))
 
 
-def _blocks(image: NDArray[Any], factor: int) -> FloatArray:
-    """Means over blocks of factor x factor pixels: rows first, because they lie together in memory."""
+def block_means(image: NDArray[Any], factor: int) -> FloatArray:
+    """Means over blocks of factor x factor pixels, what is left over dropped; (H // factor, W // factor).
+
+    Rows first, because they lie together in memory.
+    """
     if factor == 1:
         return image.astype(np.float32)
     height, width = image.shape[0] // factor * factor, image.shape[1] // factor * factor

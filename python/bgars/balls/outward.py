@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
+from itertools import groupby
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy import fft, ndimage
 
+from bgars.balls.levels import block_means
+
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from collections.abc import Iterator
 
     from bgars.records import FloatArray
     from bgars.rig import LightRig
@@ -17,6 +21,8 @@ __all__ = ["Centre", "outward_centres", "slope_field"]
 
 SMALLEST_PX = 4.0
 SCALE_STEP = 1.35
+STEPS_PER_SCALE = 10
+"""Least pixels a scale has: larger ones are looked for in coarser slopes."""
 MIN_SCORE = 0.13
 MAX_CENTRES = 3000
 
@@ -77,56 +83,47 @@ def outward_centres(slope_x: FloatArray, slope_y: FloatArray) -> list[Centre]:
 
     A sphere that fills the disc scores 2/3, a board 0, a gap between balls less than 0.
     """
-    height, width = slope_x.shape
-    largest_px = min(height, width) / 2
+    largest_px = min(slope_x.shape) / 2
     scales_px: list[float] = []
     scale_px = SMALLEST_PX
     while scale_px <= largest_px:
         scales_px.append(scale_px)
         scale_px *= SCALE_STEP
-    stack = np.zeros((len(scales_px), height, width), np.float32)
-    for index, scale_px in enumerate(scales_px):
-        step = max(1, int(scale_px // 10))
-        stack[index] = _outward_mean(slope_x, slope_y, scale_px, step)
     centres = []
-    for index, scale_px in enumerate(scales_px):
-        score = stack[index]
-        size = 2 * max(1, int(0.35 * scale_px)) + 1
-        peak = (score == ndimage.maximum_filter(score, size)) & (score > MIN_SCORE)
-        for row, col in np.argwhere(peak):
-            centres.append(Centre(float(row), float(col), scale_px, float(score[row, col])))
+    for step, group in groupby(scales_px, lambda scale_px: max(1, int(scale_px // STEPS_PER_SCALE))):
+        coarse = [block_means(slope, step) for slope in (slope_x, slope_y)]
+        for scale_px, score in _outward_means(coarse, [(scale_px, scale_px / step) for scale_px in group]):
+            size = 2 * max(1, int(0.35 * scale_px) // step) + 1
+            peak = (score == ndimage.maximum_filter(score, size)) & (score > MIN_SCORE)
+            for row, col in np.argwhere(peak).tolist():
+                value = float(score[row, col])
+                centres.append(Centre(row * step + step // 2, col * step + step // 2, scale_px, value))
     return sorted(centres, key=lambda centre: -centre.score)[:MAX_CENTRES]
 
 
-def _outward_mean(slope_x: FloatArray, slope_y: FloatArray, scale_px: float, step: int) -> FloatArray:
-    """Mean over a disc of the slope along the direction from its centre, on every step-th pixel, interpolated."""
-    full_shape = slope_x.shape
-    if step > 1:
-        slope_x, slope_y = (
-            ndimage.uniform_filter(slope, step)[step // 2 :: step, step // 2 :: step] for slope in (slope_x, slope_y)
-        )
-    radius = scale_px / step
-    reach = int(np.ceil(radius))
-    x, y = np.meshgrid(np.arange(-reach, reach + 1), np.arange(reach, -reach - 1, -1))
-    distance = np.hypot(x, y)
-    inside = np.clip(radius + 0.5 - distance, 0.0, 1.0)
-    unit = np.where(distance > 0, inside / np.maximum(distance, 1e-6), 0.0)
-    area = inside.sum()
-    score = _correlate(slope_x, (x * unit / area).astype(np.float32)) + _correlate(
-        slope_y, (y * unit / area).astype(np.float32)
-    )
-    if step > 1:
-        row = (np.arange(full_shape[0]) - step // 2) / step
-        col = (np.arange(full_shape[1]) - step // 2) / step
-        score = ndimage.map_coordinates(score, np.meshgrid(row, col, indexing="ij"), order=1, mode="nearest")
-    return score
+def _outward_means(slopes: list[FloatArray], scales: list[tuple[float, float]]) -> Iterator[tuple[float, FloatArray]]:
+    """Each scale with the mean over its disc of the slope along the direction from the centre, zeros outside.
 
-
-def _correlate(image: FloatArray, kernel: NDArray[np.float32]) -> FloatArray:
-    """Correlation of the image's size, zeros outside."""
-    shape = [fft.next_fast_len(n + k - 1, real=True) for n, k in zip(image.shape, kernel.shape, strict=True)]
-    spectrum = fft.rfft2(image, shape) * fft.rfft2(kernel[::-1, ::-1], shape)
-    full = fft.irfft2(spectrum, shape)
-    top, left = (k // 2 for k in kernel.shape)
-    correlation: FloatArray = full[top : top + image.shape[0], left : left + image.shape[1]]
-    return correlation
+    Parameters
+    ----------
+    slopes : two (H, W) float32
+        Slopes along x and y.
+    scales : list of (float, float)
+        Name of a scale, and its radius in pixels of `slopes`; ascending.
+    """
+    height, width = slopes[0].shape
+    margin = 2 * math.ceil(scales[-1][1])
+    shape = [fft.next_fast_len(side + margin, real=True) for side in (height, width)]
+    # Along x and y at once, and for all scales the same.
+    spectra = [fft.rfft2(slope, shape) for slope in slopes]
+    for scale_px, radius in scales:
+        reach = math.ceil(radius)
+        side = np.arange(-reach, reach + 1, dtype=np.float32)
+        distance = np.hypot(side, side[:, None])
+        inside = np.clip(np.float32(radius + 0.5) - distance, 0.0, 1.0)
+        outward = inside / (np.maximum(distance, np.float32(1e-6)) * inside.sum())
+        # Mirrored, because convolution mirrors: x falls along columns, y (up) grows along rows.
+        kernels = (outward * -side, outward * side[:, None])
+        along_x, along_y = (one * fft.rfft2(kernel, shape) for one, kernel in zip(spectra, kernels, strict=True))
+        mean: FloatArray = fft.irfft2(along_x + along_y, shape)
+        yield scale_px, mean[reach : reach + height, reach : reach + width]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bgars.balls.rim_model import SHAPES, RimTable
+from bgars.balls.rim_pixels import SECTORS, RimPixels
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,9 +19,8 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Circles", "RimPixels", "fit_rims"]
+__all__ = ["Circles", "fit_rims"]
 
-SECTORS = 24
 BASIS = 7
 """Board, step, root, ramp inside, ramp outside, board along the rim, step along the rim."""
 WIDE_ROUNDS = 3
@@ -83,75 +82,6 @@ class Circles:
         return replace(self, **columns)
 
 
-class RimPixels:
-    """Pixels around the rims, sorted into sectors of equal angle and padded to equal number.
-
-    Attributes
-    ----------
-    row, col : (N, SECTORS, P) float32
-        Pixels relative to the anchor of the ball.
-    weight : (N, SECTORS, P) float32
-        0 for padding and for pixels outside the image or the mask.
-    levels : (L, N, SECTORS, P) float32
-        Grey levels.
-    """
-
-    def __init__(
-        self,
-        levels: Levels,
-        circles: Circles,
-        in_px: NDArray[np.float64],
-        out_px: NDArray[np.float64],
-        every: int,
-    ) -> None:
-        row, col, radius_px = circles.row, circles.col, circles.radius_px
-        height, width = levels.height, levels.width
-        directions = levels.capture.rig.directions
-        self.azimuths_rad = np.arctan2(directions[:, 1], directions[:, 0])
-        self.anchor_row = np.rint(row).astype(np.int64)
-        self.anchor_col = np.rint(col).astype(np.int64)
-        parts = []
-        for ball in range(len(row)):
-            reach = math.ceil(radius_px[ball] + out_px[ball]) + 1
-            span = np.arange(-reach, reach + 1)
-            y = (self.anchor_row[ball] + span - row[ball])[:, None]
-            x = (self.anchor_col[ball] + span - col[ball])[None, :]
-            distance = np.sqrt(x * x + y * y)
-            depth = radius_px[ball] - distance
-            near = np.flatnonzero((depth < in_px[ball]) & (depth > -out_px[ball]))[::every]
-            r, c = np.divmod(near, len(span))
-            angle = np.arctan2(-y[r, 0], x[0, c])
-            sector = np.floor((angle / (2 * math.pi) % 1.0) * SECTORS).astype(np.int64) % SECTORS
-            order = np.argsort(sector, kind="stable")
-            counts = np.bincount(sector, minlength=SECTORS)
-            parts.append((r[order] - reach, c[order] - reach, sector[order], counts))
-        most = max(int(part[3].max()) for part in parts)
-        shape = (len(row), SECTORS, most)
-        self.row = np.zeros(shape, np.float32)
-        self.col = np.zeros(shape, np.float32)
-        self.weight = np.zeros(shape, np.float32)
-        for ball, (r, c, sector, counts) in enumerate(parts):
-            place = np.arange(len(r)) - np.repeat(np.cumsum(counts) - counts, counts)
-            self.row[ball, sector, place] = r
-            self.col[ball, sector, place] = c
-            self.weight[ball, sector, place] = 1.0
-        image_row = self.row.astype(np.int64) + self.anchor_row[:, None, None]
-        image_col = self.col.astype(np.int64) + self.anchor_col[:, None, None]
-        inside = (image_row >= 0) & (image_row < height) & (image_col >= 0) & (image_col < width)
-        self.weight *= inside
-        pixels = np.where(inside, image_row * width + image_col, 0)
-        self.levels = levels.at(pixels) * self.weight
-        self.clipped: NDArray[np.bool_] = np.any(levels.clipped_at(pixels) & (self.weight > 0), axis=3)
-
-    def take(self, index: slice | NDArray[np.intp]) -> RimPixels:
-        """The pixels of some of the balls."""
-        part = copy.copy(self)
-        for name in ("anchor_row", "anchor_col", "row", "col", "weight"):
-            setattr(part, name, getattr(self, name)[index])
-        part.levels, part.clipped = self.levels[:, index], self.clipped[:, index]
-        return part
-
-
 def fit_rims(
     levels: Levels,
     row: NDArray[np.float64],
@@ -178,16 +108,18 @@ def fit_rims(
     )
     if not len(row):
         return circles
-    table = RimTable(FIRST_BLUR_PX if blur_px is None else blur_px, WIDE_REACH_PX)
-    pixels = RimPixels(levels, circles, np.clip(0.2 * radius_px, 4.0, 9.0), np.clip(0.2 * radius_px, 4.0, 9.0), 3)
+    table = RimTable(FIRST_BLUR_PX if blur_px is None else blur_px, WIDE_REACH_PX, levels.threads)
+    wide_px = np.clip(0.2 * radius_px, 4.0, 9.0)
+    pixels = RimPixels(levels, circles.row, circles.col, circles.radius_px, wide_px, wide_px, 3)
     for _ in range(WIDE_ROUNDS):
         _update(circles, *_sector_offsets(pixels, circles, table)[:2])
     radius_px = circles.radius_px.clip(0.5 * radius_px, 2.0 * radius_px)
-    pixels = RimPixels(levels, circles, np.clip(0.15 * radius_px, 3.0, 6.0), np.clip(0.14 * radius_px, 2.5, 5.0), 1)
-    table = RimTable(table.blur_px, NARROW_REACH_PX)
+    in_px, out_px = np.clip(0.15 * radius_px, 3.0, 6.0), np.clip(0.14 * radius_px, 2.5, 5.0)
+    pixels = RimPixels(levels, circles.row, circles.col, circles.radius_px, in_px, out_px, 1)
+    table = RimTable(table.blur_px, NARROW_REACH_PX, levels.threads)
     for turn in range(NARROW_ROUNDS):
         if turn == 1 and blur_px is None:
-            table = RimTable(_estimated_blur(pixels, circles), NARROW_REACH_PX)
+            table = RimTable(_estimated_blur(pixels, circles), NARROW_REACH_PX, levels.threads)
         offset, variance, jump = _sector_offsets(pixels, circles, table)
         _update(circles, offset, variance)
     circles.blur_px = table.blur_px
@@ -216,7 +148,8 @@ def _estimated_blur(pixels: RimPixels, circles: Circles) -> float:
     """The lens blur that leaves the least, over the sectors and lights of most contrast, parabola through three."""
     some = slice(None, None, max(1, len(circles.row) // BLUR_BALLS))
     pixels, circles = pixels.take(some), circles.take(some)
-    tried = [_left_over(pixels, circles, RimTable(blur_px, NARROW_REACH_PX)) for blur_px in BLURS_PX]
+    tables = (RimTable(blur_px, NARROW_REACH_PX, pixels.threads) for blur_px in BLURS_PX)
+    tried = [_left_over(pixels, circles, table) for table in tables]
     logs = np.log(np.stack([left for left, _ in tried]) + 0.02)
     contrast = np.mean([contrast for _, contrast in tried], axis=0)
     # Textured and shadowed sectors say nothing; which these are must not depend on one blur.

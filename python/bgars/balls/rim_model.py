@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bgars import _bgars
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -18,16 +20,10 @@ SHAPES = 4
 """Depth profiles: step, square root and ramp inside the rim, ramp outside."""
 ANGLES = 16
 STEPS_PER_PX = 64
-THINNEST_PX = 0.08
 
 
 class RimTable:
     """Depth profiles averaged over a square pixel and a Gaussian blur, tabulated over depth and direction.
-
-    Near the rim of a sphere n_z = sqrt(2 t / R) with t the depth inside the silhouette, so radiance is a series in
-    sqrt(t) there. A pixel averages it over a box; along a direction the box is two boxes of widths |cos| and |sin|,
-    one after the other; two more with the variance of the blur stand for the Gaussian. Averages over boxes are
-    differences of repeated integrals, in closed form for powers of t.
 
     Parameters
     ----------
@@ -35,22 +31,17 @@ class RimTable:
         Standard deviation of the lens blur.
     reach_px : float
         Largest depth, inside and outside.
+    threads : int, optional
+        Most threads to work on; by default one a core.
     """
 
-    def __init__(self, blur_px: float, reach_px: float) -> None:
+    def __init__(self, blur_px: float, reach_px: float, threads: int | None = None) -> None:
         self.blur_px = blur_px
         self.reach_px = reach_px
-        count = 2 * math.ceil(reach_px * STEPS_PER_PX) + 1
-        self.first_px = -(count // 2) / STEPS_PER_PX
-        self.count = count
-        depth_px = self.first_px + np.arange(count) / STEPS_PER_PX
-        angles_rad = np.linspace(0.0, math.pi / 4, ANGLES)
-        table = np.zeros((ANGLES, count, 2 * SHAPES))
-        soft = math.sqrt(6.0) * blur_px
-        for index, angle in enumerate(angles_rad):
-            widths = [max(w, THINNEST_PX) for w in (math.cos(angle), math.sin(angle), soft, soft)]
-            table[index] = _profiles(depth_px, widths)
-        self.table: FloatArray = table.reshape(-1, 2 * SHAPES).astype(np.float32)
+        table = _bgars.rim_profiles(blur_px, reach_px, threads=threads)
+        self.count = table.shape[1]
+        self.first_px = -(self.count // 2) / STEPS_PER_PX
+        self.table: FloatArray = table.reshape(-1, 2 * SHAPES)
 
     def look_up(self, depth_px: NDArray[np.floating], fold: NDArray[np.int32]) -> FloatArray:
         """(..., 2 SHAPES) profiles and their derivatives by depth, at depths and folded directions (:meth:`fold`)."""
@@ -66,27 +57,3 @@ class RimTable:
         angle = np.arctan2(np.minimum(ax, ay), np.maximum(ax, ay))
         folded: NDArray[np.int32] = np.rint(angle * ((ANGLES - 1) / (math.pi / 4))).astype(np.int32)
         return folded
-
-
-def _profiles(depth_px: NDArray[np.float64], widths_px: list[float]) -> NDArray[np.float64]:
-    """(T, 2 SHAPES): averages over four boxes of the step, root and ramps, then their derivatives."""
-    profiles = np.zeros((2 * SHAPES, len(depth_px)))
-    volume = math.prod(widths_px)
-    for corner in range(16):
-        signs = [1 if corner >> bit & 1 else -1 for bit in range(4)]
-        shift = sum(sign * width / 2 for sign, width in zip(signs, widths_px, strict=True))
-        weight = math.prod(signs) / volume
-        inside = np.maximum(depth_px + shift, 0.0)
-        outside = np.maximum(-depth_px - shift, 0.0)
-        root = np.sqrt(inside)
-        cube, outer = inside * inside * inside, outside * outside
-        fourth, outer = cube * inside, outer * outer
-        profiles[0] += weight / 24 * fourth
-        profiles[1] += weight * 16 / 945 * (fourth * root)
-        profiles[2] += weight / 120 * (fourth * inside)
-        profiles[3] += weight / 120 * (outer * outside)
-        profiles[4] += weight / 6 * cube
-        profiles[5] += weight * 8 / 105 * (cube * root)
-        profiles[6] += weight / 24 * fourth
-        profiles[7] -= weight / 24 * outer
-    return profiles.T

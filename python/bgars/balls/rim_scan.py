@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from bgars import _bgars
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -19,7 +21,6 @@ __all__ = ["CoarseCircles", "scan_rims"]
 DIRECTIONS = 24
 RADII = 48
 PEAK_ADVANTAGE = 100.0
-CHUNK = 256
 AROUND_RIM = np.geomspace(0.78, 1.28, 21)
 RIM_BINS = np.flatnonzero(np.abs(np.log(AROUND_RIM)) < 0.06)  # noqa: PLR2004 - of the radius
 BESIDE_BINS = np.flatnonzero(np.abs(np.log(AROUND_RIM)) > 0.09)  # noqa: PLR2004 - of the radius
@@ -47,6 +48,7 @@ def scan_rims(
     *,
     span: tuple[float, float] = (0.3, 1.5),
     rims: int = 2,
+    threads: int | None = None,
 ) -> CoarseCircles:
     """Find the circle of the strongest rim around each centre.
 
@@ -65,23 +67,24 @@ def scan_rims(
         Radii to try, in scales.
     rims : int
         Radii to follow up for each centre.
+    threads : int, optional
+        Most threads to work on; by default one a core.
     """
     if not len(row):
         return CoarseCircles(*(np.zeros(0) for _ in range(5)))
     roots = np.sqrt(np.maximum(image, 0.0) + np.float32(DARK_LEVELS))
-    parts = [
-        _scan(roots, row[at : at + CHUNK], col[at : at + CHUNK], scale_px[at : at + CHUNK], span, rims)
-        for at in range(0, len(row), CHUNK)
-    ]
-    return CoarseCircles(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    rank = max(1, round(len(roots) * 3 / 8))
 
+    def edges(row: Array, col: Array, radii: Array) -> FloatArray:
+        """(N, A, radii) changes of sqrt(level) from ring to ring."""
+        centres = np.stack([row, col], axis=1).astype(np.float64)
+        return _bgars.ring_edges(
+            roots, centres, np.asarray(radii, np.float64), directions=DIRECTIONS, rank=rank, threads=threads
+        )
 
-def _scan(
-    roots: FloatArray, row: Array, col: Array, scale_px: Array, span: tuple[float, float], rims: int
-) -> CoarseCircles:
     angle = (np.arange(DIRECTIONS) + 0.5) * (2 * math.pi / DIRECTIONS)
     radii = scale_px[:, None] * np.geomspace(span[0], span[1], RADII)
-    edge = _edges(roots, row, col, radii, angle)
+    edge = edges(row, col, radii)
     wide = np.maximum(edge, np.maximum(np.roll(edge, 1, axis=2), np.roll(edge, -1, axis=2)))
     profile = np.quantile(wide, 0.25, axis=1) + 0.25 * np.median(edge, axis=1)
     around = np.pad(profile, ((0, 0), (SIDE, SIDE)), mode="edge")
@@ -95,7 +98,7 @@ def _scan(
     near = np.geomspace(0.75, 1.33, 33)
     for reach in (0.3, 0.15):
         radii = radius_px[:, None] * near
-        edge = _edges(roots, row, col, radii, angle)
+        edge = edges(row, col, radii)
         pick = np.argmax(edge * np.maximum(0.02, 1.0 - np.abs(np.log(near)) / reach), axis=2)
         weight = np.take_along_axis(edge, pick[..., None], axis=2)[..., 0]
         found = np.take_along_axis(radii, pick, axis=1)
@@ -103,7 +106,7 @@ def _scan(
         col += step[:, 0]
         row -= step[:, 1]
         radius_px = radius_px + step[:, 2]
-    edge = _edges(roots, row, col, radius_px[:, None] * AROUND_RIM, angle)
+    edge = edges(row, col, radius_px[:, None] * AROUND_RIM)
     rim = edge[:, :, RIM_BINS].max(axis=2)
     beside = np.median(edge[:, :, BESIDE_BINS], axis=2)
     share = (rim > 1.5 * beside + 0.08).mean(axis=1)
@@ -114,24 +117,6 @@ def _scan(
         np.quantile(rim - beside, 0.25, axis=1),
         share,
     )
-
-
-def _edges(roots: FloatArray, row: Array, col: Array, radii: Array, angle: Array) -> FloatArray:
-    """(N, A, radii) third largest over lights of the change of sqrt(level) from ring to ring."""
-    lights, height, width = roots.shape
-    r = np.rint(row[:, None, None] - np.sin(angle)[:, None] * radii[:, None, :]).astype(np.int32)
-    c = np.rint(col[:, None, None] + np.cos(angle)[:, None] * radii[:, None, :]).astype(np.int32)
-    inside = (r >= 0) & (r < height) & (c >= 0) & (c < width)
-    pixels = np.where(inside, r * width + c, 0)
-    value = roots.reshape(lights, -1).take(pixels, axis=1)
-    # Over three neighbouring directions: along a rim nothing changes, and noise falls.
-    value = value + np.roll(value, 1, axis=2) + np.roll(value, -1, axis=2)
-    edge = np.zeros_like(value)
-    np.abs(value[..., 2:] - value[..., :-2], out=edge[..., 1:-1])
-    edge[..., 1:-1] *= (inside[:, :, 2:] & inside[:, :, :-2]) * np.float32(1.0 / 3.0)
-    rank = max(1, round(lights * 3 / 8))
-    ranked: FloatArray = np.partition(edge, lights - rank, axis=0)[lights - rank]
-    return ranked
 
 
 def _circle_step(residual: Array, weight: FloatArray, angle: Array, radius_px: Array) -> Array:

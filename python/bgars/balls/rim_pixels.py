@@ -1,0 +1,81 @@
+"""Pixels around the rims of balls, and what they read in every light."""
+
+from __future__ import annotations
+
+import copy
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bgars import _bgars
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bgars.balls.levels import Levels
+
+__all__ = ["SECTORS", "RimPixels"]
+
+SECTORS = 24
+"""Equal angles that a rim is divided into."""
+
+
+class RimPixels:
+    """Pixels around the rims, sorted into sectors of equal angle and padded to equal number.
+
+    Parameters
+    ----------
+    levels : Levels
+        The capture.
+    row, col, radius_px : (N,) float64
+        The circles.
+    in_px, out_px : (N,) float64
+        Depths of the bands inside and outside.
+    every : int
+        One pixel in how many is taken.
+
+    Attributes
+    ----------
+    row, col : (N, SECTORS, P) float32
+        Pixels relative to the anchor of the ball.
+    weight : (N, SECTORS, P) float32
+        0 for padding and for pixels outside the image or the mask.
+    levels : (L, N, SECTORS, P) float32
+        Grey levels.
+    """
+
+    def __init__(
+        self,
+        levels: Levels,
+        row: NDArray[np.float64],
+        col: NDArray[np.float64],
+        radius_px: NDArray[np.float64],
+        in_px: NDArray[np.float64],
+        out_px: NDArray[np.float64],
+        every: int,
+    ) -> None:
+        directions = levels.capture.rig.directions
+        self.threads = levels.threads
+        self.azimuths_rad = np.arctan2(directions[:, 1], directions[:, 0])
+        self.anchor_row = np.rint(row).astype(np.int64)
+        self.anchor_col = np.rint(col).astype(np.int64)
+        circles, depths = np.stack([row, col, radius_px], axis=1), np.stack([in_px, out_px], axis=1)
+        self.row, self.col, self.weight = _bgars.rim_bands(
+            circles, depths, every=every, sectors=SECTORS, threads=levels.threads
+        )
+        height, width = levels.height, levels.width
+        image_row = self.row.astype(np.int64) + self.anchor_row[:, None, None]
+        image_col = self.col.astype(np.int64) + self.anchor_col[:, None, None]
+        inside = (image_row >= 0) & (image_row < height) & (image_col >= 0) & (image_col < width)
+        self.weight *= inside
+        pixels = np.where(inside, image_row * width + image_col, 0)
+        self.levels = levels.at(pixels) * self.weight
+        self.clipped: NDArray[np.bool_] = np.any(levels.clipped_at(pixels) & (self.weight > 0), axis=3)
+
+    def take(self, index: slice | NDArray[np.intp]) -> RimPixels:
+        """The pixels of some of the balls."""
+        part = copy.copy(self)
+        for name in ("anchor_row", "anchor_col", "row", "col", "weight"):
+            setattr(part, name, getattr(self, name)[index])
+        part.levels, part.clipped = self.levels[:, index], self.clipped[:, index]
+        return part
