@@ -52,7 +52,7 @@ pub fn ring_edges(planes: Planes<'_>, centres: &[[f64; 2]], radii: &[f64], direc
     let work = out.par_chunks_mut(size).zip(centres).zip(radii.par_chunks(rings));
     work.for_each_init(make, |(scratch, largest), ((out, &centre), radii)| {
         scratch.place(planes, centre, radii, &units);
-        for values in &mut largest {
+        for values in &mut *largest {
             values.fill(0.0);
         }
         for light in 0..planes.lights {
