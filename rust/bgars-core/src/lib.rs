@@ -19,6 +19,7 @@ pub mod normals;
 pub mod pixel;
 pub mod radiometry;
 pub mod reflectance;
+pub mod shadows;
 pub mod stack;
 mod stream;
 pub mod vertex_normals;

@@ -39,15 +39,20 @@ pub fn slice_mut<'a, T: Element, D: Dimension>(
 }
 
 /// Rows of three, shape (N, 3).
-pub fn triples<'a, T: Element + bytemuck::Pod>(
+pub fn triples<'a, T: Element>(array: &'a PyReadonlyArray2<'_, T>, name: &str) -> PyResult<&'a [[T; 3]]> {
+    rows_of(array, name)
+}
+
+/// Rows of `C`, shape (N, C).
+pub fn rows_of<'a, T: Element, const C: usize>(
     array: &'a PyReadonlyArray2<'_, T>,
     name: &str,
-) -> PyResult<&'a [[T; 3]]> {
-    if array.shape()[1] != 3 {
+) -> PyResult<&'a [[T; C]]> {
+    if array.shape()[1] != C {
         let shape = array.shape();
-        return Err(InputError::new_err(format!("{name}: must have shape (N, 3), got ({}, {})", shape[0], shape[1])));
+        return Err(InputError::new_err(format!("{name}: must have shape (N, {C}), got ({}, {})", shape[0], shape[1])));
     }
-    Ok(bytemuck::cast_slice(slice2(array, name)?))
+    Ok(slice2(array, name)?.as_chunks().0)
 }
 
 /// An array of shape (H, W).

@@ -10,6 +10,7 @@ mod mesh;
 mod normals;
 mod progress;
 mod reflectance;
+mod shadows;
 
 #[pyo3::pymodule]
 mod _bgars {
@@ -37,6 +38,10 @@ mod _bgars {
     use crate::normals::normal_arrays;
     #[pymodule_export]
     use crate::reflectance::estimate_reflectance;
+    #[pymodule_export]
+    use crate::shadows::draw_shadows;
+    #[pymodule_export]
+    use crate::shadows::measure_edges;
 
     #[pymodule_export]
     const REFLECTANCE_MIN_LIGHTS: usize = bgars_core::reflectance::MIN_LIGHTS;
