@@ -87,7 +87,10 @@ def tangents(vectors: Array) -> Array:
     side = np.column_stack([-unit[:, 1], unit[:, 0], np.zeros(len(unit))])
     level = np.linalg.norm(side, axis=1, keepdims=True)
     side = np.where(level > 1e-6, side / np.maximum(level, 1e-6), [1.0, 0.0, 0.0])  # noqa: PLR2004 - the zenith
-    return np.stack([side * length, np.cross(unit, side) * length], axis=1)
+    up = np.column_stack(
+        [-unit[:, 2] * side[:, 1], unit[:, 2] * side[:, 0], unit[:, 0] * side[:, 1] - unit[:, 1] * side[:, 0]]
+    )
+    return np.stack([side, up], axis=1) * length[:, None]
 
 
 def turned(vectors: Array, turns: Array) -> Array:

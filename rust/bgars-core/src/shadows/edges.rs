@@ -96,6 +96,13 @@ struct Scratch {
     counts: Vec<(usize, bool)>,
 }
 
+/// A pixel, and the cell of the map of shadows that it lies in.
+#[derive(Clone, Copy)]
+struct Place {
+    pixel: usize,
+    cell: usize,
+}
+
 struct Scene<'a, P> {
     stack: &'a ImageStack<'a, P>,
     radiometry: &'a Radiometry<'a, P>,
@@ -128,8 +135,8 @@ impl<P: crate::Pixel> Scene<'_, P> {
             let ray = shadow.ray(point.x, point.y);
             let (row, col) = self.nearest(point.x, point.y);
             let low = !(point.tangent_height > LOWEST_TANGENT * ball.radius && ray.along > 0.0);
-            let Some(pixel) = self.pixel(row, col) else { continue };
-            if low || self.silhouettes.hidden[self.cell(pixel)] {
+            let Some(at) = self.place(row, col) else { continue };
+            if low || self.silhouettes.hidden[at.cell] {
                 continue;
             }
             let way_px = ray.along / ray.slope();
@@ -141,12 +148,12 @@ impl<P: crate::Pixel> Scene<'_, P> {
             let steps = (settings.reach_px / settings.stride_px as f64).ceil() as i64;
             for offset in (-steps..=steps).map(|step| step * settings.stride_px as i64) {
                 let (row, col) = if along_cols { (row, col + offset) } else { (row + offset, col) };
-                let Some(pixel) = self.pixel(row, col) else { continue };
+                let Some(at) = self.place(row, col) else { continue };
                 let across_px = nearby.distance(self.x(col) - point.x, self.y(row) - point.y);
                 if across_px.abs() > settings.reach_px {
                     continue;
                 }
-                if let Some((value, texture)) = self.read(pixel, light, gains) {
+                if let Some((value, texture)) = self.read(at, light, gains) {
                     let columns = self.columns(across_px, spread_px, texture);
                     let scaled = across_px / spread_px;
                     pixels.push(Pixel { columns, value, texture, scaled, across_px, line: lines.len(), weight: 1.0 });
@@ -184,9 +191,9 @@ impl<P: crate::Pixel> Scene<'_, P> {
     /// Value under the shadow's light, and texture: the mean of the lights that reach the pixel, each over its gain.
     /// `None` where a ball hides it, where two balls shadow it, where it is clipped, or where too few lights reach it.
     #[inline]
-    fn read(&self, pixel: usize, light: usize, gains: &[f32]) -> Option<(f64, f64)> {
+    fn read(&self, at: Place, light: usize, gains: &[f32]) -> Option<(f64, f64)> {
         let silhouettes = &self.silhouettes;
-        let cell = self.cell(pixel);
+        let Place { pixel, cell } = at;
         let cells = silhouettes.hidden.len();
         if silhouettes.hidden[cell]
             || silhouettes.count[light * cells + cell] > 1
@@ -217,17 +224,15 @@ impl<P: crate::Pixel> Scene<'_, P> {
         (code.to_f32() < self.radiometry.saturation).then(|| self.radiometry.linearise(code) - offset)
     }
 
-    /// Index of a pixel of the image; `None` outside.
-    fn pixel(&self, row: i64, col: i64) -> Option<usize> {
-        let (row, col) = (usize::try_from(row).ok()?, usize::try_from(col).ok()?);
-        (row < self.stack.height() && col < self.stack.width()).then_some(row * self.stack.width() + col)
-    }
-
-    /// Cell of the map of shadows that a pixel lies in.
-    fn cell(&self, pixel: usize) -> usize {
-        let Silhouettes { step, cols, .. } = self.silhouettes;
-        let width = self.stack.width();
-        (pixel / width / step) * cols + pixel % width / step
+    /// A pixel of the image; `None` outside.
+    fn place(&self, row: i64, col: i64) -> Option<Place> {
+        let (row, col) = (u32::try_from(row).ok()?, u32::try_from(col).ok()?);
+        let (height, width) = (self.stack.height(), self.stack.width());
+        let step = self.silhouettes.step as u32;
+        ((row as usize) < height && (col as usize) < width).then(|| Place {
+            pixel: row as usize * width + col as usize,
+            cell: (row / step) as usize * self.silhouettes.cols + (col / step) as usize,
+        })
     }
 
     /// Row and column nearest to a place.
