@@ -105,4 +105,5 @@ def board_from_normals(field: NormalField, outside: NDArray[np.bool_]) -> Array 
         residuals = np.abs(slopes - system @ coefficients)
         spread = max(1.4826 * float(np.median(residuals[keep])), 1e-6)
         keep = residuals < TRIM * spread
-    return coefficients / unit
+    in_pixels: Array = coefficients / unit
+    return in_pixels

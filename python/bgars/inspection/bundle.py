@@ -90,7 +90,8 @@ def tangents(vectors: Array) -> Array:
     up = np.column_stack(
         [-unit[:, 2] * side[:, 1], unit[:, 2] * side[:, 0], unit[:, 0] * side[:, 1] - unit[:, 1] * side[:, 0]]
     )
-    return np.stack([side, up], axis=1) * length[:, None]
+    changes: Array = np.stack([side, up], axis=1) * length[:, None]
+    return changes
 
 
 def turned(vectors: Array, turns: Array) -> Array:
