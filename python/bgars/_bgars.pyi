@@ -7,9 +7,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars.inspection.shadow_edges import EdgeSettings
+from bgars.inspection.shadow_map import Casters
 from bgars.kernel_capture import KernelCapture
 from bgars.material_records import SurfaceMaterial
-from bgars.records import NormalField
+from bgars.records import Capture, NormalField
 
 __all__ = [
     "BLIND_MIN_LIGHTS",
@@ -17,9 +19,11 @@ __all__ = [
     "REFLECTANCE_MAX_LOSS",
     "REFLECTANCE_MIN_LIGHTS",
     "decode_stack",
+    "draw_shadows",
     "estimate_normals",
     "estimate_reflectance",
     "integrate_normals",
+    "measure_edges",
     "normal_arrays",
     "read_rgb16",
     "rim_bands",
@@ -47,6 +51,15 @@ def decode_stack(
     max_megapixels: float,
     threads: int | None,
 ) -> tuple[Any, bool, int]: ...
+def draw_shadows(
+    casters: Casters,
+    *,
+    shape: tuple[int, int],
+    step: int,
+    silhouette_margin_px: float,
+    shadow_margin_px: float,
+    threads: int | None,
+) -> tuple[NDArray[np.bool_], NDArray[np.uint8]]: ...
 def estimate_normals(
     capture: KernelCapture,
     *,
@@ -92,6 +105,20 @@ def integrate_normals(
     threads: int | None,
     progress: Callable[[int, float], object] | None,
 ) -> tuple[NDArray[np.float32], NDArray[np.int32], list[tuple[int, int, int]], int, float]: ...
+def measure_edges(
+    capture: Capture,
+    casters: Casters,
+    settings: EdgeSettings,
+    *,
+    angles_rad: list[float],
+    sectors: int,
+    gains: NDArray[np.float32],
+    step: int,
+    hidden: NDArray[np.bool_],
+    count: NDArray[np.uint8],
+    mask: NDArray[np.bool_] | None,
+    threads: int | None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
 def read_rgb16(path: str | PathLike[str], max_megapixels: float) -> NDArray[np.uint16]: ...
 def rim_bands(
     circles: NDArray[np.float64],

@@ -85,21 +85,25 @@ def board_from_normals(field: NormalField, outside: NDArray[np.bool_]) -> Array 
     (5,) float64 or None
         Coefficients in pixels; None where there are too few board pixels.
     """
-    rows, cols = np.nonzero(field.mask & outside)
-    if rows.size < MIN_BOARD_PIXELS:
+    pixels = np.flatnonzero(field.mask & outside)
+    if pixels.size < MIN_BOARD_PIXELS:
         return None
-    step = max(1, rows.size // MAX_SAMPLES)
-    rows, cols = rows[::step], cols[::step]
+    rows, cols = np.divmod(pixels[:: max(1, pixels.size // MAX_SAMPLES)], field.mask.shape[1])
     height, width = field.mask.shape
     x, y = cols + 0.5 - width / 2.0, height / 2.0 - rows - 0.5
     normals = field.normals[rows, cols].astype(np.float64)
     slopes = np.concatenate([-normals[:, 0] / normals[:, 2], -normals[:, 1] / normals[:, 2]])
-    system = np.concatenate(slope_terms(x, y))
+    # Both slopes are linear in 1, x and y: with x and y in halves of the image, normal equations are exact enough.
+    half = max(height, width) / 2.0
+    unit = np.array([1.0, 1.0, half, half, half])
+    system = np.concatenate(slope_terms(x / half, y / half))
     keep = np.isfinite(slopes)
     coefficients: Array = np.zeros(SHAPE_TERMS)
     for _ in range(ROUNDS):
-        coefficients = np.linalg.lstsq(system[keep], slopes[keep], rcond=None)[0]
+        weighted = system * keep[:, None]
+        coefficients = np.linalg.lstsq(weighted.T @ system, weighted.T @ np.where(keep, slopes, 0.0), rcond=None)[0]
         residuals = np.abs(slopes - system @ coefficients)
         spread = max(1.4826 * float(np.median(residuals[keep])), 1e-6)
         keep = residuals < TRIM * spread
-    return coefficients
+    in_pixels: Array = coefficients / unit
+    return in_pixels

@@ -87,7 +87,11 @@ def tangents(vectors: Array) -> Array:
     side = np.column_stack([-unit[:, 1], unit[:, 0], np.zeros(len(unit))])
     level = np.linalg.norm(side, axis=1, keepdims=True)
     side = np.where(level > 1e-6, side / np.maximum(level, 1e-6), [1.0, 0.0, 0.0])  # noqa: PLR2004 - the zenith
-    return np.stack([side * length, np.cross(unit, side) * length], axis=1)
+    up = np.column_stack(
+        [-unit[:, 2] * side[:, 1], unit[:, 2] * side[:, 0], unit[:, 0] * side[:, 1] - unit[:, 1] * side[:, 0]]
+    )
+    changes: Array = np.stack([side, up], axis=1) * length[:, None]
+    return changes
 
 
 def turned(vectors: Array, turns: Array) -> Array:
@@ -141,7 +145,7 @@ def solve_bundle(
     for iteration in range(1, rounds + 1):
         iterations = iteration
         board = Board(coefficients)
-        residual, blocks = _linearise(edges, table, vectors, near, board)
+        residual, derivatives = _linearise(edges, table, vectors, near, board)
         known = np.isfinite(edges.u_px)
         excess = _excess(residual[known], edges.u_px[known])
         variance = np.where(known, edges.u_px**2 + excess**2, 1.0)
@@ -151,7 +155,7 @@ def solve_bundle(
             loss = (1.0 + residual**2 / (redescend**2 * variance)) ** 2
         weight = np.where(known, 1.0 / (variance * loss), 0.0)
         normal, cross, corner, right, right_border = _normal(
-            blocks, residual, weight, table, vectors, coefficients, priors
+            derivatives, residual, weight, table, vectors, coefficients, priors
         )
         inverse = np.linalg.inv(normal)
         lever = inverse @ cross
@@ -171,9 +175,9 @@ def solve_bundle(
         ):
             break
     board = Board(coefficients)
-    residual, blocks = _linearise(edges, table, vectors, near, board)
+    residual, derivatives = _linearise(edges, table, vectors, near, board)
     honest = _honest_weights(residual, variance, known, redescend)
-    normal, cross, corner, _, _ = _normal(blocks, residual, honest, table, vectors, coefficients, priors)
+    normal, cross, corner, _, _ = _normal(derivatives, residual, honest, table, vectors, coefficients, priors)
     inverse = np.linalg.inv(normal)
     lever = inverse @ cross
     border_covariance = np.linalg.inv(corner - np.tensordot(cross, lever, axes=((0, 1), (0, 1))))
@@ -222,10 +226,8 @@ def _excess(residual: Array, u_px: Array) -> float:
     return float(np.sqrt(max(spread**2 - float(np.median(u_px)) ** 2, 0.0)))
 
 
-def _linearise(
-    edges: Edges, table: Array, vectors: Array, near: bool, board: Board
-) -> tuple[Array, tuple[Array, Array, Array]]:
-    """Distance of every point to its predicted edge, and derivatives by ball, light and board."""
+def _linearise(edges: Edges, table: Array, vectors: Array, near: bool, board: Board) -> tuple[Array, Array]:
+    """Distance (N, L, S) of every point to its predicted edge; derivatives (N, L, S, 12) by ball, light and board."""
     balls = Balls.from_table(table).spread(2)
     lamps = Lights.from_table(vectors, near).spread(1, 1)
     beam = rays(edges.x, edges.y, balls, lamps, board)
@@ -234,12 +236,12 @@ def _linearise(
     by_light = light_derivatives(beam, balls, (ways[None, :, None, 0], ways[None, :, None, 1]))
     by_ball = ball_derivatives(beam, balls, board)
     by_board = board_derivatives(edges.x, edges.y, beam, balls)
-    inverse = (1.0 / slope)[..., None]
-    return (beam.distance - balls.radius) / slope, (by_ball * inverse, by_light * inverse, by_board * inverse)
+    derivatives = np.concatenate([by_ball, by_light, by_board], axis=-1) / slope[..., None]
+    return (beam.distance - balls.radius) / slope, derivatives
 
 
 def _normal(
-    blocks: tuple[Array, Array, Array],
+    derivatives: Array,
     residual: Array,
     weight: Array,
     table: Array,
@@ -248,30 +250,25 @@ def _normal(
     priors: Priors,
 ) -> tuple[Array, Array, Array, Array, Array]:
     """Blocks of the normal equations: (N, 5, 5), (N, 5, B), (B, B), and their right sides; priors in."""
-    by_ball, by_light, by_board = blocks
     count, lights = residual.shape[:2]
     border = 2 * lights + SHAPE_TERMS
-    weighted = by_ball * weight[..., None]
-    flat = (count, -1, BALL_TERMS)
-    normal = weighted.reshape(flat).transpose(0, 2, 1) @ by_ball.reshape(flat)
-    cross = np.zeros((count, BALL_TERMS, border))
-    cross[:, :, : 2 * lights] = np.einsum("nlsi,nlsk->nilk", weighted, by_light, optimize=True).reshape(count, 5, -1)
-    cross[:, :, 2 * lights :] = weighted.reshape(flat).transpose(0, 2, 1) @ by_board.reshape(count, -1, SHAPE_TERMS)
-    right = -np.einsum("nlsi,nls->ni", weighted, residual)
-    light_weighted = by_light * weight[..., None]
-    corner, right_border = np.zeros((border, border)), np.zeros(border)
-    own = np.einsum("nlsi,nlsk->lik", light_weighted, by_light, optimize=True)
-    mixed = np.einsum("nlsi,nlsk->lik", light_weighted, by_board, optimize=True)
+    weighted = (derivatives * weight[..., None]).swapaxes(-1, -2)
+    shadows = weighted @ derivatives  # of every shadow, (N, L, 12, 12)
+    sides = -(weighted @ residual[..., None])[..., 0]
+    ball, lamp, shape = slice(BALL_TERMS), slice(BALL_TERMS, BALL_TERMS + 2), slice(BALL_TERMS + 2, None)
+    of_balls, of_lights = shadows[:, :, ball].sum(axis=1), shadows.sum(axis=0)
+    normal, right = of_balls[:, :, ball], sides[:, :, ball].sum(axis=1)
+    by_light = shadows[:, :, ball, lamp].swapaxes(1, 2).reshape(count, BALL_TERMS, 2 * lights)
+    cross = np.concatenate([by_light, of_balls[:, :, shape]], axis=2)
+    corner = np.zeros((border, border))
     for light in range(lights):
         part = slice(2 * light, 2 * light + 2)
-        corner[part, part] = own[light]
-        corner[part, 2 * lights :] = mixed[light]
-        corner[2 * lights :, part] = mixed[light].T
-    corner[2 * lights :, 2 * lights :] = np.einsum(
-        "nlsi,nlsk->ik", by_board * weight[..., None], by_board, optimize=True
-    )
-    right_border[: 2 * lights] = -np.einsum("nlsi,nls->li", light_weighted, residual).reshape(-1)
-    right_border[2 * lights :] = -np.einsum("nlsi,nls->i", by_board, weight * residual)
+        corner[part, part] = of_lights[light, lamp, lamp]
+        corner[part, 2 * lights :] = of_lights[light, lamp, shape]
+        corner[2 * lights :, part] = of_lights[light, shape, lamp]
+    corner[2 * lights :, 2 * lights :] = of_lights[:, shape, shape].sum(axis=0)
+    border_sides = sides.sum(axis=0)
+    right_border = np.concatenate([border_sides[:, lamp].reshape(-1), border_sides[:, shape].sum(axis=0)])
 
     off = priors.balls - table
     pull = 1.0 / priors.u_balls**2

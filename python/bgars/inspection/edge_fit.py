@@ -1,4 +1,7 @@
-"""Linear least squares of many short stretches of edge at once, with Cauchy weights the second time."""
+"""Linear least squares of many short stretches of outline at once, with Cauchy weights the second time.
+
+Stretches of shadow edges are fitted the same way in the core, `rust/bgars-core/src/shadows/stretch.rs`.
+"""
 
 from __future__ import annotations
 

@@ -145,7 +145,8 @@ def _across(
     cols = np.rint(radiance.col(edge[0])).astype(np.intp)[None, :] + np.where(along_cols[None, :], offsets, 0)
     usable = (rows >= 0) & (rows < radiance.height) & (cols >= 0) & (cols < radiance.width)
     rows, cols = np.clip(rows, 0, radiance.height - 1), np.clip(cols, 0, radiance.width - 1)
-    distance = np.hypot(radiance.x(cols) - table[ball, 0], radiance.y(rows) - table[ball, 1]) - table[ball, 3]
+    across_x, across_y = radiance.x(cols) - table[ball, 0], radiance.y(rows) - table[ball, 1]
+    distance = np.sqrt(across_x * across_x + across_y * across_y) - table[ball, 3]
     value = radiance.under(np.broadcast_to(light, rows.shape), rows * radiance.width + cols).astype(np.float64)
     at = shadows.pixels(rows, cols)
     shadowed = shadows.count.reshape(len(shadows.count), -1)[np.broadcast_to(light, rows.shape), at] > 0
@@ -182,6 +183,8 @@ def _centres(table: Array, middle: Array, shift: Array, u_shift: Array) -> tuple
 
 def _median(values: Array, known: NDArray[np.bool_]) -> Array:
     """(N,) medians of the known values of each row; 0 where there is none."""
-    some: NDArray[np.bool_] = np.asarray(known.any(axis=1))
-    median: Array = np.nanmedian(np.where(known, values, np.where(some[:, None], np.nan, 0.0)), axis=1)
+    count = known.sum(axis=1)
+    ascending = np.sort(np.where(known, values, np.inf), axis=1)
+    middle = np.column_stack([np.maximum(count - 1, 0) // 2, np.minimum(count // 2, values.shape[1] - 1)])
+    median: Array = np.where(count > 0, np.take_along_axis(ascending, middle, axis=1).mean(axis=1), 0.0)
     return median

@@ -23,6 +23,11 @@ class Radiance:
     ----------
     capture : Capture
         Its response, dark frame, black level, saturation and mask are honoured; intensities are not divided out here.
+
+    Attributes
+    ----------
+    mask : (H, W) bool or None
+        Pixels to use; None for all.
     """
 
     def __init__(self, capture: Capture) -> None:
@@ -34,7 +39,8 @@ class Radiance:
         black = capture.black_level
         self._black = black if table is None else float(np.interp(black, np.arange(len(table)), table))
         self.masked = not (capture.mask.strides == (0, 0) and bool(capture.mask[:1, :1].all()))
-        self._mask = np.ascontiguousarray(capture.mask).reshape(-1) if self.masked else None
+        self.mask = np.ascontiguousarray(capture.mask) if self.masked else None
+        self._mask = None if self.mask is None else self.mask.reshape(-1)
 
     @property
     def scale(self) -> float:

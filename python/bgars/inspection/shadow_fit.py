@@ -15,7 +15,7 @@ from bgars.inspection.outline import Outlines, outline_centres
 from bgars.inspection.population import q_spread
 from bgars.inspection.results import Usability, judge_balls
 from bgars.inspection.shadow_edges import Edges, EdgeSettings, measure_edges
-from bgars.inspection.shadow_map import ShadowMap
+from bgars.inspection.shadow_map import Casters, ShadowMap
 from bgars.inspection.spread import EdgeSpread, fit_spread
 from bgars.inspection.start import first_heights
 
@@ -122,10 +122,7 @@ def fit_shadows(
         settings = _settings(turn, radius, spread, last)
         shadows = ShadowMap(
             problem.radiance,
-            np.concatenate([table, problem.stand_ins(table)]),
-            vectors,
-            problem.near,
-            board,
+            Casters.of(np.concatenate([table, problem.stand_ins(table)]), vectors, problem.near, board),
             silhouette_margin_px=min(settings.reach_px, 0.1 * radius + 2.0),
             shadow_margin_px=settings.reach_px + 1.0,
             threads=threads,

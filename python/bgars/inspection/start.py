@@ -62,21 +62,23 @@ def edge_steps(
     beam = rays(edge.x, edge.y, balls, lights, board)
     off = np.maximum(BESIDE * balls.radius, 1.5) / beam.slope
     out_x, out_y = beam.gradient_x * off, beam.gradient_y * off
-    sides = []
-    for sign in (-1.0, 1.0):
-        x, y = edge.x + sign * out_x, edge.y + sign * out_y
-        row, col = np.rint(radiance.row(y)).astype(np.intp), np.rint(radiance.col(x)).astype(np.intp)
-        seen = (row >= 0) & (row < radiance.height) & (col >= 0) & (col < radiance.width) & (edge.tangent_height > 0)
-        row, col = np.clip(row, 0, radiance.height - 1), np.clip(col, 0, radiance.width - 1)
-        values = radiance.at(row * radiance.width + col) / gains.astype(np.float32).reshape(-1, *[1] * row.ndim)
-        texture = np.nan_to_num(values).mean(axis=0)
-        image = np.broadcast_to(images[..., None], row.shape)
-        own = np.take_along_axis(values, image[None], axis=0)[0]
-        seen &= np.isfinite(own) & (texture > 0)
-        for index in range(len(hidden.x)):
-            near = (hidden.radius[index] + 2.0) ** 2
-            seen &= np.square(x - hidden.x[index]) + np.square(y - hidden.y[index]) > near
-        sides.append(np.where(seen, own / np.where(texture > 0, texture, 1.0), np.nan))
+    # Both sides at once, inside first.
+    side = np.array([-1.0, 1.0]).reshape(-1, *[1] * out_x.ndim)
+    x, y = edge.x + side * out_x, edge.y + side * out_y
+    row, col = np.rint(radiance.row(y)).astype(np.intp), np.rint(radiance.col(x)).astype(np.intp)
+    seen = (row >= 0) & (row < radiance.height) & (col >= 0) & (col < radiance.width) & (edge.tangent_height > 0)
+    row, col = np.clip(row, 0, radiance.height - 1), np.clip(col, 0, radiance.width - 1)
+    values = radiance.at(row * radiance.width + col) / gains.astype(np.float32).reshape(-1, *[1] * row.ndim)
+    texture = np.nan_to_num(values).mean(axis=0)
+    image = np.broadcast_to(images[..., None], row.shape)
+    own = np.take_along_axis(values, image[None], axis=0)[0]
+    seen &= np.isfinite(own) & (texture > 0)
+    reach = hidden.radius + 2.0
+    near = (hidden.x > x.min() - reach) & (hidden.x < x.max() + reach)
+    near &= (hidden.y > y.min() - reach) & (hidden.y < y.max() + reach)
+    for index in np.flatnonzero(near):
+        seen &= np.square(x - hidden.x[index]) + np.square(y - hidden.y[index]) > reach[index] ** 2
+    sides = np.where(seen, own / np.where(texture > 0, texture, 1.0), np.nan)
     # Dark on both sides: the shadow of a neighbour, which says nothing.
     dark = (sides[0] < DARK) & (sides[1] < DARK)
     step = np.where(dark, np.nan, np.clip(sides[1] - sides[0], *CLIP))

@@ -20,6 +20,7 @@ pub mod pixel;
 pub mod radiometry;
 pub mod reflectance;
 pub mod rims;
+pub mod shadows;
 pub mod stack;
 mod stream;
 pub mod vertex_normals;

@@ -11,6 +11,7 @@ mod normals;
 mod progress;
 mod reflectance;
 mod rims;
+mod shadows;
 
 #[pyo3::pymodule]
 mod _bgars {
@@ -44,6 +45,10 @@ mod _bgars {
     use crate::rims::rim_profiles;
     #[pymodule_export]
     use crate::rims::ring_edges;
+    #[pymodule_export]
+    use crate::shadows::draw_shadows;
+    #[pymodule_export]
+    use crate::shadows::measure_edges;
 
     #[pymodule_export]
     const REFLECTANCE_MIN_LIGHTS: usize = bgars_core::reflectance::MIN_LIGHTS;

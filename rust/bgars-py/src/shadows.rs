@@ -1,0 +1,153 @@
+//! `draw_shadows`, `measure_edges`.
+
+use bgars_core::shadows::model::{Ball, Board, Lamp};
+use bgars_core::shadows::{EdgeSettings, Edges, Margins, STRETCH_FIELDS, Silhouettes};
+use bgars_core::{ImageStack, Pixel, Radiometry, shadows};
+use numpy::{PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+
+use crate::convert::{Stack, array2, array3, rows, slice2, slice3, triples};
+use crate::progress::on_threads;
+
+/// What throws shadows, in pixels: balls (N, 5), lights (L, 3), whether those are positions, the board's coefficients.
+#[derive(FromPyObject)]
+pub struct Casters<'py> {
+    balls: PyReadonlyArray2<'py, f64>,
+    lights: PyReadonlyArray2<'py, f64>,
+    near: bool,
+    board: [f64; 5],
+}
+
+impl Casters<'_> {
+    fn balls(&self) -> PyResult<Vec<Ball>> {
+        Ok(rows::<f64, 5>(&self.balls, "balls")?.iter().copied().map(Ball::from).collect())
+    }
+
+    fn lamps(&self) -> PyResult<Vec<Lamp>> {
+        Ok(triples(&self.lights, "lights")?.iter().map(|&vector| Lamp { vector, near: self.near }).collect())
+    }
+}
+
+/// hidden (rows, cols), count (L, rows, cols).
+type Maps<'py> = (Bound<'py, PyArray2<bool>>, Bound<'py, PyArray3<u8>>);
+
+#[pyfunction]
+#[pyo3(signature = (casters, *, shape, step, silhouette_margin_px, shadow_margin_px, threads))]
+#[allow(clippy::needless_pass_by_value)]
+pub fn draw_shadows<'py>(
+    py: Python<'py>,
+    casters: Casters<'py>,
+    shape: [usize; 2],
+    step: usize,
+    silhouette_margin_px: f64,
+    shadow_margin_px: f64,
+    threads: Option<i64>,
+) -> PyResult<Maps<'py>> {
+    let (balls, lamps, board) = (casters.balls()?, casters.lamps()?, Board(casters.board));
+    let margins = Margins { silhouette_px: silhouette_margin_px, shadow_px: shadow_margin_px };
+    let map =
+        on_threads(py, threads, || Ok(shadows::draw_shadows(&balls, &lamps, &board, shape, step.max(1), margins)))?;
+    Ok((array2(py, map.hidden, [map.rows, map.cols])?, array3(py, map.count, [lamps.len(), map.rows, map.cols])?))
+}
+
+/// The images of a `bgars.Capture`, without its lights.
+#[derive(FromPyObject)]
+pub struct Photographs<'py> {
+    images: Stack<'py>,
+    response: Option<PyReadonlyArray1<'py, f32>>,
+    dark: Option<Bound<'py, PyAny>>,
+    black_level: f32,
+    saturation: f32,
+    full_scale: f32,
+}
+
+/// The attributes of `bgars.inspection.shadow_edges.EdgeSettings` and of the lines across an edge.
+#[derive(FromPyObject)]
+pub struct Lines {
+    spread_px: f64,
+    lamp_spread_rad: f64,
+    reach_px: f64,
+    stride_px: usize,
+    coarse: bool,
+}
+
+/// stretches (N, L * S, fields), noise (N, L).
+type Measured<'py> = (Bound<'py, PyArray3<f64>>, Bound<'py, PyArray2<f64>>);
+
+#[pyfunction]
+#[pyo3(signature = (capture, casters, settings, *, angles_rad, sectors, gains, step, hidden, count, mask, threads))]
+#[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)]
+pub fn measure_edges<'py>(
+    py: Python<'py>,
+    capture: Photographs<'py>,
+    casters: Casters<'py>,
+    settings: Lines,
+    angles_rad: Vec<f64>,
+    sectors: usize,
+    gains: PyReadonlyArray2<'py, f32>,
+    step: usize,
+    hidden: PyReadonlyArray2<'py, bool>,
+    count: PyReadonlyArray3<'py, u8>,
+    mask: Option<PyReadonlyArray2<'py, bool>>,
+    threads: Option<i64>,
+) -> PyResult<Measured<'py>> {
+    let (balls, lamps, board) = (casters.balls()?, casters.lamps()?, Board(casters.board));
+    let (balls_count, lights) = (balls.len(), lamps.len());
+    let silhouettes = Silhouettes {
+        step,
+        cols: hidden.shape()[1],
+        hidden: slice2(&hidden, "hidden")?,
+        count: slice3(&count, "count")?,
+        mask: mask.as_ref().map(|mask| slice2(mask, "mask")).transpose()?,
+    };
+    let gains = slice2(&gains, "gains")?;
+    let Lines { spread_px, lamp_spread_rad, reach_px, stride_px, coarse } = settings;
+    let settings = EdgeSettings { spread_px, lamp_spread_rad, reach_px, stride_px, coarse, angles_rad, sectors };
+    let job = Job { silhouettes, balls, lamps, board, gains, settings };
+    let edges = match &capture.images {
+        Stack::U8(images) => job.run(py, &capture, images, threads),
+        Stack::U16(images) => job.run(py, &capture, images, threads),
+        Stack::F32(images) => job.run(py, &capture, images, threads),
+    }?;
+    let numbers = edges.stretches.iter().flat_map(shadows::Stretch::numbers).collect();
+    let shape = [balls_count, lights * sectors, STRETCH_FIELDS];
+    Ok((array3(py, numbers, shape)?, array2(py, edges.noise, [balls_count, lights])?))
+}
+
+/// Everything but the images.
+struct Job<'a> {
+    silhouettes: Silhouettes<'a>,
+    balls: Vec<Ball>,
+    lamps: Vec<Lamp>,
+    board: Board,
+    gains: &'a [f32],
+    settings: EdgeSettings,
+}
+
+impl Job<'_> {
+    fn run<P: Pixel + numpy::Element>(
+        &self,
+        py: Python<'_>,
+        capture: &Photographs<'_>,
+        images: &PyReadonlyArray3<'_, P>,
+        threads: Option<i64>,
+    ) -> PyResult<Edges> {
+        let dark: Option<PyReadonlyArray2<'_, P>> = capture.dark.as_ref().map(PyAnyMethods::extract).transpose()?;
+        let &[lights, height, width] = images.shape() else { unreachable!("a stack has three axes") };
+        let radiometry = Radiometry {
+            response: capture.response.as_ref().map(|table| table.as_slice()).transpose()?,
+            dark: dark.as_ref().map(|dark| slice2(dark, "dark")).transpose()?,
+            black_level: capture.black_level,
+            saturation: capture.saturation,
+            full_scale: capture.full_scale,
+            intensities: vec![1.0; lights],
+        };
+        let images = slice3(images, "images")?;
+        on_threads(py, threads, || {
+            let stack = ImageStack::new(images, lights, height, width)?;
+            radiometry.check(&stack)?;
+            let Self { silhouettes, balls, lamps, board, gains, settings } = self;
+            Ok(shadows::measure_edges(&stack, &radiometry, *silhouettes, balls, lamps, board, gains, settings))
+        })
+    }
+}
