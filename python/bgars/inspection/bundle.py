@@ -65,8 +65,8 @@ class Solution:
 
     `covariance` (N, 5, 5) of each ball, lights and board included; `u_light_rad` (L,); `residual_px` (N, L, S) distance
     of each point to its edge, NaN where none; `weight` (N, L, S); `iterations`; `board_covariance` (5, 5) of the
-    coefficients of `board`; `common_covariance` (5, 5) of what lights and board put all balls off by together, a part of
-    `covariance`.
+    coefficients of `board`; `common_covariance` (5, 5), a part of `covariance`: by how much lights and board put all
+    balls off together.
     """
 
     balls: Array

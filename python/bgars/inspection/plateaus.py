@@ -2,13 +2,13 @@ r"""How far all edges of shadows are off together because grey levels are rounde
 
 Noise makes the mean of rounded levels right. Without noise a smooth board, or a black shadow, reads the same wrong
 level everywhere, while the slope of the edge between them, which passes through many levels, reads right. With Gaussian
-noise of standard deviation sigma the mean of levels rounded to steps q is off by at most (RMS over all levels; q / sqrt 12
-without noise; with noise the first harmonic remains, Widrow & Kollar 2008, "Quantization noise", section 9.4)
+noise of standard deviation sigma the mean of levels rounded to steps q is off, RMS over all levels, by at most
 
-    q / sqrt 12  exp(-2 pi^2 sigma^2 / q^2),
+    q / sqrt 12  exp(-2 pi^2 sigma^2 / q^2)
 
-and noise around a level m cut off at zero lifts its mean by sigma phi(m / sigma) - m Phi(-m / sigma). A level off by e
-moves the fitted edge by about EDGE e s / c with s the spread and c the contrast: the same way on all balls.
+(q / sqrt 12 without noise; with it the first harmonic remains: Widrow & Kollar, "Quantization noise", 2008), and noise
+around a level m cut off at zero lifts its mean by sigma phi(m / sigma) - m Phi(-m / sigma). A level off by e moves the
+fitted edge by about EDGE e s / c with s the spread and c the contrast: the same way on all balls.
 """
 
 from __future__ import annotations

@@ -134,8 +134,7 @@ def fit_shadows(
             threads=threads,
         )
         if last:
-            priors = _with_outlines(problem, priors, shadows, table, spread)
-            priors = _with_free_radii(priors)
+            priors = _with_free_radii(_with_outlines(problem, priors, shadows, table, spread))
             wide = _wide_outlines(problem, shadows, table, vectors, spread)
         edges = measure_edges(
             problem.radiance, shadows, table[index], vectors, problem.near, board, gains[index], settings, threads
