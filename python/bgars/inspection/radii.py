@@ -75,7 +75,8 @@ def sharpen_radii(solution: Solution, silhouette_px: Array, u_silhouette_px: Arr
             return balls, covariance
         weight = good / (shadow + silhouette)
         middle = float((weight * apart).sum() / weight.sum())
-        scatter = float(np.sqrt(total * off[good].sum() / (good.sum() - 1.0)))
+        # n - 3: the scatter of few balls is itself uncertain (JCGM 101:2008, 6.4.9.4).
+        scatter = float(np.sqrt(total * off[good].sum() / (good.sum() - 3.0)))
     # What all radii are apart by, b - c: the silhouettes' common error less that of the shadows, through the lights.
     u_silhouette = float(np.median(np.square(u_silhouette_px[good])))
     known, prior = 1.0 / float(weight.sum()), u_silhouette + by_lights
