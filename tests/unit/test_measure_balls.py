@@ -150,6 +150,29 @@ def test_uncertainties_cover_the_truth_as_often_as_they_should() -> None:
     assert 0.61 <= float(np.mean(list(shares.values()))) <= 0.75, shares
 
 
+def test_diameters_of_found_balls_are_covered_on_captures_of_all_kinds() -> None:
+    kinds = [
+        {"supersample": 1},
+        {"supersample": 2, "pitch_um": 16.0},
+        {"supersample": 2, "pitch_um": 13.0, "read_noise_levels": 0.0, "full_well_e": None},
+        {"supersample": 3, "blur_px": 0.6},
+        {"supersample": 3, "pitch_um": 20.0, "read_noise_levels": 0.6, "full_well_e": 6000.0},
+        {"supersample": 4, "pitch_um": 12.0, "blur_px": 0.4, "bit_depth": 12},
+        {"supersample": 4, "pitch_um": 9.0, "gamma": 2.2},
+    ]
+    hits: list[bool] = []
+    for seed, kind in enumerate(kinds):
+        rig = bgars.LightRig.ring(6 + 2 * (seed % 2), elevation_deg=40.0 + 2.5 * seed)
+        capture, truth, _ = photograph(array(5, 6, 60 + seed), rig, 60 + seed, **kind)  # type: ignore[arg-type]
+        found = bgars.find_balls(capture)
+        measured = measure_balls(capture, found)
+        assert len(measured.balls) == len(truth.balls)
+        u = np.array([ball.u_diameter_um for ball in measured.balls])
+        hits.extend(np.abs(errors(measured, truth, "diameter_um")) < u)
+    assert len(hits) >= 200
+    assert 0.61 <= float(np.mean(hits)) <= 0.75, [float(np.mean(part)) for part in np.array_split(hits, len(kinds))]
+
+
 def test_lights_are_found_from_a_rig_one_degree_off() -> None:
     rig = bgars.LightRig.ring(8)
     capture, truth, found = photograph(array(4, 5, 3), rig)

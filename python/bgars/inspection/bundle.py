@@ -65,7 +65,8 @@ class Solution:
 
     `covariance` (N, 5, 5) of each ball, lights and board included; `u_light_rad` (L,); `residual_px` (N, L, S) distance
     of each point to its edge, NaN where none; `weight` (N, L, S); `iterations`; `board_covariance` (5, 5) of the
-    coefficients of `board`.
+    coefficients of `board`; `common_covariance` (5, 5), a part of `covariance`: by how much lights and board put all
+    balls off together.
     """
 
     balls: Array
@@ -78,6 +79,7 @@ class Solution:
     excess_px: float
     iterations: int
     board_covariance: Array
+    common_covariance: Array
 
 
 def tangents(vectors: Array) -> Array:
@@ -182,6 +184,7 @@ def solve_bundle(
     lever = inverse @ cross
     border_covariance = np.linalg.inv(corner - np.tensordot(cross, lever, axes=((0, 1), (0, 1))))
     covariance = inverse + lever @ border_covariance @ lever.transpose(0, 2, 1)
+    mean_lever = lever.mean(axis=0)
     board_covariance: Array = border_covariance[2 * lights :, 2 * lights :].astype(np.float64)
     u_light = np.sqrt(np.diag(border_covariance)[: 2 * lights].reshape(lights, 2).sum(axis=1))
     return Solution(
@@ -195,6 +198,7 @@ def solve_bundle(
         excess,
         iterations,
         board_covariance,
+        mean_lever @ border_covariance @ mean_lever.T,
     )
 
 

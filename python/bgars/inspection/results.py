@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from bgars.ball_records import BallMeasurement, MeasuredBall
 from bgars.inspection.bundle import angles_rad
 from bgars.inspection.highlights import sharpen_centres
+from bgars.inspection.plateaus import edge_bias_px
+from bgars.inspection.radii import sharpen_radii
 from bgars.inspection.shape_or_lights import shape_or_lights
 from bgars.inspection.spread import SHARP_PX
 
@@ -79,7 +81,7 @@ def measurement(
     fitted: dict[int, int] = {}
     if fit is not None and solution is not None:
         fitted = {int(ball): place for place, ball in enumerate(fit.index[fit.usability.usable])}
-        fit = _with_highlights(fit, solution, highlights)
+        fit = _with_silhouettes(_with_highlights(fit, solution, highlights))
     balls = []
     for index, ball in enumerate(found.balls):
         if index in fitted and fit is not None:
@@ -138,10 +140,20 @@ def _with_highlights(fit: Fit, solution: Solution, highlights: Highlights | None
     return replace(fit, solution=replace(solution, balls=balls, covariance=covariance))
 
 
-def _model_error(sharp_px: float) -> Array:
-    """(5, 5) covariance of what no residual shows: blurred texture, pixels that straddle an edge."""
+def _with_silhouettes(fit: Fit) -> Fit:
+    """The fit with radii sharpened by silhouettes; its covariance holds what all balls have in common, too."""
+    if fit.solution is None:
+        return fit
+    chosen = fit.index[fit.usability.usable]
+    balls, covariance = sharpen_radii(fit.solution, fit.problem.table[chosen, 3], fit.problem.u_radius[chosen])
+    covariance += _model_error(fit.spread.sharp_px, edge_bias_px(fit.problem.radiance, fit.edges, fit.spread.sharp_px))
+    return replace(fit, solution=replace(fit.solution, balls=balls, covariance=covariance))
+
+
+def _model_error(sharp_px: float, bias_px: float) -> Array:
+    """(5, 5) covariance of what no residual shows: blurred texture, pixels that straddle an edge, rounded levels."""
     size = np.sqrt(sharp_px / SHARP_PX)
-    centre, radius = size * MODEL_CENTRE_PX, size * MODEL_RADIUS_PX
+    centre, radius = size * MODEL_CENTRE_PX, np.hypot(size * MODEL_RADIUS_PX, bias_px)
     together = radius * np.array([0.0, 0.0, MODEL_HEIGHT_PER_RADIUS, 1.0, 0.0])
     covariance: Array = np.diag([centre**2, centre**2, 0.0, 0.0, 0.0]) + np.outer(together, together)
     return covariance
@@ -154,7 +166,7 @@ def _measured(
     solution = fit.solution
     assert solution is not None
     x, y, z, radius, q = solution.balls[place]
-    covariance = solution.covariance[place] + _model_error(fit.spread.sharp_px)
+    covariance = solution.covariance[place]
     u = np.sqrt(np.diag(covariance))
     by_top = np.array([0.0, 0.0, 1.0, q, radius])
     u_top = float(np.sqrt(by_top @ covariance @ by_top))

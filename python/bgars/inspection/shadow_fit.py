@@ -13,6 +13,7 @@ from bgars.inspection.bundle import Priors, Solution, angles_rad, solve_bundle
 from bgars.inspection.checks import check_shifts, displaced_images, explain_dark_steps, refuse_misfits
 from bgars.inspection.outline import Outlines, outline_centres
 from bgars.inspection.population import q_spread
+from bgars.inspection.radii import MIN_POPULATION
 from bgars.inspection.results import Usability, judge_balls
 from bgars.inspection.shadow_edges import Edges, EdgeSettings, measure_edges
 from bgars.inspection.shadow_map import Casters, ShadowMap
@@ -60,6 +61,8 @@ REDESCEND_FIRST, REDESCEND = 8.0, 3.5
 OUTLINE_SAFETY = 1.5
 SHIFT_BALLS = 24
 OUTLINE_FLOOR_PX = 0.01
+FREE_RADIUS = 10.0
+"""Factor of the finder's uncertainty where silhouettes enter after the fit, all balls together."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +131,7 @@ def fit_shadows(
             threads=threads,
         )
         if last:
-            priors = _with_outlines(problem, priors, shadows, table, spread)
+            priors = _with_free_radii(_with_outlines(problem, priors, shadows, table, spread))
             wide = _wide_outlines(problem, shadows, table, vectors, spread)
         edges = measure_edges(
             problem.radiance, shadows, table[index], vectors, problem.near, board, gains[index], settings, threads
@@ -240,6 +243,17 @@ def _with_outlines(problem: Problem, priors: Priors, shadows: ShadowMap, table: 
         balls[:, axis] = (by_outline * outline + by_finder * problem.table[:, axis]) / weight
         u_balls[:, axis] = 1.0 / np.sqrt(weight)
     return priors._replace(balls=balls, u_balls=u_balls)
+
+
+def _with_free_radii(priors: Priors) -> Priors:
+    """Radii nearly free, where a population has them (:mod:`bgars.inspection.radii`).
+
+    Silhouettes err alike on all balls, and a prior takes the errors of all for independent ones.
+    """
+    u_balls = priors.u_balls.copy()
+    if len(u_balls) >= MIN_POPULATION:
+        u_balls[:, 3] *= FREE_RADIUS
+    return priors._replace(u_balls=u_balls)
 
 
 def _solve(
