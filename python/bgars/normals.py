@@ -214,10 +214,10 @@ def _part_of(
 
 
 def _circles(anchors: FoundBalls | ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """(N, 5): x right, y up, radius of each anchor, standard uncertainties of centre and radius, in pixels."""
+    """(N, 4): x right, y up, radius of each anchor and standard uncertainty of the radius, in pixels."""
     if isinstance(anchors, FoundBalls):
-        circles = [(ball.x_px, ball.y_px, ball.radius_px, ball.u_centre_px, ball.u_radius_px) for ball in anchors.balls]
-        return np.array(circles, np.float64).reshape(-1, CIRCLE_VALUES + 2)
+        circles = [(ball.x_px, ball.y_px, ball.radius_px, ball.u_radius_px) for ball in anchors.balls]
+        return np.array(circles, np.float64).reshape(-1, CIRCLE_VALUES + 1)
     given = np.asarray(anchors)
     if given.dtype == np.bool_:
         if given.shape != shape or not given.any():
@@ -239,7 +239,7 @@ def _circles(anchors: FoundBalls | ArrayLike, shape: tuple[int, ...]) -> NDArray
 
 def _exact(circles_px: ArrayLike) -> NDArray[np.float64]:
     """Circles without uncertainty."""
-    return np.pad(np.asarray(circles_px, np.float64), ((0, 0), (0, 2)))
+    return np.pad(np.asarray(circles_px, np.float64), ((0, 0), (0, 1)))
 
 
 def _outside(

@@ -40,9 +40,8 @@ def add_reflectance(
         Another method's estimate; its other pixels stay.
     capture : Capture
         At least 6 lights.
-    circles_px : (N, 5) float64
-        Silhouettes of balls: x right, y up (origin at the image centre), radius, standard uncertainties of centre and
-        radius.
+    circles_px : (N, 4) float64
+        Silhouettes of balls: x right, y up (origin at the image centre), radius, standard uncertainty of the radius.
     mask : (H, W) bool or None
         Pixels to use.
     free : (H, W) bool, optional

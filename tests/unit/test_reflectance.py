@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import bgars
 import numpy as np
 import pytest
+from bgars.circle_pixels import inside_circles
 from bgars.experiments.measure import filled_normals
 
 if TYPE_CHECKING:
@@ -247,6 +248,27 @@ def test_standard_errors_cover_68_percent_of_the_errors() -> None:
         error_deg = bgars.angular_error_deg(field.normals[measured], truth.normals[measured])
         within.append(error_deg <= field.standard_error_deg[measured])
     assert np.concatenate(within).mean() == pytest.approx(0.68, abs=0.05)
+
+
+def test_standard_errors_of_found_balls_hold_their_circles_errors() -> None:
+    random = np.random.default_rng(2026)
+    within = []
+    for seed in range(16):
+        material = replace(
+            SOLDER, i_d=random.choice([1.0, 0.5, 0.25, 0.1, 0.05]), hardness=random.choice([10, 20, 40, 80])
+        )
+        rig = bgars.LightRig.ring(8, elevation_deg=random.choice([40.0, 45.0, 55.0]))
+        camera = bgars.Camera(
+            pixel_pitch_um=random.choice([10.0, 14.0, 18.0]),
+            supersample=int(random.choice([1, 3])),
+            read_noise_levels=random.choice([0.5, 1.0, 2.0]),
+        )
+        capture, truth = bgars.simulate(bgars.Scene.ball_array(3, 3), rig, material, camera, seed=seed)
+        field = bgars.estimate_normals(capture)
+        measured = judged(truth) & inside_circles(circles_px(capture, truth), truth.mask.shape) & field.measured
+        error_deg = bgars.angular_error_deg(field.normals[measured], truth.normals[measured])
+        within.append((error_deg <= field.standard_error_deg[measured]).mean())
+    assert np.mean(within) == pytest.approx(0.68, abs=0.05)
 
 
 def test_without_diffuse_light_pixels_between_the_highlights_are_not_measured() -> None:

@@ -89,13 +89,7 @@ pub fn estimate_reflectance<'py>(
     progress: Option<Py<PyAny>>,
     mut out: Outputs<'py>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let circle = |&[x_px, y_px, radius_px, u_centre_px, u_radius_px]: &[f64; 5]| Circle {
-        x_px,
-        y_px,
-        radius_px,
-        u_centre_px,
-        u_radius_px,
-    };
+    let circle = |&[x_px, y_px, radius_px, u_radius_px]: &[f64; 4]| Circle { x_px, y_px, radius_px, u_radius_px };
     let circles: Vec<Circle> = rows(&circles, "circles")?.iter().map(circle).collect();
     let material = material.map(|given| given.material()).transpose()?;
     let request = Request {

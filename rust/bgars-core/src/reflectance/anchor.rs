@@ -19,9 +19,7 @@ pub struct Circle {
     pub y_px: f64,
     /// Radius.
     pub radius_px: f64,
-    /// Standard uncertainty of the centre along each axis; 0 for a circle that is right.
-    pub u_centre_px: f64,
-    /// The same of the radius.
+    /// Standard uncertainty of the radius; 0 for a circle that is right.
     pub u_radius_px: f64,
 }
 
@@ -32,17 +30,15 @@ impl Circle {
     /// A circle that is right.
     #[must_use]
     pub const fn exact(x_px: f64, y_px: f64, radius_px: f64) -> Self {
-        Self { x_px, y_px, radius_px, u_centre_px: 0.0, u_radius_px: 0.0 }
+        Self { x_px, y_px, radius_px, u_radius_px: 0.0 }
     }
 
-    /// Root mean square angle in radian by which the circle's own error turns a normal of its sphere: `n_xy = (p - c) / R`
-    /// moves by `u_c / R` along both axes and by `n_xy u_R / R` outward, and outward the sphere turns away by `1 / n_z`.
+    /// Standard angle in radian by which the error of the radius turns a normal of its sphere: `n_xy = (p - c) / R` moves
+    /// outward by `n_xy u_R / R`, and there the sphere turns away by `1 / n_z`.
     #[must_use]
     #[inline]
     pub fn error_rad(&self, normal: &Vector3<f64>) -> f64 {
-        let (centre, radius) = (self.u_centre_px / self.radius_px, self.u_radius_px / self.radius_px);
-        let outward2 = centre.powi(2) + (1.0 - normal.z * normal.z) * radius.powi(2);
-        (centre.powi(2) + outward2 / normal.z.max(MIN_N_Z).powi(2)).sqrt()
+        normal.x.hypot(normal.y) * self.u_radius_px / (self.radius_px * normal.z.max(MIN_N_Z))
     }
 
     /// Normal of the sphere at a point of the image: `n_xy = (p - c) / R`; `None` outside.

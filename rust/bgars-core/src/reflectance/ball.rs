@@ -148,7 +148,8 @@ impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
         let deviation = self.ball.deviation_rad / DISC_RADIAN;
         let off = scratch.anchor.map_or(0.0, |anchor| angle(&from_disc(anchor.map(f64::from)), &normal));
         let error_rad = direction_error(best, best.prior_information, deviation * deviation / COMPONENTS);
-        // The material was fitted on the normals of the circles: data that agree with it are wrong where these are.
+        // The material was fitted on the normals of the circles: where all radii err alike, so do normals that agree with it.
+        // What centres err by differs from ball to ball, and the material is theirs in common.
         let circle_rad = scratch.anchor.map_or(0.0, |_| self.ball.circle.error_rad(&normal) as f32);
         BallPixel {
             pixel,
