@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bgars.balls.highlights import HighlightCircles, highlight_circles
-from bgars.balls.rim_fit import Circles, fit_rims
+from bgars.balls.rim_fit import Circles, fit_rims, rim_costs
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,6 +36,10 @@ SURE = 0.9
 CENTRE_DIFFERS = 0.015
 BETTER_SUPPORT = 0.1
 REPLACED_U = 2.0
+WORTH_A_TRY_PX = 0.05
+"""Distance from the highlights' centre from which on a fit that starts there may end elsewhere."""
+COST_SCALE = 20.0
+"""Difference of costs that speaks clearly for one of two circles; residuals of neighbouring pixels are not independent."""
 
 
 def fit_alike(levels: Levels, row: Array, col: Array, radius_px: Array) -> Circles:
@@ -139,15 +143,8 @@ def _agree_with_highlights(levels: Levels, circles: Circles, shine: HighlightCir
         far = shines & (
             (off_radius > np.maximum(DIFFERS_SIGMA * u_radius, 0.1)) | (off_centre > np.maximum(3.0 * u_centre, 0.1))
         )
-        index = np.flatnonzero(far)
-        if turn == 0 and len(index):
-            again = fit_rims(
-                levels, expected.row[index], expected.col[index], expected.radius_px[index], blur_px=circles.blur_px
-            )
-            same = np.hypot(again.row - circles.row[index], again.col - circles.col[index]) < 0.1  # noqa: PLR2004
-            same &= np.abs(again.radius_px - circles.radius_px[index]) < 0.1  # noqa: PLR2004
-            better = ~same & (again.support >= circles.support[index])
-            _put(circles, index[better], again.take(np.flatnonzero(better)))
+        if turn == 0:
+            _try_from(levels, circles, expected, np.flatnonzero(shines & (far | (off_centre > WORTH_A_TRY_PX))))
     # Silhouettes that stay elsewhere: a complete rim is a fact (a flat or odd ball), an incomplete one is not.
     sure = circles.support >= SURE
     sure &= circles.u_radius_px <= 2.0 * np.median(circles.u_radius_px[shines])
@@ -166,6 +163,25 @@ def _agree_with_highlights(levels: Levels, circles: Circles, shine: HighlightCir
     circles.u_centre_px = np.where(joined, mean, circles.u_centre_px)
     circles.u_centre_px = np.where(replaced, REPLACED_U * u_shine_centre, circles.u_centre_px)
     circles.support = np.where(replaced, np.maximum(circles.support, MIN_SUPPORT), circles.support)
+
+
+def _try_from(levels: Levels, circles: Circles, expected: HighlightCircles, index: NDArray[np.intp]) -> None:
+    """Fit some circles once more from where the highlights have them; the mean of both fits, weighted by likelihood.
+
+    Not the better one of both: a choice between two that are about as good would hang on rounding.
+    """
+    if not len(index):
+        return
+    start = HighlightCircles(*(column[index] for column in expected))
+    again = fit_rims(levels, start.row, start.col, start.radius_px, blur_px=circles.blur_px)
+    first = circles.take(index)
+    # Compared around the highlights' circle: around a shoulder inside the ball, the shoulder is the better rim.
+    costs = rim_costs(levels, start.row, start.col, start.radius_px, [first, again])
+    share = 1.0 / (1.0 + np.exp(np.clip((costs[1] - costs[0]) / COST_SCALE, -50.0, 50.0)))
+    for name in ("row", "col", "radius_px", "u_centre_px", "u_radius_px", "support"):
+        mine, other = getattr(first, name), getattr(again, name)
+        getattr(circles, name)[index] = mine + share * (other - mine)
+    circles.offsets_px[index] = np.where(share[:, None] > 0.5, again.offsets_px, first.offsets_px)  # noqa: PLR2004
 
 
 def _own_uncertainty(circles: Circles, shine: HighlightCircles, spread: float, shift_px: float) -> tuple[Array, Array]:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Circles", "fit_rims"]
+__all__ = ["Circles", "fit_rims", "rim_costs"]
 
 BASIS = 7
 """Board, step, root, ramp inside, ramp outside, board along the rim, step along the rim."""
@@ -114,8 +114,7 @@ def fit_rims(
     for _ in range(WIDE_ROUNDS):
         _update(circles, *_sector_offsets(pixels, circles, table)[:2])
     radius_px = circles.radius_px.clip(0.5 * radius_px, 2.0 * radius_px)
-    in_px, out_px = np.clip(0.15 * radius_px, 3.0, 6.0), np.clip(0.14 * radius_px, 2.5, 5.0)
-    pixels = RimPixels(levels, circles.row, circles.col, circles.radius_px, in_px, out_px, 1)
+    pixels = _narrow_band(levels, circles.row, circles.col, circles.radius_px, radius_px)
     table = RimTable(table.blur_px, NARROW_REACH_PX, levels.threads)
     for turn in range(NARROW_ROUNDS):
         if turn == 1 and blur_px is None:
@@ -126,6 +125,43 @@ def fit_rims(
     circles.u_radius_px = np.hypot(circles.u_radius_px, _u_model_px(levels, circles, variance, jump))
     circles.u_centre_px = np.hypot(circles.u_centre_px, CENTRE_BLUR_SHARE * circles.blur_px)
     return circles
+
+
+def rim_costs(levels: Levels, row: Array, col: Array, radius_px: Array, tried: list[Circles]) -> Array:
+    """How badly each of several circles explains the same pixels; differences are twice those of log-likelihoods.
+
+    A fit ends in one minimum of several where the rim is a grey level or two; which is the best only their costs tell.
+
+    Parameters
+    ----------
+    levels : Levels
+        The capture.
+    row, col, radius_px : (N,) float64
+        Circles around whose rims the pixels lie.
+    tried : list of Circles
+        K times N circles; the blur is that of the first.
+
+    Returns
+    -------
+    (K, N) float64
+        Sum over sectors and lights of n log(mean squared residual), the variances profiled out (Seber and Wild 1989, 2.2.1).
+    """
+    pixels = _narrow_band(levels, row, col, radius_px, radius_px)
+    table = RimTable(tried[0].blur_px, NARROW_REACH_PX, levels.threads)
+    costs = np.zeros((len(tried), len(row)))
+    for cost, circles in zip(costs, tried, strict=True):
+        rest, _, count = _solve(pixels, circles, table)
+        number = np.maximum(count - BASIS, 1.0)[..., None]
+        left = np.maximum(np.einsum("nsll->nsl", rest[..., 5:, 5:]), 0.0) / number
+        seen = (count >= 2 * BASIS)[..., None] & ~np.moveaxis(pixels.clipped, 0, -1)
+        cost += (number * np.log(left + NOISE_FLOOR**2) * seen).sum(axis=(1, 2))
+    return costs
+
+
+def _narrow_band(levels: Levels, row: Array, col: Array, radius_px: Array, size_px: Array) -> RimPixels:
+    """All pixels near the rims; `size_px` are the radii that its depths are in proportion to."""
+    in_px, out_px = np.clip(0.15 * size_px, 3.0, 6.0), np.clip(0.14 * size_px, 2.5, 5.0)
+    return RimPixels(levels, row, col, radius_px, in_px, out_px, 1)
 
 
 def _u_model_px(levels: Levels, circles: Circles, variance: Array, jump: Array) -> Array:
