@@ -32,14 +32,17 @@ HALF_VECTOR_BIAS = 0.06
 DIFFERS_SIGMA = 3.0
 SHAPE = 0.003
 """Standard deviation of radius ratios of real balls, which are not quite spheres."""
-SURE = 0.9
+FAR = 1.5
+"""Multiple of the limit of what agrees at which a silhouette counts as wholly elsewhere."""
+UNSURE, SURE = 0.83, 0.92
+"""Support of a rim that proves nothing, and of a complete one."""
 CENTRE_DIFFERS = 0.015
 BETTER_SUPPORT = 0.1
 REPLACED_U = 2.0
 WORTH_A_TRY_PX = 0.05
 """Distance from the highlights' centre from which on a fit that starts there may end elsewhere."""
 COST_SCALE = 20.0
-"""Difference of costs that speaks clearly for one of two circles; residuals of neighbouring pixels are not independent."""
+"""Difference of costs that speaks clearly for one of two circles: residuals of neighbouring pixels are alike."""
 
 
 def fit_alike(levels: Levels, row: Array, col: Array, radius_px: Array) -> Circles:
@@ -140,28 +143,38 @@ def _agree_with_highlights(levels: Levels, circles: Circles, shine: HighlightCir
         u_shine_radius, u_shine_centre = _own_uncertainty(circles, shine, spread, shift_px)
         u_radius = np.hypot(u_shine_radius, circles.u_radius_px)
         u_centre = np.hypot(u_shine_centre, circles.u_centre_px)
-        far = shines & (
-            (off_radius > np.maximum(DIFFERS_SIGMA * u_radius, 0.1)) | (off_centre > np.maximum(3.0 * u_centre, 0.1))
+        off = np.fmax(
+            off_radius / np.maximum(DIFFERS_SIGMA * u_radius, 0.1),
+            off_centre / np.maximum(DIFFERS_SIGMA * u_centre, 0.1),
         )
         if turn == 0:
-            _try_from(levels, circles, expected, np.flatnonzero(shines & (far | (off_centre > WORTH_A_TRY_PX))))
-    # Silhouettes that stay elsewhere: a complete rim is a fact (a flat or odd ball), an incomplete one is not.
-    sure = circles.support >= SURE
-    sure &= circles.u_radius_px <= 2.0 * np.median(circles.u_radius_px[shines])
-    replaced = far & ~sure
-    joined = shines & ~far
-    weight = np.where(replaced, 1.0, np.where(joined, 1.0 / (1.0 + (u_shine_radius / circles.u_radius_px) ** 2), 0.0))
-    circles.radius_px += np.nan_to_num(weight * (expected.radius_px - circles.radius_px))
-    common = _common_uncertainty(spread, shine, circles, joined)
-    mean = 1.0 / np.sqrt(1.0 / u_shine_radius**2 + 1.0 / circles.u_radius_px**2)
-    circles.u_radius_px = np.where(joined, np.hypot(mean, common), circles.u_radius_px)
-    circles.u_radius_px = np.where(replaced, np.hypot(REPLACED_U * u_shine_radius, common), circles.u_radius_px)
-    weight = np.where(replaced, 1.0, np.where(joined, 1.0 / (1.0 + (u_shine_centre / circles.u_centre_px) ** 2), 0.0))
-    circles.row += np.nan_to_num(weight * (expected.row - circles.row))
-    circles.col += np.nan_to_num(weight * (expected.col - circles.col))
-    mean = 1.0 / np.sqrt(1.0 / u_shine_centre**2 + 1.0 / circles.u_centre_px**2)
-    circles.u_centre_px = np.where(joined, mean, circles.u_centre_px)
-    circles.u_centre_px = np.where(replaced, REPLACED_U * u_shine_centre, circles.u_centre_px)
+            _try_from(levels, circles, expected, np.flatnonzero(shines & ((off > 1.0) | (off_centre > WORTH_A_TRY_PX))))
+    # Silhouettes that stay elsewhere: a complete rim is a fact (a flat or odd ball), an incomplete one is not. By
+    # degrees: a silhouette at a limit must not jump to its highlights, or back, by rounding.
+    far = np.where(shines, np.clip((off - 1.0) / (FAR - 1.0), 0.0, 1.0), 0.0)
+    sure = np.clip((circles.support - UNSURE) / (SURE - UNSURE), 0.0, 1.0)
+    sure *= np.clip(3.0 - circles.u_radius_px / np.median(circles.u_radius_px[shines]), 0.0, 1.0)
+    common = _common_uncertainty(spread, shine, circles, shines & (far < 0.5))  # noqa: PLR2004
+
+    def joined(shift: Array, own: Array, other: Array) -> tuple[Array, Array]:
+        """How far to shift a silhouette's coordinate by, and its uncertainty."""
+        weight = (1.0 - far) / (1.0 + (other / own) ** 2) + far * (1.0 - sure)
+        mean = 1.0 / (1.0 / own**2 + 1.0 / other**2)
+        apart = far * (sure * own**2 + (1.0 - sure) * (REPLACED_U * other) ** 2)
+        u = np.sqrt((1.0 - far) * mean + apart + far * (1.0 - far) * shift**2)
+        return np.where(shines, weight * shift, 0.0), np.where(shines, u, own)
+
+    step, u = joined(expected.radius_px - circles.radius_px, circles.u_radius_px, u_shine_radius)
+    circles.radius_px += step
+    circles.u_radius_px = np.where(shines, np.hypot(u, np.sqrt(1.0 - far * sure) * common), u)
+    (row, u_row), (col, u_col) = (
+        joined(shift, circles.u_centre_px, u_shine_centre)
+        for shift in (expected.row - circles.row, expected.col - circles.col)
+    )
+    circles.row += row
+    circles.col += col
+    circles.u_centre_px = np.sqrt((u_row**2 + u_col**2) / 2.0)
+    replaced = far * (1.0 - sure) > 0.5  # noqa: PLR2004
     circles.support = np.where(replaced, np.maximum(circles.support, MIN_SUPPORT), circles.support)
 
 
@@ -192,10 +205,12 @@ def _own_uncertainty(circles: Circles, shine: HighlightCircles, spread: float, s
     good = np.isfinite(shine.radius_px)
     usual = np.median(shine.radius_px[good])
     more_radius = max((spread * usual) ** 2 - float(np.median(circles.u_radius_px[good])) ** 2, 0.0)
-    more_centre = max(shift_px**2 - float(np.median(circles.u_centre_px[good])) ** 2, 0.0)
+    # Centres scatter by more than both state: both are then wrong by the same factor (Birge 1932).
+    stated = np.median(np.hypot(shine.u_centre_px[good], circles.u_centre_px[good]))
+    birge = max(shift_px / max(float(stated), 1e-9), 1.0)
     return (
         np.sqrt(shine.u_radius_px**2 + (SHAPE * shine.radius_px) ** 2 + more_radius),
-        np.sqrt(shine.u_centre_px**2 + more_centre),
+        birge * shine.u_centre_px,
     )
 
 

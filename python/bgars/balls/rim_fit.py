@@ -144,18 +144,19 @@ def rim_costs(levels: Levels, row: Array, col: Array, radius_px: Array, tried: l
     Returns
     -------
     (K, N) float64
-        Sum over sectors and lights of n log(mean squared residual), the variances profiled out (Seber and Wild 1989, 2.2.1).
+        Sum over sectors and lights of n log(mean squared residual): the likelihood concentrated with respect to the
+        variances (Seber and Wild 1989, section 2.2).
     """
     pixels = _narrow_band(levels, row, col, radius_px, radius_px)
     table = RimTable(tried[0].blur_px, NARROW_REACH_PX, levels.threads)
-    costs = np.zeros((len(tried), len(row)))
-    for cost, circles in zip(costs, tried, strict=True):
+    costs = []
+    for circles in tried:
         rest, _, count = _solve(pixels, circles, table)
         number = np.maximum(count - BASIS, 1.0)[..., None]
         left = np.maximum(np.einsum("nsll->nsl", rest[..., 5:, 5:]), 0.0) / number
         seen = (count >= 2 * BASIS)[..., None] & ~np.moveaxis(pixels.clipped, 0, -1)
-        cost += (number * np.log(left + NOISE_FLOOR**2) * seen).sum(axis=(1, 2))
-    return costs
+        costs.append((number * np.log(left + NOISE_FLOOR**2) * seen).sum(axis=(1, 2)))
+    return np.stack(costs)
 
 
 def _narrow_band(levels: Levels, row: Array, col: Array, radius_px: Array, size_px: Array) -> RimPixels:

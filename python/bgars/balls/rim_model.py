@@ -48,7 +48,7 @@ class RimTable:
     def look_up(self, depth_px: NDArray[np.floating], fold: NDArray[np.int32]) -> FloatArray:
         """(..., 2 SHAPES) profiles and their derivatives by depth, at depths and folded directions (:meth:`fold`).
 
-        Linear between the depths of the table: with the nearest one, circles would move by jumps, which weak rims amplify.
+        Linear between the depths of the table: with the nearest one circles move by jumps, which weak rims amplify.
         """
         inside = np.clip(depth_px, self.first_px, -self.first_px)
         place = (inside - self.first_px) * STEPS_PER_PX
