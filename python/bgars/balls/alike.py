@@ -228,15 +228,15 @@ def _relation(circles: Circles, shine: HighlightCircles) -> tuple[float, float, 
     if good.sum() < ENOUGH:
         good = np.isfinite(shine.radius_px)
     ratio = circles.radius_px[good] / shine.radius_px[good]
-    # The half with the smaller uncertainties says more.
+    # The half with the smaller uncertainties says more of the ratio; a shift is in all alike.
     sharp = circles.u_radius_px[good] <= np.median(circles.u_radius_px[good])
     middle = float(np.median(ratio[sharp]))
     shifts = np.stack([circles.row[good] - shine.row[good], circles.col[good] - shine.col[good]])
-    shift = np.median(shifts[:, sharp], axis=1)
+    shift = np.median(shifts, axis=1)
     spread = 1.48 * float(np.median(np.abs(ratio - middle)))
     shift_px = 1.48 * float(np.median(np.abs(shifts - shift[:, None])))
     # Lights all around cancel what lobes shift; only a clear shift is believed.
-    doubt = shift_px**2 * 1.6 / max(int(sharp.sum()), 1)
+    doubt = shift_px**2 * 1.6 / max(int(good.sum()), 1)
     shift *= max(0.0, 1.0 - 2.0 * doubt / max(float(shift @ shift), 1e-12))
     return middle, spread, shift, shift_px
 

@@ -238,7 +238,7 @@ def _solve(pixels: RimPixels, circles: Circles, table: RimTable) -> tuple[Array,
     solved = np.linalg.solve(basis, right)
     rest = gram[..., BASIS:, BASIS:] - np.swapaxes(right, -1, -2) @ solved
     coefficients = solved[..., 5:]  # (N, S, BASIS, L)
-    count: Array = pixels.weight.sum(axis=2).astype(np.float64)
+    count: Array = (pixels.weight**2).sum(axis=2).astype(np.float64)
     return np.asarray(rest), np.asarray(coefficients), count
 
 
