@@ -29,7 +29,8 @@ FLATTENED = 0.7
 USUAL = 0.04
 HALF_VECTOR_BIAS = 0.06
 """Largest usual difference of the highlights' radius, as a fraction: off-specular peaks and wide lobes."""
-DIFFERS_SIGMA = 3.0
+DIFFERS_SIGMA, CENTRES_DIFFER_SIGMA = 3.0, 4.0
+"""What radii and centres (two coordinates, and many balls) must differ by."""
 SHAPE = 0.003
 """Standard deviation of radius ratios of real balls, which are not quite spheres."""
 FAR = 1.5
@@ -84,7 +85,7 @@ def fit_alike(levels: Levels, row: Array, col: Array, radius_px: Array) -> Circl
                 & (again.radius_px > FLATTENED * every.radius_px[index])
             )
             better &= again.support >= circles.support[index] - BETTER_SUPPORT
-            _put(circles, index[better], again.take(np.flatnonzero(better)))
+            circles.put(index[better], again.take(np.flatnonzero(better)))
     if shines.sum() >= ENOUGH:
         _agree_with_highlights(levels, circles, shine)
     _agree_with_centres(levels, circles, every, np.isfinite(every.radius_px) & ~shines)
@@ -101,7 +102,7 @@ def _agree_with_centres(levels: Levels, circles: Circles, shine: HighlightCircle
     again = fit_rims(levels, shine.row[index], shine.col[index], shine.radius_px[index], blur_px=circles.blur_px)
     closer = np.hypot(again.row - shine.row[index], again.col - shine.col[index]) < 0.5 * off[index]
     closer &= (again.support >= circles.support[index] - BETTER_SUPPORT) & (again.support >= MIN_SUPPORT)
-    _put(circles, index[closer], again.take(np.flatnonzero(closer)))
+    circles.put(index[closer], again.take(np.flatnonzero(closer)))
     index = index[~closer]
     circles.row[index], circles.col[index] = shine.row[index], shine.col[index]
     circles.u_radius_px[index] = np.hypot(circles.u_radius_px[index], off[index])
@@ -140,9 +141,9 @@ def _agree_with_highlights(levels: Levels, circles: Circles, shine: HighlightCir
         )
         off_radius = np.abs(circles.radius_px - expected.radius_px)
         off_centre = np.hypot(circles.row - expected.row, circles.col - expected.col)
-        u_shine_radius, u_shine_centre = _own_uncertainty(circles, shine, spread, shift_px)
+        u_shine_radius, u_shine_centre, birge = _own_uncertainty(circles, shine, spread, shift_px)
         u_radius = np.hypot(u_shine_radius, circles.u_radius_px)
-        u_centre = np.hypot(u_shine_centre, circles.u_centre_px)
+        u_centre = np.hypot(u_shine_centre, birge * circles.u_centre_px)
         off = np.fmax(
             off_radius / np.maximum(DIFFERS_SIGMA * u_radius, 0.1),
             off_centre / np.maximum(DIFFERS_SIGMA * u_centre, 0.1),
@@ -197,7 +198,9 @@ def _try_from(levels: Levels, circles: Circles, expected: HighlightCircles, inde
     circles.offsets_px[index] = np.where(share[:, None] > 0.5, again.offsets_px, first.offsets_px)  # noqa: PLR2004
 
 
-def _own_uncertainty(circles: Circles, shine: HighlightCircles, spread: float, shift_px: float) -> tuple[Array, Array]:
+def _own_uncertainty(
+    circles: Circles, shine: HighlightCircles, spread: float, shift_px: float
+) -> tuple[Array, Array, float]:
     """Uncertainties of highlight radii and centres.
 
     Disorder, balls that are no spheres, and of the spread against the silhouettes what these do not account for.
@@ -211,6 +214,7 @@ def _own_uncertainty(circles: Circles, shine: HighlightCircles, spread: float, s
     return (
         np.sqrt(shine.u_radius_px**2 + (SHAPE * shine.radius_px) ** 2 + more_radius),
         birge * shine.u_centre_px,
+        birge,
     )
 
 
@@ -257,10 +261,4 @@ def _agree_with_radius(levels: Levels, circles: Circles, judged: NDArray[np.bool
     again = fit_rims(levels, circles.row[index], circles.col[index], start_px, blur_px=circles.blur_px)
     better = np.abs(again.radius_px - usual_px) < np.maximum(4.0 * spread_px, 0.03 * usual_px)
     better &= again.support >= circles.support[index] + BETTER_SUPPORT
-    _put(circles, index[better], again.take(np.flatnonzero(better)))
-
-
-def _put(circles: Circles, index: NDArray[np.intp], other: Circles) -> None:
-    """Set some of the circles."""
-    for name in ("row", "col", "radius_px", "u_centre_px", "u_radius_px", "support", "offsets_px"):
-        getattr(circles, name)[index] = getattr(other, name)
+    circles.put(index[better], again.take(np.flatnonzero(better)))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bgars.balls.rim_model import SHAPES, RimTable
-from bgars.balls.rim_pixels import SECTORS, RimPixels
+from bgars.balls.rim_pixels import SECTORS, TAPER_PX, RimPixels
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,8 +23,10 @@ __all__ = ["Circles", "fit_rims", "rim_costs"]
 
 BASIS = 7
 """Board, step, root, ramp inside, ramp outside, board along the rim, step along the rim."""
-WIDE_ROUNDS = 3
+WIDE_ROUNDS = 6
 NARROW_ROUNDS = 3
+MORE_ROUNDS, SETTLED_PX = 8, 0.05
+"""Rounds for circles whose last step was longer than that."""
 FIRST_BLUR_PX = 0.3
 WIDE_REACH_PX, NARROW_REACH_PX = 13.0, 9.0
 """Depth of the bands, and how far circles move within them."""
@@ -81,6 +83,12 @@ class Circles:
         columns = {field.name: getattr(self, field.name)[index] for field in fields(self) if field.name != "blur_px"}
         return replace(self, **columns)
 
+    def put(self, index: NDArray[np.intp], other: Circles) -> None:
+        """Set some of the circles."""
+        for field in fields(self):
+            if field.name != "blur_px":
+                getattr(self, field.name)[index] = getattr(other, field.name)
+
 
 def fit_rims(
     levels: Levels,
@@ -92,7 +100,7 @@ def fit_rims(
 ) -> Circles:
     """Fit the circle of each ball to its rim in all lights.
 
-    First on every few pixels of a wide band, then on all pixels of a narrow one.
+    First on half of the pixels of a wide band, then on all pixels of a narrow one; longer where circles still move.
 
     Parameters
     ----------
@@ -109,8 +117,8 @@ def fit_rims(
     if not len(row):
         return circles
     table = RimTable(FIRST_BLUR_PX if blur_px is None else blur_px, WIDE_REACH_PX, levels.threads)
-    wide_px = np.clip(0.2 * radius_px, 4.0, 9.0)
-    pixels = RimPixels(levels, circles.row, circles.col, circles.radius_px, wide_px, wide_px, 3)
+    wide_px = np.clip(0.2 * radius_px, 4.0, 9.0) + TAPER_PX / 2.0
+    pixels = RimPixels(levels, circles.row, circles.col, circles.radius_px, wide_px, wide_px, 2)
     for _ in range(WIDE_ROUNDS):
         _update(circles, *_sector_offsets(pixels, circles, table)[:2])
     radius_px = circles.radius_px.clip(0.5 * radius_px, 2.0 * radius_px)
@@ -119,8 +127,17 @@ def fit_rims(
     for turn in range(NARROW_ROUNDS):
         if turn == 1 and blur_px is None:
             table = RimTable(_estimated_blur(pixels, circles), NARROW_REACH_PX, levels.threads)
-        offset, variance, jump = _sector_offsets(pixels, circles, table)
-        _update(circles, offset, variance)
+        offset, variance, jump, slope = _sector_offsets(pixels, circles, table)
+        moved_px = _update(circles, offset, variance)
+    for _ in range(MORE_ROUNDS):
+        index = np.flatnonzero(moved_px > SETTLED_PX)
+        if not len(index):
+            break
+        part = circles.take(index)
+        pixels = _narrow_band(levels, part.row, part.col, part.radius_px, part.radius_px)
+        offset, variance[index], jump[index], _ = _sector_offsets(pixels, part, table, slope)
+        moved_px[index] = _update(part, offset, variance[index])
+        circles.put(index, part)
     circles.blur_px = table.blur_px
     circles.u_radius_px = np.hypot(circles.u_radius_px, _u_model_px(levels, circles, variance, jump))
     circles.u_centre_px = np.hypot(circles.u_centre_px, CENTRE_BLUR_SHARE * circles.blur_px)
@@ -242,10 +259,17 @@ def _solve(pixels: RimPixels, circles: Circles, table: RimTable) -> tuple[Array,
     return np.asarray(rest), np.asarray(coefficients), count
 
 
-def _sector_offsets(pixels: RimPixels, circles: Circles, table: RimTable) -> tuple[Array, Array, Array]:
-    """(N, S, L) outward offset of the rim in each sector and light, its variance, and the step in grey levels."""
+def _sector_offsets(
+    pixels: RimPixels, circles: Circles, table: RimTable, slope: Array | None = None
+) -> tuple[Array, Array, Array, Array]:
+    """(N, S, L) outward offset of the rim in each sector and light, its variance, and the step in grey levels.
+
+    Last, (1, S, 5, L) slopes of the rim over all balls, which a few of them cannot tell: they are given `slope`.
+    """
     rest, coefficients, count = _solve(pixels, circles, table)
-    slope = _pooled(coefficients[..., [1, 2, 3, 4, 6], :], pixels.azimuths_rad)
+    if slope is None:
+        slope = _pooled(coefficients[..., [1, 2, 3, 4, 6], :], pixels.azimuths_rad)[:1]
+    pooled, slope = slope, np.broadcast_to(slope, (len(rest), *slope.shape[1:]))
     dd = np.einsum("nskl,nskm,nsml->nsl", slope, rest[..., :5, :5], slope)
     de = np.einsum("nskl,nskl->nsl", slope, rest[..., :5, 5:])
     ee = np.einsum("nsll->nsl", rest[..., 5:, 5:])
@@ -256,7 +280,7 @@ def _sector_offsets(pixels: RimPixels, circles: Circles, table: RimTable) -> tup
     bad = (count < 2 * BASIS)[..., None] | (np.moveaxis(pixels.clipped, 0, -1))
     variance = np.where(bad, np.inf, variance)
     arc_px = (2 * math.pi / SECTORS) * circles.radius_px[:, None, None]
-    return np.clip(offset, -3.0, 3.0), variance, np.sqrt(dd / arc_px)
+    return np.clip(offset, -3.0, 3.0), variance, np.sqrt(dd / arc_px), pooled
 
 
 def _pooled(slope: Array, azimuths_rad: Array) -> Array:
@@ -290,8 +314,11 @@ def _left_over(pixels: RimPixels, circles: Circles, table: RimTable) -> tuple[Ar
     return np.maximum(left, 0.0) / np.maximum(count - BASIS - 1, 1.0)[..., None], dd
 
 
-def _update(circles: Circles, offset: Array, variance: Array) -> None:
-    """One step of the three parameters of each circle, all sectors and lights together, outliers down-weighted."""
+def _update(circles: Circles, offset: Array, variance: Array) -> Array:
+    """One step of the three parameters of each circle, all sectors and lights together, outliers down-weighted.
+
+    Returns the longest of the three steps of each, in pixels.
+    """
     mid = (np.arange(SECTORS) + 0.5) * (2 * math.pi / SECTORS)
     design = np.stack([np.cos(mid), np.sin(mid), np.ones(SECTORS)], axis=1)  # x right, y up, radius
     base = 1.0 / (variance + MODEL_ERROR_PX**2)
@@ -332,6 +359,8 @@ def _update(circles: Circles, offset: Array, variance: Array) -> None:
     circles.u_radius_px = np.sqrt(
         np.maximum(noise[:, 2, 2], scatter**2 / number) + (RADIUS_SHARE * scatter) ** 2 + U_MODEL_PX**2
     )
+    moved_px: Array = np.abs(step).max(axis=1)
+    return moved_px
 
 
 def _jackknife(weight: Array, offset: Array, design: Array) -> Array:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from bgars.balls.levels import Levels
 
-__all__ = ["SECTORS", "RimPixels"]
+__all__ = ["SECTORS", "TAPER_PX", "RimPixels"]
 
 SECTORS = 24
 """Equal angles that a rim is divided into."""
