@@ -146,7 +146,7 @@ def _agree_with_highlights(levels: Levels, circles: Circles, shine: HighlightCir
         u_centre = np.hypot(u_shine_centre, birge * circles.u_centre_px)
         off = np.fmax(
             off_radius / np.maximum(DIFFERS_SIGMA * u_radius, 0.1),
-            off_centre / np.maximum(DIFFERS_SIGMA * u_centre, 0.1),
+            off_centre / np.maximum(CENTRES_DIFFER_SIGMA * u_centre, 0.1),
         )
         if turn == 0:
             _try_from(levels, circles, expected, np.flatnonzero(shines & ((off > 1.0) | (off_centre > WORTH_A_TRY_PX))))
