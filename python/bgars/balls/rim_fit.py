@@ -23,10 +23,8 @@ __all__ = ["Circles", "fit_rims", "rim_costs"]
 
 BASIS = 7
 """Board, step, root, ramp inside, ramp outside, board along the rim, step along the rim."""
-WIDE_ROUNDS = 6
+WIDE_ROUNDS = 3
 NARROW_ROUNDS = 3
-MORE_ROUNDS, SETTLED_PX = 8, 0.05
-"""Rounds for circles whose last step was longer than that."""
 FIRST_BLUR_PX = 0.3
 WIDE_REACH_PX, NARROW_REACH_PX = 13.0, 9.0
 """Depth of the bands, and how far circles move within them."""
@@ -100,7 +98,7 @@ def fit_rims(
 ) -> Circles:
     """Fit the circle of each ball to its rim in all lights.
 
-    First on half of the pixels of a wide band, then on all pixels of a narrow one; longer where circles still move.
+    First on half of the pixels of a wide band, then on all pixels of a narrow one.
 
     Parameters
     ----------
@@ -127,17 +125,8 @@ def fit_rims(
     for turn in range(NARROW_ROUNDS):
         if turn == 1 and blur_px is None:
             table = RimTable(_estimated_blur(pixels, circles), NARROW_REACH_PX, levels.threads)
-        offset, variance, jump, slope = _sector_offsets(pixels, circles, table)
-        moved_px = _update(circles, offset, variance)
-    for _ in range(MORE_ROUNDS):
-        index = np.flatnonzero(moved_px > SETTLED_PX)
-        if not len(index):
-            break
-        part = circles.take(index)
-        pixels = _narrow_band(levels, part.row, part.col, part.radius_px, part.radius_px)
-        offset, variance[index], jump[index], _ = _sector_offsets(pixels, part, table, slope)
-        moved_px[index] = _update(part, offset, variance[index])
-        circles.put(index, part)
+        offset, variance, jump = _sector_offsets(pixels, circles, table)
+        _update(circles, offset, variance)
     circles.blur_px = table.blur_px
     circles.u_radius_px = np.hypot(circles.u_radius_px, _u_model_px(levels, circles, variance, jump))
     circles.u_centre_px = np.hypot(circles.u_centre_px, CENTRE_BLUR_SHARE * circles.blur_px)
@@ -259,17 +248,10 @@ def _solve(pixels: RimPixels, circles: Circles, table: RimTable) -> tuple[Array,
     return np.asarray(rest), np.asarray(coefficients), count
 
 
-def _sector_offsets(
-    pixels: RimPixels, circles: Circles, table: RimTable, slope: Array | None = None
-) -> tuple[Array, Array, Array, Array]:
-    """(N, S, L) outward offset of the rim in each sector and light, its variance, and the step in grey levels.
-
-    Last, (1, S, 5, L) slopes of the rim over all balls, which a few of them cannot tell: they are given `slope`.
-    """
+def _sector_offsets(pixels: RimPixels, circles: Circles, table: RimTable) -> tuple[Array, Array, Array]:
+    """(N, S, L) outward offset of the rim in each sector and light, its variance, and the step in grey levels."""
     rest, coefficients, count = _solve(pixels, circles, table)
-    if slope is None:
-        slope = _pooled(coefficients[..., [1, 2, 3, 4, 6], :], pixels.azimuths_rad)[:1]
-    pooled, slope = slope, np.broadcast_to(slope, (len(rest), *slope.shape[1:]))
+    slope = _pooled(coefficients[..., [1, 2, 3, 4, 6], :], pixels.azimuths_rad)
     dd = np.einsum("nskl,nskm,nsml->nsl", slope, rest[..., :5, :5], slope)
     de = np.einsum("nskl,nskl->nsl", slope, rest[..., :5, 5:])
     ee = np.einsum("nsll->nsl", rest[..., 5:, 5:])
@@ -280,7 +262,7 @@ def _sector_offsets(
     bad = (count < 2 * BASIS)[..., None] | (np.moveaxis(pixels.clipped, 0, -1))
     variance = np.where(bad, np.inf, variance)
     arc_px = (2 * math.pi / SECTORS) * circles.radius_px[:, None, None]
-    return np.clip(offset, -3.0, 3.0), variance, np.sqrt(dd / arc_px), pooled
+    return np.clip(offset, -3.0, 3.0), variance, np.sqrt(dd / arc_px)
 
 
 def _pooled(slope: Array, azimuths_rad: Array) -> Array:
@@ -314,11 +296,8 @@ def _left_over(pixels: RimPixels, circles: Circles, table: RimTable) -> tuple[Ar
     return np.maximum(left, 0.0) / np.maximum(count - BASIS - 1, 1.0)[..., None], dd
 
 
-def _update(circles: Circles, offset: Array, variance: Array) -> Array:
-    """One step of the three parameters of each circle, all sectors and lights together, outliers down-weighted.
-
-    Returns the longest of the three steps of each, in pixels.
-    """
+def _update(circles: Circles, offset: Array, variance: Array) -> None:
+    """One step of the three parameters of each circle, all sectors and lights together, outliers down-weighted."""
     mid = (np.arange(SECTORS) + 0.5) * (2 * math.pi / SECTORS)
     design = np.stack([np.cos(mid), np.sin(mid), np.ones(SECTORS)], axis=1)  # x right, y up, radius
     base = 1.0 / (variance + MODEL_ERROR_PX**2)
@@ -359,8 +338,6 @@ def _update(circles: Circles, offset: Array, variance: Array) -> Array:
     circles.u_radius_px = np.sqrt(
         np.maximum(noise[:, 2, 2], scatter**2 / number) + (RADIUS_SHARE * scatter) ** 2 + U_MODEL_PX**2
     )
-    moved_px: Array = np.abs(step).max(axis=1)
-    return moved_px
 
 
 def _jackknife(weight: Array, offset: Array, design: Array) -> Array:
