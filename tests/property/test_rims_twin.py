@@ -35,7 +35,8 @@ def test_rim_bands_hold_the_pixels_near_each_rim_by_sector(every: int) -> None:
         r, c = (side.ravel() for side in np.meshgrid(span, span, indexing="ij"))
         y, x = row - (np.rint(row) + r), np.rint(col) + c - col
         depth = radius - np.hypot(x, y)
-        near = np.flatnonzero((depth < inward) & (depth > -outward))[::every]
+        place = (np.rint(row) + r).astype(int) * 3242174889 + (np.rint(col) + c).astype(int) * 2447445414
+        near = np.flatnonzero((depth < inward) & (depth > -outward) & (place % 2**32 * every < 2**32))
         sector = np.floor((np.arctan2(y, x)[near] / (2 * math.pi) % 1.0) * 24).astype(int) % 24
         for index in range(24):
             used = weights[ball, index] > 0

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bgars.balls.highlights import HighlightCircles, highlight_circles
-from bgars.balls.rim_fit import Circles, fit_rims
+from bgars.balls.rim_fit import Circles, fit_rims, rim_costs
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,13 +29,21 @@ FLATTENED = 0.7
 USUAL = 0.04
 HALF_VECTOR_BIAS = 0.06
 """Largest usual difference of the highlights' radius, as a fraction: off-specular peaks and wide lobes."""
-DIFFERS_SIGMA = 3.0
+DIFFERS_SIGMA, CENTRES_DIFFER_SIGMA = 3.0, 4.0
+"""What radii and centres (two coordinates, and many balls) must differ by."""
 SHAPE = 0.003
 """Standard deviation of radius ratios of real balls, which are not quite spheres."""
-SURE = 0.9
+FAR = 1.5
+"""Multiple of the limit of what agrees at which a silhouette counts as wholly elsewhere."""
+UNSURE, SURE = 0.83, 0.92
+"""Support of a rim that proves nothing, and of a complete one."""
 CENTRE_DIFFERS = 0.015
 BETTER_SUPPORT = 0.1
 REPLACED_U = 2.0
+WORTH_A_TRY_PX = 0.05
+"""Distance from the highlights' centre from which on a fit that starts there may end elsewhere."""
+COST_SCALE = 20.0
+"""Difference of costs that speaks clearly for one of two circles: residuals of neighbouring pixels are alike."""
 
 
 def fit_alike(levels: Levels, row: Array, col: Array, radius_px: Array) -> Circles:
@@ -77,7 +85,7 @@ def fit_alike(levels: Levels, row: Array, col: Array, radius_px: Array) -> Circl
                 & (again.radius_px > FLATTENED * every.radius_px[index])
             )
             better &= again.support >= circles.support[index] - BETTER_SUPPORT
-            _put(circles, index[better], again.take(np.flatnonzero(better)))
+            circles.put(index[better], again.take(np.flatnonzero(better)))
     if shines.sum() >= ENOUGH:
         _agree_with_highlights(levels, circles, shine)
     _agree_with_centres(levels, circles, every, np.isfinite(every.radius_px) & ~shines)
@@ -94,7 +102,7 @@ def _agree_with_centres(levels: Levels, circles: Circles, shine: HighlightCircle
     again = fit_rims(levels, shine.row[index], shine.col[index], shine.radius_px[index], blur_px=circles.blur_px)
     closer = np.hypot(again.row - shine.row[index], again.col - shine.col[index]) < 0.5 * off[index]
     closer &= (again.support >= circles.support[index] - BETTER_SUPPORT) & (again.support >= MIN_SUPPORT)
-    _put(circles, index[closer], again.take(np.flatnonzero(closer)))
+    circles.put(index[closer], again.take(np.flatnonzero(closer)))
     index = index[~closer]
     circles.row[index], circles.col[index] = shine.row[index], shine.col[index]
     circles.u_radius_px[index] = np.hypot(circles.u_radius_px[index], off[index])
@@ -133,42 +141,66 @@ def _agree_with_highlights(levels: Levels, circles: Circles, shine: HighlightCir
         )
         off_radius = np.abs(circles.radius_px - expected.radius_px)
         off_centre = np.hypot(circles.row - expected.row, circles.col - expected.col)
-        u_shine_radius, u_shine_centre = _own_uncertainty(circles, shine, spread, shift_px)
+        u_shine_radius, u_shine_centre, birge = _own_uncertainty(circles, shine, spread, shift_px)
         u_radius = np.hypot(u_shine_radius, circles.u_radius_px)
-        u_centre = np.hypot(u_shine_centre, circles.u_centre_px)
-        far = shines & (
-            (off_radius > np.maximum(DIFFERS_SIGMA * u_radius, 0.1)) | (off_centre > np.maximum(3.0 * u_centre, 0.1))
+        u_centre = np.hypot(u_shine_centre, birge * circles.u_centre_px)
+        off = np.fmax(
+            off_radius / np.maximum(DIFFERS_SIGMA * u_radius, 0.1),
+            off_centre / np.maximum(CENTRES_DIFFER_SIGMA * u_centre, 0.1),
         )
-        index = np.flatnonzero(far)
-        if turn == 0 and len(index):
-            again = fit_rims(
-                levels, expected.row[index], expected.col[index], expected.radius_px[index], blur_px=circles.blur_px
-            )
-            same = np.hypot(again.row - circles.row[index], again.col - circles.col[index]) < 0.1  # noqa: PLR2004
-            same &= np.abs(again.radius_px - circles.radius_px[index]) < 0.1  # noqa: PLR2004
-            better = ~same & (again.support >= circles.support[index])
-            _put(circles, index[better], again.take(np.flatnonzero(better)))
-    # Silhouettes that stay elsewhere: a complete rim is a fact (a flat or odd ball), an incomplete one is not.
-    sure = circles.support >= SURE
-    sure &= circles.u_radius_px <= 2.0 * np.median(circles.u_radius_px[shines])
-    replaced = far & ~sure
-    joined = shines & ~far
-    weight = np.where(replaced, 1.0, np.where(joined, 1.0 / (1.0 + (u_shine_radius / circles.u_radius_px) ** 2), 0.0))
-    circles.radius_px += np.nan_to_num(weight * (expected.radius_px - circles.radius_px))
-    common = _common_uncertainty(spread, shine, circles, joined)
-    mean = 1.0 / np.sqrt(1.0 / u_shine_radius**2 + 1.0 / circles.u_radius_px**2)
-    circles.u_radius_px = np.where(joined, np.hypot(mean, common), circles.u_radius_px)
-    circles.u_radius_px = np.where(replaced, np.hypot(REPLACED_U * u_shine_radius, common), circles.u_radius_px)
-    weight = np.where(replaced, 1.0, np.where(joined, 1.0 / (1.0 + (u_shine_centre / circles.u_centre_px) ** 2), 0.0))
-    circles.row += np.nan_to_num(weight * (expected.row - circles.row))
-    circles.col += np.nan_to_num(weight * (expected.col - circles.col))
-    mean = 1.0 / np.sqrt(1.0 / u_shine_centre**2 + 1.0 / circles.u_centre_px**2)
-    circles.u_centre_px = np.where(joined, mean, circles.u_centre_px)
-    circles.u_centre_px = np.where(replaced, REPLACED_U * u_shine_centre, circles.u_centre_px)
+        if turn == 0:
+            _try_from(levels, circles, expected, np.flatnonzero(shines & ((off > 1.0) | (off_centre > WORTH_A_TRY_PX))))
+    # Silhouettes that stay elsewhere: a complete rim is a fact (a flat or odd ball), an incomplete one is not. By
+    # degrees: a silhouette at a limit must not jump to its highlights, or back, by rounding.
+    far = np.where(shines, np.clip((off - 1.0) / (FAR - 1.0), 0.0, 1.0), 0.0)
+    sure = np.clip((circles.support - UNSURE) / (SURE - UNSURE), 0.0, 1.0)
+    sure *= np.clip(3.0 - circles.u_radius_px / np.median(circles.u_radius_px[shines]), 0.0, 1.0)
+    common = _common_uncertainty(spread, shine, circles, shines & (far < 0.5))  # noqa: PLR2004
+
+    def joined(shift: Array, own: Array, other: Array) -> tuple[Array, Array]:
+        """How far to shift a silhouette's coordinate by, and its uncertainty."""
+        weight = (1.0 - far) / (1.0 + (other / own) ** 2) + far * (1.0 - sure)
+        mean = 1.0 / (1.0 / own**2 + 1.0 / other**2)
+        apart = far * (sure * own**2 + (1.0 - sure) * (REPLACED_U * other) ** 2)
+        u = np.sqrt((1.0 - far) * mean + apart + far * (1.0 - far) * shift**2)
+        return np.where(shines, weight * shift, 0.0), np.where(shines, u, own)
+
+    step, u = joined(expected.radius_px - circles.radius_px, circles.u_radius_px, u_shine_radius)
+    circles.radius_px += step
+    circles.u_radius_px = np.where(shines, np.hypot(u, np.sqrt(1.0 - far * sure) * common), u)
+    (row, u_row), (col, u_col) = (
+        joined(shift, circles.u_centre_px, u_shine_centre)
+        for shift in (expected.row - circles.row, expected.col - circles.col)
+    )
+    circles.row += row
+    circles.col += col
+    circles.u_centre_px = np.sqrt((u_row**2 + u_col**2) / 2.0)
+    replaced = far * (1.0 - sure) > 0.5  # noqa: PLR2004
     circles.support = np.where(replaced, np.maximum(circles.support, MIN_SUPPORT), circles.support)
 
 
-def _own_uncertainty(circles: Circles, shine: HighlightCircles, spread: float, shift_px: float) -> tuple[Array, Array]:
+def _try_from(levels: Levels, circles: Circles, expected: HighlightCircles, index: NDArray[np.intp]) -> None:
+    """Fit some circles once more from where the highlights have them; the mean of both fits, weighted by likelihood.
+
+    Not the better one of both: a choice between two that are about as good would hang on rounding.
+    """
+    if not len(index):
+        return
+    start = HighlightCircles(*(column[index] for column in expected))
+    again = fit_rims(levels, start.row, start.col, start.radius_px, blur_px=circles.blur_px)
+    first = circles.take(index)
+    # Compared around the highlights' circle: around a shoulder inside the ball, the shoulder is the better rim.
+    costs = rim_costs(levels, start.row, start.col, start.radius_px, [first, again])
+    share = 1.0 / (1.0 + np.exp(np.clip((costs[1] - costs[0]) / COST_SCALE, -50.0, 50.0)))
+    for name in ("row", "col", "radius_px", "u_centre_px", "u_radius_px", "support"):
+        mine, other = getattr(first, name), getattr(again, name)
+        getattr(circles, name)[index] = mine + share * (other - mine)
+    circles.offsets_px[index] = np.where(share[:, None] > 0.5, again.offsets_px, first.offsets_px)  # noqa: PLR2004
+
+
+def _own_uncertainty(
+    circles: Circles, shine: HighlightCircles, spread: float, shift_px: float
+) -> tuple[Array, Array, float]:
     """Uncertainties of highlight radii and centres.
 
     Disorder, balls that are no spheres, and of the spread against the silhouettes what these do not account for.
@@ -176,10 +208,13 @@ def _own_uncertainty(circles: Circles, shine: HighlightCircles, spread: float, s
     good = np.isfinite(shine.radius_px)
     usual = np.median(shine.radius_px[good])
     more_radius = max((spread * usual) ** 2 - float(np.median(circles.u_radius_px[good])) ** 2, 0.0)
-    more_centre = max(shift_px**2 - float(np.median(circles.u_centre_px[good])) ** 2, 0.0)
+    # Centres scatter by more than both state: both are then wrong by the same factor (Birge 1932).
+    stated = np.median(np.hypot(shine.u_centre_px[good], circles.u_centre_px[good]))
+    birge = max(shift_px / max(float(stated), 1e-9), 1.0)
     return (
         np.sqrt(shine.u_radius_px**2 + (SHAPE * shine.radius_px) ** 2 + more_radius),
-        np.sqrt(shine.u_centre_px**2 + more_centre),
+        birge * shine.u_centre_px,
+        birge,
     )
 
 
@@ -197,15 +232,15 @@ def _relation(circles: Circles, shine: HighlightCircles) -> tuple[float, float, 
     if good.sum() < ENOUGH:
         good = np.isfinite(shine.radius_px)
     ratio = circles.radius_px[good] / shine.radius_px[good]
-    # The half with the smaller uncertainties says more.
+    # The half with the smaller uncertainties says more of the ratio; a shift is in all alike.
     sharp = circles.u_radius_px[good] <= np.median(circles.u_radius_px[good])
     middle = float(np.median(ratio[sharp]))
     shifts = np.stack([circles.row[good] - shine.row[good], circles.col[good] - shine.col[good]])
-    shift = np.median(shifts[:, sharp], axis=1)
+    shift = np.median(shifts, axis=1)
     spread = 1.48 * float(np.median(np.abs(ratio - middle)))
     shift_px = 1.48 * float(np.median(np.abs(shifts - shift[:, None])))
     # Lights all around cancel what lobes shift; only a clear shift is believed.
-    doubt = shift_px**2 * 1.6 / max(int(sharp.sum()), 1)
+    doubt = shift_px**2 * 1.6 / max(int(good.sum()), 1)
     shift *= max(0.0, 1.0 - 2.0 * doubt / max(float(shift @ shift), 1e-12))
     return middle, spread, shift, shift_px
 
@@ -226,10 +261,4 @@ def _agree_with_radius(levels: Levels, circles: Circles, judged: NDArray[np.bool
     again = fit_rims(levels, circles.row[index], circles.col[index], start_px, blur_px=circles.blur_px)
     better = np.abs(again.radius_px - usual_px) < np.maximum(4.0 * spread_px, 0.03 * usual_px)
     better &= again.support >= circles.support[index] + BETTER_SUPPORT
-    _put(circles, index[better], again.take(np.flatnonzero(better)))
-
-
-def _put(circles: Circles, index: NDArray[np.intp], other: Circles) -> None:
-    """Set some of the circles."""
-    for name in ("row", "col", "radius_px", "u_centre_px", "u_radius_px", "support", "offsets_px"):
-        getattr(circles, name)[index] = getattr(other, name)
+    circles.put(index[better], again.take(np.flatnonzero(better)))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bgars.balls.rim_model import SHAPES, RimTable
-from bgars.balls.rim_pixels import SECTORS, RimPixels
+from bgars.balls.rim_pixels import SECTORS, TAPER_PX, RimPixels
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Circles", "fit_rims"]
+__all__ = ["Circles", "fit_rims", "rim_costs"]
 
 BASIS = 7
 """Board, step, root, ramp inside, ramp outside, board along the rim, step along the rim."""
@@ -81,6 +81,12 @@ class Circles:
         columns = {field.name: getattr(self, field.name)[index] for field in fields(self) if field.name != "blur_px"}
         return replace(self, **columns)
 
+    def put(self, index: NDArray[np.intp], other: Circles) -> None:
+        """Set some of the circles."""
+        for field in fields(self):
+            if field.name != "blur_px":
+                getattr(self, field.name)[index] = getattr(other, field.name)
+
 
 def fit_rims(
     levels: Levels,
@@ -92,7 +98,7 @@ def fit_rims(
 ) -> Circles:
     """Fit the circle of each ball to its rim in all lights.
 
-    First on every few pixels of a wide band, then on all pixels of a narrow one.
+    First on half of the pixels of a wide band, then on all pixels of a narrow one.
 
     Parameters
     ----------
@@ -109,13 +115,12 @@ def fit_rims(
     if not len(row):
         return circles
     table = RimTable(FIRST_BLUR_PX if blur_px is None else blur_px, WIDE_REACH_PX, levels.threads)
-    wide_px = np.clip(0.2 * radius_px, 4.0, 9.0)
-    pixels = RimPixels(levels, circles.row, circles.col, circles.radius_px, wide_px, wide_px, 3)
+    wide_px = np.clip(0.2 * radius_px, 4.0, 9.0) + TAPER_PX / 2.0
+    pixels = RimPixels(levels, circles.row, circles.col, circles.radius_px, wide_px, wide_px, 2)
     for _ in range(WIDE_ROUNDS):
         _update(circles, *_sector_offsets(pixels, circles, table)[:2])
     radius_px = circles.radius_px.clip(0.5 * radius_px, 2.0 * radius_px)
-    in_px, out_px = np.clip(0.15 * radius_px, 3.0, 6.0), np.clip(0.14 * radius_px, 2.5, 5.0)
-    pixels = RimPixels(levels, circles.row, circles.col, circles.radius_px, in_px, out_px, 1)
+    pixels = _narrow_band(levels, circles.row, circles.col, circles.radius_px, radius_px)
     table = RimTable(table.blur_px, NARROW_REACH_PX, levels.threads)
     for turn in range(NARROW_ROUNDS):
         if turn == 1 and blur_px is None:
@@ -126,6 +131,44 @@ def fit_rims(
     circles.u_radius_px = np.hypot(circles.u_radius_px, _u_model_px(levels, circles, variance, jump))
     circles.u_centre_px = np.hypot(circles.u_centre_px, CENTRE_BLUR_SHARE * circles.blur_px)
     return circles
+
+
+def rim_costs(levels: Levels, row: Array, col: Array, radius_px: Array, tried: list[Circles]) -> Array:
+    """How badly each of several circles explains the same pixels; differences are twice those of log-likelihoods.
+
+    A fit ends in one minimum of several where the rim is a grey level or two; which is the best only their costs tell.
+
+    Parameters
+    ----------
+    levels : Levels
+        The capture.
+    row, col, radius_px : (N,) float64
+        Circles around whose rims the pixels lie.
+    tried : list of Circles
+        K times N circles; the blur is that of the first.
+
+    Returns
+    -------
+    (K, N) float64
+        Sum over sectors and lights of n log(mean squared residual): the likelihood concentrated with respect to the
+        variances (Seber and Wild 1989, section 2.2).
+    """
+    pixels = _narrow_band(levels, row, col, radius_px, radius_px)
+    table = RimTable(tried[0].blur_px, NARROW_REACH_PX, levels.threads)
+    costs = []
+    for circles in tried:
+        rest, _, count = _solve(pixels, circles, table)
+        number = np.maximum(count - BASIS, 1.0)[..., None]
+        left = np.maximum(np.einsum("nsll->nsl", rest[..., 5:, 5:]), 0.0) / number
+        seen = (count >= 2 * BASIS)[..., None] & ~np.moveaxis(pixels.clipped, 0, -1)
+        costs.append((number * np.log(left + NOISE_FLOOR**2) * seen).sum(axis=(1, 2)))
+    return np.stack(costs)
+
+
+def _narrow_band(levels: Levels, row: Array, col: Array, radius_px: Array, size_px: Array) -> RimPixels:
+    """All pixels near the rims; `size_px` are the radii that its depths are in proportion to."""
+    in_px, out_px = np.clip(0.15 * size_px, 3.0, 6.0), np.clip(0.14 * size_px, 2.5, 5.0)
+    return RimPixels(levels, row, col, radius_px, in_px, out_px, 1)
 
 
 def _u_model_px(levels: Levels, circles: Circles, variance: Array, jump: Array) -> Array:
@@ -190,8 +233,9 @@ def _columns(pixels: RimPixels, circles: Circles, table: RimTable) -> FloatArray
 
 def _solve(pixels: RimPixels, circles: Circles, table: RimTable) -> tuple[Array, Array, Array]:
     """Gram matrices (N, S, 5 + L, ..) of what the basis leaves, coefficients (N, S, BASIS, L), pixel counts."""
-    columns = _columns(pixels, circles, table)
-    gram = (np.swapaxes(columns, 2, 3) @ columns).astype(np.float64)
+    # In float64: what the basis leaves on metal is a millionth of the sums, the rounding of float32.
+    columns = _columns(pixels, circles, table).astype(np.float64)
+    gram = np.swapaxes(columns, 2, 3) @ columns
     basis = gram[..., :BASIS, :BASIS] + 0.0
     trace = np.trace(basis, axis1=-2, axis2=-1)[..., None]
     diagonal = np.arange(BASIS)
@@ -200,7 +244,7 @@ def _solve(pixels: RimPixels, circles: Circles, table: RimTable) -> tuple[Array,
     solved = np.linalg.solve(basis, right)
     rest = gram[..., BASIS:, BASIS:] - np.swapaxes(right, -1, -2) @ solved
     coefficients = solved[..., 5:]  # (N, S, BASIS, L)
-    count: Array = pixels.weight.sum(axis=2).astype(np.float64)
+    count: Array = (pixels.weight**2).sum(axis=2).astype(np.float64)
     return np.asarray(rest), np.asarray(coefficients), count
 
 

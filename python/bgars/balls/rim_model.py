@@ -41,14 +41,22 @@ class RimTable:
         table = _bgars.rim_profiles(blur_px, reach_px, threads=threads)
         self.count = table.shape[1]
         self.first_px = -(self.count // 2) / STEPS_PER_PX
-        self.table: FloatArray = table.reshape(-1, 2 * SHAPES)
+        # Beside each value the step to the next depth, so that one look-up serves both.
+        rise = np.diff(table, axis=1, append=table[:, -1:])
+        self.table: FloatArray = np.concatenate([table, rise], axis=2).reshape(-1, 4 * SHAPES)
 
     def look_up(self, depth_px: NDArray[np.floating], fold: NDArray[np.int32]) -> FloatArray:
-        """(..., 2 SHAPES) profiles and their derivatives by depth, at depths and folded directions (:meth:`fold`)."""
+        """(..., 2 SHAPES) profiles and their derivatives by depth, at depths and folded directions (:meth:`fold`).
+
+        Linear between the depths of the table: with the nearest one circles move by jumps, which weak rims amplify.
+        """
         inside = np.clip(depth_px, self.first_px, -self.first_px)
-        place = np.rint((inside - self.first_px) * STEPS_PER_PX).astype(np.int32)
-        found: FloatArray = self.table.take(place + fold * self.count, axis=0)
-        return found
+        place = (inside - self.first_px) * STEPS_PER_PX
+        below = place.astype(np.int32)
+        found = self.table.take(below + fold * self.count, axis=0)
+        part = (place - below).astype(np.float32)[..., None]
+        values: FloatArray = found[..., : 2 * SHAPES] + part * found[..., 2 * SHAPES :]
+        return values
 
     @staticmethod
     def fold(x: NDArray[np.floating], y: NDArray[np.floating]) -> NDArray[np.int32]:

@@ -14,10 +14,12 @@ if TYPE_CHECKING:
 
     from bgars.balls.levels import Levels
 
-__all__ = ["SECTORS", "RimPixels"]
+__all__ = ["SECTORS", "TAPER_PX", "RimPixels"]
 
 SECTORS = 24
 """Equal angles that a rim is divided into."""
+TAPER_PX = 1.0
+"""Width over which the weight of pixels falls to nothing at the edges of a band."""
 
 
 class RimPixels:
@@ -39,9 +41,10 @@ class RimPixels:
     row, col : (N, SECTORS, P) float32
         Pixels relative to the anchor of the ball.
     weight : (N, SECTORS, P) float32
+        Roots of the pixels' weights: 1, less toward the edges of the band, so that pixels come and go without a jump;
         0 for padding and for pixels outside the image or the mask.
     levels : (L, N, SECTORS, P) float32
-        Grey levels.
+        Grey levels times `weight`.
     """
 
     def __init__(
@@ -68,6 +71,11 @@ class RimPixels:
         image_col = self.col.astype(np.int64) + self.anchor_col[:, None, None]
         inside = (image_row >= 0) & (image_row < height) & (image_col >= 0) & (image_col < width)
         self.weight *= inside
+        y = (row - self.anchor_row)[:, None, None] - self.row
+        x = self.col - (col - self.anchor_col)[:, None, None]
+        depth = radius_px[:, None, None] - np.hypot(x, y)
+        margin = np.minimum(in_px[:, None, None] - depth, depth + out_px[:, None, None])
+        self.weight *= np.sqrt(np.clip(margin / TAPER_PX, 0.0, 1.0)).astype(np.float32)
         pixels = np.where(inside, image_row * width + image_col, 0)
         self.levels = levels.at(pixels) * self.weight
         self.clipped: NDArray[np.bool_] = np.any(levels.clipped_at(pixels) & (self.weight > 0), axis=3)

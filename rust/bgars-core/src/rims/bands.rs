@@ -31,10 +31,14 @@ pub struct Bands {
 /// Pixels of one band, row by row: sector, row and column relative to the anchor; and how many each sector has.
 type Band = (Vec<(u32, i32, i32)>, Vec<usize>);
 
-/// Every `every`-th pixel whose depth inside its circle is between `-depths[1]` and `depths[0]`, both exclusive.
+/// One pixel in `every` of those whose depth inside its circle is between `-depths[1]` and `depths[0]`, both exclusive.
 ///
 /// # Inputs
 /// `circles` and their `depths` (inward, outward, in pixels), equal in number.
+///
+/// # Method
+/// Which pixels are taken is a matter of their place in the image alone, evenly by Roberts' sequence R2 (2018). Counted
+/// along the band, one pixel more at its edge would exchange all that follow.
 ///
 /// # Examples
 /// ```
@@ -73,7 +77,6 @@ fn anchor(circle: Circle) -> (i64, i64) {
 fn band(circle: Circle, [inward, outward]: [f64; 2], every: usize, sectors: usize) -> Band {
     let (anchor_row, anchor_col) = anchor(circle);
     let reach = (circle.radius_px + outward).ceil() as i64 + 1;
-    let mut seen = 0;
     let (mut found, mut counts) = (Vec::new(), vec![0; sectors]);
     for row in -reach..=reach {
         let y = (anchor_row + row) as f64 - circle.row_px;
@@ -83,8 +86,7 @@ fn band(circle: Circle, [inward, outward]: [f64; 2], every: usize, sectors: usiz
             if !(depth < inward && depth > -outward) {
                 continue;
             }
-            seen += 1;
-            if (seen - 1) % every == 0 {
+            if taken(anchor_row + row, anchor_col + col, every) {
                 let turn = ((-y).atan2(x) / TAU).rem_euclid(1.0);
                 let sector = (turn * sectors as f64) as usize % sectors;
                 counts[sector] += 1;
@@ -93,4 +95,10 @@ fn band(circle: Circle, [inward, outward]: [f64; 2], every: usize, sectors: usiz
         }
     }
     (found, counts)
+}
+
+/// Whether a pixel is among one in `every`: the fractional part of row / g + col / g^2 with g^3 = g + 1, in units of 2^-32.
+fn taken(row: i64, col: i64, every: usize) -> bool {
+    let place = row.wrapping_mul(3_242_174_889).wrapping_add(col.wrapping_mul(2_447_445_414)) as u32;
+    u64::from(place) * (every as u64) < 1 << 32
 }
