@@ -31,8 +31,8 @@ pub struct Planes<'a> {
 /// # Examples
 /// ```
 /// use bgars_core::rims::{Planes, ring_edges};
-/// // A disc of radius 5.5 in every light.
-/// let disc = |at: usize| f32::from(u8::from((at / 21).abs_diff(10).pow(2) + (at % 21).abs_diff(10).pow(2) < 30));
+/// // A disc of radius 5.7 in every light.
+/// let disc = |at: usize| f32::from(u8::from((at / 21).abs_diff(10).pow(2) + (at % 21).abs_diff(10).pow(2) < 33));
 /// let values: Vec<f32> = (0..3 * 441).map(|at| disc(at % 441)).collect();
 /// let planes = Planes { values: &values, lights: 3, height: 21, width: 21 };
 /// let edges = ring_edges(planes, &[[10.0, 10.0]], &[2.0, 3.5, 5.0, 7.0, 8.0], 4, 1);
