@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::cutoff::{LANES, Lanes, cutoffs};
 use super::gram::{BYTE_LIGHTS, ENTRIES, GramTables};
 use super::kept::Kept;
-use super::robust_lanes::RobustLanes;
+use super::robust_lanes::{self, RobustLanes};
 use crate::lights::conditioning;
 use crate::{Lights, Pixel};
 
@@ -104,9 +104,13 @@ pub(super) fn solve<K: Pixel, const FMA: bool>(
         Choice::UpToGap(gap) => kept.choose(keys, &cutoffs(keys, K::gap(*gap))),
         Choice::Window(robust) => {
             let mut bits = [0; LANES];
-            let value_of =
-                |light: usize, lane: usize| keys[light][lane].to_f32() - offset.map_or(0.0, |offset| offset[lane]);
-            careful = robust.choose::<FMA>(&solver.directions, value_of, clipped, &mut bits);
+            let mut values = [[0.0; LANES]; BYTE_LIGHTS];
+            for (values, &&key) in values.iter_mut().zip(keys) {
+                for lane in 0..LANES {
+                    values[lane] = key[lane].to_f32() - offset.map_or(0.0, |offset| offset[lane]);
+                }
+            }
+            careful = robust_lanes::choose(robust, &solver.directions, &values, clipped, &mut bits);
             kept.choose_bits(keys, &bits)
         }
     };

@@ -3,6 +3,8 @@
 //! The same windows and costs as [`super::robust_filter`]. Where rounding could decide between two windows, the pixel is
 //! left to the careful kernel, so that both keep the same lights.
 
+use multiversion::{multiversion, target::target_cfg_f};
+
 use super::cutoff::{LANES, Lanes};
 use super::gram::{BYTE_LIGHTS, ENTRIES};
 use super::lane_solve::{Careful, add_product, dot};
@@ -52,6 +54,23 @@ struct Window {
     shorter: Option<usize>,
 }
 
+/// [`RobustLanes::choose`] in a function of its own, so that the loop that calls it for one choice stays small for the others.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl+avx512dq+fma", "x86_64+avx2+fma"))]
+pub(super) fn choose(
+    robust: &RobustLanes,
+    directions: &[[f32; 3]],
+    values: &[Lanes<f32>; BYTE_LIGHTS],
+    clipped: &Lanes<u8>,
+    bits: &mut Lanes<u8>,
+) -> Careful {
+    let value_of = |light: usize, lane: usize| values[light][lane];
+    if target_cfg_f!(any(target_feature = "fma", target_arch = "aarch64")) {
+        robust.choose::<true>(directions, value_of, clipped, bits)
+    } else {
+        robust.choose::<false>(directions, value_of, clipped, bits)
+    }
+}
+
 impl RobustLanes {
     /// `None` for more lights than ranks that are tried one by one.
     pub fn new(filter: &RobustFilter, lights: usize, full_scale: f64) -> Option<Self> {
@@ -85,7 +104,7 @@ impl RobustLanes {
     ///
     /// `value_of` takes light and lane; `clipped` has a bit a light.
     #[inline(always)]
-    pub fn choose<const FMA: bool>(
+    fn choose<const FMA: bool>(
         &self,
         directions: &[[f32; 3]],
         value_of: impl Fn(usize, usize) -> f32,
