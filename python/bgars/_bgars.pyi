@@ -11,7 +11,7 @@ from bgars.inspection.shadow_edges import EdgeSettings
 from bgars.inspection.shadow_map import Casters
 from bgars.kernel_capture import KernelCapture
 from bgars.material_records import SurfaceMaterial
-from bgars.records import Capture, NormalField
+from bgars.records import NormalField
 
 __all__ = [
     "BLIND_MIN_LIGHTS",
@@ -106,7 +106,7 @@ def integrate_normals(
     progress: Callable[[int, float], object] | None,
 ) -> tuple[NDArray[np.float32], NDArray[np.int32], list[tuple[int, int, int]], int, float]: ...
 def measure_edges(
-    capture: Capture,
+    capture: KernelCapture,
     casters: Casters,
     settings: EdgeSettings,
     *,

@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from bgars import _bgars
 from bgars.inspection.shadow_map import Casters
 from bgars.inspection.shadow_model import Balls, Lights, edge_at, rays
+from bgars.kernel_capture import kernel_capture
 
 if TYPE_CHECKING:
     from bgars.inspection.board import Board
@@ -145,7 +146,7 @@ def measure_edges(
     count = int(np.clip(2.0 * WIDEST_RAD * radius / LINE_SPACING_PX, FEWEST_LINES, most))
     sectors = int(np.clip(count // LINES_A_STRETCH, FEWEST_SECTORS, SECTORS))
     stretches, noise = _bgars.measure_edges(
-        radiance.capture,
+        kernel_capture(radiance.capture),
         Casters.of(table, vectors, near, board),
         settings,
         angles_rad=((np.arange(count) + 0.5) / count * 2.0 * WIDEST_RAD - WIDEST_RAD).tolist(),

@@ -36,6 +36,10 @@ pub fn rim_bands<'py>(
     if every == 0 || sectors == 0 || depths.len() != circles.len() {
         return Err(InputError::new_err("depths: must be one pair a circle, every and sectors at least 1"));
     }
+    let finite = circles.iter().all(|circle| (circle.row_px + circle.col_px + circle.radius_px).is_finite());
+    if !finite || !depths.as_flattened().iter().all(|depth| depth.is_finite()) {
+        return Err(InputError::new_err("circles, depths: must be finite"));
+    }
     let found = on_threads(py, threads, || Ok(bands(&circles, &depths, every, sectors)))?;
     let shape = [circles.len(), sectors, found.most];
     Ok((array3(py, found.rows, shape)?, array3(py, found.cols, shape)?, array3(py, found.weights, shape)?))

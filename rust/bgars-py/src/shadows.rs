@@ -1,12 +1,16 @@
 //! `draw_shadows`, `measure_edges`.
 
+use std::ops::ControlFlow;
+
 use bgars_core::shadows::model::{Ball, Board, Lamp};
 use bgars_core::shadows::{EdgeSettings, Edges, Margins, STRETCH_FIELDS, Silhouettes};
-use bgars_core::{ImageStack, Pixel, Radiometry, shadows};
-use numpy::{PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use bgars_core::{ImageStack, Lights, Pixel, Radiometry, shadows};
+use numpy::{PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::convert::{Stack, array2, array3, rows, slice2, slice3, triples};
+use crate::capture::{Capture, Work};
+use crate::convert::{array2, array3, rows, slice2, slice3, triples};
+use crate::errors::InputError;
 use crate::progress::on_threads;
 
 /// What throws shadows, in pixels: balls (N, 5), lights (L, 3), whether those are positions, the board's coefficients.
@@ -50,17 +54,6 @@ pub fn draw_shadows<'py>(
     Ok((array2(py, map.hidden, [map.rows, map.cols])?, array3(py, map.count, [lamps.len(), map.rows, map.cols])?))
 }
 
-/// The images of a `bgars.Capture`, without its lights.
-#[derive(FromPyObject)]
-pub struct Photographs<'py> {
-    images: Stack<'py>,
-    response: Option<PyReadonlyArray1<'py, f32>>,
-    dark: Option<Bound<'py, PyAny>>,
-    black_level: f32,
-    saturation: f32,
-    full_scale: f32,
-}
-
 /// The attributes of `bgars.inspection.shadow_edges.EdgeSettings` and of the lines across an edge.
 #[derive(FromPyObject)]
 pub struct Lines {
@@ -79,7 +72,7 @@ type Measured<'py> = (Bound<'py, PyArray3<f64>>, Bound<'py, PyArray2<f64>>);
 #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)]
 pub fn measure_edges<'py>(
     py: Python<'py>,
-    capture: Photographs<'py>,
+    capture: Capture<'py>,
     casters: Casters<'py>,
     settings: Lines,
     angles_rad: Vec<f64>,
@@ -103,18 +96,17 @@ pub fn measure_edges<'py>(
     let gains = slice2(&gains, "gains")?;
     let Lines { spread_px, lamp_spread_rad, reach_px, stride_px, coarse } = settings;
     let settings = EdgeSettings { spread_px, lamp_spread_rad, reach_px, stride_px, coarse, angles_rad, sectors };
+    if settings.stride_px == 0 || !settings.reach_px.is_finite() || settings.sectors == 0 || step == 0 {
+        return Err(InputError::new_err("stride_px, sectors, step: must be at least 1, reach_px finite"));
+    }
     let job = Job { silhouettes, balls, lamps, board, gains, settings };
-    let edges = match &capture.images {
-        Stack::U8(images) => job.run(py, &capture, images, threads),
-        Stack::U16(images) => job.run(py, &capture, images, threads),
-        Stack::F32(images) => job.run(py, &capture, images, threads),
-    }?;
+    let edges = capture.work(py, threads, None, job)?;
     let numbers = edges.stretches.iter().flat_map(shadows::Stretch::numbers).collect();
     let shape = [balls_count, lights * sectors, STRETCH_FIELDS];
     Ok((array3(py, numbers, shape)?, array2(py, edges.noise, [balls_count, lights])?))
 }
 
-/// Everything but the images.
+/// Everything but the images; the lights are those of the casters, as refined so far.
 struct Job<'a> {
     silhouettes: Silhouettes<'a>,
     balls: Vec<Ball>,
@@ -124,30 +116,18 @@ struct Job<'a> {
     settings: EdgeSettings,
 }
 
-impl Job<'_> {
-    fn run<P: Pixel + numpy::Element>(
-        &self,
-        py: Python<'_>,
-        capture: &Photographs<'_>,
-        images: &PyReadonlyArray3<'_, P>,
-        threads: Option<i64>,
-    ) -> PyResult<Edges> {
-        let dark: Option<PyReadonlyArray2<'_, P>> = capture.dark.as_ref().map(PyAnyMethods::extract).transpose()?;
-        let &[lights, height, width] = images.shape() else { unreachable!("a stack has three axes") };
-        let radiometry = Radiometry {
-            response: capture.response.as_ref().map(|table| table.as_slice()).transpose()?,
-            dark: dark.as_ref().map(|dark| slice2(dark, "dark")).transpose()?,
-            black_level: capture.black_level,
-            saturation: capture.saturation,
-            full_scale: capture.full_scale,
-            intensities: vec![1.0; lights],
-        };
-        let images = slice3(images, "images")?;
-        on_threads(py, threads, || {
-            let stack = ImageStack::new(images, lights, height, width)?;
-            radiometry.check(&stack)?;
-            let Self { silhouettes, balls, lamps, board, gains, settings } = self;
-            Ok(shadows::measure_edges(&stack, &radiometry, *silhouettes, balls, lamps, board, gains, settings))
-        })
+impl Work for Job<'_> {
+    type Output = Edges;
+
+    fn run<P: Pixel>(
+        self,
+        stack: &ImageStack<'_, P>,
+        _: &Lights,
+        radiometry: &Radiometry<'_, P>,
+        _: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    ) -> bgars_core::Result<Edges> {
+        radiometry.check(stack)?;
+        let Self { silhouettes, balls, lamps, board, gains, settings } = self;
+        Ok(shadows::measure_edges(stack, radiometry, silhouettes, &balls, &lamps, &board, gains, &settings))
     }
 }

@@ -63,11 +63,10 @@ pub(super) fn choose(
     clipped: &Lanes<u8>,
     bits: &mut Lanes<u8>,
 ) -> Careful {
-    let value_of = |light: usize, lane: usize| values[light][lane];
     if target_cfg_f!(any(target_feature = "fma", target_arch = "aarch64")) {
-        robust.choose::<true>(directions, value_of, clipped, bits)
+        robust.choose::<true>(directions, values, clipped, bits)
     } else {
-        robust.choose::<false>(directions, value_of, clipped, bits)
+        robust.choose::<false>(directions, values, clipped, bits)
     }
 }
 
@@ -102,12 +101,12 @@ impl RobustLanes {
 
     /// Writes the kept lights of a block to `bits` (bit k: light k); what is returned is left to the careful kernel.
     ///
-    /// `value_of` takes light and lane; `clipped` has a bit a light.
+    /// `values` by light, of those that are there; `clipped` has a bit a light.
     #[inline(always)]
     fn choose<const FMA: bool>(
         &self,
         directions: &[[f32; 3]],
-        value_of: impl Fn(usize, usize) -> f32,
+        values: &[Lanes<f32>; BYTE_LIGHTS],
         clipped: &Lanes<u8>,
         bits: &mut Lanes<u8>,
     ) -> Careful {
@@ -117,7 +116,7 @@ impl RobustLanes {
         let mut sums = [[[0.0; WIDTH]; SUMS]; MAX_WINDOWS];
         for first in (0..LANES).step_by(WIDTH) {
             let medians =
-                ranked.fill(directions, |light, lane| value_of(light, first + lane), |lane| clipped[first + lane]);
+                ranked.fill(directions, |light, lane| values[light][first + lane], |lane| clipped[first + lane]);
             self.add_up(&ranked, &mut sums);
             let mut best = Best::new();
             for (window, sums) in self.windows.iter().zip(&sums) {
@@ -353,6 +352,9 @@ mod tests {
                 let directions = ring(lights, &mut random);
                 let exact: Vec<[f64; 3]> = directions.iter().map(|direction| direction.map(f64::from)).collect();
                 let all: Vec<Vec<f32>> = (0..LANES).map(|_| values(&directions, &mut random)).collect();
+                let block: [Lanes<f32>; BYTE_LIGHTS] = std::array::from_fn(|light| {
+                    std::array::from_fn(|lane| all[lane].get(light).copied().unwrap_or(0.0))
+                });
                 let clips = |value: f32| round % 2 == 1 && value >= 255.0;
                 let clipped: Lanes<u8> = std::array::from_fn(|lane| {
                     all[lane].iter().rev().fold(0, |bits, &value| bits << 1 | u8::from(clips(value)))
@@ -362,8 +364,8 @@ mod tests {
                 let lanes = RobustLanes::new(&filter, lights, 255.0).expect("8 lights at most");
                 let [mut plain, mut fused] = [[0; LANES]; 2];
                 let left = [
-                    lanes.choose::<false>(&directions, |light, lane| all[lane][light], &clipped, &mut plain),
-                    lanes.choose::<true>(&directions, |light, lane| all[lane][light], &clipped, &mut fused),
+                    lanes.choose::<false>(&directions, &block, &clipped, &mut plain),
+                    lanes.choose::<true>(&directions, &block, &clipped, &mut fused),
                 ];
                 pixels += LANES;
                 careful_pixels += left[0].count_ones() as usize;
