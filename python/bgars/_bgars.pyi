@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars.balls.rim_pixels import RimPixels
 from bgars.inspection.shadow_edges import EdgeSettings
 from bgars.inspection.shadow_map import Casters
 from bgars.kernel_capture import KernelCapture
@@ -20,6 +21,7 @@ __all__ = [
     "REFLECTANCE_MIN_LIGHTS",
     "decode_stack",
     "draw_shadows",
+    "eliminate_rims",
     "estimate_normals",
     "estimate_reflectance",
     "integrate_normals",
@@ -60,6 +62,14 @@ def draw_shadows(
     shadow_margin_px: float,
     threads: int | None,
 ) -> tuple[NDArray[np.bool_], NDArray[np.uint8]]: ...
+def eliminate_rims(
+    pixels: RimPixels,
+    circles: NDArray[np.float64],
+    table: NDArray[np.float32],
+    *,
+    blur_px: float,
+    threads: int | None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
 def estimate_normals(
     capture: KernelCapture,
     *,

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
+import bgars
 import numpy as np
 import pytest
 from bgars import _bgars
@@ -13,6 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SHAPES, ANGLES, STEPS_PER_PX, THINNEST_PX = 4, 16, 64, 0.08
+SECTORS, BLUR_PX, RIDGE = 24, 0.3, 1e-6
 
 
 @pytest.mark.parametrize("blur_px", [0.0, 0.3, 1.0])
@@ -60,6 +63,64 @@ def test_ring_edges_are_the_ranked_change_over_three_directions(threads: int) ->
     edge[..., 1:-1] = np.abs(mean[..., 2:] - mean[..., :-2]) * (inside[:, :, 2:] & inside[:, :, :-2])
     found = _bgars.ring_edges(images, centres, radii, directions=12, rank=2, threads=threads)
     np.testing.assert_allclose(found, np.sort(edge, axis=0)[-2], atol=1e-6)
+
+
+@pytest.mark.parametrize(("lights", "threads"), [(3, 1), (11, 2)])
+def test_eliminate_rims_is_least_squares_in_each_sector(lights: int, threads: int) -> None:
+    rng = np.random.default_rng(8)
+    circles = np.array([[0.3, -0.2, 17.4], [-0.4, 0.1, 9.8]])
+    depths = np.tile([4.0, 3.0], (2, 1))
+    row, col, weight = _bgars.rim_bands(circles, depths, every=1, sectors=SECTORS, threads=1)
+    weight *= rng.uniform(0.2, 1.0, weight.shape).astype(np.float32)
+    levels = (rng.random((lights, *row.shape)) * weight).astype(np.float32)
+    pixels = SimpleNamespace(row=row, col=col, weight=weight, levels=levels)
+    table = _bgars.rim_profiles(BLUR_PX, 6.0, threads=1)
+    moved = [*circles, 0.05, 0.1, -0.2]
+    rest, coefficients = _bgars.eliminate_rims(pixels, moved, table, blur_px=BLUR_PX, threads=threads)
+    for ball, circle in enumerate(moved):
+        for sector in range(SECTORS):
+            here = weight[ball, sector] > 0
+            x, y = col[ball, sector][here] - circle[1], circle[0] - row[ball, sector][here]
+            basis, slopes = _rim_columns(x, y, circle[2], sector, table)
+            w = weight[ball, sector][here].astype(np.float64)[:, None]
+            others = np.concatenate([slopes * w, levels[:, ball, sector][:, here].T], axis=1)
+            # The ridge as further observations of 0.
+            ridge = math.sqrt(RIDGE * float(((basis * w) ** 2).sum()) + 1e-9)
+            design = np.concatenate([basis * w, ridge * np.eye(7)])
+            right = np.concatenate([others, np.zeros((7, 5 + lights))])
+            solved = np.linalg.lstsq(design, right, rcond=None)[0]
+            left = right - design @ solved
+            # With an eighth-circle's direction halfway between two of the table rounding may choose either.
+            np.testing.assert_allclose(rest[ball, sector], left.T @ left, rtol=1e-5, atol=1e-5)
+            np.testing.assert_allclose(coefficients[ball, sector], solved[:, 5:], rtol=1e-3, atol=1e-3)
+
+
+def test_eliminate_rims_wants_pixels_and_circles_of_one_band() -> None:
+    pixels = SimpleNamespace(**{name: np.zeros((2, SECTORS, 4), np.float32) for name in ("row", "col", "weight")})
+    pixels.levels = np.zeros((3, 2, SECTORS, 4), np.float32)
+    table = _bgars.rim_profiles(BLUR_PX, 2.0, threads=1)
+    with pytest.raises(bgars.InputError, match="must be of one band"):
+        _bgars.eliminate_rims(pixels, np.zeros((1, 3)), table, blur_px=BLUR_PX, threads=1)
+
+
+def _rim_columns(
+    x: NDArray[np.float64], y: NDArray[np.float64], radius_px: float, sector: int, table: NDArray[np.float32]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Basis (P, 7) and its derivatives by the radius (P, 5) at pixels relative to a circle's centre."""
+    distance = np.hypot(x, y)
+    depth = radius_px - distance - (1.0 / 24.0 + 0.5 * BLUR_PX**2) / np.maximum(distance, 0.5)
+    fold = np.arctan2(np.minimum(abs(x), abs(y)), np.maximum(abs(x), abs(y))) * ((ANGLES - 1) / (math.pi / 4))
+    at_px = (np.arange(table.shape[1]) - table.shape[1] // 2) / STEPS_PER_PX
+    shapes = np.zeros((len(x), 2 * SHAPES))
+    for angle in range(ANGLES):
+        here = np.rint(fold) == angle
+        for shape in range(2 * SHAPES):
+            shapes[here, shape] = np.interp(depth[here], at_px, table[angle, :, shape])
+    middle = (sector + 0.5) * (2 * math.pi / SECTORS)
+    along = (y * math.cos(middle) - x * math.sin(middle)) / (radius_px * math.pi / SECTORS)
+    values, slopes = shapes[:, :SHAPES], shapes[:, SHAPES:]
+    basis = np.column_stack([np.ones(len(x)), values, along, along * values[:, 0]])
+    return basis, np.column_stack([slopes, along * slopes[:, 0]])
 
 
 def _profiles(depth_px: NDArray[np.float64], widths_px: list[float]) -> NDArray[np.float64]:

@@ -8,21 +8,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bgars.balls.rim_model import SHAPES, RimTable
+from bgars.balls.rim_model import BASIS, SLOPES, RimModel
 from bgars.balls.rim_pixels import SECTORS, TAPER_PX, RimPixels
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bgars.balls.levels import Levels
-    from bgars.records import FloatArray
 
     Array = NDArray[np.float64]
 
 __all__ = ["Circles", "fit_rims", "rim_costs"]
 
-BASIS = 7
-"""Board, step, root, ramp inside, ramp outside, board along the rim, step along the rim."""
 WIDE_ROUNDS = 3
 NARROW_ROUNDS = 3
 FIRST_BLUR_PX = 0.3
@@ -114,20 +111,20 @@ def fit_rims(
     )
     if not len(row):
         return circles
-    table = RimTable(FIRST_BLUR_PX if blur_px is None else blur_px, WIDE_REACH_PX, levels.threads)
+    model = RimModel(FIRST_BLUR_PX if blur_px is None else blur_px, WIDE_REACH_PX, levels.threads)
     wide_px = np.clip(0.2 * radius_px, 4.0, 9.0) + TAPER_PX / 2.0
     pixels = RimPixels(levels, circles.row, circles.col, circles.radius_px, wide_px, wide_px, 2)
     for _ in range(WIDE_ROUNDS):
-        _update(circles, *_sector_offsets(pixels, circles, table)[:2])
+        _update(circles, *_sector_offsets(pixels, circles, model)[:2])
     radius_px = circles.radius_px.clip(0.5 * radius_px, 2.0 * radius_px)
     pixels = _narrow_band(levels, circles.row, circles.col, circles.radius_px, radius_px)
-    table = RimTable(table.blur_px, NARROW_REACH_PX, levels.threads)
+    model = RimModel(model.blur_px, NARROW_REACH_PX, levels.threads)
     for turn in range(NARROW_ROUNDS):
         if turn == 1 and blur_px is None:
-            table = RimTable(_estimated_blur(pixels, circles), NARROW_REACH_PX, levels.threads)
-        offset, variance, jump = _sector_offsets(pixels, circles, table)
+            model = RimModel(_estimated_blur(pixels, circles), NARROW_REACH_PX, levels.threads)
+        offset, variance, jump = _sector_offsets(pixels, circles, model)
         _update(circles, offset, variance)
-    circles.blur_px = table.blur_px
+    circles.blur_px = model.blur_px
     circles.u_radius_px = np.hypot(circles.u_radius_px, _u_model_px(levels, circles, variance, jump))
     circles.u_centre_px = np.hypot(circles.u_centre_px, CENTRE_BLUR_SHARE * circles.blur_px)
     return circles
@@ -154,10 +151,10 @@ def rim_costs(levels: Levels, row: Array, col: Array, radius_px: Array, tried: l
         variances (Seber and Wild 1989, section 2.2).
     """
     pixels = _narrow_band(levels, row, col, radius_px, radius_px)
-    table = RimTable(tried[0].blur_px, NARROW_REACH_PX, levels.threads)
+    model = RimModel(tried[0].blur_px, NARROW_REACH_PX, levels.threads)
     costs = []
     for circles in tried:
-        rest, _, count = _solve(pixels, circles, table)
+        rest, _, count = _solve(pixels, circles, model)
         number = np.maximum(count - BASIS, 1.0)[..., None]
         left = np.maximum(np.einsum("nsll->nsl", rest[..., 5:, 5:]), 0.0) / number
         seen = (count >= 2 * BASIS)[..., None] & ~np.moveaxis(pixels.clipped, 0, -1)
@@ -191,8 +188,8 @@ def _estimated_blur(pixels: RimPixels, circles: Circles) -> float:
     """The lens blur that leaves the least, over the sectors and lights of most contrast, parabola through three."""
     some = slice(None, None, max(1, len(circles.row) // BLUR_BALLS))
     pixels, circles = pixels.take(some), circles.take(some)
-    tables = (RimTable(blur_px, NARROW_REACH_PX, pixels.threads) for blur_px in BLURS_PX)
-    tried = [_left_over(pixels, circles, table) for table in tables]
+    models = (RimModel(blur_px, NARROW_REACH_PX, pixels.threads) for blur_px in BLURS_PX)
+    tried = [_left_over(pixels, circles, model) for model in models]
     logs = np.log(np.stack([left for left, _ in tried]) + 0.02)
     contrast = np.mean([contrast for _, contrast in tried], axis=0)
     # Textured and shadowed sectors say nothing; which these are must not depend on one blur.
@@ -207,51 +204,16 @@ def _estimated_blur(pixels: RimPixels, circles: Circles) -> float:
     return float(-curve[1] / (2 * curve[0]))
 
 
-def _columns(pixels: RimPixels, circles: Circles, table: RimTable) -> FloatArray:
-    """(N, S, P, BASIS + 5 + L) basis, derivatives of the basis by radius, levels."""
-    y = (circles.row - pixels.anchor_row).astype(np.float32)[:, None, None] - pixels.row
-    x = pixels.col - (circles.col - pixels.anchor_col).astype(np.float32)[:, None, None]
-    distance = np.sqrt(x * x + y * y)
-    # The mean distance of the points of a pixel is a little more than that of its centre, across the direction.
-    spread = np.float32(1.0 / 24.0 + 0.5 * table.blur_px**2)
-    radius = circles.radius_px.astype(np.float32)[:, None, None]
-    depth = radius - distance - spread / np.maximum(distance, np.float32(0.5))
-    shapes = table.look_up(depth, table.fold(x, y))
-    mid = ((np.arange(SECTORS) + 0.5) * (2 * math.pi / SECTORS)).astype(np.float32)
-    along = (y * np.cos(mid)[:, None] - x * np.sin(mid)[:, None]) / (radius * np.float32(2 * math.pi / SECTORS / 2))
-    columns = np.zeros((*depth.shape, BASIS + 5 + len(pixels.levels)), np.float32)
-    columns[..., 0] = 1.0
-    columns[..., 1:5] = shapes[..., :SHAPES]
-    columns[..., 5] = along
-    columns[..., 6] = along * shapes[..., 0]
-    columns[..., 7:11] = shapes[..., SHAPES:]
-    columns[..., 11] = along * shapes[..., SHAPES]
-    columns *= pixels.weight[..., None]
-    columns[..., 12:] = np.moveaxis(pixels.levels, 0, -1)
-    return columns
-
-
-def _solve(pixels: RimPixels, circles: Circles, table: RimTable) -> tuple[Array, Array, Array]:
+def _solve(pixels: RimPixels, circles: Circles, model: RimModel) -> tuple[Array, Array, Array]:
     """Gram matrices (N, S, 5 + L, ..) of what the basis leaves, coefficients (N, S, BASIS, L), pixel counts."""
-    # In float64: what the basis leaves on metal is a millionth of the sums, the rounding of float32.
-    columns = _columns(pixels, circles, table).astype(np.float64)
-    gram = np.swapaxes(columns, 2, 3) @ columns
-    basis = gram[..., :BASIS, :BASIS] + 0.0
-    trace = np.trace(basis, axis1=-2, axis2=-1)[..., None]
-    diagonal = np.arange(BASIS)
-    basis[..., diagonal, diagonal] += 1e-6 * trace + 1e-9
-    right = gram[..., :BASIS, BASIS:]
-    solved = np.linalg.solve(basis, right)
-    rest = gram[..., BASIS:, BASIS:] - np.swapaxes(right, -1, -2) @ solved
-    coefficients = solved[..., 5:]  # (N, S, BASIS, L)
-    count: Array = (pixels.weight**2).sum(axis=2).astype(np.float64)
-    return np.asarray(rest), np.asarray(coefficients), count
+    rest, coefficients = model.take_out(pixels, circles.row, circles.col, circles.radius_px)
+    return rest, coefficients, (pixels.weight**2).sum(axis=2, dtype=np.float64)
 
 
-def _sector_offsets(pixels: RimPixels, circles: Circles, table: RimTable) -> tuple[Array, Array, Array]:
+def _sector_offsets(pixels: RimPixels, circles: Circles, model: RimModel) -> tuple[Array, Array, Array]:
     """(N, S, L) outward offset of the rim in each sector and light, its variance, and the step in grey levels."""
-    rest, coefficients, count = _solve(pixels, circles, table)
-    slope = _pooled(coefficients[..., [1, 2, 3, 4, 6], :], pixels.azimuths_rad)
+    rest, coefficients, count = _solve(pixels, circles, model)
+    slope = _pooled(coefficients[..., SLOPES, :], pixels.azimuths_rad)
     dd = np.einsum("nskl,nskm,nsml->nsl", slope, rest[..., :5, :5], slope)
     de = np.einsum("nskl,nskl->nsl", slope, rest[..., :5, 5:])
     ee = np.einsum("nsll->nsl", rest[..., 5:, 5:])
@@ -286,10 +248,10 @@ def _pooled(slope: Array, azimuths_rad: Array) -> Array:
     return np.broadcast_to(pooled, slope.shape)
 
 
-def _left_over(pixels: RimPixels, circles: Circles, table: RimTable) -> tuple[Array, Array]:
+def _left_over(pixels: RimPixels, circles: Circles, model: RimModel) -> tuple[Array, Array]:
     """(N, S, L) mean squared residual, each sector and light with its rim where it fits best; and the contrast."""
-    rest, coefficients, count = _solve(pixels, circles, table)
-    slope = coefficients[..., [1, 2, 3, 4, 6], :]
+    rest, coefficients, count = _solve(pixels, circles, model)
+    slope = coefficients[..., SLOPES, :]
     dd = np.einsum("nskl,nskm,nsml->nsl", slope, rest[..., :5, :5], slope)
     de = np.einsum("nskl,nskl->nsl", slope, rest[..., :5, 5:])
     left = np.einsum("nsll->nsl", rest[..., 5:, 5:]) - de**2 / np.maximum(dd, 1e-9)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,17 +11,19 @@ from bgars import _bgars
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bgars.records import FloatArray
+    from bgars.balls.rim_pixels import RimPixels
 
-__all__ = ["SHAPES", "RimTable"]
+    Array = NDArray[np.float64]
 
-SHAPES = 4
-"""Depth profiles: step, square root and ramp inside the rim, ramp outside."""
-ANGLES = 16
-STEPS_PER_PX = 64
+__all__ = ["BASIS", "SLOPES", "RimModel"]
+
+BASIS = 7
+"""Board, step, root, ramp inside, ramp outside, board along the rim, step along the rim."""
+SLOPES = (1, 2, 3, 4, 6)
+"""What of the basis moves with the rim: the derivatives by the radius, in this order."""
 
 
-class RimTable:
+class RimModel:
     """Depth profiles averaged over a square pixel and a Gaussian blur, tabulated over depth and direction.
 
     Parameters
@@ -37,31 +38,18 @@ class RimTable:
 
     def __init__(self, blur_px: float, reach_px: float, threads: int | None = None) -> None:
         self.blur_px = blur_px
-        self.reach_px = reach_px
-        table = _bgars.rim_profiles(blur_px, reach_px, threads=threads)
-        self.count = table.shape[1]
-        self.first_px = -(self.count // 2) / STEPS_PER_PX
-        # Beside each value the step to the next depth, so that one look-up serves both.
-        rise = np.diff(table, axis=1, append=table[:, -1:])
-        self.table: FloatArray = np.concatenate([table, rise], axis=2).reshape(-1, 4 * SHAPES)
+        self.threads = threads
+        self.table = _bgars.rim_profiles(blur_px, reach_px, threads=threads)
 
-    def look_up(self, depth_px: NDArray[np.floating], fold: NDArray[np.int32]) -> FloatArray:
-        """(..., 2 SHAPES) profiles and their derivatives by depth, at depths and folded directions (:meth:`fold`).
+    def take_out(self, pixels: RimPixels, row: Array, col: Array, radius_px: Array) -> tuple[Array, Array]:
+        """Fit the basis to each light in each sector of the circles, and to its own derivatives by the radius.
 
-        Linear between the depths of the table: with the nearest one circles move by jumps, which weak rims amplify.
+        Returns
+        -------
+        rest : (N, SECTORS, 5 + L, 5 + L) float64
+            Products of what the fit leaves of the derivatives (:data:`SLOPES`) and of the lights.
+        coefficients : (N, SECTORS, BASIS, L) float64
+            Of the lights.
         """
-        inside = np.clip(depth_px, self.first_px, -self.first_px)
-        place = (inside - self.first_px) * STEPS_PER_PX
-        below = place.astype(np.int32)
-        found = self.table.take(below + fold * self.count, axis=0)
-        part = (place - below).astype(np.float32)[..., None]
-        values: FloatArray = found[..., : 2 * SHAPES] + part * found[..., 2 * SHAPES :]
-        return values
-
-    @staticmethod
-    def fold(x: NDArray[np.floating], y: NDArray[np.floating]) -> NDArray[np.int32]:
-        """Index of directions (x, y), folded into an eighth of the circle."""
-        ax, ay = np.abs(x), np.abs(y)
-        angle = np.arctan2(np.minimum(ax, ay), np.maximum(ax, ay))
-        folded: NDArray[np.int32] = np.rint(angle * ((ANGLES - 1) / (math.pi / 4))).astype(np.int32)
-        return folded
+        circles = np.stack([row - pixels.anchor_row, col - pixels.anchor_col, radius_px], axis=1)
+        return _bgars.eliminate_rims(pixels, circles, self.table, blur_px=self.blur_px, threads=self.threads)

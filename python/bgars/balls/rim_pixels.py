@@ -84,6 +84,6 @@ class RimPixels:
         """The pixels of some of the balls."""
         part = copy.copy(self)
         for name in ("anchor_row", "anchor_col", "row", "col", "weight"):
-            setattr(part, name, getattr(self, name)[index])
-        part.levels, part.clipped = self.levels[:, index], self.clipped[:, index]
+            setattr(part, name, np.ascontiguousarray(getattr(self, name)[index]))
+        part.levels, part.clipped = np.ascontiguousarray(self.levels[:, index]), self.clipped[:, index]
         return part

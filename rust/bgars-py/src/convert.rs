@@ -2,8 +2,8 @@
 
 use numpy::ndarray::Dimension;
 use numpy::{
-    Element, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyReadwriteArray,
-    PyUntypedArrayMethods,
+    Element, PyArray1, PyArray2, PyArray3, PyArray4, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3,
+    PyReadonlyArray4, PyReadwriteArray, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 
@@ -27,6 +27,11 @@ pub fn slice2<'a, T: Element>(array: &'a PyReadonlyArray2<'_, T>, name: &str) ->
 
 /// The same for three dimensions.
 pub fn slice3<'a, T: Element>(array: &'a PyReadonlyArray3<'_, T>, name: &str) -> PyResult<&'a [T]> {
+    array.as_slice().map_err(|_| InputError::new_err(format!("{name}: must be C-contiguous")))
+}
+
+/// The same for four dimensions.
+pub fn slice4<'a, T: Element>(array: &'a PyReadonlyArray4<'_, T>, name: &str) -> PyResult<&'a [T]> {
     array.as_slice().map_err(|_| InputError::new_err(format!("{name}: must be C-contiguous")))
 }
 
@@ -59,6 +64,11 @@ pub fn array2<T: Element>(py: Python<'_>, data: Vec<T>, shape: [usize; 2]) -> Py
 
 /// An array of shape (A, B, C).
 pub fn array3<T: Element>(py: Python<'_>, data: Vec<T>, shape: [usize; 3]) -> PyResult<Bound<'_, PyArray3<T>>> {
+    PyArray1::from_vec(py, data).reshape(shape)
+}
+
+/// An array of shape (A, B, C, D).
+pub fn array4<T: Element>(py: Python<'_>, data: Vec<T>, shape: [usize; 4]) -> PyResult<Bound<'_, PyArray4<T>>> {
     PyArray1::from_vec(py, data).reshape(shape)
 }
 

@@ -40,6 +40,8 @@ mod _bgars {
     #[pymodule_export]
     use crate::reflectance::estimate_reflectance;
     #[pymodule_export]
+    use crate::rims::eliminate_rims;
+    #[pymodule_export]
     use crate::rims::rim_bands;
     #[pymodule_export]
     use crate::rims::rim_profiles;

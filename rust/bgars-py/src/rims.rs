@@ -1,10 +1,12 @@
 //! Binding of `bgars_core::rims`.
 
-use bgars_core::rims::{ANGLES, Circle, PROFILES, Planes, bands, profiles, ring_edges as edges};
-use numpy::{PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use bgars_core::rims::{
+    ANGLES, BASIS, Circle, PROFILES, Planes, RimPixels, SLOPES, bands, eliminate, profiles, ring_edges as edges,
+};
+use numpy::{PyArray3, PyArray4, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArray4, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::convert::{array3, slice2, slice3, triples};
+use crate::convert::{array3, array4, slice2, slice3, slice4, triples};
 use crate::errors::InputError;
 use crate::progress::on_threads;
 
@@ -30,8 +32,7 @@ pub fn rim_bands<'py>(
     sectors: usize,
     threads: Option<i64>,
 ) -> PyResult<(Padded<'py>, Padded<'py>, Padded<'py>)> {
-    let rows = triples(&circles, "circles")?.iter();
-    let circles: Vec<Circle> = rows.map(|&[row_px, col_px, radius_px]| Circle { row_px, col_px, radius_px }).collect();
+    let circles = circles_of(&circles)?;
     let depths: Vec<[f64; 2]> = slice2(&depths, "depths")?.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();
     if every == 0 || sectors == 0 || depths.len() != circles.len() {
         return Err(InputError::new_err("depths: must be one pair a circle, every and sectors at least 1"));
@@ -43,6 +44,65 @@ pub fn rim_bands<'py>(
     let found = on_threads(py, threads, || Ok(bands(&circles, &depths, every, sectors)))?;
     let shape = [circles.len(), sectors, found.most];
     Ok((array3(py, found.rows, shape)?, array3(py, found.cols, shape)?, array3(py, found.weights, shape)?))
+}
+
+/// Pixels near rims: the attributes of `bgars.balls.rim_pixels.RimPixels`.
+#[derive(FromPyObject)]
+pub struct Pixels<'py> {
+    row: PyReadonlyArray3<'py, f32>,
+    col: PyReadonlyArray3<'py, f32>,
+    weight: PyReadonlyArray3<'py, f32>,
+    levels: PyReadonlyArray4<'py, f32>,
+}
+
+/// Normal equations (N, sectors, 5 + L, 5 + L) and coefficients (N, sectors, 7, L).
+type Eliminated<'py> = (Bound<'py, PyArray4<f64>>, Bound<'py, PyArray4<f64>>);
+
+#[pyfunction]
+#[pyo3(signature = (pixels, circles, table, *, blur_px, threads))]
+#[allow(clippy::needless_pass_by_value)]
+pub fn eliminate_rims<'py>(
+    py: Python<'py>,
+    pixels: Pixels<'py>,
+    circles: PyReadonlyArray2<'py, f64>,
+    table: PyReadonlyArray3<'py, f32>,
+    blur_px: f64,
+    threads: Option<i64>,
+) -> PyResult<Eliminated<'py>> {
+    let circles = circles_of(&circles)?;
+    let shape = pixels.row.shape();
+    let &[lights, balls, sectors, most] = pixels.levels.shape() else { unreachable!("four axes") };
+    let alike =
+        [pixels.col.shape(), pixels.weight.shape(), &[balls, sectors, most]].iter().all(|other| *other == shape);
+    if !alike
+        || circles.len() != balls
+        || table.shape()[0] != ANGLES
+        || table.shape()[1] == 0
+        || table.shape()[2] != PROFILES
+    {
+        return Err(InputError::new_err("pixels, circles, table: must be of one band and of rim_profiles"));
+    }
+    let pixels = RimPixels {
+        rows: slice3(&pixels.row, "row")?,
+        cols: slice3(&pixels.col, "col")?,
+        weights: slice3(&pixels.weight, "weight")?,
+        levels: slice4(&pixels.levels, "levels")?,
+        lights,
+        sectors,
+        most,
+    };
+    let table = slice3(&table, "table")?.as_chunks().0;
+    let left = on_threads(py, threads, || Ok(eliminate(pixels, &circles, blur_px, table)))?;
+    let others = SLOPES + lights;
+    Ok((
+        array4(py, left.rest, [balls, sectors, others, others])?,
+        array4(py, left.coefficients, [balls, sectors, BASIS, lights])?,
+    ))
+}
+
+fn circles_of(circles: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Circle>> {
+    let rows = triples(circles, "circles")?.iter();
+    Ok(rows.map(|&[row_px, col_px, radius_px]| Circle { row_px, col_px, radius_px }).collect())
 }
 
 #[pyfunction]

@@ -22,8 +22,8 @@ const GAIN_SPREAD: f64 = 0.05;
 /// Weight of the priors, in observations.
 const PRIOR_WEIGHT: f64 = 1.0;
 
-/// Relative step of the numerical derivatives of a lobe's shape.
-const SHAPE_STEP: f64 = 1e-4;
+/// Products of losses' arguments are turned into a logarithm before they overflow.
+const LARGE: f64 = 1e200;
 
 impl Free {
     /// Only what is always free.
@@ -79,6 +79,19 @@ struct Normal {
     matrix: DMatrix<f64>,
     vector: DVector<f64>,
     loss: f64,
+    /// Product of the `1 + (r / 3)^2` that are not in `loss` yet: one logarithm for many.
+    factor: f64,
+}
+
+impl Normal {
+    fn zeros(size: usize) -> Self {
+        Self { matrix: DMatrix::zeros(size, size), vector: DVector::zeros(size), loss: 0.0, factor: 1.0 }
+    }
+
+    fn close(&mut self) {
+        self.loss += self.factor.ln();
+        self.factor = 1.0;
+    }
 }
 
 /// Fits a material from a start.
@@ -130,17 +143,18 @@ fn normal_equations(samples: &Samples, material: &Material) -> Normal {
     let chunks: Vec<Normal> = (0..samples.len().div_ceil(CHUNK))
         .into_par_iter()
         .map(|chunk| {
-            let mut sum = Normal { matrix: DMatrix::zeros(size, size), vector: DVector::zeros(size), loss: 0.0 };
+            let mut sum = Normal::zeros(size);
             let mut row = vec![0.0; size - samples.lights];
             for pixel in chunk * CHUNK..((chunk + 1) * CHUNK).min(samples.len()) {
                 for light in 0..samples.lights {
                     add_observation(samples, material, pixel * samples.lights + light, light, &mut row, &mut sum);
                 }
             }
+            sum.close();
             sum
         })
         .collect();
-    let mut sum = Normal { matrix: DMatrix::zeros(size, size), vector: DVector::zeros(size), loss: 0.0 };
+    let mut sum = Normal::zeros(size);
     for chunk in chunks {
         sum.matrix += chunk.matrix;
         sum.vector += chunk.vector;
@@ -167,21 +181,20 @@ fn add_observation(
     row[AMBIENT] = 1.0;
     let mut sum_of_parts = diffuse;
     for (lobe, row) in material.lobes.iter().zip(row[FIRST_LOBE..].chunks_exact_mut(PER_LOBE)) {
-        let light = scale * lobe.strength;
-        let at = |lobe: &Lobe| light * facet.specular(lobe, material.masking);
-        let value = at(lobe);
-        row[0] = value;
-        row[1] = (at(&Lobe { roughness: lobe.roughness * (1.0 + SHAPE_STEP), ..*lobe }) - value) / SHAPE_STEP;
-        let tail_step = if lobe.tail > 0.5 { -SHAPE_STEP } else { SHAPE_STEP };
-        row[2] = (at(&Lobe { tail: lobe.tail + tail_step, ..*lobe }) - value) / tail_step;
-        sum_of_parts += value / scale;
+        // By the logarithm of the strength the derivative is the value.
+        let slopes = facet.specular_slopes(lobe, material.masking).map(|slope| lobe.strength * slope);
+        row.copy_from_slice(&slopes.map(|slope| scale * slope));
+        sum_of_parts += slopes[0];
     }
     let level = scale * sum_of_parts + material.ambient;
     let bent = super::scale::bend(level);
     let clipped = bent >= samples.clip[light];
     let residual = samples.values[index] - bent.min(samples.clip[light]);
     let ratio = (residual / LOSS_SCALE).powi(2);
-    sum.loss += ratio.ln_1p();
+    sum.factor *= 1.0 + ratio;
+    if sum.factor > LARGE {
+        sum.close();
+    }
     if clipped {
         return;
     }

@@ -5,6 +5,9 @@ use nalgebra::Vector3;
 /// Smallest n_z at which a facet is evaluated: nearer the rim a pixel mixes ball and board.
 pub const MIN_N_Z: f64 = 0.02;
 
+/// Products of tail and `tan^2 a / m^2` below which the distribution is Beckmann's by its series.
+const SERIES: f64 = 1e-4;
+
 /// Which geometric attenuation of the microfacets is used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Masking {
@@ -38,9 +41,27 @@ impl Lobe {
         let cos2 = cos_half * cos_half;
         let t = (1.0 - cos2).max(0.0) / (cos2 * self.roughness * self.roughness);
         let u = self.tail;
-        let exponent = if u * t < 1e-4 { -t * (1.0 + u) } else { -(1.0 + 1.0 / u) * (u * t).ln_1p() };
+        let exponent = if u * t < SERIES { -t * (1.0 + u) } else { -(1.0 + 1.0 / u) * (u * t).ln_1p() };
         // Below e^-30 nothing is left.
         if exponent < -30.0 { 0.0 } else { exponent.exp() / (cos2 * cos2) }
+    }
+
+    /// [`Self::distribution`], its derivative by the logarithm of the roughness, and that by the tail.
+    #[must_use]
+    #[inline]
+    pub fn distribution_slopes(&self, cos_half: f64) -> [f64; 3] {
+        let value = self.distribution(cos_half);
+        if value == 0.0 {
+            return [0.0; 3];
+        }
+        let cos2 = cos_half * cos_half;
+        let t = (1.0 - cos2).max(0.0) / (cos2 * self.roughness * self.roughness);
+        let u = self.tail;
+        let bulge = 1.0 + u * t;
+        // The exponent's derivative by u; its limit where u t is small.
+        let by_tail =
+            if u * t < SERIES { t * (0.5 * t - 1.0) } else { bulge.ln() / (u * u) - (1.0 + 1.0 / u) * t / bulge };
+        [value, value * 2.0 * t * (1.0 + u) / bulge, value * by_tail]
     }
 
     /// Shadowing of one direction at cosine `cos` to the normal: between Beckmann's (rational form) and GGX's, by the tail.
@@ -53,6 +74,27 @@ impl Lobe {
         let c = 1.0 / slope.max(1e-9);
         let beckmann = if c < 1.6 { (3.535 * c + 2.181 * c * c) / (1.0 + 2.276 * c + 2.577 * c * c) } else { 1.0 };
         beckmann + self.tail * (ggx - beckmann)
+    }
+
+    /// [`Self::smith`], its derivative by the logarithm of the roughness, and that by the tail.
+    #[must_use]
+    #[inline]
+    pub fn smith_slopes(&self, cos: f64) -> [f64; 3] {
+        let tan = (1.0 - cos * cos).max(0.0).sqrt() / cos;
+        let slope = self.roughness * tan;
+        let root = (1.0 + slope * slope).sqrt();
+        let ggx = 2.0 / (1.0 + root);
+        let d_ggx = -0.5 * ggx * ggx * slope * slope / root;
+        let c = 1.0 / slope.max(1e-9);
+        let (beckmann, d_beckmann) = if c < 1.6 {
+            let (above, below) = (3.535 * c + 2.181 * c * c, 1.0 + 2.276 * c + 2.577 * c * c);
+            let by_c = (3.535 + 4.362 * c - (2.276 + 5.154 * c) * above / below) / below;
+            (above / below, -c * by_c)
+        } else {
+            (1.0, 0.0)
+        };
+        let mixed = |beckmann: f64, ggx: f64| beckmann + self.tail * (ggx - beckmann);
+        [mixed(beckmann, ggx), mixed(d_beckmann, d_ggx), ggx - beckmann]
     }
 }
 
@@ -102,6 +144,28 @@ impl Facet {
     #[inline]
     pub fn specular(&self, lobe: &Lobe, masking: Masking) -> f64 {
         if self.n_dot_l <= 0.0 { 0.0 } else { lobe.distribution(self.n_dot_h) * self.attenuation(lobe, masking) }
+    }
+
+    /// [`Self::specular`], its derivative by the logarithm of the roughness, and that by the tail.
+    #[must_use]
+    #[inline]
+    pub fn specular_slopes(&self, lobe: &Lobe, masking: Masking) -> [f64; 3] {
+        if self.n_dot_l <= 0.0 {
+            return [0.0; 3];
+        }
+        let slopes = lobe.distribution_slopes(self.n_dot_h);
+        if slopes[0] == 0.0 {
+            return slopes;
+        }
+        match masking {
+            Masking::CookTorrance => slopes.map(|slope| slope * self.attenuation(lobe, masking)),
+            Masking::Smith => [self.n_dot_v, self.n_dot_l]
+                .into_iter()
+                .map(|cos| lobe.smith_slopes(cos))
+                .fold(slopes.map(|slope| slope / self.n_dot_v), |[f, f_m, f_u], [g, g_m, g_u]| {
+                    [f * g, f_m * g + f * g_m, f_u * g + f * g_u]
+                }),
+        }
     }
 
     /// Diffuse light of strength 1 without and with the loss at grazing angles:
@@ -162,5 +226,34 @@ impl Material {
             sum += lobe.strength * facet.specular(lobe, self.masking);
         }
         sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slopes_are_those_of_the_specular_light() {
+        let step = 1e-6;
+        for masking in [Masking::CookTorrance, Masking::Smith] {
+            for (roughness, tail) in [(0.1, 0.3), (0.35, 0.9), (0.8, 0.02), (0.2, 1e-7)] {
+                let lobe = Lobe { strength: 1.0, roughness, tail };
+                for (x, y) in [(0.0, 0.1), (0.3, -0.2), (0.6, 0.5), (-0.4, 0.85)] {
+                    let normal = Vector3::new(x, y, (1.0f64 - x * x - y * y).sqrt());
+                    let facet = Facet::new(&normal, &Vector3::new(0.6, 0.0, 0.8));
+                    let [value, by_roughness, by_tail] = facet.specular_slopes(&lobe, masking);
+                    let at = |roughness: f64, tail: f64| facet.specular(&Lobe { roughness, tail, ..lobe }, masking);
+                    approx::assert_relative_eq!(value, at(roughness, tail), max_relative = 1e-12);
+                    let wider =
+                        (at(roughness * (1.0 + step), tail) - at(roughness * (1.0 - step), tail)) / (2.0 * step);
+                    approx::assert_relative_eq!(by_roughness, wider, max_relative = 1e-5, epsilon = 1e-9);
+                    // Beside a tail of nothing the step must leave the series.
+                    let (low, high) = if tail > step { (tail - step, tail + step) } else { (1e-4, 1.01e-4) };
+                    let longer = (at(roughness, high) - at(roughness, low)) / (high - low);
+                    approx::assert_relative_eq!(by_tail, longer, max_relative = 2e-2, epsilon = 1e-7);
+                }
+            }
+        }
     }
 }

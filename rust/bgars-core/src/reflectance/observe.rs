@@ -1,6 +1,6 @@
 //! Pixels as the reflectance estimator sees them: linear, at unit light intensity, in grey levels of 255, bent.
 
-use super::scale::bend;
+use super::scale::bend_reading;
 use crate::median::median;
 use crate::{ImageStack, Pixel, Radiometry};
 
@@ -10,7 +10,7 @@ const NO_CLIP: f64 = 1e6;
 /// Pixels that the usual offset is taken from, about.
 const OFFSET_PIXELS: usize = 1000;
 
-/// Reads pixels of a stack on the scale of [`bend`].
+/// Reads pixels of a stack on the scale of [`super::scale::bend`].
 #[derive(Debug)]
 pub struct Reader<'a, 'b, P> {
     stack: &'a ImageStack<'b, P>,
@@ -60,7 +60,7 @@ impl<'a, 'b, P: Pixel> Reader<'a, 'b, P> {
         let offset = self.radiometry.offset(pixel);
         for (light, (bent, &scale)) in bent.iter_mut().zip(&self.scales).enumerate() {
             let level = (self.radiometry.linearise(self.stack.plane(light)[pixel]) - offset) * scale;
-            *bent = bend(f64::from(level)) as f32;
+            *bent = bend_reading(level);
         }
     }
 }

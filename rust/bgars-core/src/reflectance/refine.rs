@@ -7,8 +7,8 @@ use super::table::{GROUP, Group, Signatures};
 /// Steps of the minimisation at most.
 const MAX_STEPS: usize = 12;
 
-/// A step shorter than this (units of the disc, about radian / 1.4) is the last.
-const SMALL_STEP: f32 = 1e-4;
+/// A step shorter than this (units of the disc, about radian / 1.4) is the last: the next would be a tenth of it.
+const SMALL_STEP: f32 = 3e-4;
 
 /// Residuals of so many standard deviations have half their weight.
 pub const LOSS_SCALE: f32 = 3.0;

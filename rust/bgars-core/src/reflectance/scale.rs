@@ -12,6 +12,14 @@ pub fn bend(level: f64) -> f64 {
     (x.abs() + (x * x + 1.0).sqrt()).ln().copysign(x) / BEND
 }
 
+/// [`bend`] of a reading, to 1e-5 grey levels.
+#[must_use]
+#[inline]
+pub fn bend_reading(level: f32) -> f32 {
+    let x = BEND as f32 * level;
+    (x.abs() + (x * x + 1.0).sqrt()).ln().copysign(x) / BEND as f32
+}
+
 /// Inverse of [`bend`].
 #[must_use]
 #[inline]
