@@ -27,8 +27,12 @@ __all__ = ["edge_bias_px"]
 
 Array = NDArray[np.float64]
 
-EDGE = 1.5
-"""Move of the fitted edge in s e / c: 1.2 to 1.7 for lit levels of 8 to 60 that are rounded without noise."""
+EDGE = 2.0
+"""Move of the fitted edge in s e / c: 0.9 to 2.3 for lit levels of 19 to 24 that are rounded without noise."""
+BESIDE_SIGMAS, BESIDE_PX = 3.0, 1.5
+"""How far outside the edge the board is lit."""
+PLATEAU_SHARE = 0.25
+"""Levels farther from the usual one, over the contrast, are something else: another shadow, a ball."""
 INV_SQRT_2PI = 0.3989422804014327
 
 
@@ -51,7 +55,7 @@ def edge_bias_px(radiance: Radiance, edges: Edges, spread_px: float) -> float:
     high = contrast * edges.high[known] / (edges.high[known] - edges.low[known])
     noise = float(np.median(edges.noise_levels[known.any(axis=2)]))
     step = _step_levels(radiance, float(np.median(high)))
-    smooth = max(noise**2 - step**2 / 12.0, 0.0)
+    smooth = max(_scatter_levels(radiance, edges, spread_px) ** 2 - step**2 / 12.0, 0.0)
     rounding = step / np.sqrt(12.0) * np.exp(-2.0 * np.pi**2 * smooth / step**2)
     # Boards that read many different levels are wrong by as many different roundings.
     _, counts = np.unique(np.rint(high / step), return_counts=True)
@@ -60,6 +64,28 @@ def edge_bias_px(radiance: Radiance, edges: Edges, spread_px: float) -> float:
     # Black is lifted by no more than it reads.
     lifted = min(_lifted(low, noise, _pedestal_levels(radiance)), low)
     return EDGE * spread_px * float(np.hypot(rounding, lifted)) / float(np.median(contrast))
+
+
+def _scatter_levels(radiance: Radiance, edges: Edges, spread_px: float) -> float:
+    """Standard deviation of the codes of lit board beside the edges: what the residuals at an edge are is no guide."""
+    known = np.isfinite(edges.contrast_levels)
+    number = np.maximum(known.sum(axis=2, keepdims=True), 1)
+    x, y = (
+        (edges.x - edges.x.sum(axis=2, keepdims=True) / number),
+        (edges.y - edges.y.sum(axis=2, keepdims=True) / number),
+    )
+    farther = 1.0 + (BESIDE_SIGMAS * spread_px + BESIDE_PX) / np.maximum(np.hypot(x, y), 1.0)
+    row = np.rint(radiance.row(edges.y + (farther - 1.0) * y)).astype(np.intp)
+    col = np.rint(radiance.col(edges.x + (farther - 1.0) * x)).astype(np.intp)
+    use = known & (row >= 0) & (row < radiance.height) & (col >= 0) & (col < radiance.width)
+    light = np.broadcast_to(np.arange(radiance.lights)[:, None], use.shape)[use]
+    levels = radiance.under(light, row[use] * radiance.width + col[use]) / radiance.scale
+    usual = np.array(
+        [np.nanmedian(levels[light == index]) if (light == index).any() else 0.0 for index in range(radiance.lights)]
+    )
+    off = levels - usual[light]
+    off = off[np.abs(off) < PLATEAU_SHARE * float(np.median(edges.contrast_levels[known]))]
+    return float(np.sqrt(np.mean(np.square(off)))) if off.size else 0.0
 
 
 def _step_levels(radiance: Radiance, level: float) -> float:
