@@ -45,3 +45,28 @@ def test_an_image_shifted_along_its_light_does_not_pass(shift_px: int) -> None:
     result = bgars.inspect(replace(taken, images=images), PART)
     assert result.verdict == "undecided"
     assert any("image 0" in reason and "shifted" in reason for reason in result.reasons)
+
+
+@pytest.mark.parametrize(("lights", "elevation_deg", "blur_px"), [(12, 38.0, 0.9), (6, 39.0, 0.4)])
+def test_shadows_of_neighbours_beside_the_rim_are_no_shift(lights: int, elevation_deg: float, blur_px: float) -> None:
+    jitter = bgars.Jitter(height_um=8, radius_um=3, position_um=5)
+    board = bgars.Board(bgars.Material.matte(0.2), texture=bgars.Texture(0.15))
+    scene = bgars.Scene.ball_array(5, 4, jitter=jitter, seed=5, board=board)
+    camera = bgars.Camera(supersample=3, blur_px=blur_px, read_noise_levels=0.5)
+    rig = bgars.LightRig.ring(lights, elevation_deg=elevation_deg)
+    taken, _ = bgars.simulate(scene, rig, bgars.Material(i_d=0.5, i_s=1.0, hardness=10), camera, seed=5)
+    assert not [warning for warning in bgars.inspect(taken).warnings if "shifted" in warning]
+
+
+def test_a_finder_that_is_off_on_all_balls_alike_moves_no_centre() -> None:
+    """A low-contrast rim under a blurred lens: outlines, which are sharper, say otherwise."""
+    board = bgars.Board(bgars.Material.matte(0.3))
+    scene = bgars.Scene.ball_array(4, 4, jitter=bgars.Jitter(position_um=5), seed=51, board=board)
+    camera = bgars.Camera(supersample=2, blur_px=0.9, read_noise_levels=1.5, bit_depth=12)
+    material = bgars.Material(i_d=0.1, i_s=1.0, hardness=80)
+    taken, truth = bgars.simulate(scene, bgars.LightRig.ring(8, elevation_deg=54.0), material, camera, seed=51)
+    found = bgars.find_balls(taken)
+    off = replace(found, balls=tuple(replace(ball, x_px=ball.x_px + 0.2, u_centre_px=0.01) for ball in found.balls))
+    measured = bgars.inspection.measure_balls(taken, off)
+    errors = np.array([a.x_um - float(b.x_um or 0.0) for a, b in zip(measured.balls, truth.balls, strict=True)])
+    assert abs(errors.mean()) < 0.3

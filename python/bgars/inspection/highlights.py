@@ -34,6 +34,7 @@ MIN_SHARE = 0.5
 MISSING = 0.3
 """Highlights fainter than this share of the usual one count as missing."""
 FLOOR_PX = 0.02
+LEAST_ALONE = 0.1
 MIN_STRENGTH = 4.0
 """Highlights must stand out of the noise of the patches by this factor."""
 
@@ -162,7 +163,9 @@ def _missing(gain: Array, enough: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return missing
 
 
-def sharpen_centres(highlights: Highlights, start: Array, fitted: Array, u_fitted: Array) -> tuple[Array, Array]:
+def sharpen_centres(
+    highlights: Highlights, start: Array, fitted: Array, u_fitted: Array, u_common: Array
+) -> tuple[Array, Array]:
     """Centres (N, 2) of shadows and highlights together, and their uncertainty (N, 2).
 
     Parameters
@@ -172,6 +175,8 @@ def sharpen_centres(highlights: Highlights, start: Array, fitted: Array, u_fitte
         Centres that the highlights were read at.
     fitted, u_fitted : (N, 2) float64
         Centres of the shadows and their uncertainty.
+    u_common : (2,) float64
+        The part of it that all balls share: highlights say nothing about that.
     """
     known = np.isfinite(highlights.u_px)
     if known.sum() < MIN_POPULATION:
@@ -179,12 +184,13 @@ def sharpen_centres(highlights: Highlights, start: Array, fitted: Array, u_fitte
     by_light = start + highlights.move_px
     by_light = by_light - np.median(by_light[known] - fitted[known], axis=0)
     apart = by_light[known] - fitted[known]
-    excess = np.square(1.4826 * np.median(np.abs(apart), axis=0)) - np.median(np.square(u_fitted[known]), axis=0)
+    alone = np.maximum(np.square(u_fitted) - np.square(u_common), LEAST_ALONE * np.square(u_fitted))
+    excess = np.square(1.4826 * np.median(np.abs(apart), axis=0)) - np.median(alone[known], axis=0)
     u_light = np.sqrt(np.maximum(np.square(highlights.u_px)[:, None], np.maximum(excess, 0.0)[None, :]))
     u_light = np.where(known[:, None], u_light, np.inf)
-    weight, weight_fitted = u_light**-2.0, u_fitted**-2.0
+    weight, weight_fitted = u_light**-2.0, 1.0 / alone
     total = weight + weight_fitted
     centres = (np.where(known[:, None], by_light, 0.0) * weight + fitted * weight_fitted) / total
     # The mean over the balls is still that of the shadows.
-    common = np.median(np.square(u_fitted), axis=0) / known.sum()
+    common = np.median(alone, axis=0) / known.sum() + np.square(u_common)
     return centres, np.sqrt(1.0 / total + common)

@@ -38,6 +38,7 @@ REACH_PX = 3.5
 COARSE_REACH, COARSE_EXTRA_PX = 0.2, 2.0
 MIN_STRETCHES = 12
 MIN_SPREAD_DEG = 200.0
+BESIDE_SHARE = 0.8
 ROUNDS = 8
 BIN_DEG = 20.0
 CAUCHY = 2.5
@@ -99,6 +100,9 @@ def outline_centres(
     value, distance, usable = _across(radiance, shadows, table, pick, angle, (edge_x[pick], edge_y[pick]), wide)
     if coarse:
         outside = (distance >= 0.0).astype(np.float64)
+        # By area only lines count that see the board next to the rim: a neighbour's shadow there is no outline.
+        beside = outside * (distance < wide)
+        usable *= (beside * usable).sum(axis=0) >= BESIDE_SHARE * beside.sum(axis=0)
         columns = [1.0 - outside, outside, (np.abs(distance) < 0.5 * wide) / wide]
     else:
         columns = _profile(distance, spread_px, table[ball, 3])
@@ -140,9 +144,14 @@ def _across(
     toward = angle[0, light, place]
     steps = int(np.ceil(reach_px))
     offsets = np.arange(-steps, steps + 1)[:, None]
-    along_cols = np.abs(np.cos(toward)) >= np.abs(np.sin(toward))
-    rows = np.rint(radiance.row(edge[1])).astype(np.intp)[None, :] + np.where(along_cols[None, :], 0, offsets)
-    cols = np.rint(radiance.col(edge[0])).astype(np.intp)[None, :] + np.where(along_cols[None, :], offsets, 0)
+    if reach_px > REACH_PX:
+        # Long lines must follow the normal: aslant, shading would differ from light to light.
+        rows = np.rint(radiance.row(edge[1])[None, :] - offsets * np.sin(toward)).astype(np.intp)
+        cols = np.rint(radiance.col(edge[0])[None, :] + offsets * np.cos(toward)).astype(np.intp)
+    else:
+        along_cols = np.abs(np.cos(toward)) >= np.abs(np.sin(toward))
+        rows = np.rint(radiance.row(edge[1])).astype(np.intp)[None, :] + np.where(along_cols[None, :], 0, offsets)
+        cols = np.rint(radiance.col(edge[0])).astype(np.intp)[None, :] + np.where(along_cols[None, :], offsets, 0)
     usable = (rows >= 0) & (rows < radiance.height) & (cols >= 0) & (cols < radiance.width)
     rows, cols = np.clip(rows, 0, radiance.height - 1), np.clip(cols, 0, radiance.width - 1)
     across_x, across_y = radiance.x(cols) - table[ball, 0], radiance.y(rows) - table[ball, 1]

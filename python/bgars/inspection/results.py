@@ -13,7 +13,7 @@ from bgars.inspection.bundle import angles_rad
 from bgars.inspection.highlights import sharpen_centres
 from bgars.inspection.plateaus import edge_bias_px
 from bgars.inspection.radii import sharpen_radii
-from bgars.inspection.shape_or_lights import shape_or_lights
+from bgars.inspection.shape_or_lights import shape_or_lights, silhouettes_or_shadows
 from bgars.inspection.spread import SHARP_PX
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ FLAT_SHARE = 0.01
 """A flat top is taken off the height where it is significant and more than this share of the radius."""
 POOR_SHARE = 0.02
 MANY_OUTLIERS = 0.4
-MODEL_CENTRE_PX, MODEL_RADIUS_PX = 0.0018, 0.0030
+MODEL_CENTRE_PX, MODEL_RADIUS_PX = 0.0010, 0.0030
 MODEL_HEIGHT_PER_RADIUS = -1.2
 """Scatter of simulated balls beyond the fit's own uncertainty (docs/make_inspection_accuracy.py prints both), for sharp
 edges; it grows with the root of their spread. Height and radius err against each other: the tip of the shadow stays.
@@ -102,6 +102,8 @@ def measurement(
     warnings = fit.warnings if fit is not None else ()
     doubts = fit.doubts if fit is not None else ()
     doubts += shape_or_lights(solution.balls[:, 4], problem.vectors, solution.vectors)
+    if fit is not None:
+        doubts += silhouettes_or_shadows(problem.table[fit.index[fit.usability.usable], 3], solution.balls[:, 3])
     warnings += tuple(
         f"light {light}: its shadows say that it stands {moved[light]:.1f} degrees from where the rig says"
         for light in np.flatnonzero(moved > LIGHT_WARNING_DEG)
@@ -134,7 +136,8 @@ def _with_highlights(fit: Fit, solution: Solution, highlights: Highlights | None
         return fit
     u_centre = np.sqrt(np.stack([solution.covariance[:, 0, 0], solution.covariance[:, 1, 1]], axis=1))
     here = solution.balls[:, :2]
-    centres, u_sharp = sharpen_centres(highlights, here, here, u_centre)
+    u_common = np.sqrt(np.diag(solution.common_covariance)[:2])
+    centres, u_sharp = sharpen_centres(highlights, here, here, u_centre, u_common)
     balls, covariance = solution.balls.copy(), solution.covariance.copy()
     balls[:, :2] = centres
     for axis in (0, 1):

@@ -234,8 +234,9 @@ def _with_outlines(problem: Problem, priors: Priors, shadows: ShadowMap, table: 
     off = (centres - table[:, :2])[known]
     scatter = 1.4826 * np.median(np.abs(off - np.median(off, axis=0)) / u_outline[known, None]) if known.any() else 1.0
     u_outline = OUTLINE_SAFETY * max(float(scatter), 1.0) * u_outline
-    by_outline = np.where(known, 1.0 / (OUTLINE_FLOOR_PX**2 + u_outline**2), 0.0)
-    by_finder = 1.0 / problem.u_centre**2
+    common = _apart(problem.table[:, :2] - centres, problem.u_centre, u_outline, known) ** 2
+    by_outline = np.where(known, 1.0 / (OUTLINE_FLOOR_PX**2 + u_outline**2 + common), 0.0)
+    by_finder = 1.0 / (problem.u_centre**2 + common)
     balls, u_balls = priors.balls.copy(), priors.u_balls.copy()
     weight = by_outline + by_finder
     for axis in (0, 1):
@@ -243,6 +244,18 @@ def _with_outlines(problem: Problem, priors: Priors, shadows: ShadowMap, table: 
         balls[:, axis] = (by_outline * outline + by_finder * problem.table[:, axis]) / weight
         u_balls[:, axis] = 1.0 / np.sqrt(weight)
     return priors._replace(balls=balls, u_balls=u_balls)
+
+
+def _apart(off: Array, u_finder: Array, u_outline: Array, known: NDArray[np.bool_]) -> float:
+    """What finder and outlines are apart by on all balls alike, beyond what they state, as a deviation of each ball's.
+
+    One of them is wrong then on all balls together, and many balls make that no smaller.
+    """
+    if not known.any():
+        return 0.0
+    stated = 2.0 * float(np.median(np.hypot(u_finder, u_outline)[known]))
+    apart = float(np.hypot(*np.median(off[known], axis=0)))
+    return float(np.sqrt(known.sum() * max(apart**2 - stated**2, 0.0)))
 
 
 def _with_free_radii(priors: Priors) -> Priors:

@@ -2,7 +2,8 @@
 
 With all balls flattened by a share and all lights lowered to match, every shadow stays where it is. The bundle decides
 by two assumptions: balls round on the whole, errors of the rig independent from light to light. Where the result itself
-contradicts one of them, heights may be wrong by far more than the fit says.
+contradicts one of them, or where silhouettes and shadows see balls of different size, heights may be wrong by far more
+than the fit says.
 """
 
 from __future__ import annotations
@@ -10,13 +11,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["shape_or_lights"]
+__all__ = ["shape_or_lights", "silhouettes_or_shadows"]
 
 Array = NDArray[np.float64]
 
 MIN_Q_OFF = 0.01
 MIN_RAISE_DEG = 0.3
 SIGMAS = 3.0
+MIN_RADIUS_OFF, MIN_RADIUS_OFF_PX = 0.05, 1.0
+"""By how much radii must differ: silhouettes of dark balls on blurred images are a per cent or two off."""
 MEDIAN_FACTOR = 1.2533
 """Standard error of a median over that of a mean, for normal errors."""
 
@@ -62,6 +65,36 @@ def shape_or_lights(q: Array, rig: Array, refined: Array) -> tuple[str, ...]:
             f"it is the balls that are not, heights are wrong by about {percent:.1f} %"
         )
     return tuple(texts)
+
+
+def silhouettes_or_shadows(silhouette_px: Array, shadow_px: Array) -> tuple[str, ...]:
+    """Say where balls look larger or smaller than their shadows on the whole.
+
+    Parameters
+    ----------
+    silhouette_px, shadow_px : (N,) float64
+        Radii of the same balls.
+
+    Returns
+    -------
+    tuple of str
+        One text, or none.
+
+    Examples
+    --------
+    >>> silhouettes_or_shadows(np.full(9, 29.8), np.full(9, 30.0))
+    ()
+    >>> silhouettes_or_shadows(np.full(9, 25.0), np.full(9, 30.0))[0][:45]
+    'the balls look 17 % smaller than their shadow'
+    """
+    off = float(np.median(silhouette_px / shadow_px)) - 1.0
+    if abs(off) <= max(MIN_RADIUS_OFF, MIN_RADIUS_OFF_PX / float(np.median(shadow_px))):
+        return ()
+    word = "smaller" if off < 0.0 else "larger"
+    return (
+        f"the balls look {100.0 * abs(off):.0f} % {word} than their shadows say: one of both is wrong, and heights "
+        "with it (too little contrast, or highlights taken for outlines)",
+    )
 
 
 def _elevation_rad(vectors: Array) -> Array:
