@@ -80,6 +80,8 @@ class Solution:
     iterations: int
     board_covariance: Array
     common_covariance: Array
+    edge_response: Array
+    flank_response: Array
 
 
 def tangents(vectors: Array) -> Array:
@@ -179,10 +181,21 @@ def solve_bundle(
     board = Board(coefficients)
     residual, derivatives = _linearise(edges, table, vectors, near, board)
     honest = _honest_weights(residual, variance, known, redescend)
-    normal, cross, corner, _, _ = _normal(derivatives, residual, honest, table, vectors, coefficients, priors)
+    at = (honest, table, vectors, coefficients, priors)
+    normal, cross, corner, *_ = _normal(derivatives, residual, *at)
     inverse = np.linalg.inv(normal)
     lever = inverse @ cross
     border_covariance = np.linalg.inv(corner - np.tensordot(cross, lever, axes=((0, 1), (0, 1))))
+    *_, by_priors, border_by_priors = _normal(derivatives, np.zeros_like(residual), *at)
+
+    def response(shift_px: Array) -> Array:
+        """(N, 5) change of the balls when measured points lie so much farther out: linear, priors as they are."""
+        *_, right, right_border = _normal(derivatives, shift_px, *at)
+        right, right_border = right - by_priors, right_border - border_by_priors
+        turn = border_covariance @ (right_border - np.tensordot(lever, right, axes=((0, 1), (0, 1))))
+        changed: Array = np.einsum("nij,nj->ni", inverse, right - cross @ turn)
+        return changed
+
     covariance = inverse + lever @ border_covariance @ lever.transpose(0, 2, 1)
     mean_lever = lever.mean(axis=0)
     board_covariance: Array = border_covariance[2 * lights :, 2 * lights :].astype(np.float64)
@@ -199,7 +212,23 @@ def solve_bundle(
         iterations,
         board_covariance,
         mean_lever @ border_covariance @ mean_lever.T,
+        response(np.ones_like(residual)),
+        response(_flanks(edges, table, vectors, near, board)),
     )
+
+
+def _flanks(edges: Edges, table: Array, vectors: Array, near: bool, board: Board) -> Array:
+    """(N, L, S) 1 where the edge of a shadow runs at 45 degrees to its light, 0 at tips and sides."""
+    beam = rays(
+        edges.x, edges.y, Balls.from_table(table).spread(2), Lights.from_table(vectors, near).spread(1, 1), board
+    )
+    level = np.maximum(np.hypot(beam.toward_x, beam.toward_y), 1e-9)
+    cosine = (beam.toward_x * beam.gradient_x + beam.toward_y * beam.gradient_y) / (
+        level * np.maximum(beam.slope, 1e-3)
+    )
+    tips = np.square(cosine)
+    flanks: Array = 4.0 * tips * (1.0 - tips)
+    return flanks
 
 
 def _honest_weights(residual: Array, variance: Array, known: NDArray[np.bool_], redescend: float | None) -> Array:

@@ -45,10 +45,12 @@ MODEL_HEIGHT_PER_RADIUS = -1.2
 """Scatter of simulated balls beyond the fit's own uncertainty (docs/make_inspection_accuracy.py prints both), for sharp
 edges; it grows with the root of their spread. Height and radius err against each other: the tip of the shadow stays.
 """
+MODEL_FLANK_PX, FLANK_SHARE = 0.001, 0.7
+"""What edges between tip and side of a shadow are off by against both, and its share of what all edges are off by:
+heights hang on that where the rig is free.
+"""
 GRID_SHARE = 0.1
 """The same of images of few samples a pixel: share of what points of edges scatter beyond their own uncertainty."""
-BIAS_HEIGHT_PER_RADIUS = -0.45
-"""Centres by radii where all edges are off alike: -0.3 to -0.5 for levels that are rounded or cut off at zero."""
 CLIPPED_SHARE = 0.5
 LIGHT_WARNING_DEG = 5.0
 
@@ -154,18 +156,20 @@ def _with_silhouettes(fit: Fit) -> Fit:
     chosen = fit.index[fit.usability.usable]
     balls, covariance = sharpen_radii(fit.solution, fit.problem.table[chosen, 3], fit.problem.u_radius[chosen])
     bias_px = edge_bias_px(fit.problem.radiance, fit.edges, fit.spread.sharp_px)
-    covariance += _model_error(fit.spread.sharp_px, bias_px, GRID_SHARE * fit.solution.excess_px)
+    flank_px = np.hypot(MODEL_FLANK_PX * np.sqrt(fit.spread.sharp_px / SHARP_PX), FLANK_SHARE * bias_px)
+    for size_px, response in ((bias_px, fit.solution.edge_response), (flank_px, fit.solution.flank_response)):
+        together = size_px * response
+        covariance += together[:, :, None] * together[:, None, :]
+    covariance += _model_error(fit.spread.sharp_px, GRID_SHARE * fit.solution.excess_px)
     return replace(fit, solution=replace(fit.solution, balls=balls, covariance=covariance))
 
 
-def _model_error(sharp_px: float, bias_px: float, grid_px: float) -> Array:
-    """(5, 5) covariance of what no residual shows: blurred texture, pixels that straddle an edge, rounded levels."""
+def _model_error(sharp_px: float, grid_px: float) -> Array:
+    """(5, 5) covariance of what no residual shows: blurred texture, pixels that straddle an edge."""
     size = np.sqrt(sharp_px / SHARP_PX)
     centre, radius = size * MODEL_CENTRE_PX, size * MODEL_RADIUS_PX
-    covariance: Array = np.diag(np.square([centre, centre, grid_px, grid_px, 0.0]))
-    for size_px, height in ((radius, MODEL_HEIGHT_PER_RADIUS), (bias_px, BIAS_HEIGHT_PER_RADIUS)):
-        together = size_px * np.array([0.0, 0.0, height, 1.0, 0.0])
-        covariance += np.outer(together, together)
+    together = radius * np.array([0.0, 0.0, MODEL_HEIGHT_PER_RADIUS, 1.0, 0.0])
+    covariance: Array = np.diag(np.square([centre, centre, grid_px, grid_px, 0.0])) + np.outer(together, together)
     return covariance
 
 

@@ -37,6 +37,8 @@ COARSE_STEPS = 6.0
 FINE_PASSES = 4
 """Most passes with sharp edges; two where the first leaves little to do."""
 SMALL_CHANGE_PX = 0.5
+LAST_PASSES, DRIFT_PX = 3, 0.02
+"""Heights of all balls and elevations of all lights settle slowly together, where the rig leaves them free."""
 FIRST_SPREAD_PX = 0.5
 SPREADS_PX = (0.3, 0.5, 0.8, 1.3, 2.0)
 SPREAD_BALLS = 5
@@ -107,7 +109,6 @@ def fit_shadows(
     )
     table[:, 2] = heights
     complaints = explain_dark_steps(problem, table, steps)
-    warnings: tuple[str, ...] = ()
     progress(0.1)
     priors = _priors(problem, table, field, refine_lights)
     spread = EdgeSpread(FIRST_SPREAD_PX, 0.0)
@@ -116,11 +117,10 @@ def fit_shadows(
     if not len(index):
         return None
     passes = len(COARSE) + FINE_PASSES
-    result: Fit | None = None
-    turn, last, change = 0, False, np.inf
+    turn, last, finished, change = 0, False, False, np.inf
     wide: Outlines | None = None
-    while not last:
-        last = turn == passes - 1 or (turn > len(COARSE) and change < SMALL_CHANGE_PX)
+    while not finished:
+        last = last or turn >= passes - 1 or (turn > len(COARSE) and change < SMALL_CHANGE_PX)
         radius = float(np.median(table[:, 3]))
         settings = _settings(turn, radius, spread, last)
         shadows = ShadowMap(
@@ -130,7 +130,7 @@ def fit_shadows(
             shadow_margin_px=settings.reach_px + 1.0,
             threads=threads,
         )
-        if last:
+        if last and wide is None:
             priors = _with_free_radii(_with_outlines(problem, priors, shadows, table, spread))
             wide = _wide_outlines(problem, shadows, table, vectors, spread)
         edges = measure_edges(
@@ -145,6 +145,8 @@ def fit_shadows(
         start = (table[chosen], vectors, board)
         solution, priors = _solve(used, start, problem.near, priors, chosen, turn, last, refine_lights)
         change = float(np.abs(solution.balls - table[chosen]).max())
+        drift = abs(float((solution.balls - table[chosen])[:, 2].mean()))
+        finished = last and (drift < DRIFT_PX or turn >= passes + LAST_PASSES - 2)
         table[chosen], vectors, board = solution.balls, solution.vectors, solution.board
         gains[index] = edges.lit_levels(gains[index])
         before = spread
@@ -154,14 +156,12 @@ def fit_shadows(
             spread = _first_spread(problem, shadows, table[chosen], vectors, board, gains[chosen], settings, threads)
         if abs(spread.sharp_px - before.sharp_px) > SMALL_SPREAD_CHANGE * before.sharp_px and turn >= len(COARSE):
             change = np.inf
-        if wide is not None:
-            moved_deg = np.degrees(angles_rad(vectors, problem.vectors))
-            warnings = refuse_misfits(complaints, used, solution.weight, moved_deg) + check_shifts(wide)
         turn += 1
-        progress(0.1 + 0.8 * (1.0 if last else turn / passes))
-        doubts = () if wide is None else displaced_images(wide)
-        result = Fit(problem, index, usability, solution, edges, spread, warnings, doubts)
-    return result
+        progress(0.1 + 0.8 * (1.0 if finished else min(turn / passes, 0.95)))
+    assert wide is not None
+    moved_deg = np.degrees(angles_rad(vectors, problem.vectors))
+    warnings = refuse_misfits(complaints, used, solution.weight, moved_deg) + check_shifts(wide)
+    return Fit(problem, index, usability, solution, edges, spread, warnings, displaced_images(wide))
 
 
 def _wide_outlines(problem: Problem, shadows: ShadowMap, table: Array, vectors: Array, spread: EdgeSpread) -> Outlines:
