@@ -30,7 +30,7 @@ JOINED = {
     "recipes": 5,
     "cfx": 5,
 }
-LATER = {**JOINED, "batch": 6, "report": 6, "experiments": 6, "samples": 0, "cli": 7}
+LATER = {**JOINED, "batch": 6, "report": 6, "studies": 6.5, "experiments": 6, "samples": 0, "cli": 7}
 LEVEL = {**BASE, **STAGES, **LATER, "simulate": 4}
 
 
