@@ -12,7 +12,7 @@ import pytest
 from bgars.studies.capability import capability
 from bgars.studies.control_chart import c4, control_chart
 from bgars.studies.trend import Trend
-from judged_parts import RECIPE, judged
+from judged_parts import RECIPE, judged, write_results
 
 
 @pytest.mark.parametrize(
@@ -85,18 +85,6 @@ def test_one_limit_gives_no_cp_and_no_spread_gives_nothing() -> None:
     assert one.centred.value == 1.0
     assert math.isnan(capability(1.0, 0.0, (0.0, 4.0), count=10, df=9).centred.value)
     assert math.isnan(capability(1.0, 1.0, (None, None), count=10, df=9).centred.value)
-
-
-def write_results(folder: Path, count: int, **changes: float) -> Path:
-    for number in range(count):
-        result = judged(part=number + 1, run=number, noise_um=0.3)
-        balls = tuple(replace(ball, **{k: getattr(ball, k) + v for k, v in changes.items()}) for ball in result.balls)
-        stamp = f"2026-01-{1 + number // 24:02d}T{number % 24:02d}:00:00Z"
-        place = folder / f"r{number}"
-        place.mkdir(parents=True)
-        text = replace(result, balls=balls if number >= count // 2 else result.balls, inspected_utc=stamp).to_json()
-        (place / "result.json").write_text(text, encoding="utf-8")
-    return folder
 
 
 def top_of(found: bgars.ProcessTrend) -> Trend:

@@ -14,9 +14,7 @@ import pytest
 from bgars.cli.app import app
 from bgars.cli.console import EXIT_BAD_INPUT
 from bgars.studies import study_folder
-from judged_parts import RECIPE, judged
-from test_gauge_rr import write_study
-from test_spc import write_results
+from judged_parts import RECIPE, judged, write_results, write_study
 from typer.testing import CliRunner
 
 NASTY = "<script>alert('x')</script> & co"
@@ -153,10 +151,15 @@ def a_capture(folder: Path) -> None:
     (folder / "part2" / "place1" / "2" / "result.json").rename(folder / "part2" / "place1" / "2" / "capture.toml")
 
 
+def copied(folder: Path) -> None:
+    shutil.copy(folder / "part1" / "place2" / "1" / "result.json", folder / "part1" / "place2" / "3" / "result.json")
+
+
 GRR: dict[str, tuple[Callable[[Path], object], str, str]] = {
     "mixed recipe": (mixed_recipe, "part2/place1/2", "must have the same recipe as"),
     "other limits": (other_limits, "part2/place1/2", "another layout or other limits"),
     "other pixel pitch": (other_pitch, "part2/place1/2", "must have the same pixel_pitch_um as"),
+    "a copy": (copied, "part1/place2/3", "was made from the same files as"),
     "corrupt": (cut, "part2/place1/2/result.json", "is not valid JSON"),
     "one repeat": (one_repeat, "part2/place1", "must hold at least 2 repeats, got 1"),
     "unbalanced": (hole, "part2/place1", "the design is not balanced: must hold 3 repeats like the first, got 2"),
@@ -244,13 +247,13 @@ def test_a_study_of_captures_is_inspected_and_a_bad_capture_fails_it_by_name(
     for number in (1, 2):
         capture, truth = bgars.simulate(scene, bgars.LightRig.ring(4), bgars.Material(), camera, seed=number)
         bgars.write_simulation(capture, truth, tmp_path / "s" / str(number))
-    seen = []
+    seen: list[tuple[str, object]] = []
+    failure: bgars.BgarsError = bgars.CalibrationError("light 3 is dark")
 
     def stand_in(capture: bgars.Capture, recipe: object, **_: object) -> bgars.PartResult:
         seen.append((capture.name, recipe))
-        if len(seen) == 4:
-            msg = "light 3 is dark"
-            raise bgars.CalibrationError(msg)
+        if len(seen) % 4 == 0:
+            raise failure
         return judged(run=len(seen))
 
     monkeypatch.setattr(study_folder, "inspect", stand_in)
@@ -260,4 +263,11 @@ def test_a_study_of_captures_is_inspected_and_a_bad_capture_fails_it_by_name(
     assert all(isinstance(recipe, bgars.PartRecipe) for _, recipe in seen)
     code, text = command("grr", tmp_path / "s", "-o", tmp_path / "second")
     assert (code, text) == (2, f"{tmp_path / 's' / '2'}: light 3 is dark")
+    for failure, kind in (  # noqa: B007 - the stand-in raises it
+        (bgars.InputError("no pixel pitch"), bgars.InputError),
+        (bgars.ConvergenceError("no end", 7, 0.5), bgars.CalibrationError),
+    ):
+        seen.extend([("", None)] * (3 - len(seen) % 4))
+        with pytest.raises(kind, match=re.escape(str(tmp_path / "s" / "1"))):
+            bgars.read_study(tmp_path / "s")
     assert not (tmp_path / "second").exists()

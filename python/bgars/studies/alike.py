@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from bgars.errors import InputError
@@ -27,7 +28,8 @@ def check_alike(results: Sequence[tuple[str, PartResult]]) -> tuple[str, ...]:
     Raises
     ------
     InputError
-        Another recipe, pixel pitch, number of lights or estimator than that of the first; both are named.
+        Another recipe, pixel pitch, number of lights or estimator than that of the first, or the same input files as
+        another; both are named.
     """
     first_name, first = results[0]
     for name, result in results[1:]:
@@ -42,10 +44,27 @@ def check_alike(results: Sequence[tuple[str, PartResult]]) -> tuple[str, ...]:
                 told = "" if isinstance(one, dict) or isinstance(other, dict) else f": {one!r} against {other!r}"
                 msg = f"{name}: must have the same {what} as {first_name}{told}"
                 raise InputError(msg)
+    _check_copies(results)
+    warnings = []
+    counts = Counter(result.verdict for _, result in results)
+    if counts["fail"] or (counts["undecided"] and counts["pass"]):
+        told = ", ".join(f"{counts[verdict]} {verdict}" for verdict in ("pass", "fail", "undecided") if counts[verdict])
+        warnings.append(f"verdicts of the single inspections: {told}")
     versions = sorted({result.version for _, result in results})
     if len(versions) > 1:
-        return (f"results of different versions of bgars are put together: {', '.join(versions)}",)
-    return ()
+        warnings.append(f"results of different versions of bgars are put together: {', '.join(versions)}")
+    return tuple(warnings)
+
+
+def _check_copies(results: Sequence[tuple[str, PartResult]]) -> None:
+    """Refuse the same images twice: they would repeat without any spread."""
+    seen: dict[frozenset[str], str] = {}
+    for name, result in results:
+        digests = frozenset(digest for _, digest in result.files)
+        if digests and digests in seen:
+            msg = f"{name}: was made from the same files as {seen[digests]}; every run must have images of its own"
+            raise InputError(msg)
+        seen[digests] = name
 
 
 def _recipe_name(result: PartResult) -> str | None:

@@ -141,6 +141,8 @@ def gauge_figures(readings: Readings, recipe: PartRecipe | None) -> GaugeFigures
     own = values.var(axis=2, ddof=1).mean(axis=1) ** 0.5
     worst = int(own.argmax())
     verdict, reason = _verdict(characteristic.title, spreads[0].percent_tolerance)
+    if verdict is not None and grr == 0:
+        verdict, reason = "undecided", f"{characteristic.title}: no spread at all, which no gauge has; look at the runs"
     return GaugeFigures(
         characteristic.name,
         characteristic.unit,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bgars.errors import BgarsError, FileFormatError, InputError
+from bgars.errors import BgarsError, CalibrationError, FileFormatError, InputError
 from bgars.inspection_pipeline import inspect
 from bgars.io.capture import read_capture
 from bgars.io.part_recipe import read_part_recipe
@@ -164,7 +164,8 @@ def _inspected(path: Path, recipe: PartRecipe | None, method: Method) -> PartRes
         if str(path) in str(error):
             raise
         msg = f"{path}: {error}"
-        raise type(error)(msg) from error
+        kinds = (InputError, FileFormatError)
+        raise next((kind for kind in kinds if isinstance(error, kind)), CalibrationError)(msg) from error
 
 
 def _is_run(folder: Path) -> bool:
