@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 if TYPE_CHECKING:
     from bgars.part_recipe import PartRecipe
@@ -107,9 +107,11 @@ def accuracy_figures(
     count = len(bias)
     mean = float(bias.mean()) if count else math.nan
     u = float(bias.std(ddof=1) / math.sqrt(count)) if count > 1 else math.nan
-    p = float(2.0 * stats.t.sf(abs(mean) / u, count - 1)) if count > 1 and u > 0 else math.nan
+    p = float(2.0 * special.stdtr(count - 1, -abs(mean) / u)) if count > 1 and u > 0 else math.nan
     slope = intercept = slope_p = math.nan
     if count >= MIN_LINE and np.ptp(reference) > 0:
+        from scipy import stats  # noqa: PLC0415 - slow to import, and rarely needed
+
         line = stats.linregress(reference, bias)
         slope, intercept, slope_p = float(line.slope), float(line.intercept), float(line.pvalue)
     return Accuracy(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from bgars.errors import InputError
 
@@ -160,7 +160,7 @@ def _p(ms: float, base: float, df: int, base_df: int) -> tuple[float, float]:
     if not df or not base > 0:
         return math.nan, math.nan
     f = ms / base
-    return f, float(stats.f.sf(f, df, base_df))
+    return f, float(special.fdtrc(df, base_df, f))
 
 
 def _component(ms: float, base: float, count: int) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from scipy import stats
+from scipy import special
 
 __all__ = ["CONFIDENCE", "Capability", "Index", "capability"]
 
@@ -81,10 +81,10 @@ def capability(
     if not distances or not sigma > 0 or not df > 0:
         return Capability(UNKNOWN, UNKNOWN)
     cpk = min(distances) / (3.0 * sigma)
-    half = float(stats.norm.ppf((1 + CONFIDENCE) / 2)) * math.sqrt(1.0 / (9.0 * count) + cpk**2 / (2.0 * df))
+    half = float(special.ndtri((1 + CONFIDENCE) / 2)) * math.sqrt(1.0 / (9.0 * count) + cpk**2 / (2.0 * df))
     spread = UNKNOWN
     if lowest is not None and highest is not None:
         cp = (highest - lowest) / (6.0 * sigma)
-        low, high = (float(stats.chi2.ppf(side, df)) for side in ((1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2))
+        low, high = (float(special.chdtri(df, side)) for side in ((1 + CONFIDENCE) / 2, (1 - CONFIDENCE) / 2))
         spread = Index(cp, cp * math.sqrt(low / df), cp * math.sqrt(high / df))
     return Capability(spread, Index(cpk, cpk - half, cpk + half))

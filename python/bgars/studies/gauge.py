@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from scipy import stats
+from scipy import special
 
 from bgars.studies.anova import Anova, crossed_anova
 
@@ -137,7 +137,7 @@ def gauge_figures(readings: Readings, recipe: PartRecipe | None) -> GaugeFigures
     ndc = None if math.isnan(pv2) or grr == 0 else max(1, math.floor(NDC_FACTOR * math.sqrt(pv2) / grr))
     ev = math.sqrt(ev2)
     df = anova.repeatability_df
-    high, low = (float(stats.chi2.ppf(side, df)) for side in ((1 + CONFIDENCE) / 2, (1 - CONFIDENCE) / 2))
+    high, low = (float(special.chdtri(df, side)) for side in ((1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2))
     own = values.var(axis=2, ddof=1).mean(axis=1) ** 0.5
     worst = int(own.argmax())
     verdict, reason = _verdict(characteristic.title, spreads[0].percent_tolerance)
