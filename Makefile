@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-rust test-python lint format accuracy inspection simulator experiments method performance instructions clean
+.PHONY: demo test test-rust test-python lint format accuracy inspection simulator experiments method schema studies performance instructions clean
 
 demo: $(VENV)/.installed ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
@@ -45,6 +45,12 @@ experiments: $(VENV)/.installed ## Run the paper's experiments again and rewrite
 
 method: $(VENV)/.installed ## Draw the pictures of docs/reflectance.md and one of docs/inspection.md again
 	$(BIN)/python docs/make_method_pictures.py
+
+studies: $(VENV)/.installed ## Run the gauge studies of docs/studies.md again (15 minutes)
+	$(BIN)/python docs/make_studies.py
+
+schema: $(VENV)/.installed ## Write docs/result.schema.json, the JSON Schema of result.json, again
+	$(BIN)/python docs/make_result_schema.py
 
 instructions: ## Instructions a pixel of each kernel against the kept counts (needs valgrind)
 	python3 benches/count_instructions.py

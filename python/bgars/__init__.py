@@ -14,6 +14,7 @@ from importlib.metadata import version
 from bgars.ball_records import BallLayout, FoundBall, FoundBalls
 from bgars.balls import find_balls
 from bgars.calibrate import calibrate_material
+from bgars.cfx import to_cfx
 from bgars.errors import (
     BgarsError,
     CalibrationError,
@@ -30,7 +31,9 @@ from bgars.io.height import read_height, write_height
 from bgars.io.material_file import read_material, write_material
 from bgars.io.mesh_files import write_mesh
 from bgars.io.normal_map import read_normal_map, write_normal_map
+from bgars.io.parquet import write_parquet
 from bgars.io.part_recipe import read_part_recipe
+from bgars.io.result_file import read_result
 from bgars.io.truth import read_truth
 from bgars.material_records import ReflectanceFit, SurfaceLobe, SurfaceMaterial
 from bgars.mesh import mesh_from_height
@@ -61,6 +64,16 @@ from bgars.simulate import (
     Variation,
     simulate,
 )
+from bgars.studies import (
+    GaugeStudy,
+    ProcessTrend,
+    Study,
+    gauge_rr,
+    process_trend,
+    read_references,
+    read_results,
+    read_study,
+)
 
 __version__ = version("bgars")
 
@@ -82,6 +95,7 @@ __all__ = [
     "FileFormatError",
     "FoundBall",
     "FoundBalls",
+    "GaugeStudy",
     "HeightMap",
     "InputError",
     "Jitter",
@@ -92,11 +106,13 @@ __all__ = [
     "NormalField",
     "PartRecipe",
     "PartResult",
+    "ProcessTrend",
     "Reconstruction",
     "ReflectanceFit",
     "Scene",
     "SimulatedTruth",
     "SimulationSetup",
+    "Study",
     "SurfaceLobe",
     "SurfaceMaterial",
     "Texture",
@@ -109,26 +125,34 @@ __all__ = [
     "estimate_normals",
     "evaluate",
     "find_balls",
+    "gauge_rr",
     "inspect",
     "integrate_normals",
     "mesh_from_height",
     "named_recipes",
+    "process_trend",
     "read_capture",
     "read_height",
     "read_material",
     "read_normal_map",
     "read_part_recipe",
+    "read_references",
+    "read_result",
+    "read_results",
     "read_scene",
+    "read_study",
     "read_truth",
     "reconstruct",
     "sample_capture",
     "sample_part_recipe",
     "simulate",
+    "to_cfx",
     "write_height",
     "write_material",
     "write_mesh",
     "write_normal_map",
     "write_overview",
+    "write_parquet",
     "write_part_pictures",
     "write_simulation",
 ]

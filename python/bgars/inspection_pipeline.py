@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Literal
 
@@ -99,7 +100,7 @@ def inspect(
         warnings=warnings,
     )
     report("judge", 1.0)
-    return result
+    return replace(result, method=method, capture=capture.name)
 
 
 def _material(recipe: PartRecipe | None, method: Method) -> tuple[SurfaceMaterial | None, tuple[str, ...]]:

@@ -7,7 +7,7 @@ import io
 import json
 import math
 from dataclasses import dataclass, fields
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,12 @@ from numpy.typing import NDArray
 from bgars.ball_records import BallKind
 from bgars.part_recipe import PartRecipe
 
-__all__ = ["BallResult", "PartCheck", "PartResult", "SeatingResult", "Verdict"]
+__all__ = ["FORMAT", "FORMAT_VERSION", "BallResult", "PartCheck", "PartResult", "SeatingResult", "Verdict"]
 
 Verdict = Literal["pass", "fail", "undecided"]
+FORMAT = "bgars-result"
+FORMAT_VERSION = 1
+"""Rises with every change of the keys of result.json, or of their meaning (docs/result.schema.json)."""
 DIGITS = 6
 CSV_DIGITS = 3
 TABLE = (
@@ -31,6 +34,14 @@ TABLE = (
     ("q", "q", ".3f"),
     ("flat um", "flat_um", ".1f"),
     ("verdict", "verdict", ""),
+)
+LINE_READINGS = (
+    "pitch_um",
+    "seating_coplanarity_um",
+    "u_seating_coplanarity_um",
+    "regression_coplanarity_um",
+    "u_regression_coplanarity_um",
+    "warpage_um",
 )
 
 
@@ -192,6 +203,14 @@ class PartResult:
         Name and SHA-256 of every input file.
     version : str
         Of bgars.
+    method : str
+        Estimator of the normals, which show flat tops.
+    capture : str
+        Name of the capture.
+    serial : str
+        Serial number of the part; empty: not given.
+    inspected_utc : str
+        When the command inspected it, ISO 8601, UTC; empty: not stamped, so that equal input gives an equal result.
     """
 
     name: str
@@ -221,6 +240,10 @@ class PartResult:
     pixel_pitch_um: float
     files: tuple[tuple[str, str], ...] = ()
     version: str = ""
+    method: str = ""
+    capture: str = ""
+    serial: str = ""
+    inspected_utc: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain Python values; None where something was not measured."""
@@ -232,7 +255,8 @@ class PartResult:
             values[name] = [{key: _plain(value, DIGITS) for key, value in vars(row).items()} for row in values[name]]
         # Slopes and curvatures are small numbers: they keep all digits.
         exact = {"board_coefficients_um": [None if math.isnan(c) else float(c) for c in self.board_coefficients_um]}
-        return {name: _plain(value, DIGITS) for name, value in values.items()} | exact
+        heading = {"format": FORMAT, "format_version": FORMAT_VERSION}
+        return heading | {name: _plain(value, DIGITS) for name, value in values.items()} | exact
 
     def to_json(self) -> str:
         """Return :meth:`to_dict` as JSON text."""
@@ -263,6 +287,38 @@ class PartResult:
             ]
             lines.append("  ".join(cells).rstrip())
         return "\n".join(lines)
+
+    def summary_line(self) -> str:
+        """Return one line for a log: key=value pairs, always these keys, in this order.
+
+        Numbers in the unit of their key, null = not measured; text with spaces, quotes or control characters is quoted
+        as in JSON, so that a line stays a line.
+        """
+        balls = {verdict: sum(ball.verdict == verdict for ball in self.balls) for verdict in get_args(Verdict)}
+        pairs = {
+            "time": self.inspected_utc or None,
+            "part": self.name,
+            "serial": self.serial,
+            "capture": self.capture,
+            "verdict": self.verdict,
+            "balls": len(self.balls),
+            **{f"balls_{verdict}": count for verdict, count in balls.items()},
+            "balls_missing": sum(not ball.present for ball in self.balls),
+            "bridges": len(self.bridges),
+            **{name: getattr(self, name) for name in LINE_READINGS},
+            "reason": self.reasons[0] if self.reasons else "",
+            "warnings": len(self.warnings),
+            "version": self.version,
+        }
+        return " ".join(f"{key}={_log_value(value)}" for key, value in pairs.items())
+
+
+def _log_value(value: float | str | None) -> str:
+    if isinstance(value, float):
+        return f"{value:.3f}" if math.isfinite(value) else "null"
+    if isinstance(value, str) and (not value or not value.isprintable() or set(value) & set(' "=\\')):
+        return json.dumps(value, ensure_ascii=not value.isprintable())
+    return "null" if value is None else str(value)
 
 
 def _cell(value: Any, form: str) -> str:  # noqa: ANN401 - a field of a record

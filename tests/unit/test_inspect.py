@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -240,3 +241,29 @@ def test_the_material_of_the_recipe_is_used_or_said_to_be_unused(quick: Path) ->
     (quick.parent / "solder.toml").write_text("diffuse_level = -1\n", encoding="utf-8")
     with pytest.raises(bgars.BgarsError, match=r"solder\.toml"):
         bgars.inspect(capture, part)
+
+
+def test_serial_parquet_cfx_and_the_log_line_of_the_command(quick: Path, tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    out = tmp_path / "out"
+    options = ("--recipe", recipe(quick), "--serial", "SN 7", "--parquet", "--cfx", "--log")
+    code, text = command(quick, "-o", out, *options)
+    assert code == 0, text
+    assert {path.name for path in out.iterdir()} == OUTPUTS | {"balls.parquet", "cfx.json"}
+    result = bgars.read_result(out)
+    assert text == result.summary_line() + "\n"
+    assert (result.serial, result.capture, result.method) == ("SN 7", "part", "reflectance")
+    assert result.inspected_utc.endswith("Z")
+    assert json.loads((out / "cfx.json").read_text(encoding="utf-8")) == bgars.to_cfx(result)
+    code, text = command(quick, "-o", out, "--log", "--json")
+    assert (code, text) == (EXIT_BAD_INPUT, "--log and --json: give one of them")
+
+
+def test_without_pyarrow_the_command_leaves_nothing(
+    quick: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    code, text = command(quick, "-o", tmp_path / "out", "--parquet")
+    assert code == EXIT_BAD_INPUT
+    assert "bgars[parquet]" in text
+    assert not (tmp_path / "out").exists()

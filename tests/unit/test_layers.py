@@ -21,8 +21,16 @@ RECORDS = {
 }
 BASE = {"errors": 0, "light_files": 1, "rig": 2, **RECORDS}
 STAGES = dict.fromkeys(("io", "pixelwise", "reflectance", "integrate", "mesh", "balls", "inspection"), 4)
-JOINED = {"normals": 4.5, "calibrate": 5, "pipeline": 5, "evaluate": 5, "inspection_pipeline": 5, "recipes": 5}
-LATER = {**JOINED, "batch": 6, "report": 6, "experiments": 6, "samples": 0, "cli": 7}
+JOINED = {
+    "normals": 4.5,
+    "calibrate": 5,
+    "pipeline": 5,
+    "evaluate": 5,
+    "inspection_pipeline": 5,
+    "recipes": 5,
+    "cfx": 5,
+}
+LATER = {**JOINED, "batch": 6, "report": 6, "studies": 6.5, "experiments": 6, "samples": 0, "cli": 7}
 LEVEL = {**BASE, **STAGES, **LATER, "simulate": 4}
 
 

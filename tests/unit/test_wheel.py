@@ -31,6 +31,8 @@ def test_the_wheel_installs_and_runs_the_demo(tmp_path: Path) -> None:
     output = run(tmp_path / "clean" / "bin" / "bgars", "demo", "-o", "demo", cwd=tmp_path)
     assert "overview.png" in output
     assert (tmp_path / "demo" / "mesh.ply").stat().st_size > 100_000
+    templates = "bgars.studies.pages; print(bgars.studies.pages._environment().list_templates())"
+    assert "grr.html" in run(python, "-c", f"import {templates}", cwd=tmp_path)
     typed = run(
         python,
         "-c",

@@ -17,9 +17,11 @@ from bgars.cli.console import EXIT_BAD_INPUT, fail, print_json, say, stage_progr
 from bgars.cli.describe import describe, describe_in_words
 from bgars.cli.evaluation import choice_in_words, evaluation_table
 from bgars.cli.experiment import register as register_experiment
+from bgars.cli.grr import register as register_grr
 from bgars.cli.inspect import register as register_inspect
 from bgars.cli.outputs import write_normals, write_reconstruction
 from bgars.cli.simulate import register as register_simulate
+from bgars.cli.spc import register as register_spc
 from bgars.errors import BgarsError
 from bgars.io.mesh_files import MESH_SUFFIXES
 from bgars.light_files import read_filenames
@@ -290,6 +292,8 @@ def evaluate(
 
 
 register_inspect(app)
+register_grr(app)
+register_spc(app)
 register_calibrate(app)
 register_simulate(app)
 register_experiment(app)

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
+import time
 from contextlib import contextmanager
+from datetime import datetime, timezone
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
@@ -13,7 +16,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-__all__ = ["EXIT_BAD_INPUT", "error_console", "fail", "print_json", "say", "stage_progress"]
+__all__ = ["EXIT_BAD_INPUT", "error_console", "fail", "print_json", "say", "stage_progress", "utc_now"]
 
 EXIT_BAD_INPUT = 2
 
@@ -29,6 +32,13 @@ def say(text: str = "") -> None:
 def print_json(values: dict[str, Any]) -> None:
     """Print a result for machines: one JSON object, nothing else."""
     sys.stdout.write(json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def utc_now() -> str:
+    """The time as ISO 8601, UTC, whole seconds; SOURCE_DATE_EPOCH where a build must be reproducible."""
+    epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
+    seconds = int(epoch) if epoch.isdecimal() else time.time()
+    return datetime.fromtimestamp(seconds, timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
 def fail(message: str) -> None:

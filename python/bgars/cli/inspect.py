@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 import bgars
-from bgars.cli.console import print_json, say, stage_progress
+from bgars.cli.console import print_json, say, stage_progress, utc_now
+from bgars.errors import InputError
 from bgars.io.atomic import atomic_folder
+from bgars.io.parquet import need_pyarrow
 from bgars.normals import DEFAULT_METHOD, Method
 
 if TYPE_CHECKING:
@@ -55,6 +59,18 @@ def inspect(
         ),
     ] = None,
     method: Annotated[Method, typer.Option("--method", "-m", help="Estimator of the normals.")] = DEFAULT_METHOD,
+    serial: Annotated[
+        str, typer.Option(metavar="SERIAL", help="Serial number of the part, kept in the result.", show_default=False)
+    ] = "",
+    parquet: Annotated[
+        bool, typer.Option("--parquet", help="Write balls.parquet, too (needs pip install 'bgars[parquet]').")
+    ] = False,
+    cfx: Annotated[
+        bool, typer.Option("--cfx", help="Write cfx.json, too: the IPC-CFX message UnitsInspected.")
+    ] = False,
+    log_line: Annotated[
+        bool, typer.Option("--log", help="Print one line of key=value pairs for a log instead of text.")
+    ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
     ] = False,
@@ -66,15 +82,29 @@ def inspect(
     Exit code 0: the part passes. 1: it fails, or is undecided because something is too near its limit, was not
     measured, or has no limit; the output says which. 2: wrong use, a bad recipe, or a capture that cannot be measured.
     """
+    if log_line and as_json:
+        msg = "--log and --json: give one of them"
+        raise InputError(msg)
+    if parquet:
+        need_pyarrow()
     part = None if recipe is None else bgars.read_part_recipe(recipe)
     capture = bgars.read_capture(folder)
     with stage_progress() as report, atomic_folder(output) as place:
         result = bgars.inspect(capture, part, method=method, progress=report)
+        result = replace(result, serial=serial, inspected_utc=utc_now())
         files = FILES | bgars.write_part_pictures(result, capture, place)
         (place / "result.json").write_text(result.to_json(), encoding="utf-8")
         (place / "balls.csv").write_text(result.to_csv(), encoding="utf-8")
+        if parquet:
+            bgars.write_parquet(result, place / "balls.parquet")
+            files["balls.parquet"] = "the same in full digits, units in the columns' metadata"
+        if cfx:
+            (place / "cfx.json").write_text(json.dumps(bgars.to_cfx(result), indent=2) + "\n", encoding="utf-8")
+            files["cfx.json"] = "IPC-CFX message UnitsInspected"
     if as_json:
         print_json({**result.to_dict(), "output": list(files)})
+    elif log_line:
+        say(result.summary_line())
     else:
         _tell(result, output, files)
     if result.verdict != "pass":

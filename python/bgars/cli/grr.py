@@ -1,0 +1,122 @@
+"""The command ``bgars grr``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+import bgars
+from bgars.cli.console import print_json, say, stage_progress
+from bgars.cli.inspect import EXIT_NOT_PASSED
+from bgars.io.atomic import atomic_folder
+from bgars.normals import DEFAULT_METHOD, Method
+from bgars.studies.pages import grr_page
+from bgars.studies.readings import readings_csv
+
+if TYPE_CHECKING:
+    from bgars.studies import GaugeStudy
+
+__all__ = ["register"]
+
+FILES = {
+    "grr.html": "the page to look at first",
+    "grr.json": "every figure",
+    "readings.csv": "every reading, one line each",
+}
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("grr")(grr)
+
+
+def grr(
+    folder: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FOLDER",
+            help="Folders part/placement/repeat (or part/repeat, or repeat); each repeat is a folder that bgars "
+            "inspect wrote, or a capture folder.",
+            show_default=False,
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "--output", "-o", metavar="OUT", help="Folder for the study; made if missing.", show_default=False
+        ),
+    ],
+    recipe: Annotated[
+        Path | None,
+        typer.Option(
+            "--recipe", "-r", metavar="PART.toml", help="Of captures; results bring their own.", show_default=False
+        ),
+    ] = None,
+    references: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="REFERENCES.csv",
+            help="Reference values: part,ball,characteristic,reference (docs/studies.md).",
+            show_default=False,
+        ),
+    ] = None,
+    method: Annotated[Method, typer.Option("--method", "-m", help="Estimator of the normals.")] = DEFAULT_METHOD,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
+    ] = False,
+) -> None:
+    """Say how well the gauge repeats: gauge R&R by analysis of variance, from repeated measurements of several parts.
+
+    Exit code 0: GRR is at most 10 % of every tolerance. 1: it is not, or it cannot be said; the output says why. 2:
+    wrong use, a design that is not balanced, runs that do not belong together, or a capture that cannot be measured.
+    """
+    known = None if references is None else bgars.read_references(references)
+    with stage_progress() as report, atomic_folder(output) as place:
+        study = bgars.read_study(folder, recipe, method=method, progress=lambda fraction: report("runs", fraction))
+        found = bgars.gauge_rr(study, known)
+        (place / "grr.html").write_text(grr_page(found), encoding="utf-8")
+        (place / "grr.json").write_text(_json(found), encoding="utf-8")
+        (place / "readings.csv").write_text(readings_csv(study), encoding="utf-8")
+    if as_json:
+        print_json(found.to_dict())
+    else:
+        _tell(found, output)
+    if found.verdict != "pass":
+        raise typer.Exit(EXIT_NOT_PASSED)
+
+
+def _json(found: GaugeStudy) -> str:
+    return json.dumps(found.to_dict(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _tell(found: GaugeStudy, output: Path) -> None:
+    study = found.study
+    say(f"{study.runs[0].result.name}: {found.verdict.upper()}")
+    for reason in found.reasons:
+        say(f"  {reason}")
+    for name, left_out in found.left_out:
+        say(f"left out: {name}: {left_out}")
+    for warning in found.warnings:
+        say(f"warning: {warning}")
+    say()
+    say(f"{'characteristic':<26} {'GRR':>9} {'EV':>9} {'AV':>9} {'of tolerance':>13} {'ndc':>5}  verdict")
+    for each in found.figures:
+        cells = [_cell(each.spread(name).sigma) for name in ("GRR", "EV", "AV")]
+        percent = each.spread("GRR").percent_tolerance
+        share = "-" if percent != percent else f"{percent:.1f} %"  # noqa: PLR0124 - NaN
+        ndc = "-" if each.ndc is None else str(each.ndc)
+        say(
+            f"{each.characteristic:<26} {cells[0]:>9} {cells[1]:>9} {cells[2]:>9} {share:>13} {ndc:>5}  "
+            f"{each.verdict or '-'}"
+        )
+    say()
+    width = max(len(str(output / name)) for name in FILES)
+    for name, meaning in FILES.items():
+        say(f"  {output / name!s:<{width}}  {meaning}")
+
+
+def _cell(value: float) -> str:
+    return "-" if value != value else f"{value:.3g}"  # noqa: PLR0124 - NaN

@@ -1,0 +1,54 @@
+"""Figures of a process trend."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bgars.report.part_style import VERDICT_COLORS, new_figure
+from bgars.studies.svg import PLACEMENT_COLORS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from bgars.studies.trend import Trend
+
+__all__ = ["trend_figure"]
+
+WIDTH_IN = 9.0
+LINE = PLACEMENT_COLORS[0]
+
+
+def trend_figure(trend: Trend) -> Figure:
+    """X-bar chart over S chart, signals marked."""
+    figure = new_figure(WIDTH_IN, 4.2)
+    top, bottom = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [3, 2]})
+    chart = trend.chart
+    unit = f" ({trend.unit})" if trend.unit else ""
+    _chart(top, chart.means, (chart.low, chart.centre, chart.high), "mean" + unit)
+    _chart(bottom, chart.spreads, (chart.spread_low, chart.spread_centre, chart.spread_high), "std. deviation" + unit)
+    for name, axes, values in (("mean", top, chart.means), ("spread", bottom, chart.spreads)):
+        at = sorted({signal.subgroup for signal in chart.signals if signal.chart == name})
+        if at:
+            axes.plot(np.array(at) + 1, values[at], "o", color=VERDICT_COLORS["fail"], markersize=8, label="signal")
+            axes.legend(loc="upper left")
+    bottom.set_xlabel(f"subgroup of {chart.size} consecutive parts")
+    bottom.xaxis.get_major_locator().set_params(integer=True)
+    return figure
+
+
+def _chart(axes: Axes, values: NDArray[np.float64], lines: tuple[float, float, float], title: str) -> None:
+    x = np.arange(1, len(values) + 1)
+    axes.plot(x, values, "o-", color=LINE, markersize=4, linewidth=1.0)
+    for value, name, style in zip(lines, ("LCL", "centre", "UCL"), ("--", "-", "--"), strict=True):
+        if not math.isfinite(value):
+            continue
+        axes.axhline(value, color="0.35", linestyle=style, linewidth=1.0)
+        axes.annotate(f" {name} {value:.4g}", (1.0, value), xycoords=("axes fraction", "data"), va="center", fontsize=8)
+    axes.set_ylabel(title)
+    axes.margins(x=0.02, y=0.15)
+    axes.spines[["top", "right"]].set_visible(False)

@@ -1,0 +1,146 @@
+"""result.json: written, published as a schema, read again; everything else is refused with its name."""
+
+from __future__ import annotations
+
+import json
+import runpy
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import bgars
+import jsonschema
+import pytest
+from bgars.ball_records import BallLayout
+from bgars.part_recipe import PartRecipe
+from judged_parts import LIMITS, RECIPE, judged
+
+DOCS = Path(__file__).parents[2] / "docs"
+LIST = PartRecipe("list", BallLayout(positions=(("P", -500.0, 0.0), ("Q", 500.0, 0.0))), limits=LIMITS)
+
+
+def empty() -> bgars.PartResult:
+    scene = bgars.Scene.plane(size_um=(4000.0, 4000.0))
+    capture, _ = bgars.simulate(
+        scene, bgars.LightRig.ring(4), bgars.Material(), bgars.Camera(pixel_pitch_um=100.0, read_noise_levels=1.0)
+    )
+    return bgars.inspect(capture, replace(RECIPE, file=None))
+
+
+CASES: dict[str, tuple[str, Callable[[], bgars.PartResult]]] = {
+    "pass": ("pass", judged),
+    "missing ball": ("fail", lambda: judged(defects={"B2": bgars.Defect.missing()})),
+    "bridge": ("fail", lambda: judged(bridges=(bgars.Bridge("A1", "A2", radius_um=80.0),))),
+    "too near its limit": (
+        "undecided",
+        lambda: judged(replace(RECIPE, limits=replace(LIMITS, true_position_um=2.5))),
+    ),
+    "no recipe": ("undecided", lambda: judged(None)),
+    "list of places": ("fail", lambda: judged(LIST)),
+    "no ball at all": ("fail", empty),
+}
+
+
+@pytest.mark.parametrize("name", list(CASES))
+def test_a_result_is_valid_by_the_schema_and_comes_back_as_it_was(name: str, tmp_path: Path) -> None:
+    verdict, made = CASES[name]
+    result = made()
+    assert result.verdict == verdict, result.reasons
+    text = result.to_json()
+    schema = json.loads((DOCS / "result.schema.json").read_text(encoding="utf-8"))
+    jsonschema.Draft202012Validator(schema).validate(json.loads(text))
+    (tmp_path / "result.json").write_text(text, encoding="utf-8")
+    for place in (tmp_path, tmp_path / "result.json"):
+        again = bgars.read_result(place)
+        assert again.to_json() == text
+        assert again.to_csv() == result.to_csv()
+        assert again.to_table() == result.to_table()
+    assert again.recipe == result.recipe
+    assert again.light_directions.shape == result.light_directions.shape
+
+
+def test_the_published_schema_is_the_generated_one() -> None:
+    made = runpy.run_path(str(DOCS / "make_result_schema.py"))["schema_text"]()
+    assert (DOCS / "result.schema.json").read_text(encoding="utf-8") == made, "run `make schema`"
+    schema = json.loads(made)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    for table in [schema, *schema["$defs"].values()]:
+        assert table["additionalProperties"] is False
+        assert set(table["required"]) == set(table["properties"])
+        for key, entry in table["properties"].items():
+            assert len(entry["description"]) > 10, key
+            if key.endswith("_um"):
+                assert " um" in entry["description"] or "um " in entry["description"], key
+
+
+def change(key: str, value: object) -> Callable[[dict[str, Any]], object]:
+    return lambda values: values.update({key: value})
+
+
+SPOILT: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
+    "foreign": (lambda v: v.pop("format"), "is not a result of bgars: it must be an object"),
+    "older": (lambda v: v.pop("format_version"), "format_version: this bgars reads 1, got None"),
+    "newer": (change("format_version", 2), "format_version: this bgars reads 1, got 2"),
+    "key gone": (lambda v: v["balls"][2].pop("top_um"), "balls.2.top_um: Field required"),
+    "unknown key": (change("colour", "red"), "unknown key 'colour'"),
+    "unknown key of a ball": (lambda v: v["balls"][0].update(x_mm=1), "unknown key 'balls.0.x_mm'; the nearest known"),
+    "text for a number": (lambda v: v["balls"][1].update(x_um="5"), "balls.1.x_um: Input should be a valid number"),
+    "verdict": (change("verdict", "maybe"), "verdict: Input should be 'pass', 'fail' or 'undecided', got 'maybe'"),
+    "one light too few": (lambda v: v["light_change_deg"].pop(), "light_change_deg: must have one number for each"),
+    "no pitch": (change("pixel_pitch_um", None), "pixel_pitch_um: Input should be a valid number"),
+    "contradicting layout": (lambda v: v["recipe"]["layout"].update(rows=None), "recipe: layout.rows: must be above 0"),
+    "checksum": (lambda v: v["files"][0].update(sha256="abc"), "files.0.sha256"),
+    "time": (change("inspected_utc", "yesterday"), "inspected_utc"),
+}
+
+
+@pytest.mark.parametrize("name", list(SPOILT))
+def test_a_spoilt_result_is_refused_by_file_and_key(name: str, tmp_path: Path) -> None:
+    spoil, words = SPOILT[name]
+    values = json.loads(judged().to_json())
+    spoil(values)
+    path = tmp_path / "result.json"
+    path.write_text(json.dumps(values), encoding="utf-8")
+    with pytest.raises(bgars.FileFormatError) as error:
+        bgars.read_result(path)
+    assert str(error.value).startswith(f"{path}: ")
+    assert words in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "is not valid JSON"),
+        (b'{"format": "bgars-result", "balls": [', "is not valid JSON: cut off"),
+        (b"\xff\xfe\x00", "is not valid JSON"),
+        (b'{"pitch_um": NaN}', "holds NaN"),
+        (b"[]", "but it is a list"),
+        (b'{"seating_coplanarity_um": 3}', "made before results had a format"),
+        (b"[" * 100_000, "is not valid JSON"),
+    ],
+)
+def test_a_file_that_is_no_result_is_refused_by_name(content: bytes, words: str, tmp_path: Path) -> None:
+    path = tmp_path / "x.json"
+    path.write_bytes(content)
+    with pytest.raises(bgars.FileFormatError) as error:
+        bgars.read_result(path)
+    assert str(path) in str(error.value)
+    assert words in str(error.value)
+
+
+def test_a_folder_without_a_result_and_no_file_at_all_are_named(tmp_path: Path) -> None:
+    with pytest.raises(bgars.FileFormatError, match=r"holds no result\.json"):
+        bgars.read_result(tmp_path)
+    with pytest.raises(bgars.FileFormatError, match=r"gone\.json: cannot be read"):
+        bgars.read_result(tmp_path / "gone.json")
+
+
+def test_every_cut_of_a_result_is_refused(tmp_path: Path) -> None:
+    text = judged().to_json().rstrip()
+    path = tmp_path / "result.json"
+    for length in range(0, len(text), 997):
+        path.write_text(text[:length], encoding="utf-8")
+        with pytest.raises(bgars.FileFormatError, match=r"result\.json"):
+            bgars.read_result(path)
