@@ -19,6 +19,7 @@ from bgars.cli.evaluation import choice_in_words, evaluation_table
 from bgars.cli.experiment import register as register_experiment
 from bgars.cli.inspect import register as register_inspect
 from bgars.cli.outputs import write_normals, write_reconstruction
+from bgars.cli.report import register as register_report
 from bgars.cli.simulate import register as register_simulate
 from bgars.errors import BgarsError
 from bgars.io.mesh_files import MESH_SUFFIXES
@@ -290,6 +291,7 @@ def evaluate(
 
 
 register_inspect(app)
+register_report(app)
 register_calibrate(app)
 register_simulate(app)
 register_experiment(app)
