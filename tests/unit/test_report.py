@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
+from contextlib import suppress
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -19,6 +20,8 @@ from bgars.report.page import page_text
 from bgars.report.page_photograph import photograph_of
 from bgars.report.page_source import PageSource, read_page_source
 from bgars.report.page_words import QUANTITIES, expanded, number
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from report_parts import NASTY, RESULTS, failing, hostile, passing, simulated
 from typer.testing import CliRunner
 
@@ -246,6 +249,35 @@ def test_a_result_that_is_none_is_refused_by_name(tmp_path: Path, text: str, wor
         bgars.write_report(tmp_path, tmp_path / "report.html")
     assert str(file) in str(caught.value)
     assert [path.name for path in tmp_path.iterdir()] == ["result.json"]
+
+
+VALUES = st.one_of(
+    st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=5), st.just([]), st.just({}),
+    st.sampled_from([[None], 0, 0.0, -1.0, 1e-300, 1e300, 10**400, "pass", [1.0, 2.0]]),
+    st.sampled_from([{"limits": 3}, {"limits": {"q": [1]}}]),
+)  # fmt: skip
+
+
+@given(data=st.data())
+@settings(max_examples=150, deadline=None)
+def test_a_damaged_result_makes_a_page_or_a_clear_error(
+    data: st.DataObject, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """One value anywhere becomes any other: never a traceback of anything but the file's own error."""
+    values: Any = json.loads(failing().to_json())
+    target = values
+    while True:
+        keys = list(target) if isinstance(target, dict) else list(range(len(target)))
+        key = data.draw(st.sampled_from(keys))
+        child = target[key]
+        if not isinstance(child, dict | list) or not child or data.draw(st.integers(0, 5)) == 0:
+            break
+        target = child
+    target[key] = data.draw(VALUES)
+    file = tmp_path_factory.mktemp("damaged") / "result.json"
+    file.write_text(json.dumps(values), encoding="utf-8")
+    with suppress(bgars.FileFormatError):
+        json.loads(Page(page_text(read_page_source(file))).scripts["page-data"])
 
 
 def test_what_lies_beside_a_result_is_checked(tmp_path: Path) -> None:

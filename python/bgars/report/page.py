@@ -26,12 +26,13 @@ from bgars.report.page_tables import (
     board_words,
     key_readings,
     light_rows,
+    raised_together,
     recipe_rows,
     spreads,
     unmeasured,
 )
-from bgars.report.page_vectors import vector_chart
-from bgars.report.page_words import QUANTITIES, VERDICT_MARKS, VERDICT_MEANINGS, listed, number, range_of
+from bgars.report.page_vectors import VectorChart, vector_chart
+from bgars.report.page_words import QUANTITIES, VERDICT_MARKS, VERDICT_MEANINGS, listed, number
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -136,7 +137,7 @@ def _made_source(result: PartResult, capture: Capture | None, method: str | None
 def page_text(source: PageSource) -> str:
     """Return the page: the same source, the same text."""
     result = source.result
-    figures, magnification = _figures(result)
+    figures, vectors = _figures(result)
     places = chosen_marks(result, figures)
     plotly, js = plotly_script(), _script(_file("report.js"))
     seats = [listed(seat["balls"], 8) for seat in result["seatings"][:SEATS_TOLD]]
@@ -155,8 +156,9 @@ def page_text(source: PageSource) -> str:
         columns=_columns(),
         figures=figures,
         histograms=[(q.name, q.title) for q in QUANTITIES if q.name in figures],
-        magnification=None if magnification is None else f"{magnification:g}",
-        zones=range_of(result["recipe"], "true_position_um") is not None,
+        magnification=None if vectors is None else f"{vectors.magnification:g}",
+        zones="" if vectors is None else vectors.zones,
+        raised=raised_together(source),
         grid_angle=number(result["grid_angle_deg"], 3),
         seats=seats,
         no_plane="; ".join(row["why"] for row in unmeasured(result) if "coplanarity" in row["what"]),
@@ -176,17 +178,17 @@ def page_text(source: PageSource) -> str:
     )
 
 
-def _figures(result: dict[str, Any]) -> tuple[dict[str, dict[str, Any]], float | None]:
-    """Every chart that can be drawn, and the magnification of the offsets."""
+def _figures(result: dict[str, Any]) -> tuple[dict[str, dict[str, Any]], VectorChart | None]:
+    """Every chart that can be drawn, and that of the offsets with its words."""
     vectors = vector_chart(result)
     charts = {
         "coplanarity": coplanarity_chart(result),
-        "offsets": None if vectors is None else vectors[0],
+        "offsets": None if vectors is None else vectors.figure,
         **histogram_charts(result),
         "scene": scene_chart(result),
     }
     figures = {name: chart for name, chart in charts.items() if chart is not None}
-    return figures, None if vectors is None else vectors[1]
+    return figures, vectors
 
 
 def _counts(result: dict[str, Any]) -> list[tuple[str, int]]:

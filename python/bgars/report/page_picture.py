@@ -113,7 +113,7 @@ def part_picture(source: PageSource) -> PartPicture | None:
     result, balls = source.result, source.result["balls"]
     places = drawn_places(balls)
     common_um = ball_radius(result)
-    radii = [ball["diameter_um"] / 2 if is_known(ball["diameter_um"]) else common_um for ball in balls]
+    radii = [ball["diameter_um"] / 2 if (ball["diameter_um"] or 0.0) > 0 else common_um for ball in balls]
     known = [(place, radius) for place, radius in zip(places, radii, strict=True) if place]
     if not known:
         return None

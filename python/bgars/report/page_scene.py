@@ -25,9 +25,10 @@ if TYPE_CHECKING:
 __all__ = ["scene_chart"]
 
 GREY, BOARD, PLAIN = "#b4b8bd", "#8fa58a", "#7a8aa0"
-SIDES_OF_ALL = 270.0
+SIDES_OF_ALL = 250.0
 """Sides of a ball, times the root of their number: what all balls may cost."""
-FEWEST_SIDES, MOST_SIDES = 12, 36
+FEWEST_SIDES, MOST_SIDES = 10, 32
+SKIRT_LEVELS = 3
 BOARD_POINTS = 25
 MARGIN_RADII = 2.5
 LIGHTING = {"ambient": 0.55, "diffuse": 0.65, "specular": 0.25, "roughness": 0.5}
@@ -61,7 +62,7 @@ def scene_chart(result: dict[str, Any]) -> dict[str, Any] | None:
             ball["diameter_um"] / 2, ball["centre_z_um"], ball["top_um"], ball["q"] or 1.0,
         )
         for index, ball in enumerate(balls)
-        if ball["present"] and all(is_known(ball[k]) for k in ("x_um", "y_um", "diameter_um", "centre_z_um", "top_um"))
+        if _is_whole(ball)
     ]  # fmt: skip
     name, values = deviations(result)
     sides = int(np.clip(SIDES_OF_ALL / math.sqrt(max(len(solids), 1)), FEWEST_SIDES, MOST_SIDES))
@@ -88,6 +89,12 @@ def scene_chart(result: dict[str, Any]) -> dict[str, Any] | None:
         "margin": {"l": 0, "r": 0, "t": 8, "b": 8},
     }
     return {"data": traces, "layout": layout}
+
+
+def _is_whole(ball: dict[str, Any]) -> bool:
+    """Whether all that a spheroid needs was measured."""
+    lengths = (ball[name] for name in ("x_um", "y_um", "diameter_um", "centre_z_um", "top_um"))
+    return ball["present"] and all(map(is_known, lengths)) and ball["diameter_um"] > 0 and (ball["q"] or 1.0) > 0
 
 
 def _frame(known: Array, result: dict[str, Any], solids: list[_Solid], board: Any) -> dict[str, Any]:  # noqa: ANN401
@@ -222,7 +229,7 @@ def _caps(solids: list[_Solid], sides: int) -> dict[str, Any]:
 
 def _skirts(solids: list[_Solid], sides: int) -> dict[str, Any]:
     """The spheroids from the equator down to the board."""
-    levels = 4
+    levels = SKIRT_LEVELS
     x, y, board, radius, centre, _top, q = np.moveaxis(_table(solids), 2, 0)
     down, turn = np.meshgrid(np.linspace(0.0, 1.0, levels), np.arange(sides) * 2 * np.pi / sides, indexing="ij")
     deepest = np.arcsin(np.clip(centre / (q * radius), 0.0, 1.0))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from bgars.errors import FileFormatError
 from bgars.part_result import BallResult, PartCheck, PartResult, SeatingResult
 from bgars.report.page_photograph import SIDE_FILE, Lamp, Photograph, lamps_of, photograph_of, read_side_files
+from bgars.report.page_words import VERDICT_MARKS
 
 if TYPE_CHECKING:
     from bgars.records import Capture
@@ -17,7 +18,8 @@ if TYPE_CHECKING:
 __all__ = ["RESULT_FILE", "PageSource", "read_page_source", "source_of"]
 
 RESULT_FILE = "result.json"
-NUMBER = (int, float)
+LARGEST = 1e12
+"""No length in um, no angle and no count is larger; beyond, a file is damaged."""
 NULLABLE_NUMBERS = ("float", "float | None")
 TEXTS = ("str", "BallKind", "Verdict")
 ROWS = {"balls": BallResult, "checks": PartCheck, "seatings": SeatingResult}
@@ -102,13 +104,15 @@ def _check(values: Any, kind: type, where: str) -> None:  # noqa: ANN401 - whate
 def _broken_rule(value: Any, kind: str) -> str:  # noqa: ANN401, PLR0911 - one return a kind
     """What a value of a field must be, where it is not."""
     if kind in NULLABLE_NUMBERS:
-        return "" if value is None or (isinstance(value, NUMBER) and not isinstance(value, bool)) else "a number"
+        return "" if _is_number_or_none(value) else "a number"
+    if kind == "Verdict | None":
+        return "" if value is None or isinstance(value, str) else "a text"
     if kind in TEXTS:
         return "" if isinstance(value, str) else "a text"
     if kind == "bool":
         return "" if isinstance(value, bool) else "true or false"
     if kind in {"int", "int | None"}:
-        return "" if value is None or (isinstance(value, int) and not isinstance(value, bool)) else "a whole number"
+        return "" if _is_number_or_none(value) and not isinstance(value, float) else "a whole number"
     if kind == "tuple[str, ...]":
         return "" if _is_list_of(value, str) else "a list of texts"
     if kind.startswith(("tuple", "NDArray")):
@@ -118,18 +122,18 @@ def _broken_rule(value: Any, kind: str) -> str:  # noqa: ANN401, PLR0911 - one r
 
 def _check_rest(result: dict[str, Any], file: Path) -> None:
     """Lists whose entries are no records."""
-    nullable = (int, float, type(None))
     rules = {
         "bridges": all(_is_list_of(pair, str) and len(pair) == len(("one", "other")) for pair in result["bridges"]),
-        "files": all(isinstance(entry, dict) and {"name", "sha256"} <= entry.keys() for entry in result["files"]),
-        "light_directions": all(
-            _is_list_of(row, *nullable) and len(row) == len("xyz") for row in result["light_directions"]
+        "files": all(
+            isinstance(entry, dict) and all(isinstance(entry.get(key), str) for key in ("name", "sha256"))
+            for entry in result["files"]
         ),
-        "light_change_deg": _is_list_of(result["light_change_deg"], *nullable),
-        "board_coefficients_um": _is_list_of(result["board_coefficients_um"], *nullable)
-        and len(result["board_coefficients_um"]) == len(("1", "x", "y", "xx", "xy", "yy")),
-        "recipe": isinstance(result["recipe"], dict | None),
-        "verdict": all(row["verdict"] in {"pass", "fail", "undecided"} for row in (result, *result["balls"])),
+        "light_directions": all(_are_numbers(row, len("xyz")) for row in result["light_directions"]),
+        "light_change_deg": _are_numbers(result["light_change_deg"]),
+        "board_coefficients_um": _are_numbers(result["board_coefficients_um"], len(("1", "x", "y", "xx", "xy", "yy"))),
+        "recipe": _is_recipe(result["recipe"]),
+        "verdict": all(row["verdict"] in VERDICT_MARKS for row in (result, *result["balls"]))
+        and all(check["verdict"] in {None, *VERDICT_MARKS} for check in result["checks"]),
     }
     for name, holds in rules.items():
         if not holds:
@@ -139,6 +143,26 @@ def _check_rest(result: dict[str, Any], file: Path) -> None:
 
 def _is_list_of(value: Any, *kinds: type) -> bool:  # noqa: ANN401 - whatever a file holds
     return isinstance(value, list) and all(isinstance(entry, kinds) for entry in value)
+
+
+def _is_number_or_none(value: Any) -> bool:  # noqa: ANN401 - whatever a file holds
+    return value is None or (isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < LARGEST)
+
+
+def _are_numbers(value: Any, count: int | None = None) -> bool:  # noqa: ANN401 - whatever a file holds
+    """A list of numbers or None, of a length if one is given."""
+    return isinstance(value, list) and all(map(_is_number_or_none, value)) and count in {None, len(value)}
+
+
+def _is_recipe(value: Any) -> bool:  # noqa: ANN401 - whatever a file holds
+    """None, or what is read of a recipe is as it is written."""
+    if value is None:
+        return True
+    limits = value.get("limits") if isinstance(value, dict) else 0
+    if not isinstance(limits, dict | None) or not _is_number_or_none(value.get("diameter_um")):
+        return False
+    pairs = (isinstance(limit, list) and _are_numbers(limit, 2) for limit in (limits or {}).values())
+    return all(map(any, zip(pairs, map(_is_number_or_none, (limits or {}).values()), strict=True)))
 
 
 def _shown(value: Any) -> str:  # noqa: ANN401 - whatever a file holds

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from bgars.inspection.judge import MAX_LIGHT_CHANGE_DEG
+from bgars.inspection.shape_or_lights import MIN_RAISE_DEG
 from bgars.report.page_words import (
     NOT_MEASURED,
     PART_WORDS,
@@ -22,12 +24,10 @@ from bgars.report.page_words import (
 if TYPE_CHECKING:
     from bgars.report.page_source import PageSource
 
-__all__ = ["ball_rows", "board_words", "key_readings", "light_rows", "recipe_rows", "unmeasured"]
+__all__ = ["ball_rows", "board_words", "key_readings", "light_rows", "raised_together", "recipe_rows", "unmeasured"]
 
 VERDICT_ORDER = {"fail": 0, "undecided": 1, "pass": 2}
 CORE = (("x_um", "position"), ("diameter_um", "diameter"), ("top_um", "height"), ("q", "q"), ("flat_um", "flat top"))
-LIGHT_WARNING_DEG = 0.3
-"""All elevations moved together by more: the part is undecided (docs/inspection.md)."""
 
 
 def key_readings(result: dict[str, Any]) -> list[dict[str, str]]:
@@ -151,10 +151,24 @@ def light_rows(source: PageSource) -> list[dict[str, str]]:
                 "elevation": number(elevation),
                 "raised": _signed(elevation - lamp.elevation_deg if lamp and elevation is not None else None),
                 "moved": number(moved, 3),
-                "strayed": "yes" if is_known(moved) and moved > LIGHT_WARNING_DEG else "",
+                "strayed": "yes" if is_known(moved) and moved > MAX_LIGHT_CHANGE_DEG else "",
             }
         )
     return rows
+
+
+def raised_together(source: PageSource) -> str:
+    """By how much all lights were raised on average: what balls that are all flattened alike look like."""
+    rows = source.result["light_directions"]
+    if len(rows) != len(source.lamps) or not all(is_known(value) for row in rows for value in row) or not rows:
+        return "not known: report.json does not lie beside the result"
+    raised = [
+        math.degrees(math.atan2(z, math.hypot(x, y))) - lamp.elevation_deg
+        for (x, y, z), lamp in zip(rows, source.lamps, strict=True)
+    ]
+    return (
+        f"by {sum(raised) / len(raised):+.2f}° on average; nothing passes where it is clearly over {MIN_RAISE_DEG:g}°"
+    )
 
 
 def _signed(value: float | None) -> str:
@@ -188,11 +202,11 @@ def recipe_rows(recipe: dict[str, Any] | None) -> list[tuple[str, str]]:
 
 
 def _recipe_value(value: Any) -> str:  # noqa: ANN401 - whatever a recipe holds
-    if isinstance(value, bool) or not isinstance(value, int | float | list | tuple):
-        return str(value)
-    if isinstance(value, int | float):
+    if isinstance(value, float):
         return f"{value:g}"
-    if value and isinstance(value[0], list | tuple):
+    if not isinstance(value, list | tuple):
+        return str(value)
+    if value and all(isinstance(entry, list | tuple) and entry for entry in value):
         return f"{len(value)} places: " + listed([str(entry[0]) for entry in value])
     parts = [_recipe_value(entry) for entry in value]
     is_range = len(value) == len(("lowest", "highest")) and not isinstance(value[0], str)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,31 +12,50 @@ from bgars.report.page_charts import BLUE, FAIL, axis, literal
 from bgars.report.page_picture import ball_radius, drawn_places, round_down
 from bgars.report.page_words import is_known, range_of
 
-__all__ = ["vector_chart"]
+__all__ = ["VectorChart", "vector_chart"]
 
 LONGEST_ARROW = 0.9
 """Length of the longest arrow, of the pitch."""
+LARGEST_ZONE = 0.6
+"""Radius up to which circles of the limit are drawn, of the pitch: larger ones run into each other."""
 CIRCLE_POINTS = 25
 DECIMALS = 1
 
 
-def vector_chart(result: dict[str, Any]) -> tuple[dict[str, Any], float] | None:
-    """The figure and its magnification; None where no offset is known."""
+@dataclass(frozen=True)
+class VectorChart:
+    """The figure, its magnification, and what is to be said of the limit."""
+
+    figure: dict[str, Any]
+    magnification: float
+    zones: str
+
+
+def vector_chart(result: dict[str, Any]) -> VectorChart | None:
+    """Draw the offsets; None where none is known."""
     balls = result["balls"]
-    known = [index for index, ball in enumerate(balls) if is_known(ball["true_position_um"])]
+    known = [index for index, ball in enumerate(balls) if _has_offset(ball)]
     if not known:
         return None
     nominal = np.array([(balls[at]["x_nominal_um"], balls[at]["y_nominal_um"]) for at in known], dtype=np.float64)
     centres = np.array([(balls[at]["x_um"], balls[at]["y_um"]) for at in known], dtype=np.float64)
     offsets = centres - nominal
     longest_um = float(np.hypot(*offsets.T).max())
-    room_um = result["pitch_um"] or 3.0 * ball_radius(result)
+    room_um = abs(result["pitch_um"] or 0.0) or 3.0 * ball_radius(result)
     magnification = round_down(LONGEST_ARROW * room_um / longest_um) if longest_um > 0 else 1.0
     tips = nominal + magnification * offsets
     limits = range_of(result["recipe"], "true_position_um")
-    traces = []
+    traces, zones = [], ""
     if limits is not None and limits[1] is not None:
-        traces.append(_zones(nominal, magnification * limits[1], f"limit {limits[1]:g} µm, magnified alike"))
+        if magnification * limits[1] <= LARGEST_ZONE * room_um:
+            traces.append(_zones(nominal, magnification * limits[1], f"limit {limits[1]:g} µm, magnified alike"))
+            zones = (
+                "Dotted circles are the limit at the same magnification: an arrow that leaves its circle is outside."
+            )
+        else:
+            zones = (
+                f"The limit, {limits[1]:g} µm, is too large to be drawn here; the longest arrow is {longest_um:.2f} µm."
+            )
     traces += [_gaps(balls), *_arrows(balls, known, nominal, tips)]
     layout = {
         "xaxis": axis("x (µm)", zeroline=False, constrain="domain"),
@@ -45,7 +65,13 @@ def vector_chart(result: dict[str, Any]) -> tuple[dict[str, Any], float] | None:
     }
     if longest_um > 0:
         traces.append(_key(nominal, magnification, longest_um, room_um))
-    return {"data": [trace for trace in traces if trace["x"]], "layout": layout}, magnification
+    figure = {"data": [trace for trace in traces if trace["x"]], "layout": layout}
+    return VectorChart(figure, magnification, zones)
+
+
+def _has_offset(ball: dict[str, Any]) -> bool:
+    names = ("true_position_um", "x_um", "y_um", "x_nominal_um", "y_nominal_um")
+    return all(is_known(ball[name]) for name in names)
 
 
 def _arrows(balls: list[dict[str, Any]], known: list[int], nominal: Any, tips: Any) -> list[dict[str, Any]]:  # noqa: ANN401
@@ -105,7 +131,7 @@ def _gaps(balls: list[dict[str, Any]]) -> dict[str, Any]:
     places = [
         (place, literal(ball["name"]))
         for ball, place in zip(balls, drawn_places(balls), strict=True)
-        if place and not is_known(ball["true_position_um"])
+        if place and not _has_offset(ball)
     ]
     return {
         "type": "scatter",

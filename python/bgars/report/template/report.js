@@ -10,6 +10,7 @@
   const panel = document.getElementById("chosen");
   const hint = panel ? [...panel.childNodes].map((node) => node.cloneNode(true)) : [];
   const charts = new Map();
+  const reached = (stage) => { document.documentElement.dataset[stage] = "yes"; performance.mark(stage); };
   let chosen = null;
 
   // --- choosing a ball: picture, table and charts show the same one ---
@@ -42,6 +43,13 @@
     if (ball !== null) markAs(ball, "hover", true);
     tell(ball === null ? chosen : ball);
   };
+  const mark = () => {
+    for (const [name, places] of Object.entries(page.places)) {
+      const node = charts.get(name);
+      const [x, y, z] = (chosen !== null && places[chosen]) || [[], [], []];
+      if (node) Plotly.restyle(node, z ? { x: [x], y: [y], z: [z] } : { x: [x], y: [y] }, [node.data.length - 1]);
+    }
+  };
   const choose = (ball, scroll) => {
     if (chosen !== null) markAs(chosen, "chosen", false);
     if (chosen !== null && rowOf.get(chosen)) rowOf.get(chosen).removeAttribute("aria-current");
@@ -57,11 +65,7 @@
       }
     }
     tell(chosen);
-    for (const [name, places] of Object.entries(page.places)) {
-      const gd = charts.get(name);
-      const [x, y, z] = (chosen !== null && places[chosen]) || [[], [], []];
-      if (gd) Plotly.restyle(gd, z ? { x: [x], y: [y], z: [z] } : { x: [x], y: [y] }, [gd.data.length - 1]);
-    }
+    mark();
   };
   for (const [nodes, scroll] of [[rowOf, false], [marks, true]]) {
     for (const [ball, node] of nodes) {
@@ -128,11 +132,14 @@
       hoverlabel: { bgcolor: isDark ? "#1b222b" : "#ffffff", font: { color: ink } },
     } };
   };
-  const shape = (name, node) => {
-    const figure = page.figures[name];
+  // Thin marks on a dark page need lighter colours; the 3-D view has its own light.
+  const lighter = { "#0072B2": "#56B4E9", "#B0578D": "#E39AC6", "#D55E00": "#FF8A3D" };
+  const shape = (name, isDark, size) => {
+    let figure = page.figures[name];
+    if (isDark && name !== "scene") figure = JSON.parse(JSON.stringify(figure).replace(/#(0072B2|B0578D|D55E00)/g, (color) => lighter[color]));
     const margin = figure.layout.margin || { l: 56, r: 14, t: 40, b: 44 };
-    const clone = { ...figure.layout, margin, template: look(dark.matches), dragmode: node.classList.contains("scene") ? "orbit" : false };
-    return { data: figure.data, layout: clone };
+    const layout = { ...figure.layout, ...size, margin, template: look(isDark), dragmode: name === "scene" ? "orbit" : false };
+    return { data: figure.data, layout };
   };
   const config = { responsive: true, displaylogo: false, displayModeBar: false, doubleClick: "reset" };
   const ballAt = (event) => {
@@ -142,7 +149,7 @@
   };
   const draw = async (node) => {
     const name = node.dataset.figure;
-    const { data, layout } = shape(name, node);
+    const { data, layout } = shape(name, dark.matches);
     await Plotly.newPlot(node, data, layout, name === "scene" ? { ...config, displayModeBar: true, modeBarButtonsToRemove: ["tableRotation", "resetCameraLastSave3d"] } : config);
     charts.set(name, node);
     if (!(name in page.places)) return;
@@ -172,7 +179,7 @@
     const nodes = [...document.querySelectorAll("[data-figure]")];
     for (const node of nodes.filter((each) => each.dataset.figure !== "scene")) { await draw(node); await pause(); }
     const scene = nodes.find((each) => each.dataset.figure === "scene");
-    document.documentElement.dataset.charted = "yes";
+    reached("charted");
     if (scene) await near(scene);
     await idle();
     if (scene && hasWebgl()) await draw(scene);
@@ -182,23 +189,27 @@
       note.textContent = "This browser draws no 3-D (WebGL is off). The numbers are in the table of balls.";
       scene.append(note);
     }
-    document.documentElement.dataset.drawn = "yes";
+    reached("drawn");
     await idle();
     if (charts.has("scene")) await keepForPrint();
-    document.documentElement.dataset.ready = "yes";
+    reached("ready");
   };
-  const repaint = (isDark) => { for (const node of charts.values()) Plotly.relayout(node, { template: look(isDark) }); };
-  dark.addEventListener("change", () => repaint(dark.matches));
-  window.addEventListener("beforeprint", () => {
+  const repaint = (isDark, sizeOf) => {
     for (const [name, node] of charts) {
-      if (name === "scene") continue;
-      const half = node.parentElement.classList.contains("grid");
-      Plotly.relayout(node, { width: half ? 228 : 690, height: half ? 225 : node.classList.contains("square") ? 500 : 320, template: look(false) });
+      if (name === "scene") { if (!sizeOf) Plotly.relayout(node, { template: look(isDark) }); continue; }
+      const { data, layout } = shape(name, isDark, sizeOf ? sizeOf(node) : { autosize: true });
+      Plotly.react(node, data, layout);
     }
-  });
-  window.addEventListener("afterprint", () => {
-    for (const [name, node] of charts) if (name !== "scene") Plotly.relayout(node, { width: null, height: null, autosize: true, template: look(dark.matches) });
-  });
-  document.documentElement.dataset.usable = "yes";
-  requestAnimationFrame(() => setTimeout(drawAll, 0));
+    if (chosen !== null) mark();
+  };
+  const paper = (node) => {
+    if (node.parentElement.classList.contains("grid")) return { width: 228, height: 225 };
+    return { width: 690, height: node.classList.contains("square") ? 500 : 320 };
+  };
+  dark.addEventListener("change", () => repaint(dark.matches));
+  window.addEventListener("beforeprint", () => repaint(false, paper));
+  window.addEventListener("afterprint", () => repaint(dark.matches));
+  reached("usable");
+  // The charts' library comes after this script: the tables answer before it is read.
+  document.addEventListener("DOMContentLoaded", () => requestAnimationFrame(() => setTimeout(drawAll, 0)));
 })();
