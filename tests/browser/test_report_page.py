@@ -84,7 +84,7 @@ def test_numbers_are_those_of_the_result(failed_page: Path, open_page: Open) -> 
 def test_hostile_texts_are_only_texts(tmp_path: Path, open_page: Open) -> None:
     path = tmp_path / "report.html"
     bgars.write_report(hostile(), path)
-    opened = open_page(path).wait("drawn")
+    opened = open_page(path).wait("charted")
     page = opened.page
     assert "owned" not in page.title().split("document.title='owned'")[0]
     assert page.evaluate("document.scripts.length") == 4
