@@ -26,9 +26,11 @@ from report_parts import LIMITS, RIG
 from synthetic_parts import measured_part
 
 STAGES = (
+    ("fcp", "verdict on screen"),
     ("usable", "tables answer"),
     ("charted", "charts drawn"),
-    ("drawn", "3-D drawn (begins at 2.5 s or when near)"),
+    ("cost", "processor time of the page's own thread until then"),
+    ("drawn", "3-D drawn (begins when near, or 2.5 s after the charts)"),
 )
 OPTIONS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 TIMES = """() => Object.fromEntries(performance.getEntriesByType("mark").map(m => [m.name, m.startTime])

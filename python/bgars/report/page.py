@@ -200,18 +200,17 @@ def _counts(result: dict[str, Any]) -> list[tuple[str, int]]:
 
 def _columns() -> list[dict[str, Any]]:
     """Heads of the table of balls."""
-    readings = [
-        {"key": q.name, "title": q.title, "meaning": f"sort by {q.title}: {q.meaning}", "num": True} for q in QUANTITIES
+    columns = [
+        ("index", "ball", "in reading order", False, ""),
+        ("verdict", "verdict", "by verdict, fail first", False, ""),
+        ("x_um", "x", "by x: centre, right is positive", True, "µm"),
+        ("y_um", "y", "by y: centre, up is positive", True, "µm"),
+        *((q.name, q.title, f"by {q.title}: {q.meaning}", True, q.unit) for q in QUANTITIES),
+        ("lights_used", "lights", "by the number of usable shadows", True, ""),
+        ("reasons", "reasons", "by reason", False, ""),
     ]
-    return [
-        {"key": "index", "title": "ball", "meaning": "sort in reading order", "num": False},
-        {"key": "verdict", "title": "verdict", "meaning": "sort by verdict, fail first", "num": False},
-        {"key": "x_um", "title": "x", "meaning": "sort by x: centre, right is positive", "num": True},
-        {"key": "y_um", "title": "y", "meaning": "sort by y: centre, up is positive", "num": True},
-        *readings,
-        {"key": "lights_used", "title": "lights", "meaning": "sort by the number of usable shadows", "num": True},
-        {"key": "reasons", "title": "reasons", "meaning": "sort by reason", "num": False},
-    ]
+    names = ("key", "title", "meaning", "num", "unit")
+    return [dict(zip(names, (key, title, f"sort {how}", *rest), strict=True)) for key, title, how, *rest in columns]
 
 
 @cache

@@ -28,6 +28,7 @@
       const value = document.createElement("dd");
       name.textContent = head.textContent;
       value.textContent = row.cells[at + 1].textContent;
+      if (head.dataset.unit && value.textContent !== "-") value.textContent += " " + head.dataset.unit;
       entry.append(name, value);
       list.append(entry);
     });
