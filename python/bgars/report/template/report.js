@@ -142,7 +142,7 @@
     const layout = { ...figure.layout, ...size, margin, template: look(isDark), dragmode: name === "scene" ? "orbit" : false };
     return { data: figure.data, layout };
   };
-  const config = { responsive: true, displaylogo: false, displayModeBar: false, doubleClick: "reset" };
+  const config = { responsive: false, displaylogo: false, displayModeBar: false, doubleClick: "reset" };
   const ballAt = (event) => {
     const data = event.points && event.points[0] && event.points[0].customdata;
     const index = Array.isArray(data) ? data[0] : data;
@@ -207,9 +207,16 @@
     if (node.parentElement.classList.contains("grid")) return { width: 228, height: 225 };
     return { width: 690, height: node.classList.contains("square") ? 500 : 320 };
   };
-  dark.addEventListener("change", () => repaint(dark.matches));
-  window.addEventListener("beforeprint", () => repaint(false, paper));
-  window.addEventListener("afterprint", () => repaint(dark.matches));
+  // Paper has sizes of its own: while it is printed, no change of the window or of its colours may undo them.
+  let printing = false;
+  let waiting = 0;
+  dark.addEventListener("change", () => { if (!printing) repaint(dark.matches); });
+  window.addEventListener("beforeprint", () => { printing = true; repaint(false, paper); });
+  window.addEventListener("afterprint", () => { printing = false; repaint(dark.matches); });
+  window.addEventListener("resize", () => {
+    clearTimeout(waiting);
+    waiting = setTimeout(() => { if (!printing) for (const node of charts.values()) Plotly.Plots.resize(node); }, 150);
+  });
   reached("usable");
   // The charts' library comes after this script: the tables answer before it is read.
   document.addEventListener("DOMContentLoaded", () => requestAnimationFrame(() => setTimeout(drawAll, 0)));
