@@ -16,6 +16,7 @@ test-rust:
 	else echo "SKIPPED: the Rust tests need cargo on the PATH (the Python tests run without it)"; fi
 
 test-python: $(VENV)/.installed
+	@.ci/find-browser || test "$$BGARS_REQUIRE_BROWSER" != 1
 	$(BIN)/python -m pytest
 
 lint: $(VENV)/.installed ## Formatting, clippy, ruff, mypy, and the stub against the compiled module

@@ -44,6 +44,7 @@ from bgars.pipeline import Reconstruction, reconstruct
 from bgars.recipes import named_recipes, read_scene, write_simulation
 from bgars.records import Capture, Component, HeightMap, NormalField, Truth
 from bgars.report.overview import write_overview
+from bgars.report.page import write_report
 from bgars.report.part import write_part_pictures
 from bgars.rig import LightRig
 from bgars.samples import sample_capture, sample_part_recipe
@@ -154,5 +155,6 @@ __all__ = [
     "write_overview",
     "write_parquet",
     "write_part_pictures",
+    "write_report",
     "write_simulation",
 ]

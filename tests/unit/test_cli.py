@@ -105,7 +105,7 @@ def test_evaluate_on_the_sample() -> None:
     "command",
     [
         *("", "demo", "reconstruct", "normals", "mesh", "info", "evaluate", "inspect", "calibrate material"),
-        *("simulate", "experiment", "grr", "spc"),
+        *("simulate", "experiment", "grr", "report", "spc"),
     ],
 )
 def test_every_command_has_help(command: str) -> None:
@@ -125,6 +125,7 @@ def test_every_command_has_help(command: str) -> None:
         (["evaluate", "nowhere"], "nowhere"),
         (["inspect", "nowhere", "-o", "out"], "nowhere: no such folder"),
         (["inspect", "nowhere", "-o", "out", "--recipe", "none.toml"], "none.toml: cannot be read"),
+        (["report", "nowhere"], "nowhere: cannot be read"),
         (["grr", "nowhere", "-o", "out"], "nowhere: no such folder"),
         (["spc", "nowhere", "-o", "out"], "nowhere: no such file or folder"),
         (["nonsense"], "nonsense"),

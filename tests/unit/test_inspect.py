@@ -22,7 +22,8 @@ from bgars.report.part import PICTURES
 from synthetic_parts import measured_part
 from typer.testing import CliRunner
 
-OUTPUTS = {"result.json", "balls.csv", "part.png", "shadows.png", "deviations.png", "histograms.png"}
+PAGE = {"report.html", "photograph.jpg", "report.json"}
+OUTPUTS = {"result.json", "balls.csv", "part.png", "shadows.png", "deviations.png", "histograms.png", *PAGE}
 LIMITS = (
     "[limits]\ntrue_position_um = 50.0\ndiameter_um = [560.0, 640.0]\nheight_um = [460.0, 540.0]\n"
     "seating_coplanarity_um = 60.0\n"

@@ -20,6 +20,7 @@ from bgars.cli.experiment import register as register_experiment
 from bgars.cli.grr import register as register_grr
 from bgars.cli.inspect import register as register_inspect
 from bgars.cli.outputs import write_normals, write_reconstruction
+from bgars.cli.report import register as register_report
 from bgars.cli.simulate import register as register_simulate
 from bgars.cli.spc import register as register_spc
 from bgars.errors import BgarsError
@@ -292,6 +293,7 @@ def evaluate(
 
 
 register_inspect(app)
+register_report(app)
 register_grr(app)
 register_spc(app)
 register_calibrate(app)

@@ -77,7 +77,7 @@ def inspect(
 ) -> None:
     """Find, measure and judge the solder balls of a part.
 
-    Writes result.json, balls.csv and four pictures; part.png is the one to look at first.
+    Writes report.html, which is the page to look at first, result.json, balls.csv and four pictures.
 
     Exit code 0: the part passes. 1: it fails, or is undecided because something is too near its limit, was not
     measured, or has no limit; the output says which. 2: wrong use, a bad recipe, or a capture that cannot be measured.
@@ -95,6 +95,8 @@ def inspect(
         files = FILES | bgars.write_part_pictures(result, capture, place)
         (place / "result.json").write_text(result.to_json(), encoding="utf-8")
         (place / "balls.csv").write_text(result.to_csv(), encoding="utf-8")
+        pages = bgars.write_report(result, place / "report.html", capture=capture, method=method)
+        files = {"report.html": pages.pop("report.html"), **files, **pages}
         if parquet:
             bgars.write_parquet(result, place / "balls.parquet")
             files["balls.parquet"] = "the same in full digits, units in the columns' metadata"

@@ -1,0 +1,90 @@
+"""What report.html costs: its size, the processor time to write it, and when a browser has which part on screen.
+
+    python benches/report_page.py
+
+A part of 100 and one of 1,024 balls, made from records, over a photograph of their own; no image is measured. The
+browser is Chromium without a graphics card: 3-D is drawn by the processor there.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import bgars
+from bgars.ball_records import BallLayout
+from bgars.inspection.judge import judge_part
+from bgars.part_recipe import PartRecipe
+from playwright.sync_api import CDPSession, sync_playwright
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "unit"))
+from report_parts import LIMITS, RIG
+from synthetic_parts import measured_part
+
+STAGES = (
+    ("fcp", "verdict on screen"),
+    ("usable", "tables answer"),
+    ("charted", "charts drawn"),
+    ("cost", "processor time of the page's own thread until then"),
+    ("drawn", "3-D drawn (begins when near, or 2.5 s after the charts)"),
+)
+OPTIONS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+TIMES = """() => Object.fromEntries(performance.getEntriesByType("mark").map(m => [m.name, m.startTime])
+    .concat([["fcp", performance.getEntriesByName("first-contentful-paint")[0].startTime]]))"""
+RUNS = 3
+
+
+def write_page(side: int, folder: Path) -> Path:
+    """Inspect a part of side x side balls on paper and write its page."""
+    scene = bgars.Scene.ball_array(side, side, jitter=bgars.Jitter(8.0, 4.0, 5.0), seed=3)
+    capture, truth = bgars.simulate(scene, RIG, bgars.Material(), bgars.Camera(pixel_pitch_um=12.0))
+    recipe = PartRecipe("bench", BallLayout(side, side, 1000.0), limits=LIMITS)
+    result = judge_part(*measured_part(truth), recipe, pixel_pitch_um=12.0)
+    path = folder / f"{side * side}.html"
+    start = time.process_time()
+    bgars.write_report(result, path, capture=capture)
+    cost = time.process_time() - start
+    print(f"{side * side} balls: {path.stat().st_size / 1e6:.1f} MB, written in {cost:.2f} s of processor time")
+    return path
+
+
+def processor_s(metrics: CDPSession) -> float:
+    """Time that the thread of the page has worked, whatever else the machine does."""
+    values = metrics.send("Performance.getMetrics")["metrics"]
+    return next(entry["value"] for entry in values if entry["name"] == "TaskDuration")
+
+
+def main() -> None:
+    """Write, open, print."""
+    browser_path = os.environ.get("BGARS_BROWSER") or shutil.which("chromium") or shutil.which("google-chrome")
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=browser_path, args=OPTIONS)
+        for side in (10, 32):
+            path = write_page(side, Path(folder))
+            runs = []
+            for _ in range(RUNS):
+                page = browser.new_page(viewport={"width": 1280, "height": 900})
+                page.goto(path.parent.as_uri())
+                metrics = page.context.new_cdp_session(page)
+                metrics.send("Performance.enable", {"timeDomain": "threadTicks"})
+                before = processor_s(metrics)
+                page.goto(path.as_uri(), wait_until="commit")
+                page.wait_for_selector("html[data-charted]", state="attached", timeout=120_000)
+                cost = processor_s(metrics) - before
+                page.wait_for_selector("html[data-drawn]", state="attached", timeout=120_000)
+                runs.append({**page.evaluate(TIMES), "cost": 1000.0 * cost})
+                page.close()
+            for key, words in STAGES:
+                seconds = sorted(run[key] / 1000.0 for run in runs)
+                middle = f"median {seconds[len(seconds) // 2]:.1f} s of {RUNS}"
+                print(f"  {words}: {middle}, {seconds[0]:.1f} to {seconds[-1]:.1f}")
+        browser.close()
+    print(f"load of the machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} processors")
+
+
+if __name__ == "__main__":
+    main()

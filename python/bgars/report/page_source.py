@@ -1,0 +1,60 @@
+"""What the page is made from: the content of result.json, and what lies beside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from bgars.io.result_file import read_result
+from bgars.report.page_photograph import SIDE_FILE, Lamp, Photograph, lamps_of, photograph_of, read_side_files
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from bgars.part_result import PartResult
+    from bgars.records import Capture
+
+__all__ = ["PageSource", "read_page_source", "source_of"]
+
+
+@dataclass(frozen=True, eq=False)
+class PageSource:
+    """Everything on the page.
+
+    Attributes
+    ----------
+    result : dict
+        As :meth:`bgars.PartResult.to_dict` returns it; None = not measured.
+    photograph : Photograph or None
+        The part as the camera saw it.
+    method : str or None
+        Estimator of the normals.
+    lamps : tuple of Lamp
+        The lights as the rig gives them; empty when unknown.
+    """
+
+    result: dict[str, Any]
+    photograph: Photograph | None = None
+    method: str | None = None
+    lamps: tuple[Lamp, ...] = ()
+
+
+def source_of(result: PartResult, capture: Capture | None, method: str | None) -> PageSource:
+    """Gather the page of an inspection that was just made."""
+    if capture is None:
+        return PageSource(result.to_dict(), method=method)
+    return PageSource(result.to_dict(), photograph_of(capture), method, lamps_of(capture))
+
+
+def read_page_source(path: Path) -> PageSource:
+    """Read result.json (or the folder that holds it), and the photograph that lies beside it.
+
+    Raises
+    ------
+    FileFormatError
+        There is no result, or it is not one.
+    """
+    result = read_result(path).to_dict()
+    folder = path if path.is_dir() else path.parent
+    photograph, method, lamps = read_side_files(folder / SIDE_FILE)
+    return PageSource(result, photograph, method, lamps)

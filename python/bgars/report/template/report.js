@@ -1,0 +1,223 @@
+"use strict";
+(() => {
+  const page = JSON.parse(document.getElementById("page-data").textContent);
+  const table = document.getElementById("balls");
+  const body = table.tBodies[0];
+  const rows = [...body.rows];
+  const rowOf = new Map(rows.map((row) => [row.dataset.ball, row]));
+  const marks = new Map([...document.querySelectorAll(".mark")].map((mark) => [mark.dataset.ball, mark]));
+  const heads = [...table.tHead.rows[0].cells];
+  const panel = document.getElementById("chosen");
+  const hint = panel ? [...panel.childNodes].map((node) => node.cloneNode(true)) : [];
+  const charts = new Map();
+  const reached = (stage) => { document.documentElement.dataset[stage] = "yes"; performance.mark(stage); };
+  let chosen = null;
+
+  // --- choosing a ball: picture, table and charts show the same one ---
+  const tell = (ball) => {
+    if (!panel) return;
+    panel.replaceChildren();
+    const row = rowOf.get(ball);
+    if (!row) return panel.append(...hint.map((node) => node.cloneNode(true)));
+    const title = document.createElement("h3");
+    title.textContent = row.cells[0].textContent;
+    const list = document.createElement("dl");
+    heads.slice(1, -1).forEach((head, at) => {
+      const entry = document.createElement("div");
+      const name = document.createElement("dt");
+      const value = document.createElement("dd");
+      name.textContent = head.textContent;
+      value.textContent = row.cells[at + 1].textContent;
+      if (head.dataset.unit && value.textContent !== "-") value.textContent += " " + head.dataset.unit;
+      entry.append(name, value);
+      list.append(entry);
+    });
+    const why = document.createElement("p");
+    why.textContent = row.cells[row.cells.length - 1].textContent;
+    panel.append(title, list, why);
+  };
+  const markAs = (ball, name, on) => {
+    for (const node of [rowOf.get(ball), marks.get(ball)]) if (node) node.classList.toggle(name, on);
+  };
+  const hover = (ball) => {
+    document.querySelectorAll(".hover").forEach((node) => node.classList.remove("hover"));
+    if (ball !== null) markAs(ball, "hover", true);
+    tell(ball === null ? chosen : ball);
+  };
+  const mark = () => {
+    for (const [name, places] of Object.entries(page.places)) {
+      const node = charts.get(name);
+      const [x, y, z] = (chosen !== null && places[chosen]) || [[], [], []];
+      if (node) Plotly.restyle(node, z ? { x: [x], y: [y], z: [z] } : { x: [x], y: [y] }, [node.data.length - 1]);
+    }
+  };
+  const choose = (ball, scroll) => {
+    if (chosen !== null) markAs(chosen, "chosen", false);
+    if (chosen !== null && rowOf.get(chosen)) rowOf.get(chosen).removeAttribute("aria-current");
+    chosen = rowOf.has(ball) ? ball : null;
+    if (chosen !== null) {
+      markAs(chosen, "chosen", true);
+      const row = rowOf.get(chosen);
+      row.setAttribute("aria-current", "true");
+      if (row.hidden) { document.getElementById("filter").value = ""; press("all"); }
+      if (scroll) {
+        const frame = table.closest(".scroll");
+        frame.scrollTop += row.getBoundingClientRect().top - frame.getBoundingClientRect().top - frame.clientHeight / 2;
+      }
+    }
+    tell(chosen);
+    mark();
+  };
+  for (const [nodes, scroll] of [[rowOf, false], [marks, true]]) {
+    for (const [ball, node] of nodes) {
+      node.addEventListener("pointerenter", () => hover(ball));
+      node.addEventListener("pointerleave", () => hover(null));
+      node.addEventListener("click", () => choose(chosen === ball ? null : ball, scroll));
+    }
+  }
+  document.addEventListener("keydown", (event) => { if (event.key === "Escape") choose(null, false); });
+
+  const bare = document.getElementById("bare");
+  if (bare) bare.addEventListener("click", () => {
+    bare.setAttribute("aria-pressed", String(document.getElementById("picture").classList.toggle("bare")));
+  });
+
+  // --- sorting and filtering ---
+  const keyOf = (row, at) => row.cells[at].dataset.value;
+  const sortBy = (at) => {
+    const head = heads[at];
+    const down = head.getAttribute("aria-sort") === "ascending";
+    heads.forEach((each) => each.setAttribute("aria-sort", "none"));
+    head.setAttribute("aria-sort", down ? "descending" : "ascending");
+    const isText = at === heads.length - 1;
+    const compare = (one, two) => {
+      const a = keyOf(one, at), b = keyOf(two, at);
+      // What was not measured stays last, whichever way.
+      if (a === "" || b === "") return (a === "") - (b === "") || one.dataset.ball - two.dataset.ball;
+      const order = isText ? a.localeCompare(b) : Number(a) - Number(b);
+      return (down ? -order : order) || one.dataset.ball - two.dataset.ball;
+    };
+    body.append(...[...rows].sort(compare));
+  };
+  heads.forEach((head, at) => head.querySelector("button").addEventListener("click", () => sortBy(at)));
+  const filters = [...document.querySelectorAll("[data-filter]")];
+  const words = document.getElementById("filter");
+  const texts = new Map(rows.map((row) => [row, [0, 1, row.cells.length - 1].map((at) => row.cells[at].textContent).join(" ").toLowerCase()]));
+  const filter = () => {
+    const open = filters.some((each) => each.dataset.filter === "open" && each.getAttribute("aria-pressed") === "true");
+    const wanted = words.value.trim().toLowerCase().split(/\s+/).filter(Boolean);
+    let count = 0;
+    for (const row of rows) {
+      const shown = !(open && row.dataset.verdict === "pass") && wanted.every((word) => texts.get(row).includes(word));
+      row.hidden = !shown;
+      count += shown;
+    }
+    document.getElementById("shown").textContent = `${count} of ${rows.length} balls`;
+  };
+  const press = (name) => {
+    filters.forEach((each) => each.setAttribute("aria-pressed", String(each.dataset.filter === name)));
+    filter();
+  };
+  filters.forEach((each) => each.addEventListener("click", () => press(each.dataset.filter)));
+  words.addEventListener("input", filter);
+
+  // --- charts ---
+  const dark = window.matchMedia("(prefers-color-scheme: dark)");
+  const look = (isDark) => {
+    const ink = isDark ? "#e8edf2" : "#16202b", grid = isDark ? "#37424e" : "#dfe3e8", strong = isDark ? "#a3afbb" : "#55626f";
+    const axis = { gridcolor: grid, zerolinecolor: strong, linecolor: strong, zerolinewidth: 1.5 };
+    const axis3d = { gridcolor: grid, zerolinecolor: grid, showbackground: false };
+    return { layout: {
+      font: { color: ink, family: 'system-ui, "Liberation Sans", Arial, sans-serif', size: 12 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+      xaxis: axis, yaxis: axis, scene: { xaxis: axis3d, yaxis: axis3d, zaxis: axis3d }, title: { font: { size: 13 }, x: 0.5 },
+      hoverlabel: { bgcolor: isDark ? "#1b222b" : "#ffffff", font: { color: ink } },
+    } };
+  };
+  // Thin marks on a dark page need lighter colours; the 3-D view has its own light.
+  const lighter = { "#0072B2": "#56B4E9", "#B0578D": "#E39AC6", "#D55E00": "#FF8A3D" };
+  const shape = (name, isDark, size) => {
+    let figure = page.figures[name];
+    if (isDark && name !== "scene") figure = JSON.parse(JSON.stringify(figure).replace(/#(0072B2|B0578D|D55E00)/g, (color) => lighter[color]));
+    const margin = figure.layout.margin || { l: 56, r: 14, t: 40, b: 44 };
+    const layout = { ...figure.layout, ...size, margin, template: look(isDark), dragmode: name === "scene" ? "orbit" : false };
+    return { data: figure.data, layout };
+  };
+  const config = { responsive: false, displaylogo: false, displayModeBar: false, doubleClick: "reset" };
+  const ballAt = (event) => {
+    const data = event.points && event.points[0] && event.points[0].customdata;
+    const index = Array.isArray(data) ? data[0] : data;
+    return Number.isInteger(index) ? String(index) : null;
+  };
+  const draw = async (node) => {
+    const name = node.dataset.figure;
+    const { data, layout } = shape(name, dark.matches);
+    await Plotly.newPlot(node, data, layout, name === "scene" ? { ...config, displayModeBar: true, modeBarButtonsToRemove: ["tableRotation", "resetCameraLastSave3d"] } : config);
+    charts.set(name, node);
+    if (!(name in page.places)) return;
+    node.on("plotly_hover", (event) => hover(ballAt(event)));
+    node.on("plotly_unhover", () => hover(null));
+    node.on("plotly_click", (event) => { const ball = ballAt(event); if (ball !== null) choose(ball, true); });
+  };
+  const hasWebgl = () => {
+    const context = document.createElement("canvas").getContext("webgl");
+    return Boolean(context);
+  };
+  const keepForPrint = async () => {
+    const image = document.getElementById("scene-print");
+    const layout = { ...page.figures.scene.layout, template: look(false), width: 1000, height: 620 };
+    image.src = await Plotly.toImage({ data: page.figures.scene.data, layout, config }, { format: "png", width: 1000, height: 620 });
+    image.dataset.ready = "yes";
+  };
+  const pause = () => new Promise((next) => setTimeout(next, 0));
+  // Where no graphics card helps, a 3-D view takes seconds: it waits until nothing else is to be done.
+  const idle = () => new Promise((next) => (window.requestIdleCallback ? requestIdleCallback(next, { timeout: 1500 }) : setTimeout(next, 200)));
+  const near = (node) => new Promise((next) => {
+    const watch = new IntersectionObserver((entries) => { if (entries.some((each) => each.isIntersecting)) { watch.disconnect(); next(); } }, { rootMargin: "100% 0px" });
+    watch.observe(node);
+    setTimeout(next, 2500);
+  });
+  const drawAll = async () => {
+    const nodes = [...document.querySelectorAll("[data-figure]")];
+    for (const node of nodes.filter((each) => each.dataset.figure !== "scene")) { await draw(node); await pause(); }
+    const scene = nodes.find((each) => each.dataset.figure === "scene");
+    reached("charted");
+    if (scene) await near(scene);
+    await idle();
+    if (scene && hasWebgl()) await draw(scene);
+    else if (scene) {
+      const note = document.createElement("p");
+      note.className = "missing-view";
+      note.textContent = "This browser draws no 3-D (WebGL is off). The numbers are in the table of balls.";
+      scene.append(note);
+    }
+    reached("drawn");
+    await idle();
+    if (charts.has("scene")) await keepForPrint();
+    reached("ready");
+  };
+  const repaint = (isDark, sizeOf) => {
+    for (const [name, node] of charts) {
+      if (name === "scene") { if (!sizeOf) Plotly.relayout(node, { template: look(isDark) }); continue; }
+      const { data, layout } = shape(name, isDark, sizeOf ? sizeOf(node) : { autosize: true });
+      Plotly.react(node, data, layout);
+    }
+    if (chosen !== null) mark();
+  };
+  const paper = (node) => {
+    if (node.parentElement.classList.contains("grid")) return { width: 228, height: 225 };
+    return { width: 690, height: node.classList.contains("square") ? 500 : 320 };
+  };
+  // Paper has sizes of its own: while it is printed, no change of the window or of its colours may undo them.
+  let printing = false;
+  let waiting = 0;
+  dark.addEventListener("change", () => { if (!printing) repaint(dark.matches); });
+  window.addEventListener("beforeprint", () => { printing = true; repaint(false, paper); });
+  window.addEventListener("afterprint", () => { printing = false; repaint(dark.matches); });
+  window.addEventListener("resize", () => {
+    clearTimeout(waiting);
+    waiting = setTimeout(() => { if (!printing) for (const node of charts.values()) Plotly.Plots.resize(node); }, 150);
+  });
+  reached("usable");
+  // The charts' library comes after this script: the tables answer before it is read.
+  document.addEventListener("DOMContentLoaded", () => requestAnimationFrame(() => setTimeout(drawAll, 0)));
+})();
