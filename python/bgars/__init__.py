@@ -35,11 +35,12 @@ from bgars.io.truth import read_truth
 from bgars.material_records import ReflectanceFit, SurfaceLobe, SurfaceMaterial
 from bgars.mesh import mesh_from_height
 from bgars.normals import estimate_normals
+from bgars.part_anchors import anchors_from_part
 from bgars.part_recipe import Limits, PartRecipe
 from bgars.part_result import BallResult, PartResult
 from bgars.pipeline import Reconstruction, reconstruct
 from bgars.recipes import named_recipes, read_scene, write_simulation
-from bgars.records import Capture, Component, HeightMap, NormalField, Truth
+from bgars.records import Capture, Component, DepthMap, HeightMap, NormalField, Truth
 from bgars.report.overview import write_overview
 from bgars.report.part import write_part_pictures
 from bgars.rig import LightRig
@@ -61,15 +62,18 @@ from bgars.simulate import (
     Variation,
     simulate,
 )
+from bgars.surface_records import Anchors, BilateralFit, Pinhole
 
 __version__ = version("bgars")
 
 __all__ = [
+    "Anchors",
     "Ball",
     "BallLayout",
     "BallResult",
     "BallTruth",
     "BgarsError",
+    "BilateralFit",
     "Board",
     "Bridge",
     "CalibrationError",
@@ -78,6 +82,7 @@ __all__ = [
     "Component",
     "ConvergenceError",
     "Defect",
+    "DepthMap",
     "Evaluation",
     "FileFormatError",
     "FoundBall",
@@ -92,6 +97,7 @@ __all__ = [
     "NormalField",
     "PartRecipe",
     "PartResult",
+    "Pinhole",
     "Reconstruction",
     "ReflectanceFit",
     "Scene",
@@ -104,6 +110,7 @@ __all__ = [
     "UnsupportedImageError",
     "Variation",
     "__version__",
+    "anchors_from_part",
     "angular_error_deg",
     "calibrate_material",
     "estimate_normals",
