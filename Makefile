@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-rust test-python lint format accuracy inspection simulator experiments method schema studies performance instructions clean
+.PHONY: demo test test-rust test-python lint format accuracy inspection bilateral simulator experiments method schema studies performance instructions clean
 
 demo: $(VENV)/.installed ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
@@ -37,6 +37,9 @@ accuracy: $(VENV)/.installed ## Rewrite the tables of docs/accuracy.md (needs BG
 
 inspection: $(VENV)/.installed ## Rewrite the inspection tables of docs/accuracy.md (needs BGARS_DATA)
 	$(BIN)/python docs/make_inspection_accuracy.py
+
+bilateral: $(VENV)/.installed ## Rewrite the bilateral tables of docs/accuracy.md, draw their pictures (needs BGARS_DATA)
+	$(BIN)/python docs/make_bilateral.py
 
 simulator: $(VENV)/.installed ## Rewrite the tables of docs/simulator.md (needs BGARS_DATA)
 	$(BIN)/python docs/make_simulator_check.py

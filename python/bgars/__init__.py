@@ -38,11 +38,12 @@ from bgars.io.truth import read_truth
 from bgars.material_records import ReflectanceFit, SurfaceLobe, SurfaceMaterial
 from bgars.mesh import mesh_from_height
 from bgars.normals import estimate_normals
+from bgars.part_anchors import anchors_from_part
 from bgars.part_recipe import Limits, PartRecipe
 from bgars.part_result import BallResult, PartResult
 from bgars.pipeline import Reconstruction, reconstruct
 from bgars.recipes import named_recipes, read_scene, write_simulation
-from bgars.records import Capture, Component, HeightMap, NormalField, Truth
+from bgars.records import Capture, Component, DepthMap, HeightMap, NormalField, Truth
 from bgars.report.overview import write_overview
 from bgars.report.page import write_report
 from bgars.report.part import write_part_pictures
@@ -75,15 +76,18 @@ from bgars.studies import (
     read_results,
     read_study,
 )
+from bgars.surface_records import Anchors, BilateralFit, Pinhole
 
 __version__ = version("bgars")
 
 __all__ = [
+    "Anchors",
     "Ball",
     "BallLayout",
     "BallResult",
     "BallTruth",
     "BgarsError",
+    "BilateralFit",
     "Board",
     "Bridge",
     "CalibrationError",
@@ -92,6 +96,7 @@ __all__ = [
     "Component",
     "ConvergenceError",
     "Defect",
+    "DepthMap",
     "Evaluation",
     "FileFormatError",
     "FoundBall",
@@ -107,6 +112,7 @@ __all__ = [
     "NormalField",
     "PartRecipe",
     "PartResult",
+    "Pinhole",
     "ProcessTrend",
     "Reconstruction",
     "ReflectanceFit",
@@ -121,6 +127,7 @@ __all__ = [
     "UnsupportedImageError",
     "Variation",
     "__version__",
+    "anchors_from_part",
     "angular_error_deg",
     "calibrate_material",
     "estimate_normals",

@@ -24,6 +24,7 @@ __all__ = [
     "eliminate_rims",
     "estimate_normals",
     "estimate_reflectance",
+    "integrate_bilateral",
     "integrate_normals",
     "measure_edges",
     "normal_arrays",
@@ -103,10 +104,26 @@ def normal_arrays(
     NDArray[np.bool_] | None,
 ]: ...
 def usable_normals(normals: NDArray[np.float32]) -> NDArray[np.bool_]: ...
+def integrate_bilateral(
+    normals: NDArray[np.float32],
+    mask: NDArray[np.bool_],
+    weights: NDArray[np.float32] | None,
+    regions: NDArray[np.int32] | None,
+    *,
+    camera: tuple[float, float, float, float] | None,
+    k: float,
+    max_iters: int,
+    tolerance: float,
+    setting: str,
+    precision: str,
+    threads: int | None,
+    progress: Callable[[int, float], object] | None,
+) -> dict[str, Any]: ...
 def integrate_normals(
     normals: NDArray[np.float32],
     mask: NDArray[np.bool_],
     weights: NDArray[np.float32] | None,
+    regions: NDArray[np.int32] | None,
     *,
     difference: str,
     relative_tolerance: float,

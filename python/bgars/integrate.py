@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args, overload
 
 import numpy as np
 
 from bgars import _bgars
+from bgars.anchoring import anchored
 from bgars.errors import InputError
-from bgars.records import Component, HeightMap, NormalField
+from bgars.records import Component, DepthMap, HeightMap, NormalField
+from bgars.surface_records import BilateralFit, Pinhole
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -16,15 +18,20 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from bgars.records import BoolArray, FloatArray
+    from bgars.surface_records import Anchors
 
-__all__ = ["DIFFERENCES", "Difference", "IntegrationMethod", "integrate_normals"]
+__all__ = ["DIFFERENCES", "Difference", "IntegrationMethod", "Solver", "integrate_normals"]
 
 Difference = Literal["trapezoid", "forward"]
 DIFFERENCES: tuple[Difference, ...] = get_args(Difference)
-IntegrationMethod = Literal["least-squares"]
+IntegrationMethod = Literal["least-squares", "bilateral"]
+Solver = Literal["converged", "compatible"]
+Precision = Literal["double", "single"]
 NORMALS_NDIM = 3
+LEAST_SQUARES_ITERS, BILATERAL_ITERS = 2_000, 150
 
 
+@overload
 def integrate_normals(
     normals: NormalField | ArrayLike,
     *,
@@ -34,18 +41,71 @@ def integrate_normals(
     weights: Literal["confidence"] | ArrayLike | None = None,
     relative_tolerance: float = 1e-8,
     absolute_tolerance: float = 1e-12,
-    max_iters: int = 2_000,
+    max_iters: int | None = None,
+    k: float = 2.0,
+    tol: float = 1e-4,
+    solver: Solver = "converged",
+    precision: Precision = "double",
+    camera: None = None,
+    anchors: Anchors | None = None,
     pixel_pitch_um: float | None = None,
     threads: int | None = None,
     progress: Callable[[int, float], object] | None = None,
-) -> HeightMap:
-    """Integrate normals to heights by weighted least squares.
+) -> HeightMap: ...
+@overload
+def integrate_normals(
+    normals: NormalField | ArrayLike,
+    *,
+    mask: ArrayLike | None = None,
+    method: IntegrationMethod = "least-squares",
+    difference: Difference = "trapezoid",
+    weights: Literal["confidence"] | ArrayLike | None = None,
+    relative_tolerance: float = 1e-8,
+    absolute_tolerance: float = 1e-12,
+    max_iters: int | None = None,
+    k: float = 2.0,
+    tol: float = 1e-4,
+    solver: Solver = "converged",
+    precision: Precision = "double",
+    camera: Pinhole,
+    anchors: Anchors | None = None,
+    pixel_pitch_um: float | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, float], object] | None = None,
+) -> DepthMap: ...
+def integrate_normals(
+    normals: NormalField | ArrayLike,
+    *,
+    mask: ArrayLike | None = None,
+    method: IntegrationMethod = "least-squares",
+    difference: Difference = "trapezoid",
+    weights: Literal["confidence"] | ArrayLike | None = None,
+    relative_tolerance: float = 1e-8,
+    absolute_tolerance: float = 1e-12,
+    max_iters: int | None = None,
+    k: float = 2.0,
+    tol: float = 1e-4,
+    solver: Solver = "converged",
+    precision: Precision = "double",
+    camera: Pinhole | None = None,
+    anchors: Anchors | None = None,
+    pixel_pitch_um: float | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, float], object] | None = None,
+) -> HeightMap | DepthMap:
+    """Integrate normals to heights, by least squares or with jumps (bilateral).
 
-    Minimises the sum over neighbouring pixels of ``(n_z dz + n_x)^2`` along x and ``(n_z dz + n_y)^2`` along y (up), by
-    conjugate gradient on the normal equations, preconditioned by multigrid: about 8 iterations whatever the size.
-    **What this cannot give**: heights across an occluding contour. Between a ball and its board the surface jumps where
-    no pixel sees it, so the stand-off height is not in the normals, and parts that do not touch (components) each float
-    freely.
+    **Least squares** minimises the sum over neighbouring pixels of ``(n_z dz + n_x)^2`` along x and ``(n_z dz +
+    n_y)^2`` along y (up), by conjugate gradient on the normal equations, preconditioned by multigrid: about 8
+    iterations whatever the size. A jump inside the mask is smeared over everything around it.
+
+    **Bilateral** weighs the differences to the two sides of each pixel by how well the surface follows them, solves,
+    and weighs again: a jump stays a jump, at ten to a hundred times the cost. On a surface without jumps least squares
+    is the better choice: its edges take the mean of two normals, while a one-sided difference is of first order.
+
+    **What neither can give**: heights across an occluding contour. Between a ball and its board the surface jumps where
+    no pixel sees it, so the stand-off height is not in the normals: least squares and bilateral both invent it.
+    `anchors` cut the surface there and put its parts where other evidence says.
 
     Parameters
     ----------
@@ -54,41 +114,61 @@ def integrate_normals(
         copied once.
     mask : (H, W) array_like of bool, optional
         True = use; combined with the field's own mask. For plain arrays: by default every finite normal with n_z > 0.
-    method : {"least-squares"}
+    method : {"least-squares", "bilateral"}
         Integrator.
     difference : {"trapezoid", "forward"}
-        Slope between two pixels: mean of their normals, or the first pixel's alone as the paper prints it (this
-        shifts the surface by half a pixel).
+        Least squares: slope between two pixels, the mean of their normals, or the first pixel's alone as the paper
+        prints it (this shifts the surface by half a pixel).
     weights : "confidence" or (H, W) array_like, optional
-        Trust in each pixel, at least 0; an edge takes the geometric mean of its two. n_z^2 is always a weight.
+        Trust in each pixel, at least 0; an edge of least squares takes the geometric mean of its two. n_z^2 is always a
+        weight.
     relative_tolerance, absolute_tolerance : float
-        Stop at a residual of this times the right side, or of this a pixel (root mean square, pixels).
-    max_iters : int
-        Most iterations. Masks of narrow winding corridors may need hundreds; all others, ten to twenty.
+        Least squares: stop at a residual of this times the right side, or of this a pixel (root mean square, pixels).
+    max_iters : int, optional
+        Least squares: most iterations, by default 2000 (masks of narrow winding corridors may need hundreds, all others
+        ten to twenty). Bilateral: most re-weightings, by default 150; where it is reached the result says ``converged =
+        False``.
+    k : float
+        Bilateral: sharpness; at 0 both sides count alike, and at 2 a step of one pixel more on one side is a jump.
+    tol : float
+        Bilateral: stop when the energy changes by less than this times itself.
+    solver : {"converged", "compatible"}
+        Bilateral: every system solved by multigrid to 1e-6, or by Jacobi-preconditioned conjugate gradient to 1e-3 as
+        published. Stopped that early, jumps depend on how far the solver happened to come, and so on details of it.
+    precision : {"double", "single"}
+        Bilateral, compatible: numbers inside a solve; "single" is faster, and what a solve changes is still added in
+        double.
+    camera : Pinhole, optional
+        Bilateral: perspective; the result is then a :class:`DepthMap`.
+    anchors : Anchors, optional
+        Known heights and cuts; needs a pixel pitch.
     pixel_pitch_um : float, optional
         Size of a pixel; a field brings its own.
     threads : int, optional
         Most threads to work on; by default what the environment variable ``RAYON_NUM_THREADS`` says, else one a core.
         The result does not depend on it.
     progress : callable, optional
-        Called with (iteration, relative residual), at most ten times a second.
+        Called with (iteration, relative residual), for bilateral with (re-weightings, relative change of the energy),
+        at most ten times a second.
 
     Returns
     -------
-    HeightMap
-        Zero mean in each connected component.
+    HeightMap or DepthMap
+        Zero mean in each connected component without an anchor. Under a camera, depths of geometric mean 1.
 
     Raises
     ------
     InputError
-        Shapes that do not fit, an empty mask, normals inside the mask that are not finite or face away.
+        Shapes that do not fit, an empty mask, normals inside the mask that are not finite or face away, arguments that
+        the method does not have.
     ConvergenceError
-        `max_iters` reached; carries iterations and residual.
+        A system was not solved within its iterations; carries iterations and residual.
 
     References
     ----------
     B. K. P. Horn and M. J. Brooks, "The variational approach to shape from shading", CVGIP 33 (1986).
     Y. Quéau, J.-D. Durou, J.-F. Aujol, "Normal integration: a survey", J. Math. Imaging Vis. 60 (2018).
+    X. Cao, H. Santo, B. Shi, F. Okura, Y. Matsushita, "Bilateral normal integration", ECCV 2022.
 
     Examples
     --------
@@ -96,13 +176,19 @@ def integrate_normals(
     >>> normals = np.tile(np.float32([-0.6, 0.0, 0.8]), (2, 3, 1))  # rises by 3/4 pixel a column
     >>> bgars.integrate_normals(normals).height_px[0].round(4).tolist()
     [-0.75, 0.0, 0.75]
+    >>> bgars.integrate_normals(normals, method="bilateral").height_px[0].round(2).tolist()
+    [-0.75, 0.0, 0.75]
     """
-    if method not in get_args(IntegrationMethod):
-        msg = f"method: must be one of {', '.join(get_args(IntegrationMethod))}; got {method!r}"
-        raise InputError(msg)
-    if difference not in DIFFERENCES:
-        msg = f"difference: must be one of {', '.join(DIFFERENCES)}; got {difference!r}"
-        raise InputError(msg)
+    for name, value, allowed in (
+        ("method", method, get_args(IntegrationMethod)),
+        ("difference", difference, DIFFERENCES),
+        ("solver", solver, get_args(Solver)),
+        ("precision", precision, get_args(Precision)),
+    ):
+        if value not in allowed:
+            msg = f"{name}: must be one of {', '.join(allowed)}; got {value!r}"
+            raise InputError(msg)
+    _check_camera(camera, method, anchors)
     if isinstance(normals, NormalField):
         vectors, valid = normals.normals, normals.mask
         pixel_pitch_um = normals.pixel_pitch_um if pixel_pitch_um is None else pixel_pitch_um
@@ -112,26 +198,69 @@ def integrate_normals(
         msg = f"pixel_pitch_um: must be finite and above 0, got {pixel_pitch_um:g}"
         raise InputError(msg)
     use = np.ascontiguousarray(valid if mask is None else valid & _bool_mask(mask, valid.shape))
-    height_px, labels, components, iterations, residual = _bgars.integrate_normals(
-        np.ascontiguousarray(vectors),
-        use,
-        _edge_trust(normals, weights, use),
-        difference=difference,
-        relative_tolerance=relative_tolerance,
-        absolute_tolerance=absolute_tolerance,
-        max_iters=max_iters,
-        threads=threads,
-        progress=progress,
-    )
-    return HeightMap(
-        height_px=height_px,
-        mask=use,
-        pixel_pitch_um=pixel_pitch_um,
-        iterations=iterations,
-        residual=residual,
-        components=tuple(Component(*part) for part in components),
-        labels=labels,
-    )
+    regions = None
+    if anchors is not None:
+        anchors.check(use.shape)
+        regions = None if anchors.regions is None else np.ascontiguousarray(anchors.regions, dtype=np.int32)
+    arrays = (np.ascontiguousarray(vectors), use, _edge_trust(normals, weights, use), regions)
+    common: dict[str, Any] = {"threads": threads, "progress": progress}
+    if method == "least-squares":
+        height_px, labels, parts, iterations, residual = _bgars.integrate_normals(
+            *arrays,
+            difference=difference,
+            relative_tolerance=relative_tolerance,
+            absolute_tolerance=absolute_tolerance,
+            max_iters=LEAST_SQUARES_ITERS if max_iters is None else max_iters,
+            **common,
+        )
+        components = tuple(Component(*part) for part in parts)
+        found: dict[str, Any] = {"mask": use, "iterations": iterations, "residual": residual, "labels": labels}
+    else:
+        surface = _bgars.integrate_bilateral(
+            *arrays,
+            camera=None if camera is None else camera.numbers_px,
+            k=k,
+            max_iters=BILATERAL_ITERS if max_iters is None else max_iters,
+            tolerance=tol,
+            setting=solver,
+            precision=precision,
+            **common,
+        )
+        height_px, labels = surface["height"], surface["labels"]
+        components = tuple(Component(*part) for part in surface["components"])
+        found = {
+            "mask": use,
+            "iterations": surface["inner_iterations"],
+            "residual": surface["residual"],
+            "labels": labels,
+            "bilateral": BilateralFit(
+                rightward=surface["rightward"],
+                upward=surface["upward"],
+                energies=np.array(surface["energies"]),
+                converged=surface["converged"],
+                k=k,
+                solver=solver,
+            ),
+        }
+    if camera is not None:
+        return DepthMap(depth=np.exp(-height_px), camera=camera, components=components, **found)
+    if anchors is not None:
+        height_px, components = anchored(height_px, labels, components, anchors, pixel_pitch_um)
+    return HeightMap(height_px=height_px, pixel_pitch_um=pixel_pitch_um, components=components, **found)
+
+
+def _check_camera(camera: object, method: IntegrationMethod, anchors: Anchors | None) -> None:
+    if camera is None:
+        return
+    if not isinstance(camera, Pinhole):
+        msg = f"camera: must be a bgars.Pinhole, got {type(camera).__name__}"
+        raise InputError(msg)
+    if method != "bilateral":
+        msg = f"camera: only method 'bilateral' integrates under a camera, got {method!r}"
+        raise InputError(msg)
+    if anchors is not None:
+        msg = "anchors: heights in micrometres do not fix a depth under a camera; leave one of the two out"
+        raise InputError(msg)
 
 
 def _normal_array(normals: ArrayLike, mask: ArrayLike | None) -> tuple[FloatArray, BoolArray]:

@@ -6,6 +6,7 @@ where a name ends in ``_um`` and in pixels where it ends in ``_px``.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -19,11 +20,13 @@ if TYPE_CHECKING:
 
     from bgars.material_records import ReflectanceFit
     from bgars.rig import LightRig
+    from bgars.surface_records import BilateralFit, Pinhole
 
 __all__ = [
     "BoolArray",
     "Capture",
     "Component",
+    "DepthMap",
     "FloatArray",
     "HeightMap",
     "NormalField",
@@ -166,7 +169,7 @@ class NormalField:
 
 @dataclass(frozen=True)
 class Component:
-    """One connected part of a height map; its mean height is 0, its height against other parts is unknown.
+    """One connected part of a height map; without an anchor its mean is 0, its height against other parts unknown.
 
     Attributes
     ----------
@@ -174,16 +177,22 @@ class Component:
         Number of pixels.
     first_row, first_col : int
         Its first pixel in reading order.
+    anchor_pixels : int
+        Known heights that hold it; 0: it floats freely.
+    anchor_rms_px : float
+        How far it passes from them, root mean square; NaN without any.
     """
 
     pixels: int
     first_row: int
     first_col: int
+    anchor_pixels: int = 0
+    anchor_rms_px: float = math.nan
 
 
 @dataclass(frozen=True, eq=False)
 class HeightMap:
-    """Integrated heights, zero mean in each connected component.
+    """Integrated heights, zero mean in each connected component that no anchor holds.
 
     Attributes
     ----------
@@ -201,6 +210,8 @@ class HeightMap:
         The connected parts, in reading order.
     labels : (H, W) int32
         Index into `components` of each pixel, -1 outside the mask.
+    bilateral : BilateralFit or None
+        Jumps and energies, from the bilateral method.
     """
 
     height_px: FloatArray
@@ -210,6 +221,7 @@ class HeightMap:
     residual: float
     components: tuple[Component, ...]
     labels: NDArray[np.int32]
+    bilateral: BilateralFit | None = field(default=None, repr=False)
 
     def check_field(self, field: NormalField | None) -> None:
         """Raise InputError unless a field, where there is one, has the size of this map."""
@@ -271,6 +283,34 @@ class HeightMap:
             "iterations": self.iterations,
             "residual": self.residual,
         }
+
+
+@dataclass(frozen=True, eq=False)
+class DepthMap:
+    """Depths under a pinhole camera, up to one factor a connected component.
+
+    Attributes
+    ----------
+    depth : (H, W) float32
+        Distance from the camera's plane, above 0, of geometric mean 1 in each component; NaN outside the mask.
+    mask : (H, W) bool
+        True where there is a depth.
+    camera : Pinhole
+        The camera.
+    iterations, residual, components, labels
+        As in :class:`HeightMap`.
+    bilateral : BilateralFit
+        Jumps and energies.
+    """
+
+    depth: FloatArray
+    mask: BoolArray
+    camera: Pinhole
+    iterations: int
+    residual: float
+    components: tuple[Component, ...]
+    labels: NDArray[np.int32]
+    bilateral: BilateralFit = field(repr=False)
 
 
 @dataclass(frozen=True, eq=False)

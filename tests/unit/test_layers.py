@@ -15,21 +15,16 @@ RECORDS = {
     "ball_records": 1,
     "material_records": 1,
     "part_recipe": 2,
+    "surface_records": 2,
     "records": 3,
     "part_result": 3,
     "kernel_capture": 3.5,
+    "anchoring": 3.5,
 }
 BASE = {"errors": 0, "light_files": 1, "rig": 2, **RECORDS}
 STAGES = dict.fromkeys(("io", "pixelwise", "reflectance", "integrate", "mesh", "balls", "inspection"), 4)
-JOINED = {
-    "normals": 4.5,
-    "calibrate": 5,
-    "pipeline": 5,
-    "evaluate": 5,
-    "inspection_pipeline": 5,
-    "recipes": 5,
-    "cfx": 5,
-}
+PIPELINES = ("calibrate", "pipeline", "evaluate", "part_anchors", "inspection_pipeline", "recipes", "cfx")
+JOINED = {"normals": 4.5, **dict.fromkeys(PIPELINES, 5)}
 LATER = {**JOINED, "batch": 6, "report": 6, "studies": 6.5, "experiments": 6, "samples": 0, "cli": 7}
 LEVEL = {**BASE, **STAGES, **LATER, "simulate": 4}
 

@@ -109,6 +109,16 @@ pub enum Error {
         /// The z component found.
         n_z: f64,
     },
+    /// Most normals are seen from behind.
+    #[error(
+        "normals: {count} of {pixels} face away from the camera; check the axes (y up, z toward the camera) and the camera"
+    )]
+    LooksAway {
+        /// Pixels inside the mask whose normal looks away.
+        count: usize,
+        /// Pixels inside the mask.
+        pixels: usize,
+    },
     /// A weight inside the mask that is negative or not finite.
     #[error("weights: at row {row}, column {col}: must be finite and >= 0, got {value}")]
     BadWeight {

@@ -37,6 +37,7 @@ pub fn to_python(error: Error) -> PyErr {
         | Error::OutOfRange { .. }
         | Error::NonFinitePixel { .. }
         | Error::BadNormal { .. }
+        | Error::LooksAway { .. }
         | Error::BadWeight { .. } => InputError::new_err(message),
     }
 }

@@ -1,6 +1,6 @@
 //! `integrate_normals`.
 
-use bgars_core::integrate::{Difference, Params, integrate, usable};
+use bgars_core::integrate::{Difference, Field, Params, integrate_field, usable};
 use numpy::{PyArray2, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
@@ -12,7 +12,7 @@ use crate::progress::watched;
 type Result5<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<i32>>, Vec<(usize, usize, usize)>, usize, f64);
 
 #[pyfunction]
-#[pyo3(signature = (normals, mask, weights, *, difference, relative_tolerance, absolute_tolerance, max_iters,
+#[pyo3(signature = (normals, mask, weights, regions, *, difference, relative_tolerance, absolute_tolerance, max_iters,
                     threads, progress))]
 #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)]
 pub fn integrate_normals<'py>(
@@ -20,6 +20,7 @@ pub fn integrate_normals<'py>(
     normals: PyReadonlyArray3<'py, f32>,
     mask: PyReadonlyArray2<'py, bool>,
     weights: Option<PyReadonlyArray2<'py, f32>>,
+    regions: Option<PyReadonlyArray2<'py, i32>>,
     difference: &str,
     relative_tolerance: f64,
     absolute_tolerance: f64,
@@ -37,8 +38,10 @@ pub fn integrate_normals<'py>(
     let normals = slice3(&normals, "normals")?;
     let mask = slice2(&mask, "mask")?;
     let weights = weights.as_ref().map(|weights| slice2(weights, "weights")).transpose()?;
+    let regions = regions.as_ref().map(|regions| slice2(regions, "regions")).transpose()?;
+    let field = Field { normals, mask, weights, regions, width: shape[1] };
     let surface = watched(py, threads, progress.as_ref(), |report| {
-        integrate(normals, mask, shape[1], weights, &params, &mut |state| report((state.iteration, state.residual)))
+        integrate_field(field, &params, &mut |state| report((state.iteration, state.residual)))
     })?;
     let components = surface.components.iter().map(|part| (part.pixels, part.first_row, part.first_col)).collect();
     Ok((

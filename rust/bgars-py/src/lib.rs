@@ -1,6 +1,7 @@
 //! The compiled half of the Python package `bgars`: a list of functions. Every one of them releases the GIL once, around
 //! the whole of its work; `python/bgars/_bgars.pyi` documents them.
 
+mod bilateral;
 mod capture;
 mod convert;
 mod errors;
@@ -15,6 +16,8 @@ mod shadows;
 
 #[pyo3::pymodule]
 mod _bgars {
+    #[pymodule_export]
+    use crate::bilateral::integrate_bilateral;
     #[pymodule_export]
     use crate::files::decode_stack;
     #[pymodule_export]

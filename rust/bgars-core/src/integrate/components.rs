@@ -24,7 +24,7 @@ pub(super) struct Run {
     pub component: usize,
 }
 
-/// A mask as runs in reading order, and the components that they form.
+/// A mask as runs in reading order (each within one region), and the components that they form.
 #[derive(Debug)]
 pub(super) struct Runs {
     width: usize,
@@ -37,10 +37,14 @@ pub(super) struct Runs {
 impl Runs {
     /// # Cost
     /// Linear in the number of pixels, in parallel, and nearly linear in the number of runs (union-find).
-    pub fn new(mask: &[bool], width: usize) -> Self {
+    pub fn new(mask: &[bool], regions: Option<&[i32]>, width: usize) -> Self {
         let height = mask.len() / width;
-        let mut runs: Vec<Run> =
-            mask.par_chunks(width).enumerate().flat_map_iter(|(row, mask)| RowRuns { row, mask, col: 0 }).collect();
+        let region = |row: usize, col: usize| regions.map_or(0, |regions| regions[row * width + col]);
+        let row_runs = |(row, mask)| {
+            let regions = regions.map(|regions| &regions[row * width..(row + 1) * width]);
+            RowRuns { row, mask, regions, col: 0 }
+        };
+        let mut runs: Vec<Run> = mask.par_chunks(width).enumerate().flat_map_iter(row_runs).collect();
         let mut row_starts = vec![0; height + 1];
         for run in &runs {
             row_starts[run.row + 1] += 1;
@@ -58,7 +62,9 @@ impl Runs {
                 // The last run above may reach over the next one here, too.
                 let mut touching = above;
                 while touching < end_above && runs[touching].start < runs[run].end {
-                    unite(&mut parents, run, touching);
+                    if region(row, runs[run].start) == region(row - 1, runs[touching].start) {
+                        unite(&mut parents, run, touching);
+                    }
                     touching += 1;
                 }
             }
@@ -117,6 +123,7 @@ impl Runs {
 struct RowRuns<'a> {
     row: usize,
     mask: &'a [bool],
+    regions: Option<&'a [i32]>,
     col: usize,
 }
 
@@ -126,7 +133,11 @@ impl Iterator for RowRuns<'_> {
     fn next(&mut self) -> Option<Run> {
         let start = self.col + self.mask[self.col..].iter().position(|&used| used)?;
         let rest = &self.mask[start..];
-        let end = start + rest.iter().position(|&used| !used).unwrap_or(rest.len());
+        let mut end = start + rest.iter().position(|&used| !used).unwrap_or(rest.len());
+        if let Some(regions) = self.regions {
+            let rest = &regions[start..end];
+            end = start + rest.iter().position(|&region| region != rest[0]).unwrap_or(rest.len());
+        }
         self.col = end;
         Some(Run { row: self.row, start, end, component: 0 })
     }
@@ -153,7 +164,7 @@ mod tests {
     #[test]
     fn diagonal_neighbours_are_apart() {
         let mask = [true, false, false, true, false, true];
-        let runs = Runs::new(&mask, 2);
+        let runs = Runs::new(&mask, None, 2);
         assert_eq!(runs.labels(), [0, -1, -1, 1, -1, 1]);
         let sizes: Vec<usize> = runs.components.iter().map(|component| component.pixels).collect();
         assert_eq!(sizes, [1, 2]);
@@ -162,7 +173,7 @@ mod tests {
 
     #[test]
     fn rows_do_not_wrap_around() {
-        assert_eq!(Runs::new(&[false, true, true, false], 2).components.len(), 2);
+        assert_eq!(Runs::new(&[false, true, true, false], None, 2).components.len(), 2);
     }
 
     #[test]
@@ -170,15 +181,25 @@ mod tests {
         // A comb: three teeth on one beam, and a pixel of its own.
         let rows = ["#.#.#", "#.#.#", "#####", ".....", "..#.."];
         let mask: Vec<bool> = rows.concat().chars().map(|mark| mark == '#').collect();
-        let runs = Runs::new(&mask, 5);
+        let runs = Runs::new(&mask, None, 5);
         let sizes: Vec<usize> = runs.components.iter().map(|component| component.pixels).collect();
         assert_eq!(sizes, [11, 1]);
     }
 
     #[test]
+    fn regions_split_rows_and_stacks() {
+        // Two regions side by side, a third below both.
+        let regions = [1, 1, 2, 2, 1, 3, 3, 2];
+        let runs = Runs::new(&[true; 8], Some(&regions), 4);
+        assert_eq!(runs.labels(), [0, 0, 1, 1, 0, 2, 2, 1]);
+        let sizes: Vec<usize> = runs.components.iter().map(|component| component.pixels).collect();
+        assert_eq!(sizes, [3, 3, 2]);
+    }
+
+    #[test]
     fn means_are_taken_a_component() {
         let mask = [true, true, false, true, false, false];
-        let means = Runs::new(&mask, 3).means(|row, col| (10 * row + col) as f64);
+        let means = Runs::new(&mask, None, 3).means(|row, col| (10 * row + col) as f64);
         // Row 0: columns 0 and 1; row 1: column 0, below column 0.
         assert_eq!(means, [(0.0 + 1.0 + 10.0) / 3.0]);
     }

@@ -8,6 +8,7 @@
 //! from `coarsen` (after `fill` has closed the smallest holes) and talk to each other by `transfer`. What a coarser grid
 //! cannot hold, nor lead around (`detours`), is found by `lost`; it goes as `strays` to the `graph` that takes over from the last grid.
 
+mod bilateral;
 mod checkerboard;
 mod coarsen;
 mod components;
@@ -25,8 +26,10 @@ mod strays;
 mod system;
 mod transfer;
 
+pub use bilateral::{BilateralParams, BilateralSurface, Pinhole, Precision, Setting, integrate_bilateral};
 pub use components::Component;
-pub use solve::{integrate, usable};
+pub use operator::Field;
+pub use solve::{integrate, integrate_field, usable};
 pub use system::{Operator, System, VCycle};
 
 use std::ops::ControlFlow;

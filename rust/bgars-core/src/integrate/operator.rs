@@ -10,11 +10,17 @@ use crate::memory::zeros;
 const MIN_N_Z: f64 = 1e-3;
 
 /// The pixels to integrate over, their normals and how much each is trusted.
-#[derive(Clone, Copy)]
-pub(super) struct Field<'a> {
+#[derive(Clone, Copy, Debug)]
+pub struct Field<'a> {
+    /// 3 values a pixel (x right, y up, z to the camera), row-major.
     pub normals: &'a [f32],
+    /// True = use.
     pub mask: &'a [bool],
+    /// Trust in each pixel, at least 0; `None`: all alike.
     pub weights: Option<&'a [f32]>,
+    /// A number for each pixel: where it differs between neighbours, nothing joins them. `None`: all one.
+    pub regions: Option<&'a [i32]>,
+    /// Pixels in a row.
     pub width: usize,
 }
 
@@ -99,6 +105,17 @@ impl EdgeRow {
         }
     }
 
+    /// Takes away the edges between regions: from pixel k of the image to pixel k + `stride`, k counted from `first`.
+    fn cut(&mut self, field: Field<'_>, first: usize, stride: usize) {
+        let Some(regions) = field.regions else { return };
+        for (k, (weight, push)) in self.weight.iter_mut().zip(&mut self.push).enumerate() {
+            let (a, b) = (first + k, first + k + stride);
+            if b < regions.len() && regions[a] != regions[b] {
+                (*weight, *push) = (0.0, 0.0);
+            }
+        }
+    }
+
     fn clear(&mut self, width: usize) {
         self.weight.clear();
         self.weight.resize(width, 0.0);
@@ -139,6 +156,7 @@ pub(super) fn assemble(field: Field<'_>, difference: Difference) -> (Weights, Co
         if first > 0 {
             next.load(field, first - 1);
             join_rows(&next, &here, &mut above);
+            above.cut(field, (first - 1) * width, width);
         }
         let mut left = vec![0.0f32; width];
         let mut unused = vec![0.0f32; half];
@@ -152,9 +170,11 @@ pub(super) fn assemble(field: Field<'_>, difference: Difference) -> (Weights, Co
                 difference,
                 true,
             );
+            along.cut(field, row * width, 1);
             if row + 1 < grid.height {
                 next.load(field, row + 1);
                 join_rows(&here, &next, &mut below);
+                below.cut(field, row * width, width);
             } else {
                 below.clear(width);
             }

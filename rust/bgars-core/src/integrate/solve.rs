@@ -52,9 +52,27 @@ pub fn integrate(
     params: &Params,
     on_progress: OnProgress<'_>,
 ) -> Result<Surface> {
-    let field = Field { normals, mask, weights, width };
+    integrate_field(Field { normals, mask, weights, regions: None, width }, params, on_progress)
+}
+
+/// [`integrate`] with regions: pixels of different ones are not joined, so that each region floats freely.
+///
+/// # Errors
+/// Those of [`integrate`].
+///
+/// # Examples
+/// ```
+/// use bgars_core::integrate::{Field, Params, integrate_field};
+/// let (normals, mask) = ([0.0, 0.0, 1.0].repeat(4), [true; 4]);
+/// let field = Field { normals: &normals, mask: &mask, weights: None, regions: Some(&[7, 7, 8, 8]), width: 4 };
+/// let surface = integrate_field(field, &Params::default(), &mut |_| std::ops::ControlFlow::Continue(()))?;
+/// assert_eq!(surface.components.len(), 2);
+/// # Ok::<(), bgars_core::Error>(())
+/// ```
+pub fn integrate_field(field: Field<'_>, params: &Params, on_progress: OnProgress<'_>) -> Result<Surface> {
     check(field, params)?;
-    let runs = Runs::new(mask, width);
+    let Field { mask, width, .. } = field;
+    let runs = Runs::new(mask, field.regions, width);
     let (mut weights, mut right) = assemble(field, params.difference);
     fill_corners(&mut weights);
     let scale = (square_sum(&right.reds) + square_sum(&right.blacks)).sqrt();
@@ -101,25 +119,8 @@ pub fn usable(normals: &[f32]) -> Vec<bool> {
 
 /// Refuses what the solver cannot work on.
 pub(super) fn check(field: Field<'_>, params: &Params) -> Result<()> {
-    let Field { normals, mask, weights, width } = field;
-    let length = |argument, expected, actual| {
-        if expected == actual { Ok(()) } else { Err(Error::LengthMismatch { argument, expected, actual }) }
-    };
-    length("normals", mask.len() * 3, normals.len())?;
-    if let Some(weights) = weights {
-        length("weights", mask.len(), weights.len())?;
-    }
-    if width == 0 || !mask.contains(&true) {
-        return Err(Error::EmptyMask);
-    }
-    length("mask", mask.len().div_ceil(width) * width, mask.len())?;
-    // Nearly always all is well, and that shows quickly; only otherwise the first offender is looked for.
-    if !mask.par_chunks(CHECK_PIXELS).enumerate().all(|(chunk, mask)| {
-        let first = chunk * CHECK_PIXELS;
-        (first..first + mask.len()).all(|pixel| check_pixel(field, pixel).is_ok())
-    }) {
-        (0..mask.len()).try_for_each(|pixel| check_pixel(field, pixel))?;
-    }
+    check_lengths(field)?;
+    check_pixels(field, check_pixel)?;
     for (argument, value) in
         [("relative_tolerance", params.relative_tolerance), ("absolute_tolerance", params.absolute_tolerance)]
     {
@@ -133,15 +134,58 @@ pub(super) fn check(field: Field<'_>, params: &Params) -> Result<()> {
     Ok(())
 }
 
+/// Refuses arrays that do not fit each other, and a mask without a pixel.
+pub(super) fn check_lengths(field: Field<'_>) -> Result<()> {
+    let Field { normals, mask, weights, regions, width } = field;
+    let length = |argument, expected, actual| {
+        if expected == actual { Ok(()) } else { Err(Error::LengthMismatch { argument, expected, actual }) }
+    };
+    length("normals", mask.len() * 3, normals.len())?;
+    if let Some(weights) = weights {
+        length("weights", mask.len(), weights.len())?;
+    }
+    if let Some(regions) = regions {
+        length("regions", mask.len(), regions.len())?;
+    }
+    if width == 0 || !mask.contains(&true) {
+        return Err(Error::EmptyMask);
+    }
+    length("mask", mask.len().div_ceil(width) * width, mask.len())?;
+    Ok(())
+}
+
+/// Refuses the first pixel of the image that `check` refuses.
+pub(super) fn check_pixels(field: Field<'_>, check: impl Fn(Field<'_>, usize) -> Result<()> + Sync) -> Result<()> {
+    // Nearly always all is well, and that shows quickly; only otherwise the first offender is looked for.
+    let mask = field.mask;
+    if !mask.par_chunks(CHECK_PIXELS).enumerate().all(|(chunk, mask)| {
+        let first = chunk * CHECK_PIXELS;
+        (first..first + mask.len()).all(|pixel| check(field, pixel).is_ok())
+    }) {
+        (0..mask.len()).try_for_each(|pixel| check(field, pixel))?;
+    }
+    Ok(())
+}
+
 /// Refuses a normal or a weight inside the mask that means nothing.
-fn check_pixel(field: Field<'_>, pixel: usize) -> Result<()> {
-    let Field { normals, mask, weights, width } = field;
+pub(super) fn check_pixel(field: Field<'_>, pixel: usize) -> Result<()> {
+    check_finite(field, pixel)?;
+    let n_z = field.normals[pixel * 3 + 2];
+    if field.mask[pixel] && n_z < 0.0 {
+        return Err(Error::BadNormal { row: pixel / field.width, col: pixel % field.width, n_z: f64::from(n_z) });
+    }
+    Ok(())
+}
+
+/// The same for perspective, where the camera may see a normal with `n_z < 0`.
+pub(super) fn check_finite(field: Field<'_>, pixel: usize) -> Result<()> {
+    let Field { normals, mask, weights, width, .. } = field;
     if !mask[pixel] {
         return Ok(());
     }
     let (row, col) = (pixel / width, pixel % width);
     let normal = &normals[pixel * 3..pixel * 3 + 3];
-    if !(normal.iter().all(|component| component.is_finite()) && normal[2] >= 0.0) {
+    if !normal.iter().all(|component| component.is_finite()) {
         return Err(Error::BadNormal { row, col, n_z: f64::from(normal[2]) });
     }
     if let Some(weights) = weights

@@ -43,7 +43,7 @@ impl System {
         weights: Option<&[f32]>,
         difference: Difference,
     ) -> Result<Self> {
-        let field = Field { normals, mask, weights, width };
+        let field = Field { normals, mask, weights, regions: None, width };
         check(field, &Params { difference, ..Params::default() })?;
         let (mut weights, mut right) = assemble(field, difference);
         fill_corners(&mut weights);

@@ -1,0 +1,233 @@
+//! The bilateral integrator: solve, re-weigh, until the energy rests.
+
+use std::ops::ControlFlow;
+
+use rayon::prelude::*;
+
+use super::super::checkerboard::{Weights, join_row, split_row};
+use super::super::components::Runs;
+use super::super::conjugate_gradient::{conjugate_gradients, square_sum};
+use super::super::fill::fill_corners;
+use super::super::operator::{Colours, Field};
+use super::super::reduction::{eliminate_blacks, fill_blacks, multiply};
+use super::super::solve::{check_finite, check_lengths, check_pixel, check_pixels};
+use super::super::{Params, Progress};
+use super::assemble::assemble;
+use super::jacobi::correct;
+use super::pixels::Pixels;
+use super::reweigh::{even, reweigh};
+use super::{BilateralParams, BilateralSurface, Pinhole, Precision, Setting};
+use crate::{Error, Result};
+
+/// Largest relative residual of an inner solve: as published.
+const COMPATIBLE_TOLERANCE: f64 = 1e-3;
+/// The same where every system is solved.
+const CONVERGED_TOLERANCE: f64 = 1e-6;
+/// Least share of a side in a system that multigrid solves. Weaker ties than this hold nothing within the tolerance, and the
+/// preconditioner's `f32` could not carry them.
+const CONVERGED_LEAST_SHARE: f64 = 1e-6;
+/// Most iterations of an inner solve by Jacobi, each two of the published ones.
+const COMPATIBLE_ITERS: usize = 2_500;
+/// The same by multigrid.
+const CONVERGED_ITERS: usize = 500;
+
+/// Callback of [`integrate_bilateral`], once a re-weighting, with the relative change of the energy in place of the residual.
+pub type OnReweigh<'a> = &'a mut dyn FnMut(Progress) -> ControlFlow<()>;
+
+/// Integrates normals to a surface that may jump between pixels.
+///
+/// # Inputs
+/// `field` as for [`super::super::integrate_field`]; `camera` for perspective, where any side of a normal may face the camera.
+///
+/// # Method
+/// Iteratively re-weighted least squares on one-sided differences (Cao et al. 2022, algorithm 1), each system solved from the
+/// surface before it. See [`super`] for the functional.
+///
+/// # Errors
+/// Those of [`super::super::integrate`]; in perspective, normals that look away from the camera.
+///
+/// # Examples
+/// ```
+/// use bgars_core::integrate::{BilateralParams, Field, integrate_bilateral};
+/// // Flat, and tilted by one pixel a pixel: the fold is no jump, and costs nothing.
+/// let s = 0.5f32.sqrt();
+/// let normals = [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [-s, 0.0, s], [-s, 0.0, s]].concat();
+/// let field = Field { normals: &normals, mask: &[true; 4], weights: None, regions: None, width: 4 };
+/// let surface = integrate_bilateral(field, None, &BilateralParams::default(), &mut |_| {
+///     std::ops::ControlFlow::Continue(())
+/// })?;
+/// assert!((surface.height[3] - surface.height[2] - 1.0).abs() < 0.1);
+/// assert!(surface.converged);
+/// # Ok::<(), bgars_core::Error>(())
+/// ```
+///
+/// # Cost
+/// A re-weighting is linear in the pixels of the mask's bounding box, and so is an iteration of the inner solver; the same
+/// bits for any number of threads.
+pub fn integrate_bilateral(
+    field: Field<'_>,
+    camera: Option<Pinhole>,
+    params: &BilateralParams,
+    on_progress: OnReweigh<'_>,
+) -> Result<BilateralSurface> {
+    let Field { mask, width, .. } = field;
+    check(field, camera, params)?;
+    let pixels = Pixels::new(field, camera);
+    let mut z = vec![0.0; pixels.all.len()];
+    let mut shares = even(&pixels);
+    let least_share = if params.setting == Setting::Converged { CONVERGED_LEAST_SHARE } else { 0.0 };
+    let mut fit = Progressed::default();
+    let mut energies: Vec<f64> = Vec::new();
+    let mut converged = false;
+    while energies.len() < params.max_iters && !converged {
+        let (system, right) = assemble(&pixels, &shares, least_share);
+        improve(system, right, &mut z, params, &mut fit, on_progress)?;
+        let energy = reweigh(&pixels, &z, params.k, &mut shares);
+        let before = energies.last().copied().unwrap_or(f64::INFINITY);
+        energies.push(energy);
+        fit.change = (energy - before).abs() / before;
+        converged = energy == 0.0 || (before.is_finite() && fit.change < params.tolerance);
+        fit.rounds = energies.len();
+        if on_progress(Progress { iteration: fit.rounds, residual: fit.change }).is_break() {
+            return Err(Error::Cancelled);
+        }
+    }
+    let runs = Runs::new(mask, field.regions, width);
+    let crop = pixels.crop;
+    let means = runs.means(|row, col| z[(row - crop.row) * crop.grid.width + (col - crop.col)]);
+    let labels = runs.labels();
+    let mean_at = |pixel: usize| {
+        let (row, col) = (pixel / crop.grid.width + crop.row, pixel % crop.grid.width + crop.col);
+        means[labels[row * width + col] as usize]
+    };
+    Ok(BilateralSurface {
+        height: pixels.whole(mask.len(), width, |pixel| z[pixel] - mean_at(pixel)),
+        rightward: pixels.whole(mask.len(), width, |pixel| shares[0][pixel]),
+        upward: pixels.whole(mask.len(), width, |pixel| shares[1][pixel]),
+        labels,
+        components: runs.components,
+        energies,
+        converged,
+        inner_iterations: fit.inner_iterations,
+        residual: fit.residual,
+    })
+}
+
+/// Refuses what the integrator cannot work on.
+fn check(field: Field<'_>, camera: Option<Pinhole>, params: &BilateralParams) -> Result<()> {
+    check_lengths(field)?;
+    match camera {
+        None => check_pixels(field, check_pixel)?,
+        Some(camera) => {
+            camera.check()?;
+            check_pixels(field, check_finite)?;
+            check_facing(field, camera)?;
+        }
+    }
+    for (argument, value, least) in [("k", params.k, 0.0), ("tol", params.tolerance, f64::MIN_POSITIVE)] {
+        if !(value.is_finite() && value >= least) {
+            let rule = if least == 0.0 { "finite and at least 0" } else { "finite and above 0" };
+            return Err(Error::OutOfRange { argument, rule, value });
+        }
+    }
+    if params.max_iters == 0 {
+        return Err(Error::OutOfRange { argument: "max_iters", rule: "at least 1", value: 0.0 });
+    }
+    Ok(())
+}
+
+/// Refuses a camera under which most of the surface looks away: a sign is wrong somewhere.
+fn check_facing(field: Field<'_>, camera: Pinhole) -> Result<()> {
+    let Field { normals, mask, width, .. } = field;
+    let away = |&pixel: &usize| {
+        let normal = std::array::from_fn(|axis| f64::from(normals[3 * pixel + axis]));
+        mask[pixel] && camera.slants(normal, pixel / width, pixel % width)[0] <= 0.0
+    };
+    let count = (0..mask.len()).into_par_iter().filter(away).count();
+    let pixels = mask.iter().filter(|&&used| used).count();
+    if 2 * count > pixels {
+        return Err(Error::LooksAway { count, pixels });
+    }
+    Ok(())
+}
+
+/// What the inner solves add up to.
+#[derive(Default)]
+struct Progressed {
+    rounds: usize,
+    change: f64,
+    inner_iterations: usize,
+    residual: f64,
+}
+
+/// Brings `z` (row-major in the box) closer to the solution of a system.
+fn improve(
+    mut weights: Weights,
+    mut right: Colours,
+    z: &mut [f64],
+    params: &BilateralParams,
+    fit: &mut Progressed,
+    on_progress: OnReweigh<'_>,
+) -> Result<()> {
+    let grid = weights.grid;
+    let (width, half) = (grid.width, grid.half());
+    let scale = (square_sum(&right.reds) + square_sum(&right.blacks)).sqrt();
+    if scale == 0.0 {
+        z.fill(0.0);
+        return Ok(());
+    }
+    if params.setting == Setting::Converged {
+        fill_corners(&mut weights);
+    }
+    let [mut reds, mut before] = [vec![0.0; grid.half_pixels()], vec![0.0; grid.half_pixels()]];
+    reds.par_chunks_mut(half)
+        .zip(before.par_chunks_mut(half))
+        .zip(z.par_chunks(width))
+        .enumerate()
+        .for_each(|(row, ((reds, blacks), z))| split_row(row, z, reds, blacks));
+    // The residual of the reds, the blacks solved for: b - S x.
+    eliminate_blacks(&weights, &mut right.reds, &right.blacks);
+    let mut residual = before;
+    multiply(&weights, &reds, &mut residual);
+    residual.par_iter_mut().zip(&right.reds).for_each(|(residual, b)| *residual = b - *residual);
+    let (iterations, left) = match params.setting {
+        Setting::Compatible => {
+            let target = COMPATIBLE_TOLERANCE * scale;
+            let mut stopped = false;
+            let Progressed { rounds, change, .. } = *fit;
+            let mut done = 0;
+            let each = || {
+                done += 1;
+                // A look at the callback costs more than a small iteration.
+                stopped = done % 64 == 0 && on_progress(Progress { iteration: rounds, residual: change }).is_break();
+                !stopped
+            };
+            let outcome = match params.precision {
+                Precision::Double => correct::<f64>(&weights, &residual, &mut reds, target, COMPATIBLE_ITERS, each),
+                Precision::Single => correct::<f32>(&weights, &residual, &mut reds, target, COMPATIBLE_ITERS, each),
+            };
+            if stopped {
+                return Err(Error::Cancelled);
+            }
+            (outcome.0, outcome.1 / scale)
+        }
+        Setting::Converged => {
+            let inner =
+                Params { relative_tolerance: CONVERGED_TOLERANCE, max_iters: CONVERGED_ITERS, ..Params::default() };
+            let (rounds, change) = (fit.rounds, fit.change);
+            let mut report = |_: Progress| on_progress(Progress { iteration: rounds, residual: change });
+            let solution = conjugate_gradients(&weights, &residual, scale, &inner, &mut report)?;
+            reds.par_iter_mut().zip(&solution.x).for_each(|(red, change)| *red += change);
+            (solution.iterations, solution.residual)
+        }
+    };
+    fit.inner_iterations += iterations;
+    fit.residual = fit.residual.max(left);
+    fill_blacks(&weights, &reds, &mut right.blacks);
+    z.par_chunks_mut(width)
+        .zip(reds.par_chunks(half))
+        .zip(right.blacks.par_chunks(half))
+        .enumerate()
+        .for_each(|(row, ((z, reds), blacks))| join_row(row, reds, blacks, z));
+    Ok(())
+}
