@@ -14,9 +14,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
+    from pathlib import Path
 
-__all__ = ["EXIT_BAD_INPUT", "error_console", "fail", "print_json", "say", "stage_progress", "utc_now"]
+__all__ = ["EXIT_BAD_INPUT", "error_console", "fail", "print_json", "say", "say_files", "stage_progress", "utc_now"]
 
 EXIT_BAD_INPUT = 2
 
@@ -27,6 +28,13 @@ error_console = Console(stderr=True, highlight=False, soft_wrap=True)
 def say(text: str = "") -> None:
     """Print a line of a command's result; brackets are taken literally."""
     output_console.print(text, markup=False)
+
+
+def say_files(output: Path, files: Mapping[str, str]) -> None:
+    """List the files in a folder of results, each with what it holds."""
+    width = max(len(str(output / name)) for name in files)
+    for name, meaning in files.items():
+        say(f"  {output / name!s:<{width}}  {meaning}")
 
 
 def print_json(values: dict[str, Any]) -> None:

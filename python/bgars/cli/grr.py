@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import bgars
-from bgars.cli.console import print_json, say, stage_progress
+from bgars.cli.console import print_json, say, say_files, stage_progress
 from bgars.cli.inspect import EXIT_NOT_PASSED
 from bgars.io.atomic import atomic_folder
 from bgars.normals import DEFAULT_METHOD, Method
@@ -113,9 +113,7 @@ def _tell(found: GaugeStudy, output: Path) -> None:
             f"{each.verdict or '-'}"
         )
     say()
-    width = max(len(str(output / name)) for name in FILES)
-    for name, meaning in FILES.items():
-        say(f"  {output / name!s:<{width}}  {meaning}")
+    say_files(output, FILES)
 
 
 def _cell(value: float) -> str:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import bgars
-from bgars.cli.console import print_json, say, stage_progress, utc_now
+from bgars.cli.console import print_json, say, say_files, stage_progress, utc_now
 from bgars.errors import InputError
 from bgars.io.atomic import atomic_folder
 from bgars.io.parquet import need_pyarrow
@@ -132,9 +132,7 @@ def _tell(result: PartResult, output: Path, files: dict[str, str]) -> None:
     if len(rows) > MAX_ROWS:
         say(f"... and {len(rows) - MAX_ROWS} more in balls.csv")
     say()
-    width = max(len(str(output / name)) for name in files)
-    for name, meaning in files.items():
-        say(f"  {output / name!s:<{width}}  {meaning}")
+    say_files(output, files)
 
 
 def _summary(result: PartResult) -> str:

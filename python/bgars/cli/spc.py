@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 import bgars
-from bgars.cli.console import print_json, say, stage_progress
+from bgars.cli.console import print_json, say, say_files, stage_progress
 from bgars.cli.inspect import EXIT_NOT_PASSED
 from bgars.io.atomic import atomic_folder
 from bgars.studies.pages import spc_page
@@ -88,6 +88,4 @@ def _tell(found: bgars.ProcessTrend, output: Path) -> None:
             f"{len(each.chart.signals):>8}  {each.verdict or '-'}"
         )
     say()
-    width = max(len(str(output / name)) for name in FILES)
-    for name, meaning in FILES.items():
-        say(f"  {output / name!s:<{width}}  {meaning}")
+    say_files(output, FILES)
