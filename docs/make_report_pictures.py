@@ -29,7 +29,7 @@ def main() -> None:
     path = os.environ.get("BGARS_BROWSER") or shutil.which("chromium") or shutil.which("google-chrome")
     PICTURES.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
-        bgars.write_report(result, Path(folder) / "report.html", capture=capture, method="reflectance")
+        bgars.write_report(result, Path(folder) / "report.html", capture=capture)
         browser = driver.chromium.launch(executable_path=path, args=OPTIONS)
         for name, (scheme, place, chosen) in VIEWS.items():
             page = browser.new_page(viewport={"width": 1280, "height": 1000}, color_scheme=scheme)

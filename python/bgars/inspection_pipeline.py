@@ -86,7 +86,7 @@ def inspect(
     report("find", 0.0)
     found = _found(capture, recipe, threads, report)
     report("find", 1.0)
-    measurement = _measured(capture, found, method, material, threads, report)
+    measurement, choice = _measured(capture, found, method, material, threads, report)
     report("measure", 1.0)
     files = capture_files(capture) + (() if recipe is None or recipe.file is None else (recipe.file,))
     result = judge_part(
@@ -100,7 +100,7 @@ def inspect(
         warnings=warnings,
     )
     report("judge", 1.0)
-    return replace(result, method=method, capture=capture.name)
+    return replace(result, method=method, normals_choice=choice, capture=capture.name)
 
 
 def _material(recipe: PartRecipe | None, method: Method) -> tuple[SurfaceMaterial | None, tuple[str, ...]]:
@@ -129,17 +129,20 @@ def _measured(
     material: SurfaceMaterial | None,
     threads: int | None,
     report: Callable[[InspectionStage, float], None],
-) -> BallMeasurement:
-    """Measure the balls; their normals are made beside the fit of the shadows, which needs only some of the board."""
+) -> tuple[BallMeasurement, str]:
+    """Measure the balls; their normals are made beside the fit of the shadows, which needs only some of the board.
+
+    Returns also what the estimator of their normals says that it did.
+    """
     if not found.balls:
-        return measure_balls(capture, found, threads=threads)
+        return measure_balls(capture, found, threads=threads), ""
     balls = inside_circles(((ball.x_px, ball.y_px, ball.radius_px + 1.0) for ball in found.balls), capture.mask.shape)
     sparse = np.zeros_like(balls)
     sparse[::BOARD_STEP, ::BOARD_STEP] = True
     board = sparse & ~balls & capture.mask
     field = estimate_normals(capture, method="robust-filter", mask=board, threads=threads) if board.any() else None
     if not (balls & capture.mask).any():
-        return measure_balls(capture, found, field=field, threads=threads)
+        return measure_balls(capture, found, field=field, threads=threads), ""
     anchors = found if method == "reflectance" else None
     with ThreadPoolExecutor(1) as background:
         normals = background.submit(
@@ -151,7 +154,7 @@ def _measured(
             material=material,
             threads=threads,
         )
-        return measure_balls(
+        measurement = measure_balls(
             capture,
             found,
             field=field,
@@ -159,3 +162,4 @@ def _measured(
             threads=threads,
             progress=lambda fraction: report("measure", fraction),
         )
+        return measurement, normals.result().choice

@@ -205,6 +205,8 @@ class PartResult:
         Of bgars.
     method : str
         Estimator of the normals, which show flat tops.
+    normals_choice : str
+        What it did, and how well one material explains the balls; empty: no ball was looked at.
     capture : str
         Name of the capture.
     serial : str
@@ -241,6 +243,7 @@ class PartResult:
     files: tuple[tuple[str, str], ...] = ()
     version: str = ""
     method: str = ""
+    normals_choice: str = ""
     capture: str = ""
     serial: str = ""
     inspected_utc: str = ""

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 @pytest.fixture(scope="module")
 def failed_page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("pages") / "report.html"
-    bgars.write_report(failing(), path, capture=simulated("bad")[0], method="reflectance")
+    bgars.write_report(failing(), path, capture=simulated("bad")[0])
     return path
 
 

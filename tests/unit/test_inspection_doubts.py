@@ -28,6 +28,7 @@ def test_a_sound_part_passes_with_a_limit_on_warpage() -> None:
     result = bgars.inspect(capture(), PART)
     assert result.verdict == "pass", result.reasons
     assert 0.0 < result.u_warpage_um < 1.0
+    assert "material fitted on 9 balls" in result.normals_choice
 
 
 @pytest.mark.parametrize("options", [{"elevation_deg": 46.0}, {"elevation_deg": 47.5}, {"height": 0.95}])

@@ -162,7 +162,7 @@ def test_report_again_from_the_folder(tmp_path: Path) -> None:
     capture, _ = simulated("bad")
     result = failing()
     (tmp_path / "result.json").write_text(result.to_json(), encoding="utf-8")
-    files = bgars.write_report(result, tmp_path / "report.html", capture=capture, method="reflectance")
+    files = bgars.write_report(result, tmp_path / "report.html", capture=capture)
     assert set(files) == {"report.html", "photograph.jpg", "report.json"}
     first = (tmp_path / "report.html").read_bytes()
     for place in (tmp_path, tmp_path / "result.json"):

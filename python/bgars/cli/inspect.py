@@ -95,7 +95,7 @@ def inspect(
         files = FILES | bgars.write_part_pictures(result, capture, place)
         (place / "result.json").write_text(result.to_json(), encoding="utf-8")
         (place / "balls.csv").write_text(result.to_csv(), encoding="utf-8")
-        pages = bgars.write_report(result, place / "report.html", capture=capture, method=method)
+        pages = bgars.write_report(result, place / "report.html", capture=capture)
         files = {"report.html": pages.pop("report.html"), **files, **pages}
         if parquet:
             bgars.write_parquet(result, place / "balls.parquet")

@@ -172,6 +172,9 @@ class ResultTable(Table):
     files: list[FileTable] = Field(description="every input file")
     version: str = Field(description="version of bgars")
     method: str = Field(description="estimator of the normals, which show flat tops")
+    normals_choice: str = Field(
+        description="what the estimator did, and how well one material explains the balls; empty = no ball looked at"
+    )
     capture: str = Field(description="name of the capture folder")
     serial: str = Field(description="serial number of the part; empty = not given")
     inspected_utc: str = Field(

@@ -56,7 +56,6 @@ def write_report(
     path: str | PathLike[str],
     *,
     capture: Capture | None = None,
-    method: str | None = None,
 ) -> dict[str, str]:
     """Write the page of an inspection: one HTML file that loads nothing and works without a network.
 
@@ -72,8 +71,6 @@ def write_report(
         result.json the page can be written again.
     capture : Capture, optional
         That the result was made from: without one the part is drawn without a photograph. Not with a path.
-    method : str, optional
-        Estimator of the normals, to be named on the page. Not with a path.
 
     Returns
     -------
@@ -83,7 +80,7 @@ def write_report(
     Raises
     ------
     InputError
-        A capture or a method with a path; a capture without a pixel pitch or of another number of lights.
+        A capture with a path; a capture without a pixel pitch or of another number of lights.
     FileFormatError
         No result at the path, or a file that cannot be written.
 
@@ -103,9 +100,9 @@ def write_report(
         msg = f"{path}: must end in .html"
         raise InputError(msg)
     if isinstance(result, PartResult):
-        source = _made_source(result, capture, method)
-    elif capture is not None or method is not None:
-        msg = "capture, method: must not be given with the path of a result, whose folder keeps both"
+        source = _made_source(result, capture)
+    elif capture is not None:
+        msg = "capture: must not be given with the path of a result, whose folder keeps the photograph"
         raise InputError(msg)
     else:
         source = read_page_source(Path(result))
@@ -114,14 +111,14 @@ def write_report(
     with atomic_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
     if capture is not None and source.photograph is not None:
-        for name, content in side_files(source.photograph, source.method, source.lamps).items():
+        for name, content in side_files(source.photograph, source.lamps).items():
             with atomic_file(path.with_name(name)) as temporary:
                 temporary.write_bytes(content)
             written[name] = REPORT_FILES[name]
     return written
 
 
-def _made_source(result: PartResult, capture: Capture | None, method: str | None) -> PageSource:
+def _made_source(result: PartResult, capture: Capture | None) -> PageSource:
     if capture is not None:
         if capture.pixel_pitch_um is None:
             msg = "capture.pixel_pitch_um: needed for a report in um, got none"
@@ -131,7 +128,7 @@ def _made_source(result: PartResult, capture: Capture | None, method: str | None
                 f"capture: must have the {len(result.light_directions)} lights of the result, got {len(capture.images)}"
             )
             raise InputError(msg)
-    return source_of(result, capture, method)
+    return source_of(result, capture)
 
 
 def page_text(source: PageSource) -> str:
@@ -164,7 +161,6 @@ def page_text(source: PageSource) -> str:
         no_plane="; ".join(row["why"] for row in unmeasured(result) if "coplanarity" in row["what"]),
         residual="not measured" if residual is None else f"{residual:.1%} of the contrast of lit and shadowed board",
         board=board_words(result),
-        method=source.method,
         lights=light_rows(source),
         unmeasured=unmeasured(result),
         pixel_pitch=number(result["pixel_pitch_um"], 4),

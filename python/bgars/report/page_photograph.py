@@ -111,19 +111,18 @@ def lamps_of(capture: Capture) -> tuple[Lamp, ...]:
     return tuple(Lamp(name, float(a), float(e)) for name, (a, e) in zip(names, angles, strict=True))
 
 
-def side_files(photograph: Photograph, method: str | None, lamps: tuple[Lamp, ...]) -> dict[str, bytes]:
+def side_files(photograph: Photograph, lamps: tuple[Lamp, ...]) -> dict[str, bytes]:
     """Return the files that let the page be written again: names and contents."""
     place = {name: value for name, value in asdict(photograph).items() if name != "jpeg"}
     values = {
         "photograph": {"file": PHOTOGRAPH_FILE, **place},
-        "method": method,
         "lights": [asdict(lamp) for lamp in lamps],
     }
     text = json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     return {PHOTOGRAPH_FILE: photograph.jpeg, SIDE_FILE: text.encode("utf-8")}
 
 
-def read_side_files(path: Path) -> tuple[Photograph | None, str | None, tuple[Lamp, ...]]:
+def read_side_files(path: Path) -> tuple[Photograph | None, tuple[Lamp, ...]]:
     """Read what :func:`side_files` wrote; nothing where there is nothing.
 
     Raises
@@ -132,14 +131,14 @@ def read_side_files(path: Path) -> tuple[Photograph | None, str | None, tuple[La
         The file is there, but is not what was written.
     """
     if not path.is_file():
-        return None, None, ()
+        return None, ()
     try:
         values: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         place = values["photograph"]
         left_um, right_um, bottom_um, top_um = (
             float(place[f"{name}_um"]) for name in ("left", "right", "bottom", "top")
         )
-        meaning, method = str(place["meaning"]), values["method"]
+        meaning = str(place["meaning"])
         lamps = tuple(
             Lamp(str(row["image"]), float(row["azimuth_deg"]), float(row["elevation_deg"])) for row in values["lights"]
         )
@@ -147,7 +146,7 @@ def read_side_files(path: Path) -> tuple[Photograph | None, str | None, tuple[La
         msg = f"{path}: is not what `bgars inspect` writes beside its result ({error!r}); remove it to do without"
         raise FileFormatError(msg) from error
     photograph = _read_jpeg(path.with_name(PHOTOGRAPH_FILE), (left_um, right_um, bottom_um, top_um), meaning)
-    return photograph, None if method is None else str(method), lamps
+    return photograph, lamps
 
 
 def _read_jpeg(path: Path, edges_um: tuple[float, float, float, float], meaning: str) -> Photograph | None:

@@ -27,23 +27,20 @@ class PageSource:
         As :meth:`bgars.PartResult.to_dict` returns it; None = not measured.
     photograph : Photograph or None
         The part as the camera saw it.
-    method : str or None
-        Estimator of the normals.
     lamps : tuple of Lamp
         The lights as the rig gives them; empty when unknown.
     """
 
     result: dict[str, Any]
     photograph: Photograph | None = None
-    method: str | None = None
     lamps: tuple[Lamp, ...] = ()
 
 
-def source_of(result: PartResult, capture: Capture | None, method: str | None) -> PageSource:
+def source_of(result: PartResult, capture: Capture | None) -> PageSource:
     """Gather the page of an inspection that was just made."""
     if capture is None:
-        return PageSource(result.to_dict(), method=method)
-    return PageSource(result.to_dict(), photograph_of(capture), method, lamps_of(capture))
+        return PageSource(result.to_dict())
+    return PageSource(result.to_dict(), photograph_of(capture), lamps_of(capture))
 
 
 def read_page_source(path: Path) -> PageSource:
@@ -56,5 +53,5 @@ def read_page_source(path: Path) -> PageSource:
     """
     result = read_result(path).to_dict()
     folder = path if path.is_dir() else path.parent
-    photograph, method, lamps = read_side_files(folder / SIDE_FILE)
-    return PageSource(result, photograph, method, lamps)
+    photograph, lamps = read_side_files(folder / SIDE_FILE)
+    return PageSource(result, photograph, lamps)
