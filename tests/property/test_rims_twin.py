@@ -75,7 +75,7 @@ def test_eliminate_rims_is_least_squares_in_each_sector(lights: int, threads: in
     levels = (rng.random((lights, *row.shape)) * weight).astype(np.float32)
     pixels = SimpleNamespace(row=row, col=col, weight=weight, levels=levels)
     table = _bgars.rim_profiles(BLUR_PX, 6.0, threads=1)
-    moved = [*circles, 0.05, 0.1, -0.2]
+    moved = circles + np.array([0.05, 0.1, -0.2])
     rest, coefficients = _bgars.eliminate_rims(pixels, moved, table, blur_px=BLUR_PX, threads=threads)
     for ball, circle in enumerate(moved):
         for sector in range(SECTORS):
