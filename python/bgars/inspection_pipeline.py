@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from bgars.ball_records import BallMeasurement, FoundBalls
     from bgars.material_records import SurfaceMaterial
     from bgars.part_result import PartResult
-    from bgars.records import Capture
+    from bgars.records import Capture, NormalField
 
 __all__ = ["inspect"]
 
@@ -84,9 +84,12 @@ def inspect(
     check_capture(capture)
     material, warnings = _material(recipe, method)
     report("find", 0.0)
-    found = _found(capture, recipe, threads, report)
-    report("find", 1.0)
-    measurement, choice = _measured(capture, found, method, material, threads, report)
+    with ThreadPoolExecutor(1) as background:
+        # The board's normals need no balls: they are made while the balls are looked for.
+        board = background.submit(_board_normals, capture, threads)
+        found = _found(capture, recipe, threads, report)
+        report("find", 1.0)
+        measurement, choice = _measured(capture, found, board.result(), method, material, threads, report)
     report("measure", 1.0)
     files = capture_files(capture) + (() if recipe is None or recipe.file is None else (recipe.file,))
     result = judge_part(
@@ -122,25 +125,29 @@ def _found(
     return find_balls(capture, layout=layout, threads=threads, progress=lambda fraction: report("find", fraction))
 
 
+def _board_normals(capture: Capture, threads: int | None) -> NormalField | None:
+    """Normals of some pixels all over the image; those of balls are left out where they are used."""
+    mask = np.zeros_like(capture.mask)
+    mask[::BOARD_STEP, ::BOARD_STEP] = capture.mask[::BOARD_STEP, ::BOARD_STEP]
+    return estimate_normals(capture, method="robust-filter", mask=mask, threads=threads) if mask.any() else None
+
+
 def _measured(
     capture: Capture,
     found: FoundBalls,
+    field: NormalField | None,
     method: Method,
     material: SurfaceMaterial | None,
     threads: int | None,
     report: Callable[[InspectionStage, float], None],
 ) -> tuple[BallMeasurement, str]:
-    """Measure the balls; their normals are made beside the fit of the shadows, which needs only some of the board.
+    """Measure the balls; their normals are made beside the fit of the shadows, which needs only those of the board.
 
     Returns also what the estimator of their normals says that it did.
     """
     if not found.balls:
         return measure_balls(capture, found, threads=threads), ""
     balls = inside_circles(((ball.x_px, ball.y_px, ball.radius_px + 1.0) for ball in found.balls), capture.mask.shape)
-    sparse = np.zeros_like(balls)
-    sparse[::BOARD_STEP, ::BOARD_STEP] = True
-    board = sparse & ~balls & capture.mask
-    field = estimate_normals(capture, method="robust-filter", mask=board, threads=threads) if board.any() else None
     if not (balls & capture.mask).any():
         return measure_balls(capture, found, field=field, threads=threads), ""
     anchors = found if method == "reflectance" else None
