@@ -45,7 +45,7 @@ __all__ = ["REPORT_FILES", "write_report"]
 REPORT_FILES = {
     "report.html": "open in a browser: verdict, balls, charts and a 3-D view on one page that needs no network",
     "photograph.jpg": "the part as the camera saw it, for `bgars report`",
-    "report.json": "where the photograph lies, lights and estimator, for `bgars report`",
+    "report.json": "where the photograph lies, and the lights, for `bgars report`",
 }
 TEMPLATES = Path(__file__).parent / "template"
 SEATS_TOLD = 3
