@@ -80,8 +80,9 @@ def _scatter_levels(radiance: Radiance, edges: Edges, spread_px: float) -> float
     use = known & (row >= 0) & (row < radiance.height) & (col >= 0) & (col < radiance.width)
     light = np.broadcast_to(np.arange(radiance.lights)[:, None], use.shape)[use]
     levels = radiance.under(light, row[use] * radiance.width + col[use]) / radiance.scale
+    light, levels = light[np.isfinite(levels)], levels[np.isfinite(levels)]  # clipped ones say nothing
     usual = np.array(
-        [np.nanmedian(levels[light == index]) if (light == index).any() else 0.0 for index in range(radiance.lights)]
+        [np.median(levels[light == index]) if (light == index).any() else 0.0 for index in range(radiance.lights)]
     )
     off = levels - usual[light]
     off = off[np.abs(off) < PLATEAU_SHARE * float(np.median(edges.contrast_levels[known]))]
