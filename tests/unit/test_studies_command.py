@@ -271,3 +271,47 @@ def test_a_study_of_captures_is_inspected_and_a_bad_capture_fails_it_by_name(
         with pytest.raises(kind, match=re.escape(str(tmp_path / "s" / "1"))):
             bgars.read_study(tmp_path / "s")
     assert not (tmp_path / "second").exists()
+
+
+def test_results_of_captures_are_kept_and_repeat_the_study_without_images(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = bgars.Scene.ball_array(2, 2, seed=1)
+    for number in (1, 2, 3):
+        capture, truth = bgars.simulate(
+            scene, bgars.LightRig.ring(4), bgars.Material(), bgars.Camera(pixel_pitch_um=40.0), seed=number
+        )
+        bgars.write_simulation(capture, truth, tmp_path / "s" / "part 7" / str(number))
+
+    def stand_in(
+        capture: bgars.Capture, _recipe: object, *, progress: Callable[[str, float], None], **_: object
+    ) -> bgars.PartResult:
+        for stage in ("find", "measure", "judge"):
+            progress(stage, 0.5)
+        return judged(run=int(capture.name))
+
+    monkeypatch.setattr(study_folder, "inspect", stand_in)
+    told: list[float] = []
+    study = bgars.read_study(tmp_path / "s", progress=told.append)
+    assert study.inspected
+    assert told == sorted(told)
+    assert (told[0], told[-1], len(set(told))) == (0.0, 1.0, 3 * 4 + 1), "it moves while a capture is inspected"
+    code, text = command("grr", tmp_path / "s", "-o", tmp_path / "out")
+    assert "3 runs, inspected" in text
+    kept = tmp_path / "out" / "results"
+    assert [bgars.read_result(kept / "part 7" / str(number)).to_json() for number in (1, 2, 3)] == [
+        run.result.to_json() for run in study.runs
+    ]
+    monkeypatch.delattr(study_folder, "inspect")
+    again, text = command("grr", kept, "-o", tmp_path / "again")
+    assert (again, "3 runs, read from finished results" in text) == (code, True), text
+    assert not (tmp_path / "again" / "results").exists()
+    first, second = (
+        json.loads((tmp_path / name / "grr.json").read_text(encoding="utf-8"))["characteristics"]
+        for name in ("out", "again")
+    )
+    for one, two in zip(first, second, strict=True):
+        sigmas = [[spread["sigma"] for spread in each["spreads"]] for each in (one, two)]
+        assert sigmas[0] == pytest.approx(sigmas[1], abs=1e-5)
+    code, text = command("grr", tmp_path / "s", "-o", tmp_path / "out")
+    assert (code, text.startswith(f"{kept}: holds the results of an earlier study")) == (2, True), text

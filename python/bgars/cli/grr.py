@@ -11,10 +11,12 @@ import typer
 import bgars
 from bgars.cli.console import print_json, say, say_files, stage_progress
 from bgars.cli.inspect import EXIT_NOT_PASSED
+from bgars.errors import InputError
 from bgars.io.atomic import atomic_folder
 from bgars.normals import DEFAULT_METHOD, Method
 from bgars.studies.pages import grr_page
 from bgars.studies.readings import readings_csv
+from bgars.studies.study_folder import write_single_results
 
 if TYPE_CHECKING:
     from bgars.studies import GaugeStudy
@@ -26,6 +28,8 @@ FILES = {
     "grr.json": "every figure",
     "readings.csv": "every reading, one line each",
 }
+RESULTS = "results"
+RESULTS_MEANING = "the result of every run: bgars report shows one, bgars grr repeats the study from them"
 
 
 def register(app: typer.Typer) -> None:
@@ -70,9 +74,12 @@ def grr(
 ) -> None:
     """Say how well the gauge repeats: gauge R&R by analysis of variance, from repeated measurements of several parts.
 
+    Runs that are captures are inspected, and their results kept in OUT/results, in folders of the same names.
+
     Exit code 0: GRR is at most 10 % of every tolerance. 1: it is not, or it cannot be said; the output says why. 2:
     wrong use, a design that is not balanced, runs that do not belong together, or a capture that cannot be measured.
     """
+    _check_results(folder, output)
     known = None if references is None else bgars.read_references(references)
     with stage_progress() as report, atomic_folder(output) as place:
         study = bgars.read_study(folder, recipe, method=method, progress=lambda fraction: report("runs", fraction))
@@ -80,12 +87,22 @@ def grr(
         (place / "grr.html").write_text(grr_page(found), encoding="utf-8")
         (place / "grr.json").write_text(_json(found), encoding="utf-8")
         (place / "readings.csv").write_text(readings_csv(study), encoding="utf-8")
+        if study.inspected:
+            write_single_results(study, place / RESULTS)
     if as_json:
         print_json(found.to_dict())
     else:
         _tell(found, output)
     if found.verdict != "pass":
         raise typer.Exit(EXIT_NOT_PASSED)
+
+
+def _check_results(folder: Path, output: Path) -> None:
+    """Refuse, before any work, to leave results of an earlier study beside the figures of this one."""
+    earlier = output / RESULTS
+    if earlier.exists() and earlier.resolve() != folder.resolve():
+        msg = f"{earlier}: holds the results of an earlier study; name another folder with -o, or remove it"
+        raise InputError(msg)
 
 
 def _json(found: GaugeStudy) -> str:
@@ -101,6 +118,7 @@ def _tell(found: GaugeStudy, output: Path) -> None:
         say(f"left out: {name}: {left_out}")
     for warning in found.warnings:
         say(f"warning: {warning}")
+    say(f"{len(study.runs)} runs, {'inspected' if study.inspected else 'read from finished results'}")
     say()
     say(f"{'characteristic':<26} {'GRR':>9} {'EV':>9} {'AV':>9} {'of tolerance':>13} {'ndc':>5}  verdict")
     for each in found.figures:
@@ -113,7 +131,7 @@ def _tell(found: GaugeStudy, output: Path) -> None:
             f"{each.verdict or '-'}"
         )
     say()
-    say_files(output, FILES)
+    say_files(output, FILES | ({RESULTS: RESULTS_MEANING} if study.inspected else {}))
 
 
 def _cell(value: float) -> str:

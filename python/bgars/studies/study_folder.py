@@ -22,13 +22,15 @@ if TYPE_CHECKING:
 
     from bgars.part_result import PartResult
 
-__all__ = ["Run", "Study", "natural", "read_study", "subfolders"]
+__all__ = ["Run", "Study", "natural", "read_study", "subfolders", "write_single_results"]
 
 CAPTURE_SIGNS = ("capture.toml", "light_directions.txt", "*.lp")
 LEVELS = ("repeat", "part/repeat", "part/placement/repeat")
 ONLY = "1"
 """Name of the part or placement where the folders have none."""
 MIN_REPEATS = 2
+STAGES = {"find": (0.0, 0.4), "measure": (0.4, 0.95), "judge": (0.95, 1.0)}
+"""About where in an inspection each of its stages begins and ends."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,8 @@ class Study:
     runs : tuple of Run
         Part by part, placement by placement.
     warnings : tuple of str
+    inspected : bool
+        True where the runs were captures, and their results exist only here.
     """
 
     folder: Path
@@ -70,6 +74,7 @@ class Study:
     repeats: int
     runs: tuple[Run, ...]
     warnings: tuple[str, ...]
+    inspected: bool = False
 
     @property
     def recipe(self) -> PartRecipe | None:
@@ -96,7 +101,7 @@ def read_study(
     method : str
         Estimator of the normals, for captures.
     progress : callable, optional
-        Called with the fraction done.
+        Called with the fraction done, also while a capture is inspected.
 
     Returns
     -------
@@ -127,13 +132,35 @@ def read_study(
         recipe = read_part_recipe(recipe)
     runs = []
     for done, (names, path) in enumerate(places):
-        if progress is not None:
-            progress(done / len(places))
-        runs.append(Run(*names, path, read_result(path) if finished else _inspected(path, recipe, method)))
+
+        def report(fraction: float, done: int = done) -> None:
+            if progress is not None:
+                progress((done + fraction) / len(places))
+
+        report(0.0)
+        runs.append(Run(*names, path, read_result(path) if finished else _inspected(path, recipe, method, report)))
     if progress is not None:
         progress(1.0)
     warnings = check_alike([(str(run.path), run.result) for run in runs])
-    return Study(folder, parts, placements, repeats, tuple(runs), warnings)
+    return Study(folder, parts, placements, repeats, tuple(runs), warnings, inspected=not finished)
+
+
+def write_single_results(study: Study, folder: Path) -> None:
+    """Write the result of every run into folders named as those of the study: :func:`read_study` reads them again.
+
+    Raises
+    ------
+    FileFormatError
+        Nothing can be written there.
+    """
+    for run in study.runs:
+        place = folder / run.path.relative_to(study.folder)
+        try:
+            place.mkdir(parents=True)
+            (place / RESULT_NAME).write_text(run.result.to_json(), encoding="utf-8")
+        except OSError as error:
+            msg = f"{place}: cannot be written ({error.strerror})"
+            raise FileFormatError(msg) from error
 
 
 def natural(name: str) -> list[tuple[int, int, str]]:
@@ -157,9 +184,13 @@ def subfolders(folder: Path) -> list[Path]:
     return sorted(inside, key=lambda path: natural(path.name))
 
 
-def _inspected(path: Path, recipe: PartRecipe | None, method: Method) -> PartResult:
+def _inspected(path: Path, recipe: PartRecipe | None, method: Method, report: Callable[[float], None]) -> PartResult:
+    def stage(name: str, fraction: float) -> None:
+        first, last = STAGES[name]
+        report(first + (last - first) * fraction)
+
     try:
-        return inspect(read_capture(path), recipe, method=method)
+        return inspect(read_capture(path), recipe, method=method, progress=stage)
     except BgarsError as error:
         if str(path) in str(error):
             raise
