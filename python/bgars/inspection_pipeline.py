@@ -18,6 +18,7 @@ from bgars.io.material_file import read_material
 from bgars.io.part_recipe import read_part_recipe
 from bgars.io.provenance import capture_files, checksums
 from bgars.normals import DEFAULT_METHOD, Method, estimate_normals
+from bgars.part_material import part_material
 from bgars.part_recipe import PartRecipe
 
 if TYPE_CHECKING:
@@ -89,7 +90,7 @@ def inspect(
         board = background.submit(_board_normals, capture, threads)
         found = _found(capture, recipe, threads, report)
         report("find", 1.0)
-        measurement, choice = _measured(capture, found, board.result(), method, material, threads, report)
+        measurement, field = _measured(capture, found, board.result(), method, material, threads, report)
     report("measure", 1.0)
     files = capture_files(capture) + (() if recipe is None or recipe.file is None else (recipe.file,))
     result = judge_part(
@@ -103,7 +104,14 @@ def inspect(
         warnings=warnings,
     )
     report("judge", 1.0)
-    return replace(result, method=method, normals_choice=choice, capture=capture.name)
+    fit = None if field is None else field.reflectance
+    return replace(
+        result,
+        method=method,
+        normals_choice="" if field is None else field.choice,
+        material=None if fit is None else part_material(fit, from_file=material is not None),
+        capture=capture.name,
+    )
 
 
 def _material(recipe: PartRecipe | None, method: Method) -> tuple[SurfaceMaterial | None, tuple[str, ...]]:
@@ -140,16 +148,16 @@ def _measured(
     material: SurfaceMaterial | None,
     threads: int | None,
     report: Callable[[InspectionStage, float], None],
-) -> tuple[BallMeasurement, str]:
+) -> tuple[BallMeasurement, NormalField | None]:
     """Measure the balls; their normals are made beside the fit of the shadows, which needs only those of the board.
 
-    Returns also what the estimator of their normals says that it did.
+    Returns also these normals; None where there is no ball.
     """
     if not found.balls:
-        return measure_balls(capture, found, threads=threads), ""
+        return measure_balls(capture, found, threads=threads), None
     balls = inside_circles(((ball.x_px, ball.y_px, ball.radius_px + 1.0) for ball in found.balls), capture.mask.shape)
     if not (balls & capture.mask).any():
-        return measure_balls(capture, found, field=field, threads=threads), ""
+        return measure_balls(capture, found, field=field, threads=threads), None
     anchors = found if method == "reflectance" else None
     with ThreadPoolExecutor(1) as background:
         normals = background.submit(
@@ -169,4 +177,4 @@ def _measured(
             threads=threads,
             progress=lambda fraction: report("measure", fraction),
         )
-        return measurement, normals.result().choice
+        return measurement, normals.result()

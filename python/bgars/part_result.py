@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.ball_records import BallKind
+from bgars.part_material import PartMaterial
 from bgars.part_recipe import PartRecipe
 
 __all__ = ["FORMAT", "FORMAT_VERSION", "BallResult", "PartCheck", "PartResult", "SeatingResult", "Verdict"]
 
 Verdict = Literal["pass", "fail", "undecided"]
 FORMAT = "bgars-result"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 """Rises with every change of the keys of result.json, or of their meaning (docs/result.schema.json)."""
 DIGITS = 6
 CSV_DIGITS = 3
@@ -207,6 +208,8 @@ class PartResult:
         Estimator of the normals, which show flat tops.
     normals_choice : str
         What it did, and how well one material explains the balls; empty: no ball was looked at.
+    material : PartMaterial or None
+        What the estimator fitted to the balls; None: another estimator, or no ball was looked at.
     capture : str
         Name of the capture.
     serial : str
@@ -244,6 +247,7 @@ class PartResult:
     version: str = ""
     method: str = ""
     normals_choice: str = ""
+    material: PartMaterial | None = None
     capture: str = ""
     serial: str = ""
     inspected_utc: str = ""
@@ -253,6 +257,7 @@ class PartResult:
         values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
         values["balls"] = [ball.to_dict() for ball in self.balls]
         values["recipe"] = None if self.recipe is None else self.recipe.to_dict()
+        values["material"] = None if self.material is None else _material_dict(self.material)
         values["files"] = [{"name": name, "sha256": digest} for name, digest in self.files]
         for name in ("seatings", "checks"):
             values[name] = [{key: _plain(value, DIGITS) for key, value in vars(row).items()} for row in values[name]]
@@ -314,6 +319,10 @@ class PartResult:
             "version": self.version,
         }
         return " ".join(f"{key}={_log_value(value)}" for key, value in pairs.items())
+
+
+def _material_dict(material: PartMaterial) -> dict[str, Any]:
+    return vars(material) | {"parameters": [dict(vars(row)) for row in material.parameters]}
 
 
 def _log_value(value: float | str | None) -> str:

@@ -62,7 +62,7 @@ def stand_in(monkeypatch: pytest.MonkeyPatch, setup: bgars.SimulationSetup) -> N
     _, truth = bgars.simulate(setup.scene, setup.rig, setup.material, setup.camera)
     found, measurement = measured_part(truth)
     monkeypatch.setattr(inspection_pipeline, "_found", lambda *_: found)
-    monkeypatch.setattr(inspection_pipeline, "_measured", lambda *_: (measurement, ""))
+    monkeypatch.setattr(inspection_pipeline, "_measured", lambda *_: (measurement, None))
 
 
 def recipe(folder: Path, text: str = PART + LIMITS) -> Path:
@@ -200,7 +200,7 @@ def test_a_capture_with_no_ball_fails(quick: Path, tmp_path: Path, monkeypatch: 
     nothing = FoundBalls((), (), (), 0, 0, None, 0.0, (0.0, 0.0))
     measurement = BallMeasurement((), np.full(6, np.nan), np.eye(4, 3), np.zeros(4), float("nan"))
     monkeypatch.setattr(inspection_pipeline, "_found", lambda *_: nothing)
-    monkeypatch.setattr(inspection_pipeline, "_measured", lambda *_: (measurement, ""))
+    monkeypatch.setattr(inspection_pipeline, "_measured", lambda *_: (measurement, None))
     for options in (["--recipe", recipe(quick)], []):
         code, text = command(quick, *options, "-o", tmp_path / "out")
         assert code == 1
@@ -222,7 +222,7 @@ def test_the_finder_gets_the_layout_as_the_camera_sees_it(quick: Path, monkeypat
         return found
 
     monkeypatch.setattr(inspection_pipeline, "_found", find)
-    monkeypatch.setattr(inspection_pipeline, "_measured", lambda *_: (measurement, ""))
+    monkeypatch.setattr(inspection_pipeline, "_measured", lambda *_: (measurement, None))
     text = PART + 'view = "top"\ndepopulated = ["A1"]\n' + LIMITS
     result = bgars.inspect(bgars.read_capture(quick), recipe(quick, text))
     assert seen[0].depopulated == ("A3",)

@@ -29,6 +29,11 @@ def test_a_sound_part_passes_with_a_limit_on_warpage() -> None:
     assert result.verdict == "pass", result.reasons
     assert 0.0 < result.u_warpage_um < 1.0
     assert "material fitted on 9 balls" in result.normals_choice
+    assert result.material is not None
+    told = {row.name: row for row in result.material.parameters}
+    assert not result.material.from_file
+    assert 0 < told["diffuse_level"].standard_error < told["diffuse_level"].value
+    assert {f"gain_{light}" for light in range(len(result.light_directions))} <= set(told)
 
 
 @pytest.mark.parametrize("options", [{"elevation_deg": 46.0}, {"elevation_deg": 47.5}, {"height": 0.95}])

@@ -14,6 +14,7 @@ RECORDS = {
     "circle_pixels": 0,
     "ball_records": 1,
     "material_records": 1,
+    "part_material": 2,
     "part_recipe": 2,
     "surface_records": 2,
     "records": 3,

@@ -120,6 +120,22 @@ def test_the_page_names_no_address_and_allows_none() -> None:
             assert re.match(r"#|data:|$", values.get(name) or ""), values
 
 
+def test_the_material_is_told_parameter_by_parameter() -> None:
+    result = failing()
+    page = Page(page_text(PageSource(result.to_dict())))
+    rows = [row[1:] for row in page.rows if row[0] == "-" and row[-1] in {"ratio", "grey levels of 255"}]
+    assert result.material is not None
+    assert [row[1] for row in rows] == [row.name for row in result.material.parameters]
+    told = {row[1]: row[2:] for row in rows}
+    assert told["diffuse_level"] == ["31.50", "0.21", "grey levels of 255"]
+    assert told["roughness_1"] == ["0.2000", "0.0012", "ratio"]
+    assert told["strength_1_level"] == ["255.0", "1.9", "grey levels of 255"]
+    assert told["gain_0"] == ["1.000", "not fitted", "ratio"]
+    assert rows[-1][0].startswith("brightness of light 3")
+    without = page_text(PageSource(replace(result, material=None).to_dict()))
+    assert "No material was fitted" in without
+
+
 def test_histograms_count_every_measured_ball() -> None:
     result = failing()
     figures = json.loads(Page(page_text(PageSource(result.to_dict()))).scripts["page-data"])["figures"]

@@ -80,8 +80,8 @@ def change(key: str, value: object) -> Callable[[dict[str, Any]], object]:
 
 SPOILT: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     "foreign": (lambda v: v.pop("format"), "is not a result of bgars: it must be an object"),
-    "older": (lambda v: v.pop("format_version"), "format_version: this bgars reads 1, got None"),
-    "newer": (change("format_version", 2), "format_version: this bgars reads 1, got 2"),
+    "older": (lambda v: v.pop("format_version"), "format_version: this bgars reads 2, got None"),
+    "newer": (change("format_version", 3), "format_version: this bgars reads 2, got 3"),
     "key gone": (lambda v: v["balls"][2].pop("top_um"), "balls.2.top_um: Field required"),
     "unknown key": (change("colour", "red"), "unknown key 'colour'"),
     "unknown key of a ball": (lambda v: v["balls"][0].update(x_mm=1), "unknown key 'balls.0.x_mm'; the nearest known"),
@@ -91,6 +91,7 @@ SPOILT: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     "no pitch": (change("pixel_pitch_um", None), "pixel_pitch_um: Input should be a valid number"),
     "contradicting layout": (lambda v: v["recipe"]["layout"].update(rows=None), "recipe: layout.rows: must be above 0"),
     "checksum": (lambda v: v["files"][0].update(sha256="abc"), "files.0.sha256"),
+    "material's unit": (lambda v: v["material"]["parameters"][0].update(unit="cd"), "material.parameters.0.unit"),
     "time": (change("inspected_utc", "yesterday"), "inspected_utc"),
 }
 

@@ -13,13 +13,14 @@ from bgars.ball_records import BallLayout
 from bgars.errors import FileFormatError, InputError
 from bgars.io.result_schema import Reading, ResultTable
 from bgars.io.strict_toml import checked
+from bgars.part_material import MaterialParameter, PartMaterial
 from bgars.part_recipe import Limits, PartRecipe
 from bgars.part_result import FORMAT, FORMAT_VERSION, BallResult, PartCheck, PartResult, SeatingResult
 
 if TYPE_CHECKING:
     from os import PathLike
 
-    from bgars.io.result_schema import RecipeTable, Table
+    from bgars.io.result_schema import MaterialTable, RecipeTable, Table
 
 __all__ = ["RESULT_NAME", "read_result"]
 
@@ -119,9 +120,15 @@ def _result(table: ResultTable) -> PartResult:
         "light_change_deg": np.array(table.light_change_deg, dtype=np.float64),
         "board_coefficients_um": np.array(table.board_coefficients_um, dtype=np.float64),
         "recipe": None if table.recipe is None else _recipe(table.recipe),
+        "material": None if table.material is None else _material(table.material),
         "files": tuple((file.name, file.sha256) for file in table.files),
     }
     return PartResult(**values)
+
+
+def _material(table: MaterialTable) -> PartMaterial:
+    rows = tuple(MaterialParameter(**_fields(row)) for row in table.parameters)
+    return PartMaterial(**(_fields(table) | {"parameters": rows}))
 
 
 def _recipe(table: RecipeTable) -> PartRecipe:

@@ -124,6 +124,30 @@ class RecipeTable(Table):
     file: str | None = Field(description="file that the recipe was read from")
 
 
+class ParameterTable(Table):
+    """A number of the material."""
+
+    name: str = Field(description="as in a material file: diffuse_level, roughness_1, gain_0, ...")
+    value: Reading = Field(description="the number, in `unit`")
+    standard_error: Reading = Field(description="standard error (k = 1) in `unit`; null = the number was not fitted")
+    unit: Literal["grey levels of 255", "ratio"] = Field(description="unit of value and standard error")
+
+
+class MaterialTable(Table):
+    """What the balls do with light, as the estimator of the normals fitted it."""
+
+    parameters: list[ParameterTable] = Field(description="diffuse light, one or two lobes, brightness of each light")
+    masking: Literal["smith", "cook-torrance"] = Field(description="attenuation of the lobes that explains more")
+    loss: Reading = Field(
+        description="mean of log(1 + (r / 3)^2) over pixels and lights, r in grey levels: below 0.1 explained very "
+        "well, above 2 not at all"
+    )
+    accepted: bool = Field(description="false: the fit was too bad, normals are another estimator's")
+    from_file: bool = Field(description="true: the recipe brought the material, nothing was fitted")
+    own_material_balls: Count = Field(description="balls that were given a material of their own")
+    residuals_learnt: bool = Field(description="whether balls were corrected by what the others show beyond it")
+
+
 class FileTable(Table):
     """A file that the result was made from."""
 
@@ -135,7 +159,7 @@ class ResultTable(Table):
     """The result of one inspection; lengths in um, angles in degrees, null = not measured."""
 
     format: Literal["bgars-result"] = Field(description="says that this file is a result of bgars")
-    format_version: Literal[1] = Field(description="rises with every change of the keys or their meaning")
+    format_version: Literal[2] = Field(description="rises with every change of the keys or their meaning")
     name: str = Field(description="name of the part (recipe), else of the capture")
     balls: list[BallTable] = Field(description="places in reading order, missing ones too; balls off the layout last")
     verdict: Verdict = Field(
@@ -175,6 +199,7 @@ class ResultTable(Table):
     normals_choice: str = Field(
         description="what the estimator did, and how well one material explains the balls; empty = no ball looked at"
     )
+    material: MaterialTable | None = Field(description="null: another estimator, or no ball was looked at")
     capture: str = Field(description="name of the capture folder")
     serial: str = Field(description="serial number of the part; empty = not given")
     inspected_utc: str = Field(

@@ -17,6 +17,7 @@ from bgars.io.atomic import atomic_file
 from bgars.part_result import PartResult
 from bgars.report.page_charts import coplanarity_chart, histogram_charts
 from bgars.report.page_chosen import chosen_marks
+from bgars.report.page_material import material_facts, material_rows
 from bgars.report.page_photograph import side_files
 from bgars.report.page_picture import part_picture
 from bgars.report.page_scene import scene_chart
@@ -162,6 +163,8 @@ def page_text(source: PageSource) -> str:
         residual="not measured" if residual is None else f"{residual:.1%} of the contrast of lit and shadowed board",
         board=board_words(result),
         lights=light_rows(source),
+        material=material_rows(result),
+        material_facts=material_facts(result),
         unmeasured=unmeasured(result),
         pixel_pitch=number(result["pixel_pitch_um"], 4),
         recipe=recipe_rows(result["recipe"]),

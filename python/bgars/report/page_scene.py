@@ -126,6 +126,8 @@ def _board_of(result: dict[str, Any]) -> Any:  # noqa: ANN401 - a function of x 
 def _packed(values: Array) -> dict[str, str]:
     """An array as plotly's typed array: a third of the size of its digits."""
     kind = "f4" if values.dtype.kind == "f" else "u4"
+    if kind == "f4":  # a damaged result may hold what single precision cannot
+        values = np.clip(values, np.finfo(np.float32).min, np.finfo(np.float32).max)
     return {"dtype": kind, "bdata": b64encode(values.astype(f"<{kind}").tobytes()).decode("ascii")}
 
 
