@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["anchors_from_part"]
 
 CAP_FROM, CAP_TO = 0.4, 0.8
-"""Part of a ball's radius that anchors it: outside a flat on its top, inside the steep rim."""
+"""Part of a ball's radius that anchors it: outside a usual flat on its top, inside the steep rim."""
 BOARD_MARGIN = 1.1
 """The board anchors itself from this times the radius of a ball on."""
 BOARD_REACH = 0.25
@@ -81,9 +81,9 @@ def anchors_from_part(result: PartResult, shape: tuple[int, int]) -> Anchors:
         if math.isfinite(ball.top_um) and math.isfinite(ball.centre_z_um):
             q = ball.q if math.isfinite(ball.q) else 1.0
             base_um = float(board_um(ball.x_um, ball.y_um))
-            height_um[rows, cols][cap] = (base_um + ball.centre_z_um + q * radius_um * np.sqrt(1.0 - off[cap])).astype(
-                np.float32
-            )
+            # A wide flat top reaches into the ring.
+            cap_um = np.minimum(ball.centre_z_um + q * radius_um * np.sqrt(1.0 - off[cap]), ball.top_um)
+            height_um[rows, cols][cap] = (base_um + cap_um).astype(np.float32)
     reach_px = BOARD_REACH * float(np.median([radius for _, _, radius in circles]))
     return Anchors(height_um=height_um, regions=regions, reach_px={0: reach_px})
 
