@@ -76,6 +76,7 @@ from bgars.studies import (
     read_results,
     read_study,
 )
+from bgars.surface_map import PartSurface
 from bgars.surface_records import Anchors, BilateralFit, Pinhole
 
 __version__ = version("bgars")
@@ -112,6 +113,7 @@ __all__ = [
     "NormalField",
     "PartRecipe",
     "PartResult",
+    "PartSurface",
     "Pinhole",
     "ProcessTrend",
     "Reconstruction",

@@ -20,6 +20,7 @@ from bgars.io.provenance import capture_files, checksums
 from bgars.normals import DEFAULT_METHOD, Method, estimate_normals
 from bgars.part_material import part_material
 from bgars.part_recipe import PartRecipe
+from bgars.part_surface import part_surface
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 
 __all__ = ["inspect"]
 
-InspectionStage = Literal["find", "measure", "judge"]
+InspectionStage = Literal["find", "measure", "judge", "surface"]
 BOARD_STEP = 4
 """Every so many rows and columns of the board give it its first shape."""
 MATERIAL_UNUSED = "material.file of the recipe is not used by method {method}"
@@ -43,6 +44,7 @@ def inspect(
     recipe: PartRecipe | str | PathLike[str] | None = None,
     *,
     method: Method = DEFAULT_METHOD,
+    surface: bool = False,
     threads: int | None = None,
     progress: Callable[[InspectionStage, float], object] | None = None,
 ) -> PartResult:
@@ -57,6 +59,9 @@ def inspect(
         measured, but undecided: there is nothing to judge it by.
     method : str
         Estimator of the normals, which show flat tops; heights come from shadows.
+    surface : bool
+        Integrate the normals, too: ``result.surface`` is then the height map that :func:`bgars.write_report` draws. No
+        reading depends on it.
     threads : int, optional
         Most threads to work on; the result does not depend on it.
     progress : callable, optional
@@ -87,10 +92,11 @@ def inspect(
     report("find", 0.0)
     with ThreadPoolExecutor(1) as background:
         # The board's normals need no balls: they are made while the balls are looked for.
-        board = background.submit(_board_normals, capture, threads)
+        started = background.submit(_board_normals, capture, threads)
         found = _found(capture, recipe, threads, report)
         report("find", 1.0)
-        measurement, field = _measured(capture, found, board.result(), method, material, threads, report)
+        board = started.result()
+        measurement, field = _measured(capture, found, board, method, material, threads, report)
     report("measure", 1.0)
     files = capture_files(capture) + (() if recipe is None or recipe.file is None else (recipe.file,))
     result = judge_part(
@@ -105,13 +111,18 @@ def inspect(
     )
     report("judge", 1.0)
     fit = None if field is None else field.reflectance
-    return replace(
+    result = replace(
         result,
         method=method,
         normals_choice="" if field is None else field.choice,
         material=None if fit is None else part_material(fit, from_file=material is not None),
         capture=capture.name,
     )
+    if surface and field is not None:
+        report("surface", 0.0)
+        result = replace(result, surface=part_surface(result, field, board, BOARD_STEP, threads=threads))
+        report("surface", 1.0)
+    return result
 
 
 def _material(recipe: PartRecipe | None, method: Method) -> tuple[SurfaceMaterial | None, tuple[str, ...]]:

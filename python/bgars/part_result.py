@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from bgars.ball_records import BallKind
 from bgars.part_material import PartMaterial
 from bgars.part_recipe import PartRecipe
+from bgars.surface_map import PartSurface
 
 __all__ = ["FORMAT", "FORMAT_VERSION", "BallResult", "PartCheck", "PartResult", "SeatingResult", "Verdict"]
 
@@ -216,6 +217,8 @@ class PartResult:
         Serial number of the part; empty: not given.
     inspected_utc : str
         When the command inspected it, ISO 8601, UTC; empty: not stamped, so that equal input gives an equal result.
+    surface : PartSurface or None
+        Integrated heights for the page, where they were asked for; not part of result.json.
     """
 
     name: str
@@ -251,10 +254,11 @@ class PartResult:
     capture: str = ""
     serial: str = ""
     inspected_utc: str = ""
+    surface: PartSurface | None = field(default=None, repr=False)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain Python values; None where something was not measured."""
-        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        """Return everything but the surface as plain Python values; None where something was not measured."""
+        values = {entry.name: getattr(self, entry.name) for entry in fields(self) if entry.name != "surface"}
         values["balls"] = [ball.to_dict() for ball in self.balls]
         values["recipe"] = None if self.recipe is None else self.recipe.to_dict()
         values["material"] = None if self.material is None else _material_dict(self.material)

@@ -60,9 +60,15 @@ class Opened:
         self.page.wait_for_selector("html[data-usable]", state="attached")
 
     def wait(self, stage: str) -> Opened:
-        """Until charts ("charted"), the 3-D view ("drawn") or its picture for paper ("ready") are there."""
+        """Until charts ("charted") or the 3-D view ("drawn") are there."""
         self.page.wait_for_selector(f"html[data-{stage}]", state="attached")
         return self
+
+    def open_scene(self) -> Opened:
+        """Ask for the 3-D view, which is a still until then."""
+        self.wait("charted")
+        self.page.click("#open-scene")
+        return self.wait("drawn")
 
 
 @pytest.fixture

@@ -48,7 +48,9 @@ def test_every_kind_of_result_opens_in_silence_and_alone(kind: str, tmp_path: Pa
     result = RESULTS[kind]()
     path = tmp_path / "report.html"
     bgars.write_report(result, path)
-    opened = open_page(path).wait("drawn" if kind in {"undecided", "nothing measured"} else "charted")
+    opened = open_page(path).wait("charted")
+    if kind in {"undecided", "list of positions"}:
+        opened.open_scene()
     assert opened.errors == []
     outside = [url for url in opened.requests if not url.startswith(("data:", "blob:"))]
     assert outside == [path.as_uri()], "nothing but the file itself"
@@ -87,8 +89,8 @@ def test_hostile_texts_are_only_texts(tmp_path: Path, open_page: Open) -> None:
     opened = open_page(path).wait("charted")
     page = opened.page
     assert "owned" not in page.title().split("document.title='owned'")[0]
-    assert page.evaluate("document.scripts.length") == 4
-    assert page.evaluate("document.querySelectorAll('main img:not(#scene-print)').length") == 0
+    assert page.evaluate("document.scripts.length") == 5
+    assert page.evaluate("document.querySelectorAll('main img:not(#scene-still)').length") == 0
     page.locator("#balls button.choose").first.click()
     assert page.inner_text("#chosen h3") == hostile().balls[0].name
     assert page.evaluate("document.querySelector('#chosen img, #chosen script')") is None
@@ -138,7 +140,7 @@ def test_filtering_by_verdict_and_by_words(failed_page: Path, open_page: Open) -
 
 
 def test_a_ball_is_chosen_in_picture_table_and_charts(failed_page: Path, open_page: Open) -> None:
-    opened = open_page(failed_page).wait("drawn")
+    opened = open_page(failed_page).open_scene()
     page = opened.page
     balls = failing().balls
     index = next(at for at, ball in enumerate(balls) if ball.name == "A3")
@@ -172,7 +174,13 @@ def test_a_ball_is_chosen_in_picture_table_and_charts(failed_page: Path, open_pa
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_the_3d_view_draws_balls(scheme: str, failed_page: Path, open_page: Open) -> None:
-    opened = open_page(failed_page, color_scheme=scheme).wait("drawn")
+    opened = open_page(failed_page, color_scheme=scheme).wait("charted")
+    assert opened.page.evaluate("document.querySelectorAll('canvas').length") == 0, (
+        "nothing is drawn before it is asked for"
+    )
+    assert opened.page.locator("#scene-still").is_visible()
+    opened.open_scene()
+    assert not opened.page.locator("#scene-still").is_visible()
     scene = opened.page.locator("[data-figure=scene]")
     scene.scroll_into_view_if_needed()
     opened.page.wait_for_timeout(300)
@@ -199,16 +207,23 @@ def test_on_a_phone_nothing_sticks_out(failed_page: Path, open_page: Open) -> No
     assert opened.errors == []
 
 
-def test_on_paper_charts_and_the_3d_view_are_there(failed_page: Path, open_page: Open, tmp_path: Path) -> None:
-    opened = open_page(failed_page, color_scheme="dark").wait("ready")
+@pytest.mark.parametrize("opened_before", [False, True])
+def test_on_paper_charts_and_the_3d_view_are_there(
+    opened_before: bool, failed_page: Path, open_page: Open, tmp_path: Path
+) -> None:
+    opened = open_page(failed_page, color_scheme="dark").wait("charted")
     page = opened.page
+    if opened_before:
+        opened.open_scene()
     page.emulate_media(media="print", color_scheme="light")
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
-    assert page.locator("#scene-print").is_visible()
-    data = page.evaluate("document.getElementById('scene-print').src").partition("base64,")[2]
+    assert page.locator("#scene-still").is_visible()
+    assert page.locator("#scene-keys").is_visible()
+    assert not page.locator("[data-figure=scene]").is_visible()
+    data = page.evaluate("document.getElementById('scene-still').src").partition("base64,")[2]
     picture = iio.imread(io.BytesIO(base64.b64decode(data)), extension=".png")[..., :3].astype(int)
     assert ((picture.max(axis=2) - picture.min(axis=2)) > 60).mean() > 0.03, "coloured caps on paper, too"
-    assert page.evaluate("document.getElementById('scene-print').naturalWidth") >= 800
+    assert page.evaluate("document.getElementById('scene-still').naturalWidth") >= 800
     assert not page.locator(".tools").first.is_visible()
     widest = "Math.max(...[...document.querySelectorAll('.chart:not(.scene) .main-svg')].map(s => s.clientWidth))"
     page.wait_for_function(f"() => {widest} <= 700", timeout=30_000)
@@ -227,7 +242,10 @@ def test_without_webgl_the_page_says_so(failed_page: Path, browser: object, open
     context.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
     page = context.new_page()
     page.goto(failed_page.as_uri())
+    page.wait_for_selector("html[data-charted]", state="attached")
+    page.click("#open-scene")
     page.wait_for_selector(".missing-view")
+    assert page.locator("#scene-still").is_visible(), "the still remains"
     assert "WebGL is off" in page.inner_text(".missing-view")
 
 

@@ -22,7 +22,7 @@ from bgars.report.part import PICTURES
 from synthetic_parts import measured_part
 from typer.testing import CliRunner
 
-PAGE = {"report.html", "photograph.jpg", "report.json"}
+PAGE = {"report.html", "photograph.jpg", "report.json", "surface.npz"}
 OUTPUTS = {"result.json", "balls.csv", "part.png", "shadows.png", "deviations.png", "histograms.png", *PAGE}
 LIMITS = (
     "[limits]\ntrue_position_um = 50.0\ndiameter_um = [560.0, 640.0]\nheight_um = [460.0, 540.0]\n"
@@ -62,7 +62,12 @@ def stand_in(monkeypatch: pytest.MonkeyPatch, setup: bgars.SimulationSetup) -> N
     _, truth = bgars.simulate(setup.scene, setup.rig, setup.material, setup.camera)
     found, measurement = measured_part(truth)
     monkeypatch.setattr(inspection_pipeline, "_found", lambda *_: found)
-    monkeypatch.setattr(inspection_pipeline, "_measured", lambda *_: (measurement, None))
+    # Any normals: the page has a surface to keep, no reading hangs on it.
+    monkeypatch.setattr(
+        inspection_pipeline,
+        "_measured",
+        lambda capture, *_: (measurement, bgars.estimate_normals(capture, method="lambertian")),
+    )
 
 
 def recipe(folder: Path, text: str = PART + LIMITS) -> Path:

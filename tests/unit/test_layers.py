@@ -17,6 +17,7 @@ RECORDS = {
     "part_material": 2,
     "part_recipe": 2,
     "surface_records": 2,
+    "surface_map": 0,
     "records": 3,
     "part_result": 3,
     "kernel_capture": 3.5,
@@ -24,8 +25,8 @@ RECORDS = {
 }
 BASE = {"errors": 0, "light_files": 1, "rig": 2, **RECORDS}
 STAGES = dict.fromkeys(("io", "pixelwise", "reflectance", "integrate", "mesh", "balls", "inspection"), 4)
-PIPELINES = ("calibrate", "pipeline", "evaluate", "part_anchors", "inspection_pipeline", "recipes", "cfx")
-JOINED = {"normals": 4.5, **dict.fromkeys(PIPELINES, 5)}
+PIPELINES = ("calibrate", "pipeline", "evaluate", "part_anchors", "recipes", "cfx")
+JOINED = {"normals": 4.5, **dict.fromkeys(PIPELINES, 5), "part_surface": 5.2, "inspection_pipeline": 5.4}
 LATER = {**JOINED, "batch": 6, "report": 6, "studies": 6.5, "experiments": 6, "samples": 0, "cli": 7}
 LEVEL = {**BASE, **STAGES, **LATER, "simulate": 4}
 

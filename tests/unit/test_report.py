@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import re
 from contextlib import suppress
@@ -17,6 +16,7 @@ import plotly.graph_objects
 import pytest
 from bgars.cli.app import app
 from bgars.report.page import page_text
+from bgars.report.page_mesh import unpacked
 from bgars.report.page_photograph import photograph_of
 from bgars.report.page_source import PageSource, read_page_source
 from bgars.report.page_words import QUANTITIES, expanded, number
@@ -93,6 +93,8 @@ def test_every_kind_of_result_makes_a_page_with_its_own_numbers(result: bgars.Pa
 def test_every_chart_is_a_valid_plotly_figure(result: bgars.PartResult) -> None:
     page = Page(page_text(PageSource(result.to_dict())))
     figures = json.loads(page.scripts["page-data"])["figures"]
+    if "scene-data" in page.scripts:
+        figures["scene"] = json.loads(page.scripts["scene-data"])
     for figure in figures.values():
         plotly.graph_objects.Figure(figure)
     assert {tag["data-figure"] for _, tag in page.elements if "data-figure" in tag} == set(figures)
@@ -100,8 +102,9 @@ def test_every_chart_is_a_valid_plotly_figure(result: bgars.PartResult) -> None:
 
 def test_no_text_becomes_markup() -> None:
     plain, page = (Page(page_text(PageSource(made().to_dict()))) for made in (failing, hostile))
-    assert [tag for tag, _ in page.elements].count("script") == [tag for tag, _ in plain.elements].count("script") == 4
-    assert "img" not in {tag for tag, values in page.elements if values.get("src")}
+    assert [tag for tag, _ in page.elements].count("script") == [tag for tag, _ in plain.elements].count("script") == 5
+    pictures = [values["src"] or "" for tag, values in page.elements if tag == "img"]
+    assert [picture[:22] for picture in pictures] == ["data:image/png;base64,"], "the still of the 3-D view"
     assert not any(name.startswith("on") for _, values in page.elements for name in values)
     assert NASTY in page.balls[0][0], "shown as it is"
     for figure in json.loads(page.scripts["page-data"])["figures"].values():
@@ -145,14 +148,10 @@ def test_histograms_count_every_measured_ball() -> None:
     assert limits == {560.0, 640.0}
 
 
-def unpacked(array: dict[str, str]) -> np.ndarray[Any, Any]:
-    return np.frombuffer(base64.b64decode(array["bdata"]), dtype=f"<{array['dtype']}")
-
-
 def test_the_3d_view_is_the_measurement() -> None:
     """Caps reach from the equator to the measured top, skirts end on the board, planes touch the seats."""
     result = failing()
-    scene = json.loads(Page(page_text(PageSource(result.to_dict()))).scripts["page-data"])["figures"]["scene"]
+    scene = json.loads(Page(page_text(PageSource(result.to_dict()))).scripts["scene-data"])
     traces = {trace["name"]: trace for trace in scene["data"]}
     cap, skirt = traces["balls, measured (equator up)"], traces["below the equator: drawn, not measured"]
     drawn = [ball for ball in result.balls if np.isfinite(ball.top_um)]
@@ -167,9 +166,9 @@ def test_the_3d_view_is_the_measurement() -> None:
         assert faces.max() == x.size - 1
     for name, key in (("seating plane", "seating_deviation_um"), ("regression plane", "regression_deviation_um")):
         plane = traces[name]
-        corners = np.array([(x, y) for y in plane["y"] for x in plane["x"]])
+        corners = np.array([(x, y) for y in unpacked(plane["y"]) for x in unpacked(plane["x"])])
         terms = np.column_stack([np.ones(4), corners])
-        fit = np.linalg.lstsq(terms, np.ravel(plane["z"]), rcond=None)[0]
+        fit = np.linalg.lstsq(terms, np.ravel(unpacked(plane["z"])), rcond=None)[0]
         below = [fit @ [1, ball.x_um, ball.y_um] - ball.top_um for ball in drawn]
         np.testing.assert_allclose(below, [getattr(ball, key) for ball in drawn], atol=0.05)
 

@@ -90,7 +90,7 @@ def inspect(
     part = None if recipe is None else bgars.read_part_recipe(recipe)
     capture = bgars.read_capture(folder)
     with stage_progress() as report, atomic_folder(output) as place:
-        result = bgars.inspect(capture, part, method=method, progress=report)
+        result = bgars.inspect(capture, part, method=method, surface=True, progress=report)
         result = replace(result, serial=serial, inspected_utc=utc_now())
         files = FILES | bgars.write_part_pictures(result, capture, place)
         (place / "result.json").write_text(result.to_json(), encoding="utf-8")

@@ -20,8 +20,9 @@ from bgars.report.page_chosen import chosen_marks
 from bgars.report.page_material import material_facts, material_rows
 from bgars.report.page_photograph import side_files
 from bgars.report.page_picture import part_picture
-from bgars.report.page_scene import scene_chart
+from bgars.report.page_scene import scene_chart, view_words
 from bgars.report.page_source import PageSource, read_page_source, source_of
+from bgars.report.page_still import still_of
 from bgars.report.page_tables import (
     ball_rows,
     board_words,
@@ -47,6 +48,7 @@ REPORT_FILES = {
     "report.html": "open in a browser: verdict, balls, charts and a 3-D view on one page that needs no network",
     "photograph.jpg": "the part as the camera saw it, for `bgars report`",
     "report.json": "where the photograph lies, and the lights, for `bgars report`",
+    "surface.npz": "height map of the part, for the 3-D view of `bgars report`",
 }
 TEMPLATES = Path(__file__).parent / "template"
 SEATS_TOLD = 3
@@ -60,16 +62,17 @@ def write_report(
 ) -> dict[str, str]:
     """Write the page of an inspection: one HTML file that loads nothing and works without a network.
 
-    Heights on the page are those of the result. Its 3-D view is drawn from the result too: caps of balls from the
-    equator up are measured, everything below the equator is drawn and grey.
+    Heights on the page are those of the result. Its 3-D view shows the integrated surface that the result brings
+    (``bgars.inspect(..., surface=True)``), else spheroids as the shadows gave them; everything below the equator is
+    drawn and grey.
 
     Parameters
     ----------
     result : PartResult or path
         From :func:`bgars.inspect`; or a folder that ``bgars inspect`` wrote, or a result.json.
     path : path
-        The page, ``.html``. With a capture, photograph.jpg and report.json are left beside it: from these and
-        result.json the page can be written again.
+        The page, ``.html``. With a capture, photograph.jpg, report.json and, where there is a surface, surface.npz are
+        left beside it: from these and result.json the page can be written again.
     capture : Capture, optional
         That the result was made from: without one the part is drawn without a photograph. Not with a path.
 
@@ -112,7 +115,7 @@ def write_report(
     with atomic_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
     if capture is not None and source.photograph is not None:
-        for name, content in side_files(source.photograph, source.lamps).items():
+        for name, content in side_files(source.photograph, source.lamps, source.surface).items():
             with atomic_file(path.with_name(name)) as temporary:
                 temporary.write_bytes(content)
             written[name] = REPORT_FILES[name]
@@ -135,8 +138,11 @@ def _made_source(result: PartResult, capture: Capture | None) -> PageSource:
 def page_text(source: PageSource) -> str:
     """Return the page: the same source, the same text."""
     result = source.result
-    figures, vectors = _figures(result)
+    figures, vectors = _figures(source)
+    still = still_of(figures["scene"]) if "scene" in figures else None  # None, too, for a damaged result
     places = chosen_marks(result, figures)
+    # Apart from the others: it is only read when the view is opened.
+    scene = figures.pop("scene", None)
     plotly, js = plotly_script(), _script(_file("report.js"))
     seats = [listed(seat["balls"], 8) for seat in result["seatings"][:SEATS_TOLD]]
     residual = result["shadow_residual_rms"]
@@ -174,17 +180,21 @@ def page_text(source: PageSource) -> str:
         script_hashes=_markup(" ".join(f"'sha256-{_hash(text)}'" for text in (plotly, js))),
         result_json=_json(result),
         page_json=_json({"figures": figures, "places": places}),
+        scene_json=None if scene is None else _json(scene),
+        still=still,
+        view=view_words(source),
     )
 
 
-def _figures(result: dict[str, Any]) -> tuple[dict[str, dict[str, Any]], VectorChart | None]:
+def _figures(source: PageSource) -> tuple[dict[str, dict[str, Any]], VectorChart | None]:
     """Every chart that can be drawn, and that of the offsets with its words."""
+    result = source.result
     vectors = vector_chart(result)
     charts = {
         "coplanarity": coplanarity_chart(result),
         "offsets": None if vectors is None else vectors.figure,
         **histogram_charts(result),
-        "scene": scene_chart(result),
+        "scene": scene_chart(result, source.surface),
     }
     figures = {name: chart for name, chart in charts.items() if chart is not None}
     return figures, vectors

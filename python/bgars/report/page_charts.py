@@ -24,7 +24,9 @@ BLUE, PURPLE, FAIL, UNDECIDED = "#0072B2", "#B0578D", "#D55E00", "#E69F00"
 HISTOGRAMS = ("true_position_um", "diameter_um", "top_um", "seating_deviation_um", "q", "flat_um")
 LEAST_SPAN_UM = 1.0
 LEAST_SPAN_RATIO = 0.002
-MAX_TICKS = 40
+MAX_TICKS = 32
+MAX_NAME = 6
+"""Letters of a name that the margin holds, turned."""
 MAX_ERROR_BARS = 120
 DASH = {"dash": "dash", "width": 1.6, "color": FAIL}
 
@@ -41,8 +43,8 @@ def literal(text: str) -> str:
 
 
 def axis(title: str, **options: Any) -> dict[str, Any]:  # noqa: ANN401 - plotly's schema
-    """An axis with its title."""
-    return {"title": {"text": title}, "automargin": True, **options}
+    """An axis with its title; margins are fixed, as fitting them to labels lays a chart out several times."""
+    return {"title": {"text": title, "standoff": 6}, **options}
 
 
 def coplanarity_chart(result: dict[str, Any]) -> dict[str, Any] | None:
@@ -107,6 +109,7 @@ def coplanarity_chart(result: dict[str, Any]) -> dict[str, Any] | None:
                 "ball",
                 tickvals=ticks,
                 ticktext=[names[at] for at in ticks],
+                automargin=max(len(balls[at]["name"]) for at in ticks) > MAX_NAME,
                 range=[-0.7, len(balls) - 0.3],
                 zeroline=False,
             ),

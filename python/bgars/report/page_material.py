@@ -38,7 +38,7 @@ def material_rows(result: dict[str, Any]) -> list[dict[str, str]]:
             {
                 "key": row["name"],
                 "title": title.format(number),
-                "meaning": meaning,
+                "meaning": "" if key == "gain" and int(number) else meaning,
                 "value": f"{value:.{digits}f}" if is_known(value) else NOT_MEASURED,
                 "error": f"{error:.{digits}f}" if is_known(error) else "not fitted",
                 "unit": row["unit"],

@@ -6,12 +6,14 @@ import json
 import math
 from base64 import b64encode
 from dataclasses import asdict, dataclass
+from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
 import imageio.v3 as iio
 import numpy as np
 
 from bgars.errors import FileFormatError
+from bgars.io.surface_file import SURFACE_FILE, read_surface, surface_bytes
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bgars.records import Capture
+    from bgars.surface_map import PartSurface
 
 __all__ = [
     "PHOTOGRAPH_FILE",
@@ -111,18 +114,22 @@ def lamps_of(capture: Capture) -> tuple[Lamp, ...]:
     return tuple(Lamp(name, float(a), float(e)) for name, (a, e) in zip(names, angles, strict=True))
 
 
-def side_files(photograph: Photograph, lamps: tuple[Lamp, ...]) -> dict[str, bytes]:
+def side_files(photograph: Photograph, lamps: tuple[Lamp, ...], surface: PartSurface | None) -> dict[str, bytes]:
     """Return the files that let the page be written again: names and contents."""
+    content = None if surface is None else surface_bytes(surface)
     place = {name: value for name, value in asdict(photograph).items() if name != "jpeg"}
     values = {
         "photograph": {"file": PHOTOGRAPH_FILE, **place},
         "lights": [asdict(lamp) for lamp in lamps],
+        # By its checksum: the file of an earlier inspection must not be taken for this one's.
+        "surface": None if content is None else {"file": SURFACE_FILE, "sha256": sha256(content).hexdigest()},
     }
     text = json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-    return {PHOTOGRAPH_FILE: photograph.jpeg, SIDE_FILE: text.encode("utf-8")}
+    files = {PHOTOGRAPH_FILE: photograph.jpeg, SIDE_FILE: text.encode("utf-8")}
+    return files if content is None else files | {SURFACE_FILE: content}
 
 
-def read_side_files(path: Path) -> tuple[Photograph | None, tuple[Lamp, ...]]:
+def read_side_files(path: Path) -> tuple[Photograph | None, tuple[Lamp, ...], PartSurface | None]:
     """Read what :func:`side_files` wrote; nothing where there is nothing.
 
     Raises
@@ -131,7 +138,7 @@ def read_side_files(path: Path) -> tuple[Photograph | None, tuple[Lamp, ...]]:
         The file is there, but is not what was written.
     """
     if not path.is_file():
-        return None, ()
+        return None, (), None
     try:
         values: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         place = values["photograph"]
@@ -142,11 +149,25 @@ def read_side_files(path: Path) -> tuple[Photograph | None, tuple[Lamp, ...]]:
         lamps = tuple(
             Lamp(str(row["image"]), float(row["azimuth_deg"]), float(row["elevation_deg"])) for row in values["lights"]
         )
+        surface = values.get("surface")
+        digest = None if surface is None else str(surface["sha256"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         msg = f"{path}: is not what `bgars inspect` writes beside its result ({error!r}); remove it to do without"
         raise FileFormatError(msg) from error
     photograph = _read_jpeg(path.with_name(PHOTOGRAPH_FILE), (left_um, right_um, bottom_um, top_um), meaning)
-    return photograph, lamps
+    return photograph, lamps, _surface(path.with_name(SURFACE_FILE), digest)
+
+
+def _surface(path: Path, digest: str | None) -> PartSurface | None:
+    """The height map that belongs to the result; None where there is none, or only another one's."""
+    if digest is None or not path.is_file():
+        return None
+    try:
+        found = sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        msg = f"{path}: cannot be read ({error.strerror})"
+        raise FileFormatError(msg) from error
+    return read_surface(path) if found == digest else None
 
 
 def _read_jpeg(path: Path, edges_um: tuple[float, float, float, float], meaning: str) -> Photograph | None:

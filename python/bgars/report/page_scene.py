@@ -1,54 +1,46 @@
-"""The 3-D view of the page: board, balls and planes, each from the result and nothing else.
+"""The 3-D view of the page: the part's integrated surface where there is one, its spheroids, board and planes.
 
-What is measured is coloured: the caps of the balls, from the equator up, as the spheroids that shadows and silhouettes
-gave. What is only drawn is grey: below the equator no light of the camera's comes back.
+What is measured is coloured. What is a prior is rose; what is only drawn is grey: below the equator no light of the
+camera's comes back.
 """
 
 from __future__ import annotations
 
 import math
-from base64 import b64encode
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bgars.report.page_charts import BLUE, FAIL, PURPLE, literal
-from bgars.report.page_picture import ball_radius, deviations, drawn_places
+from bgars.report.page_mesh import grid_trace, mesh_trace, packed
+from bgars.report.page_picture import COLORS, ball_radius, deviations, drawn_places
+from bgars.report.page_solids import Solid, cap_points, caps, skirts, solids_of
+from bgars.report.page_surface import OUTERMOST, ball_mesh, board_trace, mesh_sides
 from bgars.report.page_words import is_known
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
+    from bgars.report.page_source import PageSource
+    from bgars.surface_map import PartSurface
+
     Array = NDArray[np.float64]
+    Board = Callable[[Any, Any], Any]
 
-__all__ = ["scene_chart"]
+__all__ = ["ViewWords", "scene_chart", "view_words"]
 
-GREY, BOARD, PLAIN = "#b4b8bd", "#8fa58a", "#7a8aa0"
+GREY, BOARD, PLAIN, PRIOR = "#b4b8bd", "#8fa58a", "#7a8aa0", "#d8899a"
 SIDES_OF_ALL = 250.0
-"""Sides of a ball, times the root of their number: what all balls may cost."""
+"""Sides of a spheroid, times the root of their number: what all of them may cost."""
 FEWEST_SIDES, MOST_SIDES = 10, 32
-SKIRT_LEVELS = 3
 BOARD_POINTS = 25
 MARGIN_RADII = 2.5
-LIGHTING = {"ambient": 0.55, "diffuse": 0.65, "specular": 0.25, "roughness": 0.5}
 
 
-@dataclass(frozen=True)
-class _Solid:
-    """A ball that is measured whole; heights in the world."""
-
-    index: int
-    x_um: float
-    y_um: float
-    board_um: float
-    radius_um: float
-    centre_z_um: float
-    top_um: float
-    q: float
-
-
-def scene_chart(result: dict[str, Any]) -> dict[str, Any] | None:
+def scene_chart(result: dict[str, Any], surface: PartSurface | None = None) -> dict[str, Any] | None:
     """The figure; None when no ball has a place."""
     balls = result["balls"]
     places = drawn_places(balls)
@@ -56,48 +48,111 @@ def scene_chart(result: dict[str, Any]) -> dict[str, Any] | None:
     if not len(known):
         return None
     board = _board_of(result)
-    solids = [
-        _Solid(
-            index, ball["x_um"], ball["y_um"], float(board(ball["x_um"], ball["y_um"])),
-            ball["diameter_um"] / 2, ball["centre_z_um"], ball["top_um"], ball["q"] or 1.0,
-        )
-        for index, ball in enumerate(balls)
-        if _is_whole(ball)
-    ]  # fmt: skip
+    solids = solids_of(result, board)
     name, values = deviations(result)
-    sides = int(np.clip(SIDES_OF_ALL / math.sqrt(max(len(solids), 1)), FEWEST_SIDES, MOST_SIDES))
     coloured = [solid for solid in solids if is_known(values[solid.index])]
     plain = [solid for solid in solids if not is_known(values[solid.index])]
-    traces = [_board_trace(known, ball_radius(result), board)]
+    colors = np.array([values[solid.index] for solid in coloured], dtype=np.float64)
+    traces = []
+    if surface is not None and solids:
+        traces += _integrated(coloured, plain, colors, surface)
+        margin_um = MARGIN_RADII * ball_radius(result)
+        low, high = known.min(axis=0) - margin_um, known.max(axis=0) + margin_um
+        traces.append(board_trace(surface, low, high, BOARD, name="board, integrated normals"))
+    is_meshed = any(traces)
+    if not is_meshed:
+        traces.append(_fitted_board(known, ball_radius(result), board))
+    sides = int(np.clip(SIDES_OF_ALL / math.sqrt(max(len(solids), 1)), FEWEST_SIDES, MOST_SIDES))
+    shown = {"visible": "legendonly"} if is_meshed else {}
     if coloured:
-        colors = np.array([values[solid.index] for solid in coloured], dtype=np.float64)
-        bar = {"title": {"text": f"{name} (µm)", "side": "right"}, "thickness": 14, "len": 0.75}
-        cap = _caps(coloured, sides)
-        cap |= {"intensity": _packed(np.repeat(colors, _cap_points(sides))), "colorscale": "Viridis", "colorbar": bar}
-        traces.append({**cap, "name": "balls, measured (equator up)", "showlegend": True})
+        look = {"intensity": packed(np.repeat(colors, cap_points(sides))), "coloraxis": "coloraxis", **shown}
+        title = "spheroids that shadows gave" if is_meshed else "balls, measured (equator up)"
+        traces.append(caps(coloured, sides, name=title, **look))
     if plain:
-        traces.append({**_caps(plain, sides), "color": PLAIN, "name": "balls without a plane", "showlegend": True})
+        title = "spheroids without a plane" if is_meshed else "balls without a plane"
+        traces.append(caps(plain, sides, name=title, color=PLAIN, **shown))
     if solids:
-        skirt = {"color": GREY, "name": "below the equator: drawn, not measured"}
-        traces.append({**_skirts(solids, sides), **skirt, "showlegend": True})
+        title = "rim and below the equator" if is_meshed else "below the equator"
+        across = OUTERMOST if is_meshed else 1.0
+        sides = mesh_sides(len(solids)) if is_meshed else sides  # rims must meet
+        traces.append(skirts(solids, sides, across, color=GREY, name=f"{title}: drawn, not measured"))
         traces.append(_apexes(solids, balls))
     ring = _rings(result, places, {solid.index for solid in solids}, board)
-    traces += [trace for trace in (ring, *_planes(result, solids, known)) if trace]
+    traces += [ring, *_planes(result, solids, known)]
+    bar = {"title": {"text": f"{name} (µm)", "side": "right"}, "thickness": 14, "len": 0.75}
     layout = {
         "scene": _frame(known, result, solids, board),
+        "coloraxis": {"colorscale": COLORS.title(), "colorbar": bar},
         "legend": {"orientation": "h", "y": 0, "yanchor": "top", "x": 0},
         "margin": {"l": 0, "r": 0, "t": 8, "b": 8},
     }
-    return {"data": traces, "layout": layout}
+    return {"data": [trace for trace in traces if trace], "layout": layout}
 
 
-def _is_whole(ball: dict[str, Any]) -> bool:
-    """Whether all that a spheroid needs was measured."""
-    lengths = (ball[name] for name in ("x_um", "y_um", "diameter_um", "centre_z_um", "top_um"))
-    return ball["present"] and all(map(is_known, lengths)) and ball["diameter_um"] > 0 and (ball["q"] or 1.0) > 0
+@dataclass(frozen=True)
+class ViewWords:
+    """What the 3-D view shows, in words.
+
+    Attributes
+    ----------
+    meshed : bool
+        Whether it is the integrated surface; else spheroids.
+    sampling : str
+        How densely the surface was read.
+    keys : tuple of (str, str)
+        Colours and what they stand for.
+    """
+
+    meshed: bool
+    sampling: str
+    keys: tuple[tuple[str, str], ...]
 
 
-def _frame(known: Array, result: dict[str, Any], solids: list[_Solid], board: Any) -> dict[str, Any]:  # noqa: ANN401
+def view_words(source: PageSource) -> ViewWords:
+    """Say what is drawn, how finely, and what the colours mean."""
+    surface = source.surface
+    solids = solids_of(source.result, lambda _x, _y: 0.0)
+    grey = (GREY, "drawn, not measured: below the equator")
+    if surface is None or not solids:
+        return ViewWords(False, "", ((BOARD, "board, fitted"), grey, (BLUE, "seating plane")))
+    sides = mesh_sides(len(solids))
+    ball_um, board_um = (step * surface.pixel_pitch_um for step in (surface.ball_step_px, surface.board_step_px))
+    sampling = (
+        f"Each ball is read from a height map with a sample every {ball_um:g} µm, on {sides // 2} rings in {sides} "
+        f"directions, out to {OUTERMOST:g} of its radius; the board's samples are {board_um:g} µm apart or more."
+    )
+    grey = (GREY, "drawn, not measured: rim and below the equator")
+    keys = (
+        (BOARD, "board, integrated"), (PRIOR, "from a prior, not measured"), grey, (BLUE, "seating plane"),
+    )  # fmt: skip
+    return ViewWords(True, sampling, keys)
+
+
+def _integrated(
+    coloured: list[Solid], plain: list[Solid], colors: Array, surface: PartSurface
+) -> list[dict[str, Any] | None]:
+    """The balls of the height map; what is a prior in a colour of its own."""
+    sides = mesh_sides(len(coloured) + len(plain))
+    traces: list[dict[str, Any] | None] = []
+    for solids, title in ((coloured, "balls, integrated normals"), (plain, "balls without a plane")):
+        if not solids:
+            continue
+        mesh = ball_mesh(solids, surface, sides)
+        points = mesh.vertices.shape[1]
+        look: dict[str, Any] = {"color": PLAIN}
+        if solids is coloured:
+            look = {"intensity": packed(np.repeat(colors, points)), "coloraxis": "coloraxis"}
+        if len(mesh.measured):
+            traces.append(mesh_trace(mesh.vertices, mesh.measured, name=title, **look))
+        if len(mesh.prior):
+            # Only the vertices that are needed: often a handful.
+            used, faces = np.unique(mesh.prior, return_inverse=True)
+            vertices = mesh.vertices.reshape(-1, 3)[used]
+            traces.append(mesh_trace(vertices, faces, name="from a prior, not measured", color=PRIOR))
+    return traces
+
+
+def _frame(known: Array, result: dict[str, Any], solids: list[Solid], board: Board) -> dict[str, Any]:
     """Axes true to scale, as large as the balls and their board."""
     x, y = _rectangle(known, MARGIN_RADII * ball_radius(result), BOARD_POINTS)
     z = np.broadcast_to(board(x, y), x.shape)
@@ -114,21 +169,19 @@ def _frame(known: Array, result: dict[str, Any], solids: list[_Solid], board: An
     }
     ratio = {name: 1.6 * float(high - low) / float(longest_um) for name, (low, high) in ranges.items()}
     camera = {"eye": {"x": 0.5, "y": -1.75, "z": 1.1}, "center": {"x": 0.0, "y": 0.0, "z": -0.12}}
-    return {"aspectmode": "manual", "aspectratio": ratio, "camera": camera, **axes}
+    return {
+        "aspectmode": "manual",
+        "aspectratio": ratio,
+        "camera": camera,
+        "domain": {"x": [0, 1], "y": [0.05, 1]},
+        **axes,
+    }
 
 
-def _board_of(result: dict[str, Any]) -> Any:  # noqa: ANN401 - a function of x and y
+def _board_of(result: dict[str, Any]) -> Board:
     """The board's height at x, y; unknown terms count as 0."""
     c = np.array([value if is_known(value) else 0.0 for value in result["board_coefficients_um"]])
     return lambda x, y: c[0] + c[1] * x + c[2] * y + c[3] * x * x + c[4] * x * y + c[5] * y * y
-
-
-def _packed(values: Array) -> dict[str, str]:
-    """An array as plotly's typed array: a third of the size of its digits."""
-    kind = "f4" if values.dtype.kind == "f" else "u4"
-    if kind == "f4":  # a damaged result may hold what single precision cannot
-        values = np.clip(values, np.finfo(np.float32).min, np.finfo(np.float32).max)
-    return {"dtype": kind, "bdata": b64encode(values.astype(f"<{kind}").tobytes()).decode("ascii")}
 
 
 def _rectangle(known: Array, margin_um: float, count: int) -> tuple[Array, Array]:
@@ -137,37 +190,22 @@ def _rectangle(known: Array, margin_um: float, count: int) -> tuple[Array, Array
     return x, y
 
 
-def _surface(x: Array, y: Array, z: Array, color: str, **options: Any) -> dict[str, Any]:  # noqa: ANN401
-    return {
-        "type": "surface",
-        "x": x[0].round(2).tolist(),
-        "y": y[:, 0].round(2).tolist(),
-        "z": z.round(3).tolist(),
-        "colorscale": [[0, color], [1, color]],
-        "showscale": False,
-        "showlegend": True,
-        "contours": {each: {"highlight": False} for each in "xyz"},
-        "lighting": {"ambient": 0.8, "diffuse": 0.3, "specular": 0.0},
-        **options,
-    }
-
-
-def _board_trace(known: Array, radius_um: float, board: Any) -> dict[str, Any]:  # noqa: ANN401
+def _fitted_board(known: Array, radius_um: float, board: Board) -> dict[str, Any]:
     x, y = _rectangle(known, MARGIN_RADII * radius_um, BOARD_POINTS)
     z = np.broadcast_to(board(x, y), x.shape)
-    return _surface(x, y, z, BOARD, name="board, fitted", hoverinfo="skip")
+    return grid_trace(x[0], y[:, 0], z, BOARD, name="board, fitted")
 
 
-def _planes(result: dict[str, Any], solids: list[_Solid], known: Array) -> list[dict[str, Any]]:
+def _planes(result: dict[str, Any], solids: list[Solid], known: Array) -> list[dict[str, Any]]:
     """The worst seating plane, and the regression plane as the deviations from it say."""
     planes = []
     x, y = _rectangle(known, 2.0 * ball_radius(result), 2)
-    look = {"opacity": 0.22, "hoverinfo": "skip"}
+    look = {"opacity": 0.22}
     if result["seatings"]:
         seat = result["seatings"][0]
         if all(is_known(seat[key]) for key in ("slope_x", "slope_y", "offset_um")):
             z = seat["slope_x"] * x + seat["slope_y"] * y + seat["offset_um"]
-            planes.append(_surface(x, y, z, BLUE, name="seating plane", **look))
+            planes.append(grid_trace(x[0], y[:, 0], z, BLUE, name="seating plane", **look))
     points = [
         (solid.x_um, solid.y_um, solid.board_um + solid.top_um + deviation)
         for solid in solids
@@ -178,86 +216,11 @@ def _planes(result: dict[str, Any], solids: list[_Solid], known: Array) -> list[
         terms = np.column_stack([np.ones(len(table)), table[:, :2]])
         offset, slope_x, slope_y = np.linalg.lstsq(terms, table[:, 2], rcond=None)[0]
         z = offset + slope_x * x + slope_y * y
-        planes.append(_surface(x, y, z, PURPLE, name="regression plane", visible="legendonly", **look))
+        planes.append(grid_trace(x[0], y[:, 0], z, PURPLE, name="regression plane", visible="legendonly", **look))
     return planes
 
 
-def _cap_points(sides: int) -> int:
-    return 1 + _cap_rings(sides) * sides
-
-
-def _cap_rings(sides: int) -> int:
-    return max(4, sides // 4)
-
-
-def _mesh(vertices: Array, faces: Array) -> dict[str, Any]:
-    x, y, z = vertices.reshape(-1, 3).T
-    i, j, k = faces.reshape(-1, 3).T
-    arrays = {"x": x, "y": y, "z": z, "i": i, "j": j, "k": k}
-    packed = {name: _packed(values) for name, values in arrays.items()}
-    return {"type": "mesh3d", **packed, "hoverinfo": "skip", "lighting": LIGHTING, "flatshading": False}
-
-
-def _table(solids: list[_Solid]) -> Array:
-    """(n, 1, 7) x, y, board, radius, centre, top, q of each ball."""
-    rows = [(s.x_um, s.y_um, s.board_um, s.radius_um, s.centre_z_um, s.top_um, s.q) for s in solids]
-    return np.array(rows, dtype=np.float64)[:, None, :]
-
-
-def _caps(solids: list[_Solid], sides: int) -> dict[str, Any]:
-    """Upper halves of the spheroids, cut off where the top is flat."""
-    rings = _cap_rings(sides)
-    slant, turn = np.meshgrid(
-        np.linspace(0, np.pi / 2, rings + 1)[1:], np.arange(sides) * 2 * np.pi / sides, indexing="ij"
-    )
-    across = np.append(0.0, np.sin(slant).ravel())
-    up = np.append(1.0, np.cos(slant).ravel())
-    around = np.append(0.0, turn.ravel())
-    x, y, board, radius, centre, top, q = np.moveaxis(_table(solids), 2, 0)
-    # The apex is the measured top, whether the top is flat or not.
-    z = np.minimum(centre + np.maximum(q * radius, top - centre) * up, top)
-    vertices = np.stack([x + radius * across * np.cos(around), y + radius * across * np.sin(around), board + z], axis=2)
-    one = np.arange(sides)
-    two = (one + 1) % sides
-    faces = [np.column_stack([np.zeros(sides, dtype=np.int64), 1 + one, 1 + two])]
-    for ring in range(rings - 1):
-        inner, outer = 1 + ring * sides, 1 + (ring + 1) * sides
-        faces += [
-            np.column_stack([inner + one, outer + one, outer + two]),
-            np.column_stack([inner + one, outer + two, inner + two]),
-        ]
-    return _mesh(vertices, _repeated(np.concatenate(faces), len(solids), vertices.shape[1]))
-
-
-def _skirts(solids: list[_Solid], sides: int) -> dict[str, Any]:
-    """The spheroids from the equator down to the board."""
-    levels = SKIRT_LEVELS
-    x, y, board, radius, centre, _top, q = np.moveaxis(_table(solids), 2, 0)
-    down, turn = np.meshgrid(np.linspace(0.0, 1.0, levels), np.arange(sides) * 2 * np.pi / sides, indexing="ij")
-    deepest = np.arcsin(np.clip(centre / (q * radius), 0.0, 1.0))
-    slant = deepest * down.ravel()
-    z = centre - q * radius * np.sin(slant)
-    across = radius * np.cos(slant)
-    around = turn.ravel()
-    vertices = np.stack([x + across * np.cos(around), y + across * np.sin(around), board + z], axis=2)
-    one = np.arange(sides)
-    two = (one + 1) % sides
-    faces = []
-    for level in range(levels - 1):
-        upper, lower = level * sides, (level + 1) * sides
-        faces += [
-            np.column_stack([upper + one, lower + one, lower + two]),
-            np.column_stack([upper + one, lower + two, upper + two]),
-        ]
-    return _mesh(vertices, _repeated(np.concatenate(faces), len(solids), vertices.shape[1]))
-
-
-def _repeated(faces: Any, count: int, points: int) -> Any:  # noqa: ANN401 - (n, 3) integers
-    """The faces of one ball for all."""
-    return (faces[None, :, :] + points * np.arange(count)[:, None, None]).reshape(-1, 3)
-
-
-def _apexes(solids: list[_Solid], balls: list[dict[str, Any]]) -> dict[str, Any]:
+def _apexes(solids: list[Solid], balls: list[dict[str, Any]]) -> dict[str, Any]:
     """A point on every top: what is named, pointed at and chosen."""
     return {
         "type": "scatter3d",
@@ -283,7 +246,7 @@ def _rings(
     result: dict[str, Any],
     places: list[tuple[float, float] | None],
     drawn: set[int],
-    board: Any,  # noqa: ANN401
+    board: Board,
 ) -> dict[str, Any] | None:
     """Balls without a height, and places without a ball: circles on the board."""
     turn = np.linspace(0.0, 2.0 * math.pi, 25)

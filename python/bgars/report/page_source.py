@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from bgars.part_result import PartResult
     from bgars.records import Capture
+    from bgars.surface_map import PartSurface
 
 __all__ = ["PageSource", "read_page_source", "source_of"]
 
@@ -29,22 +30,25 @@ class PageSource:
         The part as the camera saw it.
     lamps : tuple of Lamp
         The lights as the rig gives them; empty when unknown.
+    surface : PartSurface or None
+        Integrated heights; None: the 3-D view falls back to spheroids.
     """
 
     result: dict[str, Any]
     photograph: Photograph | None = None
     lamps: tuple[Lamp, ...] = ()
+    surface: PartSurface | None = None
 
 
 def source_of(result: PartResult, capture: Capture | None) -> PageSource:
     """Gather the page of an inspection that was just made."""
     if capture is None:
-        return PageSource(result.to_dict())
-    return PageSource(result.to_dict(), photograph_of(capture), lamps_of(capture))
+        return PageSource(result.to_dict(), surface=result.surface)
+    return PageSource(result.to_dict(), photograph_of(capture), lamps_of(capture), result.surface)
 
 
 def read_page_source(path: Path) -> PageSource:
-    """Read result.json (or the folder that holds it), and the photograph that lies beside it.
+    """Read result.json (or the folder that holds it), and photograph and surface that lie beside it.
 
     Raises
     ------
@@ -53,5 +57,4 @@ def read_page_source(path: Path) -> PageSource:
     """
     result = read_result(path).to_dict()
     folder = path if path.is_dir() else path.parent
-    photograph, lamps = read_side_files(folder / SIDE_FILE)
-    return PageSource(result, photograph, lamps)
+    return PageSource(result, *read_side_files(folder / SIDE_FILE))

@@ -147,7 +147,7 @@ def light_rows(source: PageSource) -> list[dict[str, str]]:
             {
                 "index": str(index),
                 "image": lamp.image if lamp else "",
-                "azimuth": number(math.degrees(math.atan2(y, x)) % 360.0 if known else None),
+                "azimuth": number(round(math.degrees(math.atan2(y, x)), 2) % 360.0 if known else None),
                 "elevation": number(elevation),
                 "raised": _signed(elevation - lamp.elevation_deg if lamp and elevation is not None else None),
                 "moved": number(moved, 3),
@@ -172,7 +172,7 @@ def raised_together(source: PageSource) -> str:
 
 
 def _signed(value: float | None) -> str:
-    return NOT_MEASURED if value is None else f"{value:+.2f}"
+    return NOT_MEASURED if value is None else f"{round(value, 2) + 0.0:+.2f}"
 
 
 def board_words(result: dict[str, Any]) -> str:

@@ -138,7 +138,7 @@
   const shape = (name, isDark, size) => {
     let figure = page.figures[name];
     if (isDark && name !== "scene") figure = JSON.parse(JSON.stringify(figure).replace(/#(0072B2|B0578D|D55E00)/g, (color) => lighter[color]));
-    const margin = figure.layout.margin || { l: 56, r: 14, t: 40, b: 44 };
+    const margin = figure.layout.margin || { l: 64, r: 14, t: 40, b: 56 };
     const layout = { ...figure.layout, ...size, margin, template: look(isDark), dragmode: name === "scene" ? "orbit" : false };
     return { data: figure.data, layout };
   };
@@ -162,39 +162,35 @@
     const context = document.createElement("canvas").getContext("webgl");
     return Boolean(context);
   };
-  const keepForPrint = async () => {
-    const image = document.getElementById("scene-print");
-    const layout = { ...page.figures.scene.layout, template: look(false), width: 1000, height: 620 };
-    image.src = await Plotly.toImage({ data: page.figures.scene.data, layout, config }, { format: "png", width: 1000, height: 620 });
-    image.dataset.ready = "yes";
-  };
   const pause = () => new Promise((next) => setTimeout(next, 0));
-  // Where no graphics card helps, a 3-D view takes seconds: it waits until nothing else is to be done.
-  const idle = () => new Promise((next) => (window.requestIdleCallback ? requestIdleCallback(next, { timeout: 1500 }) : setTimeout(next, 200)));
-  const near = (node) => new Promise((next) => {
-    const watch = new IntersectionObserver((entries) => { if (entries.some((each) => each.isIntersecting)) { watch.disconnect(); next(); } }, { rootMargin: "100% 0px" });
-    watch.observe(node);
-    setTimeout(next, 2500);
-  });
   const drawAll = async () => {
-    const nodes = [...document.querySelectorAll("[data-figure]")];
-    for (const node of nodes.filter((each) => each.dataset.figure !== "scene")) { await draw(node); await pause(); }
-    const scene = nodes.find((each) => each.dataset.figure === "scene");
+    for (const node of document.querySelectorAll("[data-figure]:not([data-figure=scene])")) { await draw(node); await pause(); }
     reached("charted");
-    if (scene) await near(scene);
-    await idle();
-    if (scene && hasWebgl()) await draw(scene);
-    else if (scene) {
-      const note = document.createElement("p");
+  };
+  // Without a graphics card a 3-D view takes its time: it is drawn when it is asked for, and until then there is a still.
+  const opener = document.getElementById("open-scene");
+  const openScene = async () => {
+    const node = document.querySelector("[data-figure=scene]"), note = document.getElementById("scene-note");
+    opener.disabled = true;
+    if (!hasWebgl()) {
       note.className = "missing-view";
       note.textContent = "This browser draws no 3-D (WebGL is off). The numbers are in the table of balls.";
-      scene.append(note);
+      return;
     }
+    note.textContent = "drawing ...";
+    await pause();
+    await pause();
+    page.figures.scene = JSON.parse(document.getElementById("scene-data").textContent);
+    node.hidden = false;
+    const still = document.getElementById("scene-still");
+    if (still) still.hidden = true;
+    document.getElementById("scene-keys").hidden = true;
+    await draw(node);
+    opener.parentElement.hidden = true;
+    if (chosen !== null) mark();
     reached("drawn");
-    await idle();
-    if (charts.has("scene")) await keepForPrint();
-    reached("ready");
   };
+  if (opener) opener.addEventListener("click", openScene);
   const repaint = (isDark, sizeOf) => {
     for (const [name, node] of charts) {
       if (name === "scene") { if (!sizeOf) Plotly.relayout(node, { template: look(isDark) }); continue; }
