@@ -11,6 +11,8 @@ from bgars.report.part_style import VERDICT_COLORS, new_figure
 from bgars.studies.svg import PLACEMENT_COLORS
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
@@ -43,12 +45,29 @@ def trend_figure(trend: Trend) -> Figure:
 
 def _chart(axes: Axes, values: NDArray[np.float64], lines: tuple[float, float, float], title: str) -> None:
     x = np.arange(1, len(values) + 1)
+    digits = _digits([*values, *lines])
     axes.plot(x, values, "o-", color=LINE, markersize=4, linewidth=1.0)
     for value, name, style in zip(lines, ("LCL", "centre", "UCL"), ("--", "-", "--"), strict=True):
         if not math.isfinite(value):
             continue
         axes.axhline(value, color="0.35", linestyle=style, linewidth=1.0)
-        axes.annotate(f" {name} {value:.4g}", (1.0, value), xycoords=("axes fraction", "data"), va="center", fontsize=8)
+        axes.annotate(
+            f" {name} {value:.{digits}f}", (1.0, value), xycoords=("axes fraction", "data"), va="center", fontsize=8
+        )
     axes.set_ylabel(title)
+    axes.ticklabel_format(axis="y", useOffset=False)
     axes.margins(x=0.02, y=0.15)
     axes.spines[["top", "right"]].set_visible(False)
+
+
+def _digits(values: Sequence[float]) -> int:
+    """Decimals that tell apart what a chart shows: a hundredth of its height.
+
+    Examples
+    --------
+    >>> _digits([599.0, 601.05, math.nan]), _digits([0.9996, 1.001])
+    (2, 5)
+    """
+    known = [value for value in values if math.isfinite(value)]
+    span = max(known, default=0.0) - min(known, default=0.0)
+    return max(0, 2 - math.floor(math.log10(span))) if span > 0 else 3
