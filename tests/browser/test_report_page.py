@@ -181,6 +181,9 @@ def test_the_3d_view_draws_balls(scheme: str, failed_page: Path, open_page: Open
     assert opened.page.locator("#scene-still").is_visible()
     opened.open_scene()
     assert not opened.page.locator("#scene-still").is_visible()
+    buttons = opened.page.eval_on_selector_all(".modebar-btn", "all => all.map(each => each.dataset.title)")
+    assert len(buttons) == 5
+    assert not any("share" in title.lower() or "cloud" in title.lower() for title in buttons), "nothing leaves the page"
     scene = opened.page.locator("[data-figure=scene]")
     scene.scroll_into_view_if_needed()
     opened.page.wait_for_timeout(300)

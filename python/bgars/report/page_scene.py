@@ -38,6 +38,8 @@ SIDES_OF_ALL = 250.0
 FEWEST_SIDES, MOST_SIDES = 10, 32
 BOARD_POINTS = 25
 MARGIN_RADII = 2.5
+MANY = 200
+"""Balls above which dots on their tops would hide them."""
 
 
 def scene_chart(result: dict[str, Any], surface: PartSurface | None = None) -> dict[str, Any] | None:
@@ -232,7 +234,10 @@ def _apexes(solids: list[Solid], balls: list[dict[str, Any]]) -> dict[str, Any]:
         "z": [round(solid.board_um + solid.top_um + 0.06 * solid.radius_um, 3) for solid in solids],
         "text": [literal(balls[solid.index]["name"]) for solid in solids],
         "customdata": [[solid.index, balls[solid.index]["top_um"]] for solid in solids],
-        "marker": {"size": 3, "color": [_apex_color(balls[solid.index]["verdict"]) for solid in solids]},
+        "marker": {
+            "size": 3 if len(solids) <= MANY else 1.5,
+            "color": [_apex_color(balls[solid.index]["verdict"]) for solid in solids],
+        },
         "hovertemplate": "%{text}: height %{customdata[1]:.2f} µm<extra></extra>",
         "showlegend": False,
     }

@@ -26,8 +26,8 @@ POINTS_OF_ALL = 40_000
 FEWEST_SIDES, MOST_SIDES = 10, 48
 OUTERMOST = 0.97
 """Where a ball is read to, of its radius: further out a pixel shows the rim."""
-MOST_BOARD_SAMPLES = 120
-"""Samples of the board along the longer side of the image."""
+MOST_BOARD_SAMPLES = 200
+"""Samples of the board along the longer side of the image: six a pitch of 32 x 32 balls, enough to go around each."""
 
 
 @dataclass(frozen=True)

@@ -142,6 +142,8 @@
     const layout = { ...figure.layout, ...size, margin, template: look(isDark), dragmode: name === "scene" ? "orbit" : false };
     return { data: figure.data, layout };
   };
+  // Named one by one: plotly.js would add a button that sends the chart's data to its makers.
+  const VIEW_BUTTONS = [["toImage", "zoom3d", "pan3d", "orbitRotation", "resetCameraDefault3d"]];
   const config = { responsive: false, displaylogo: false, displayModeBar: false, doubleClick: "reset" };
   const ballAt = (event) => {
     const data = event.points && event.points[0] && event.points[0].customdata;
@@ -151,7 +153,7 @@
   const draw = async (node) => {
     const name = node.dataset.figure;
     const { data, layout } = shape(name, dark.matches);
-    await Plotly.newPlot(node, data, layout, name === "scene" ? { ...config, displayModeBar: true, modeBarButtonsToRemove: ["tableRotation", "resetCameraLastSave3d"] } : config);
+    await Plotly.newPlot(node, data, layout, name === "scene" ? { ...config, displayModeBar: true, modeBarButtons: VIEW_BUTTONS } : config);
     charts.set(name, node);
     if (!(name in page.places)) return;
     node.on("plotly_hover", (event) => hover(ballAt(event)));
