@@ -24,7 +24,8 @@ from bgars.inspection.judge import judge_part
 from bgars.inspection_pipeline import BOARD_STEP
 from bgars.part_recipe import PartRecipe
 from bgars.part_surface import part_surface
-from playwright.sync_api import CDPSession, sync_playwright
+from bgars.report.page import plotly_script
+from playwright.sync_api import Browser, CDPSession, sync_playwright
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "unit"))
 from report_parts import LIMITS, RIG
@@ -50,6 +51,7 @@ WATCH = """() => { window.longest = 0; window.clicked = 0;
 TOLD = """() => new Promise(next => setTimeout(() => next(
     [performance.getEntriesByName("drawn")[0].startTime - window.clicked, window.longest]), 300))"""
 RUNS = 3
+SIDES = (10, 32)
 
 
 def write_page(side: int, folder: Path) -> Path:
@@ -84,12 +86,28 @@ def processor_s(metrics: CDPSession) -> float:
     return next(entry["value"] for entry in values if entry["name"] == "TaskDuration")
 
 
+def library_s(browser: Browser, folder: Path) -> float:
+    """Processor time of a page that holds plotly.js and nothing else."""
+    path = folder / "library.html"
+    path.write_text(f"<!doctype html><meta charset=utf-8><script>{plotly_script()}</script>", encoding="utf-8")
+    page = browser.new_page()
+    metrics = page.context.new_cdp_session(page)
+    metrics.send("Performance.enable", {"timeDomain": "threadTicks"})
+    before = processor_s(metrics)
+    page.goto(path.as_uri())
+    cost = processor_s(metrics) - before
+    page.close()
+    return cost
+
+
 def main() -> None:
     """Write, open, print."""
     browser_path = os.environ.get("BGARS_BROWSER") or shutil.which("chromium") or shutil.which("google-chrome")
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=browser_path, args=OPTIONS)
-        for side in (10, 32):
+        alone = sorted(library_s(browser, Path(folder)) for _ in range(RUNS))
+        print(f"plotly.js alone: median {alone[RUNS // 2]:.1f} s of processor time, {alone[0]:.1f} to {alone[-1]:.1f}")
+        for side in SIDES:
             path = write_page(side, Path(folder))
             runs = []
             for _ in range(RUNS):

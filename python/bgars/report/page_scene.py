@@ -170,7 +170,7 @@ def _frame(known: Array, result: dict[str, Any], solids: list[Solid], board: Boa
         for name, (low, high) in ranges.items()
     }
     ratio = {name: 1.6 * float(high - low) / float(longest_um) for name, (low, high) in ranges.items()}
-    camera = {"eye": {"x": 0.5, "y": -1.75, "z": 1.1}, "center": {"x": 0.0, "y": 0.0, "z": -0.12}}
+    camera = {"eye": {"x": 0.5, "y": -1.75, "z": 1.1}, "center": {"x": 0.0, "y": 0.0, "z": -0.2}}
     return {
         "aspectmode": "manual",
         "aspectratio": ratio,
