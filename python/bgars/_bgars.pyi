@@ -27,7 +27,6 @@ __all__ = [
     "integrate_bilateral",
     "integrate_normals",
     "measure_edges",
-    "normal_arrays",
     "read_rgb16",
     "rim_bands",
     "rim_profiles",
@@ -53,6 +52,7 @@ def decode_stack(
     gains: NDArray[np.float32] | None,
     max_megapixels: float,
     threads: int | None,
+    allocate: Callable[[tuple[int, ...], str], NDArray[Any]],
 ) -> tuple[Any, bool, int]: ...
 def draw_shadows(
     casters: Casters,
@@ -92,17 +92,6 @@ def estimate_reflectance(
     progress: Callable[[float], object] | None,
     out: NormalField,
 ) -> dict[str, Any]: ...
-def normal_arrays(
-    height: int, width: int, set_lights: int
-) -> tuple[
-    NDArray[np.float32],
-    NDArray[np.float32],
-    NDArray[np.bool_],
-    NDArray[np.float32],
-    NDArray[np.bool_],
-    NDArray[np.uint16],
-    NDArray[np.bool_] | None,
-]: ...
 def usable_normals(normals: NDArray[np.float32]) -> NDArray[np.bool_]: ...
 def integrate_bilateral(
     normals: NDArray[np.float32],

@@ -10,6 +10,7 @@ import numpy as np
 from bgars import _bgars
 from bgars.errors import InputError
 from bgars.kernel_capture import kernel_capture
+from bgars.large_arrays import any_content
 from bgars.records import Capture, NormalField, float_full_scale, integer_full_scale
 from bgars.rig import LightRig
 
@@ -66,23 +67,21 @@ def _result(capture: Capture, method: PixelwiseMethod, keep_sets: bool, out: Nor
     lights, height, width = capture.images.shape
     sets_shape = (height, width, lights) if keep_sets else None
     if out is None:
-        normals, albedo, valid, confidence, measured, lights_kept, kept_sets = _bgars.normal_arrays(
-            height, width, lights if keep_sets else 0
-        )
+        shape = (height, width)
         return NormalField(
-            normals=normals,
-            albedo=albedo,
-            mask=valid,
-            confidence=confidence,
-            measured=measured,
-            lights_kept=lights_kept,
+            normals=any_content((*shape, 3), np.float32),
+            albedo=any_content(shape, np.float32),
+            mask=any_content(shape, np.bool_),
+            confidence=any_content(shape, np.float32),
+            measured=any_content(shape, np.bool_),
+            lights_kept=any_content(shape, np.uint16),
             method=method,
             pixel_pitch_um=capture.pixel_pitch_um,
-            kept_sets=kept_sets,
+            kept_sets=None if sets_shape is None else any_content(sets_shape, np.bool_),
         )
-    shape = out.normals.shape
-    if shape != (height, width, 3):
-        msg = f"out: must be the result for images of {width} x {height} pixels, got one for {shape[1]} x {shape[0]}"
+    found = out.normals.shape
+    if found != (height, width, 3):
+        msg = f"out: must be the result for images of {width} x {height} pixels, got one for {found[1]} x {found[0]}"
         raise InputError(msg)
     if (None if out.kept_sets is None else out.kept_sets.shape) != sets_shape:
         msg = "out: must have kept sets, for the same number of lights, exactly when keep_sets is asked for"

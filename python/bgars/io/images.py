@@ -9,6 +9,7 @@ import numpy as np
 
 from bgars import _bgars
 from bgars.errors import FileFormatError, InputError, UnsupportedImageError
+from bgars.large_arrays import any_content
 from bgars.records import integer_full_scale
 
 if TYPE_CHECKING:
@@ -92,6 +93,7 @@ def decode_stack(
             gains=gains,
             max_megapixels=max_megapixels,
             threads=threads,
+            allocate=any_content,
         )
     except UnsupportedImageError:
         return _decode_with_imageio(paths, channel, response, gains, max_megapixels)

@@ -1,5 +1,7 @@
 //! Comparisons of pixels that vectorise; a private supertrait, so that [`crate::Pixel`] stays with its three types.
 
+use crate::vector::Vector;
+
 /// What is sorted: grey levels as they come, or linear values.
 pub trait Key: Copy {
     /// Bits as wide as a key, so that loops over both take the same vectors.
@@ -11,6 +13,8 @@ pub trait Key: Copy {
     /// What a dropped light counts as in a sum.
     const ZERO: Self;
 
+    /// Values of a slice as floats.
+    fn load<V: Vector>(from: &[Self]) -> V;
     /// The smaller of both.
     fn least(self, other: Self) -> Self;
     /// The larger of both.
@@ -24,12 +28,17 @@ pub trait Key: Copy {
 }
 
 macro_rules! integer_key {
-    ($type:ty) => {
+    ($type:ty, $load:ident) => {
         impl Key for $type {
             type Bits = Self;
             const LEAST: Self = 0;
             const LARGEST: Self = Self::MAX;
             const ZERO: Self = 0;
+
+            #[inline(always)]
+            fn load<V: Vector>(from: &[Self]) -> V {
+                V::$load(from)
+            }
 
             #[inline(always)]
             fn least(self, other: Self) -> Self {
@@ -58,8 +67,8 @@ macro_rules! integer_key {
         }
     };
 }
-integer_key!(u8);
-integer_key!(u16);
+integer_key!(u8, from_bytes);
+integer_key!(u16, from_words);
 
 impl Key for f32 {
     type Bits = u32;
@@ -67,6 +76,11 @@ impl Key for f32 {
     const LEAST: Self = Self::NEG_INFINITY;
     const LARGEST: Self = Self::INFINITY;
     const ZERO: Self = 0.0;
+
+    #[inline(always)]
+    fn load<V: Vector>(from: &[Self]) -> V {
+        V::load(from)
+    }
 
     // Not f32::min and f32::max: these take care of NaN, which costs three instructions instead of one.
     #[inline(always)]

@@ -23,6 +23,7 @@ pub mod rims;
 pub mod shadows;
 pub mod stack;
 mod stream;
+mod vector;
 pub mod vertex_normals;
 
 pub use error::{Error, Result};

@@ -16,28 +16,50 @@ pub(crate) fn copy<T: bytemuck::NoUninit>(from: &[T], to: &mut [T]) {
     assert_eq!(from.len(), to.len());
     #[cfg(target_arch = "x86_64")]
     {
-        use std::arch::x86_64::{__m128i, _mm_loadu_si128, _mm_stream_si128};
-        const WORD: usize = size_of::<__m128i>();
-        let bytes = size_of_val(from);
-        let place = to.as_mut_ptr().cast::<__m128i>();
-        if place.is_aligned() && bytes.is_multiple_of(WORD) {
-            let source = from.as_ptr().cast::<__m128i>();
-            // SAFETY: both slices are `bytes` long; the source has no uninitialised bytes (NoUninit) and is read without
-            // alignment; the place is aligned, borrowed mutably, and gets bytes of its own type. SSE2 is part of x86_64.
-            #[allow(unsafe_code)]
-            let move_word =
-                |word: usize| unsafe { _mm_stream_si128(place.add(word), _mm_loadu_si128(source.add(word))) };
-            let words = bytes / WORD;
-            // By cache lines, which saves most of the counting.
-            for line in 0..words / 4 {
-                (4 * line..4 * line + 4).for_each(move_word);
+        use std::arch::x86_64::{__m128i, __m256i, __m512i};
+        let (bytes, place) = (size_of_val(from), to.as_mut_ptr().cast::<u8>());
+        let fits = |width: usize| bytes.is_multiple_of(width) && (place as usize).is_multiple_of(width);
+        let source = from.as_ptr().cast::<u8>();
+        // SAFETY: both slices are `bytes` long, a multiple of the vector; the source has no uninitialised bytes (NoUninit); the
+        // place is aligned, borrowed mutably, and gets bytes of its own type; the processor has the instructions.
+        #[allow(unsafe_code)]
+        unsafe {
+            if fits(size_of::<__m512i>()) && is_x86_feature_detected!("avx512f") {
+                return copy_avx512(source, place, bytes);
+            } else if fits(size_of::<__m256i>()) && is_x86_feature_detected!("avx") {
+                return copy_avx(source, place, bytes);
+            } else if fits(size_of::<__m128i>()) {
+                return copy_sse2(source, place, bytes);
             }
-            (words / 4 * 4..words).for_each(move_word);
-            return;
         }
     }
     to.copy_from_slice(from);
 }
+
+/// Defines a copy by vectors of one width.
+#[cfg(target_arch = "x86_64")]
+macro_rules! copy_by {
+    ($name:ident, $feature:literal, $vector:ident, $load:ident, $stream:ident) => {
+        /// # Safety
+        /// Both places hold `bytes` bytes, a multiple of the vector; the second is aligned to it.
+        #[target_feature(enable = $feature)]
+        #[inline]
+        #[allow(unsafe_code)]
+        unsafe fn $name(from: *const u8, to: *mut u8, bytes: usize) {
+            use std::arch::x86_64::{$load, $stream, $vector};
+            for start in (0..bytes).step_by(size_of::<$vector>()) {
+                // SAFETY: the caller's.
+                unsafe { $stream(to.add(start).cast(), $load(from.add(start).cast())) };
+            }
+        }
+    };
+}
+#[cfg(target_arch = "x86_64")]
+copy_by!(copy_avx512, "avx512f", __m512i, _mm512_loadu_si512, _mm512_stream_si512);
+#[cfg(target_arch = "x86_64")]
+copy_by!(copy_avx, "avx", __m256i, _mm256_loadu_si256, _mm256_stream_si256);
+#[cfg(target_arch = "x86_64")]
+copy_by!(copy_sse2, "sse2", __m128i, _mm_loadu_si128, _mm_stream_si128);
 
 /// Has the processor fetch the cache line of `values[index]`, if there is one, while it works on something else.
 #[inline(always)]

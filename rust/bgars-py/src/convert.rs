@@ -40,7 +40,7 @@ pub fn slice_mut<'a, T: Element, D: Dimension>(
     array: &'a mut PyReadwriteArray<'_, T, D>,
     name: &str,
 ) -> PyResult<&'a mut [T]> {
-    array.as_slice_mut().map_err(|_| InputError::new_err(format!("out.{name}: must be C-contiguous")))
+    array.as_slice_mut().map_err(|_| InputError::new_err(format!("{name}: must be C-contiguous")))
 }
 
 /// Rows of `N` values, shape (rows, N).

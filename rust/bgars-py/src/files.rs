@@ -2,19 +2,40 @@
 
 use std::path::{Path, PathBuf};
 
-use bgars_core::io::decode::{self, Channel, Color, StackData};
+use bgars_core::io::decode::{Channel, Color, StackMut, StackPlan, StackType};
 use bgars_core::io::{HeightSource, MeshFormat, MeshView, rgb16, write_mesh_file};
 use bgars_core::mesh::HeightMesh;
-use numpy::{PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadwriteArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::convert::{array3, slice2, slice3, triples};
+use crate::convert::{array3, slice_mut, slice2, slice3, triples};
 use crate::errors::{InputError, to_python};
 use crate::progress::on_threads;
 
+/// A stack to be written.
+#[derive(FromPyObject)]
+enum OwnStack<'py> {
+    #[pyo3(transparent)]
+    U8(PyReadwriteArray3<'py, u8>),
+    #[pyo3(transparent)]
+    U16(PyReadwriteArray3<'py, u16>),
+    #[pyo3(transparent)]
+    F32(PyReadwriteArray3<'py, f32>),
+}
+
+/// What numpy calls a type.
+fn numpy_name(kind: StackType) -> &'static str {
+    match kind {
+        StackType::U8 => "uint8",
+        StackType::U16 => "uint16",
+        StackType::F32 => "float32",
+    }
+}
+
+/// `allocate(shape, dtype)` makes the array, once the headers are read.
 #[pyfunction]
-#[pyo3(signature = (paths, *, channel, response, gains, max_megapixels, threads))]
-#[allow(clippy::needless_pass_by_value)]
+#[pyo3(signature = (paths, *, channel, response, gains, max_megapixels, threads, allocate))]
+#[allow(clippy::needless_pass_by_value, clippy::too_many_arguments)]
 pub fn decode_stack<'py>(
     py: Python<'py>,
     paths: Vec<PathBuf>,
@@ -23,6 +44,7 @@ pub fn decode_stack<'py>(
     gains: Option<PyReadonlyArray2<'py, f32>>,
     max_megapixels: f64,
     threads: Option<i64>,
+    allocate: Bound<'py, PyAny>,
 ) -> PyResult<(Bound<'py, PyAny>, bool, u16)> {
     let channel = match channel {
         "luminance" => Channel::Luminance,
@@ -37,14 +59,16 @@ pub fn decode_stack<'py>(
         response: response.as_ref().map(|table| table.as_slice()).transpose()?,
         gains: gains.as_ref().map(|gains| triples(gains, "gains")).transpose()?,
     };
-    let stack = on_threads(py, threads, || decode::decode_stack(&paths, &color, max_megapixels))?;
-    let shape = [paths.len(), stack.height, stack.width];
-    let array = match stack.data {
-        StackData::U8(data) => array3(py, data, shape)?.into_any(),
-        StackData::U16(data) => array3(py, data, shape)?.into_any(),
-        StackData::F32(data) => array3(py, data, shape)?.into_any(),
+    let plan = on_threads(py, threads, || StackPlan::new(&paths, &color, max_megapixels))?;
+    let array = allocate.call1(((paths.len(), plan.height, plan.width), numpy_name(plan.kind)))?;
+    let mut out: OwnStack<'py> = array.extract()?;
+    let out = match &mut out {
+        OwnStack::U8(out) => StackMut::U8(slice_mut(out, "stack")?),
+        OwnStack::U16(out) => StackMut::U16(slice_mut(out, "stack")?),
+        OwnStack::F32(out) => StackMut::F32(slice_mut(out, "stack")?),
     };
-    Ok((array, stack.linear, stack.bits))
+    on_threads(py, threads, || plan.decode_into(out))?;
+    Ok((array, plan.linear, plan.bits))
 }
 
 #[pyfunction]

@@ -39,8 +39,6 @@ mod _bgars {
     #[pymodule_export]
     use crate::normals::estimate_normals;
     #[pymodule_export]
-    use crate::normals::normal_arrays;
-    #[pymodule_export]
     use crate::reflectance::estimate_reflectance;
     #[pymodule_export]
     use crate::rims::eliminate_rims;

@@ -2,41 +2,14 @@
 
 use std::ops::ControlFlow;
 
-use bgars_core::normals::{Method, NormalMap, NormalMapMut, RobustParams, estimate_into};
+use bgars_core::normals::{Method, NormalMapMut, RobustParams, estimate_into};
 use bgars_core::{ImageStack, Lights, Pixel, Radiometry, blind};
-use numpy::{PyArray2, PyArray3, PyReadonlyArray2, PyReadwriteArray2, PyReadwriteArray3};
+use numpy::{PyReadonlyArray2, PyReadwriteArray2, PyReadwriteArray3};
 use pyo3::prelude::*;
 
 use crate::capture::{Capture, Work};
-use crate::convert::{array2, array3, slice_mut, slice2};
+use crate::convert::{slice_mut, slice2};
 use crate::errors::InputError;
-
-/// normals (H, W, 3), albedo, mask, confidence, measured, lights_kept (H, W), kept sets (H, W, L).
-type Arrays<'py> = (
-    Bound<'py, PyArray3<f32>>,
-    Bound<'py, PyArray2<f32>>,
-    Bound<'py, PyArray2<bool>>,
-    Bound<'py, PyArray2<f32>>,
-    Bound<'py, PyArray2<bool>>,
-    Bound<'py, PyArray2<u16>>,
-    Option<Bound<'py, PyArray3<bool>>>,
-);
-
-/// Zeros on large pages, for `estimate_normals` to write.
-#[pyfunction]
-pub fn normal_arrays(py: Python<'_>, height: usize, width: usize, set_lights: usize) -> PyResult<Arrays<'_>> {
-    let map = NormalMap::zeros(height * width, set_lights);
-    let shape = [height, width];
-    Ok((
-        array3(py, map.normals, [height, width, 3])?,
-        array2(py, map.albedo, shape)?,
-        array2(py, map.mask, shape)?,
-        array2(py, map.confidence, shape)?,
-        array2(py, map.measured, shape)?,
-        array2(py, map.lights_kept, shape)?,
-        (set_lights > 0).then(|| array3(py, map.kept_sets, [height, width, set_lights])).transpose()?,
-    ))
-}
 
 /// The arrays to write: normals (H, W, 3), albedo, mask, confidence, measured, lights_kept (H, W), and the kept sets (H, W, L).
 #[derive(FromPyObject)]
@@ -54,14 +27,14 @@ impl Outputs<'_> {
     /// The arrays as the core writes them.
     pub fn as_map(&mut self) -> PyResult<NormalMapMut<'_>> {
         Ok(NormalMapMut {
-            normals: slice_mut(&mut self.normals, "normals")?,
-            albedo: slice_mut(&mut self.albedo, "albedo")?,
-            mask: slice_mut(&mut self.mask, "mask")?,
-            confidence: slice_mut(&mut self.confidence, "confidence")?,
-            measured: slice_mut(&mut self.measured, "measured")?,
-            lights_kept: slice_mut(&mut self.lights_kept, "lights_kept")?,
+            normals: slice_mut(&mut self.normals, "out.normals")?,
+            albedo: slice_mut(&mut self.albedo, "out.albedo")?,
+            mask: slice_mut(&mut self.mask, "out.mask")?,
+            confidence: slice_mut(&mut self.confidence, "out.confidence")?,
+            measured: slice_mut(&mut self.measured, "out.measured")?,
+            lights_kept: slice_mut(&mut self.lights_kept, "out.lights_kept")?,
             kept_sets: match &mut self.kept_sets {
-                Some(sets) => slice_mut(sets, "kept_sets")?,
+                Some(sets) => slice_mut(sets, "out.kept_sets")?,
                 None => &mut [],
             },
         })

@@ -102,77 +102,144 @@ impl Header {
     fn bits(self) -> u16 {
         self.color.bits_per_pixel() / u16::from(self.color.channel_count())
     }
+}
 
-    fn pixels(self) -> usize {
-        self.width as usize * self.height as usize
+/// Where the pixels of a stack go, image after image.
+#[derive(Debug)]
+pub enum StackMut<'a> {
+    /// 8-bit grey levels.
+    U8(&'a mut [u8]),
+    /// 16-bit grey levels.
+    U16(&'a mut [u16]),
+    /// Linear values.
+    F32(&'a mut [f32]),
+}
+
+/// The type of a stack's values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StackType {
+    /// 8-bit grey levels.
+    U8,
+    /// 16-bit grey levels.
+    U16,
+    /// Linear values of colour images, in the grey levels of their files.
+    F32,
+}
+
+/// What the headers of some files promise; nothing is decoded yet.
+#[derive(Clone, Debug)]
+pub struct StackPlan<'a> {
+    paths: &'a [PathBuf],
+    color: &'a Color<'a>,
+    max_megapixels: f64,
+    /// Rows of an image.
+    pub height: usize,
+    /// Columns of an image.
+    pub width: usize,
+    /// Type of the values.
+    pub kind: StackType,
+    /// True when response and gains will be in the values (colour files).
+    pub linear: bool,
+    /// Bits a channel of the files (8, 16 or 32).
+    pub bits: u16,
+}
+
+impl<'a> StackPlan<'a> {
+    /// Reads the headers of PNG, TIFF, JPEG, BMP and PNM files.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Decode`], [`Error::UnsupportedImage`] (float grey, palette oddities: let another library try),
+    /// [`Error::ImageTooLarge`], [`Error::StackMismatch`], each naming the file.
+    pub fn new(paths: &'a [PathBuf], color: &'a Color<'a>, max_megapixels: f64) -> Result<Self> {
+        let Some(first_path) = paths.first() else {
+            return Err(Error::TooFewLights { count: 0 });
+        };
+        let headers = paths.par_iter().map(|path| read_header(path, max_megapixels)).collect::<Result<Vec<_>>>()?;
+        let first = headers[0];
+        for (path, &header) in paths.iter().zip(&headers) {
+            let alike = header.width == first.width
+                && header.height == first.height
+                && header.bits() == first.bits()
+                && header.color.has_color() == first.color.has_color();
+            if !alike {
+                return Err(Error::StackMismatch {
+                    path: path.clone(),
+                    first: first_path.clone(),
+                    expected: first.describe(),
+                    actual: header.describe(),
+                });
+            }
+        }
+        let linear = first.color.has_color() && color.needs_float();
+        let kind = match (first.bits(), linear) {
+            (8, false) => StackType::U8,
+            (16, false) => StackType::U16,
+            _ => StackType::F32,
+        };
+        let (height, width) = (first.height as usize, first.width as usize);
+        Ok(Self { paths, color, max_megapixels, height, width, kind, linear, bits: first.bits() })
+    }
+
+    /// Values of the whole stack.
+    #[must_use]
+    pub fn values(&self) -> usize {
+        self.paths.len() * self.height * self.width
+    }
+
+    /// Decodes the files, each on a thread of its own, to `out`: [`values`](Self::values) values of the [`kind`](Self::kind).
+    ///
+    /// # Errors
+    /// [`Error::Io`] and [`Error::Decode`], naming the file, and [`Error::LengthMismatch`].
+    ///
+    /// # Cost
+    /// Grey files are decoded in place. Colour files pass through one image a thread.
+    pub fn decode_into(&self, out: StackMut<'_>) -> Result<()> {
+        let reader = |index: usize| Reader { path: &self.paths[index], max_megapixels: self.max_megapixels };
+        let channel = self.color.channel;
+        match out {
+            StackMut::U8(out) => self.fill(out, |index, image| reader(index).read_u8(image, channel)),
+            StackMut::U16(out) => self.fill(out, |index, image| reader(index).read_u16(image, channel)),
+            StackMut::F32(out) => self.fill(out, |index, image| reader(index).read_f32(image, self.color, index)),
+        }
+    }
+
+    /// Runs `read` on every image's part of `out`, in parallel.
+    fn fill<T: Send>(&self, out: &mut [T], read: impl Fn(usize, &mut [T]) -> Result<()> + Sync) -> Result<()> {
+        if out.len() != self.values() {
+            return Err(Error::LengthMismatch { argument: "out", expected: self.values(), actual: out.len() });
+        }
+        out.par_chunks_mut((self.height * self.width).max(1)).enumerate().try_for_each(|(index, out)| read(index, out))
     }
 }
 
-/// Decodes PNG, TIFF, JPEG, BMP and PNM files of equal size and depth to one stack, grey values as they are stored.
+/// Decodes files of equal size and depth to one stack, grey values as they are stored.
 ///
 /// # Inputs
 /// `paths` one file an image; `color` for colour files; `max_megapixels` bounds what a header may claim, checked before
 /// anything is allocated.
 ///
 /// # Errors
-/// [`Error::Io`], [`Error::Decode`], [`Error::UnsupportedImage`] (float grey, palette oddities: let another library try),
-/// [`Error::ImageTooLarge`], [`Error::StackMismatch`], each naming the file.
-///
-/// # Cost
-/// Grey files are decoded in place: one stack of memory. Colour files pass through one image a thread.
+/// Those of [`StackPlan`].
 pub fn decode_stack(paths: &[PathBuf], color: &Color<'_>, max_megapixels: f64) -> Result<DecodedStack> {
-    let Some(first_path) = paths.first() else {
-        return Err(Error::TooFewLights { count: 0 });
-    };
-    let headers = paths.par_iter().map(|path| read_header(path, max_megapixels)).collect::<Result<Vec<_>>>()?;
-    let first = headers[0];
-    for (path, &header) in paths.iter().zip(&headers) {
-        let alike = header.width == first.width
-            && header.height == first.height
-            && header.bits() == first.bits()
-            && header.color.has_color() == first.color.has_color();
-        if !alike {
-            return Err(Error::StackMismatch {
-                path: path.clone(),
-                first: first_path.clone(),
-                expected: first.describe(),
-                actual: header.describe(),
-            });
-        }
-    }
-    let limit = |path: &Path| Reader { path: path.to_path_buf(), max_megapixels };
-    let pixels = first.pixels();
-    let colored = first.color.has_color();
-    let linear = colored && color.needs_float();
-    let data = match (first.bits(), linear || first.bits() == 32) {
-        (8, false) => {
-            let mut data = zeros::<u8>(pixels * paths.len());
-            fill(paths, &mut data, pixels, |index, out| limit(&paths[index]).read_u8(out, color.channel))?;
+    let plan = StackPlan::new(paths, color, max_megapixels)?;
+    let data = match plan.kind {
+        StackType::U8 => {
+            let mut data = zeros(plan.values());
+            plan.decode_into(StackMut::U8(&mut data))?;
             StackData::U8(data)
         }
-        (16, false) => {
-            let mut data = zeros::<u16>(pixels * paths.len());
-            fill(paths, &mut data, pixels, |index, out| limit(&paths[index]).read_u16(out, color.channel))?;
+        StackType::U16 => {
+            let mut data = zeros(plan.values());
+            plan.decode_into(StackMut::U16(&mut data))?;
             StackData::U16(data)
         }
-        _ => {
-            let mut data = zeros::<f32>(pixels * paths.len());
-            fill(paths, &mut data, pixels, |index, out| limit(&paths[index]).read_f32(out, color, index))?;
+        StackType::F32 => {
+            let mut data = zeros(plan.values());
+            plan.decode_into(StackMut::F32(&mut data))?;
             StackData::F32(data)
         }
     };
-    Ok(DecodedStack { data, height: first.height as usize, width: first.width as usize, linear, bits: first.bits() })
-}
-
-/// Runs `read` on every image's part of `data`, in parallel.
-fn fill<T: Send>(
-    paths: &[PathBuf],
-    data: &mut [T],
-    pixels: usize,
-    read: impl Fn(usize, &mut [T]) -> Result<()> + Sync,
-) -> Result<()> {
-    debug_assert_eq!(data.len(), paths.len() * pixels);
-    data.par_chunks_mut(pixels.max(1)).enumerate().try_for_each(|(index, out)| read(index, out))
+    Ok(DecodedStack { data, height: plan.height, width: plan.width, linear: plan.linear, bits: plan.bits })
 }
 
 pub(super) fn open(path: &Path, max_megapixels: f64) -> Result<impl ImageDecoder + use<>> {
@@ -232,19 +299,19 @@ pub(super) fn translate(path: &Path, error: ImageError) -> Error {
 }
 
 /// One file of the stack.
-struct Reader {
-    path: PathBuf,
+struct Reader<'a> {
+    path: &'a Path,
     max_megapixels: f64,
 }
 
-impl Reader {
+impl Reader<'_> {
     fn read_u8(&self, out: &mut [u8], channel: Channel) -> Result<()> {
-        if read_gray_tiff(&self.path, 8, out, self.max_megapixels)? {
+        if read_gray_tiff(self.path, 8, out, self.max_megapixels)? {
             return Ok(());
         }
-        let decoder = open(&self.path, self.max_megapixels)?;
+        let decoder = open(self.path, self.max_megapixels)?;
         if decoder.color_type() == ColorType::L8 {
-            return decoder.read_image(out).map_err(|error| translate(&self.path, error));
+            return decoder.read_image(out).map_err(|error| translate(self.path, error));
         }
         let image = self.decode(decoder)?;
         if image.color().has_color() {
@@ -259,13 +326,13 @@ impl Reader {
     }
 
     fn read_u16(&self, out: &mut [u16], channel: Channel) -> Result<()> {
-        if read_gray_tiff(&self.path, 16, bytemuck::cast_slice_mut(out), self.max_megapixels)? {
+        if read_gray_tiff(self.path, 16, bytemuck::cast_slice_mut(out), self.max_megapixels)? {
             return Ok(());
         }
-        let decoder = open(&self.path, self.max_megapixels)?;
+        let decoder = open(self.path, self.max_megapixels)?;
         if decoder.color_type() == ColorType::L16 {
             let bytes = bytemuck::cast_slice_mut(out);
-            return decoder.read_image(bytes).map_err(|error| translate(&self.path, error));
+            return decoder.read_image(bytes).map_err(|error| translate(self.path, error));
         }
         let image = self.decode(decoder)?;
         if image.color().has_color() {
@@ -280,7 +347,7 @@ impl Reader {
     }
 
     fn read_f32(&self, out: &mut [f32], color: &Color<'_>, index: usize) -> Result<()> {
-        let image = self.decode(open(&self.path, self.max_megapixels)?)?;
+        let image = self.decode(open(self.path, self.max_megapixels)?)?;
         let mut weights = color.channel.weights();
         if let Some(gains) = color.gains {
             for (weight, gain) in weights.iter_mut().zip(gains[index]) {
@@ -309,7 +376,7 @@ impl Reader {
     }
 
     fn decode(&self, decoder: impl ImageDecoder) -> Result<DynamicImage> {
-        DynamicImage::from_decoder(decoder).map_err(|error| translate(&self.path, error))
+        DynamicImage::from_decoder(decoder).map_err(|error| translate(self.path, error))
     }
 }
 

@@ -1,7 +1,7 @@
 //! The lights that a block of pixels keeps.
 
 use super::cutoff::{LANES, Lanes};
-use super::gram::BYTE_LIGHTS;
+use super::lane_solve::BYTE_LIGHTS;
 use crate::Pixel;
 
 /// The lights that a block keeps.

@@ -7,21 +7,18 @@ use std::ops::Range;
 use bytemuck::NoUninit;
 use multiversion::{multiversion, target::target_cfg_f};
 
-use super::confidence::{HALF_DEG, PRIOR_RESIDUAL};
 use super::cutoff::{LANES, Lanes};
+use super::finish::{Finished, Spare};
 use super::kept::Kept;
-use super::lane_solve::{Careful, Choice, LaneSolver, Solutions, solve};
+use super::lane_solve::{Choice, LaneSolver, Readings, solve};
 use super::out::Out;
+#[cfg(target_arch = "x86_64")]
+use crate::vector::{Avx2, Avx512};
+use crate::vector::{Portable, Vector};
 use crate::{Pixel, Radiometry, stream};
 
 /// How far ahead the images are fetched: as many streams as lights are more than processors follow by themselves.
 const AHEAD_PIXELS: usize = 16 * LANES;
-
-/// `n_z` below which `f32` cannot say whether a facet faces the camera.
-const GRAZING: f32 = 1e-5;
-
-/// Least `|rho n|^2` that leaves residuals and inverses in the normal range of `f32`, and one over the largest.
-const MIN_SQUARE: f32 = 1e-30;
 
 /// Bytes of a cache line.
 const LINE_BYTES: usize = 64;
@@ -118,15 +115,20 @@ fn run_blocks<K: Pixel>(
     pixels: Range<usize>,
     sink: &mut Sink<'_, '_>,
 ) {
-    if target_cfg_f!(any(target_feature = "fma", target_arch = "aarch64")) {
-        run_blocks_with::<K, true>(solver, source, offsets, common, pixels, sink);
-    } else {
-        run_blocks_with::<K, false>(solver, source, offsets, common, pixels, sink);
+    #[cfg(target_arch = "x86_64")]
+    {
+        if target_cfg_f!(target_feature = "avx512f") {
+            return run_blocks_with::<K, Avx512>(solver, source, offsets, common, pixels, sink);
+        }
+        if target_cfg_f!(target_feature = "avx2") {
+            return run_blocks_with::<K, Avx2>(solver, source, offsets, common, pixels, sink);
+        }
     }
+    run_blocks_with::<K, Portable>(solver, source, offsets, common, pixels, sink);
 }
 
 #[inline(always)]
-fn run_blocks_with<K: Pixel, const FMA: bool>(
+fn run_blocks_with<K: Pixel, V: Vector>(
     solver: &LaneSolver,
     source: &Source<'_, K>,
     offsets: Option<&Offsets<'_>>,
@@ -139,7 +141,8 @@ fn run_blocks_with<K: Pixel, const FMA: bool>(
     let mut in_place = Vec::with_capacity(solver.lights());
     let mut offset = [0.0; LANES];
     let mut clipped = [0; LANES];
-    let mut solutions = Solutions::new();
+    let mut finished = Finished::new();
+    let per_full_scale = 1.0 / full_scale;
     for first in pixels.clone().step_by(LANES) {
         let block = first..(first + LANES).min(pixels.end);
         let span = first - pixels.start..block.end - pixels.start;
@@ -182,13 +185,19 @@ fn run_blocks_with<K: Pixel, const FMA: bool>(
         if let Some(mark) = clips {
             mark(&block, &mut clipped);
         }
-        solve::<K, FMA>(solver, keys, &clipped, &mut kept, offsets.map(|_| &offset), &mut solutions);
-        write(full_scale, &mut solutions, used, span.clone(), sink.out);
+        let readings = Readings { keys, clipped: &clipped, offset: offsets.map(|_| &offset) };
+        let mut spare = None;
+        let mut place = sink.out.place(&span).unwrap_or_else(|| spare.insert(Spare::new()).place());
+        solve::<K, V>(solver, &readings, &mut kept, per_full_scale, &mut finished, &mut place);
+        if let Some(spare) = &spare {
+            spare.copy_to(&span, sink.out);
+        }
+        write(&finished, used, span.clone(), sink.out);
         if !sink.out.kept_sets.is_empty() {
             write_sets(&kept, used, span, sink.out);
         }
-        if solutions.careful != 0 {
-            for lane in (0..block.len()).filter(|lane| solutions.careful >> lane & 1 == 1) {
+        if finished.careful != 0 {
+            for lane in (0..block.len()).filter(|lane| finished.careful >> lane & 1 == 1) {
                 if used.is_none_or(|used| used[lane]) {
                     (sink.careful)(first + lane, sink.out);
                 }
@@ -203,59 +212,9 @@ fn run_blocks_with<K: Pixel, const FMA: bool>(
 /// Normals, albedo, mask, confidence and counts of a block; facets seen from the side, and
 /// values far from 1, are left to the careful kernel, too.
 #[inline(always)]
-fn write(full_scale: f32, solutions: &mut Solutions, used: Option<&[bool]>, span: Range<usize>, out: &mut Out<'_>) {
-    const DEG2: f32 = ((180.0 / std::f64::consts::PI) * (180.0 / std::f64::consts::PI) / (HALF_DEG * HALF_DEG)) as f32;
-    const PRIOR2: f32 = (PRIOR_RESIDUAL * PRIOR_RESIDUAL) as f32;
-    let [mut scale, mut albedo, mut confidence] = [[0.0f32; LANES]; 3];
-    let mut valid = [false; LANES];
-    let mut doubtful = [0u8; LANES];
-    let per_full_scale = 1.0 / full_scale;
-    for lane in 0..LANES {
-        let [x, y, z] = [solutions.scaled[0][lane], solutions.scaled[1][lane], solutions.scaled[2][lane]];
-        let square = x * x + y * y + z * z;
-        let length = square.sqrt();
-        // Seen from the side, or of a size at which squares leave the range of floats; NaN counts, too.
-        let in_range =
-            square > MIN_SQUARE && square < 1.0 / MIN_SQUARE || square == 0.0 && x == 0.0 && y == 0.0 && z == 0.0;
-        doubtful[lane] = u8::from(z * z < GRAZING * GRAZING * square || !in_range);
-        // NaN spreads into everything that is computed from it.
-        let length = if z > 0.0 && square < f32::INFINITY { length } else { f32::NAN };
-        let inverse = 1.0 / length;
-        let inverse2 = inverse * inverse;
-        scale[lane] = inverse;
-        albedo[lane] = length * per_full_scale;
-        // See `confidence`: the squared standard error over the squared half-way point, with one division in all.
-        let freedom = f32::from(solutions.kept[lane]) - 2.0;
-        let squares = solutions.squared_residuals[lane] + PRIOR2 * square;
-        let turning = solutions.trace[lane] - solutions.along[lane] * inverse2;
-        let turning = if turning > 0.0 { turning } else { 0.0 };
-        let certainty = freedom / (freedom + squares * turning * inverse2 * DEG2);
-        confidence[lane] = if length > 0.0 { certainty } else { 0.0 };
-    }
-    for lane in 0..LANES {
-        valid[lane] = albedo[lane] >= 0.0;
-    }
-    if doubtful.iter().fold(0, |any, doubtful| any | doubtful) != 0 {
-        for (lane, &doubtful) in doubtful.iter().enumerate() {
-            solutions.careful |= Careful::from(doubtful) << lane;
-        }
-    }
-    let [mut x, mut y, mut z] = [[0.0f32; LANES]; 3];
-    for lane in 0..LANES {
-        x[lane] = solutions.scaled[0][lane] * scale[lane];
-        y[lane] = solutions.scaled[1][lane] * scale[lane];
-        z[lane] = solutions.scaled[2][lane] * scale[lane];
-    }
-    let mut normals = [0.0f32; 3 * LANES];
-    for lane in 0..LANES {
-        normals[3 * lane] = x[lane];
-        normals[3 * lane + 1] = y[lane];
-        normals[3 * lane + 2] = z[lane];
-    }
-    store(&normals, &mut out.normals[3 * span.start..3 * span.end], out.streamed);
-    store(&albedo, &mut out.albedo[span.clone()], out.streamed);
-    store(&confidence, &mut out.confidence[span.clone()], out.streamed);
-    store(&solutions.kept, &mut out.lights_kept[span.clone()], out.streamed);
+fn write(finished: &Finished, used: Option<&[bool]>, span: Range<usize>, out: &mut Out<'_>) {
+    let valid: [bool; LANES] = std::array::from_fn(|lane| finished.valid >> lane & 1 == 1);
+    store(&finished.kept, &mut out.lights_kept[span.clone()], out.streamed);
     store(&valid, &mut out.mask[span.clone()], out.streamed);
     store(&valid, &mut out.measured[span.clone()], out.streamed);
     if let Some(used) = used {

@@ -6,7 +6,7 @@
 
 mod confidence;
 mod cutoff;
-mod gram;
+mod finish;
 mod kept;
 mod kernel;
 mod lane_solve;

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::NormalMapMut;
+use super::finish::Place;
 use crate::stream;
 
 /// Pixels of one task.
@@ -51,6 +52,16 @@ impl<'a> Out<'a> {
             });
         }
         tasks
+    }
+
+    /// Where a whole block goes; `None` for a part of one.
+    pub fn place(&mut self, span: &Range<usize>) -> Option<Place<'_>> {
+        Some(Place {
+            normals: self.normals[3 * span.start..3 * span.end].first_chunk_mut()?,
+            albedo: self.albedo[span.clone()].first_chunk_mut()?,
+            confidence: self.confidence[span.clone()].first_chunk_mut()?,
+            streamed: self.streamed,
+        })
     }
 
     /// Marks pixels as not asked for.

@@ -1,0 +1,129 @@
+//! From the least squares of some pixels to what the result holds.
+
+use std::ops::Range;
+
+use super::confidence::{HALF_DEG, PRIOR_RESIDUAL};
+use super::cutoff::{LANES, Lanes};
+use super::lane_solve::Careful;
+use super::out::Out;
+use crate::vector::Vector;
+
+/// `n_z` below which `f32` cannot say whether a facet faces the camera.
+const GRAZING: f32 = 1e-5;
+
+/// Least `|rho n|^2` that leaves residuals and inverses in the normal range of `f32`, and one over the largest.
+const MIN_SQUARE: f32 = 1e-30;
+
+/// The smallest float above zero.
+const LEAST: f32 = f32::from_bits(1);
+
+/// The least squares of some pixels.
+#[derive(Clone, Copy)]
+pub(super) struct Facets<V> {
+    /// `g = rho n`, by component.
+    pub scaled: [V; 3],
+    pub squared_residuals: V,
+    /// `tr C`, `C` the inverse in use.
+    pub trace: V,
+    /// `g^T C g`.
+    pub along: V,
+    /// How many lights were kept.
+    pub kept: V,
+}
+
+/// Where the results of a block go.
+pub(super) struct Place<'a> {
+    /// Unit normals, x y z of each pixel; NaN without solution, like the albedo.
+    pub normals: &'a mut [f32; 3 * LANES],
+    pub albedo: &'a mut Lanes<f32>,
+    pub confidence: &'a mut Lanes<f32>,
+    /// Past the caches.
+    pub streamed: bool,
+}
+
+/// A place for a block that the image cuts off.
+#[repr(align(64))] // a cache line
+pub(super) struct Spare {
+    normals: [f32; 3 * LANES],
+    albedo: Lanes<f32>,
+    confidence: Lanes<f32>,
+}
+
+impl Spare {
+    pub fn new() -> Self {
+        Self { normals: [0.0; 3 * LANES], albedo: [0.0; LANES], confidence: [0.0; LANES] }
+    }
+
+    pub fn place(&mut self) -> Place<'_> {
+        let Self { normals, albedo, confidence } = self;
+        Place { normals, albedo, confidence, streamed: false }
+    }
+
+    /// Copies the pixels that the image has.
+    pub fn copy_to(&self, span: &Range<usize>, out: &mut Out<'_>) {
+        let count = span.len();
+        out.normals[3 * span.start..3 * span.end].copy_from_slice(&self.normals[..3 * count]);
+        out.albedo[span.clone()].copy_from_slice(&self.albedo[..count]);
+        out.confidence[span.clone()].copy_from_slice(&self.confidence[..count]);
+    }
+}
+
+/// What is still to be written of a block of pixels.
+pub(super) struct Finished {
+    pub kept: Lanes<u16>,
+    /// Bit k is set where pixel k has a solution.
+    pub valid: u64,
+    /// Bit k is set where pixel k wants the careful kernel.
+    pub careful: Careful,
+}
+
+impl Finished {
+    pub fn new() -> Self {
+        Self { kept: [0; LANES], valid: 0, careful: 0 }
+    }
+
+    /// Writes the pixels from `at` on to their place; facets seen from the side, and values far from 1, are left to the careful kernel.
+    #[inline(always)]
+    pub fn write<V: Vector>(&mut self, at: usize, facets: &Facets<V>, per_full_scale: f32, place: &mut Place<'_>) {
+        const DEG2: f32 =
+            ((180.0 / std::f64::consts::PI) * (180.0 / std::f64::consts::PI) / (HALF_DEG * HALF_DEG)) as f32;
+        const PRIOR2: f32 = (PRIOR_RESIDUAL * PRIOR_RESIDUAL) as f32;
+        let zero = V::splat(0.0);
+        let [x, y, z] = facets.scaled;
+        let square = squared_length(facets.scaled);
+        // Not seen from the side, and of a size whose square is in the range of floats; false for NaN.
+        let in_range = V::both(square.is_over(V::splat(MIN_SQUARE)), V::splat(1.0 / MIN_SQUARE).is_over(square));
+        let sound = V::bits(V::both(in_range, (z * z).is_over(V::splat(GRAZING * GRAZING) * square)));
+        if sound != all_bits::<V>() {
+            let size = x.at_least(zero - x) + y.at_least(zero - y) + z.at_least(zero - z);
+            let is_zero = V::bits(V::splat(LEAST).is_over(size));
+            self.careful |= (all_bits::<V>() & !(sound | is_zero)) << at;
+        }
+        // NaN spreads into everything that is computed from it.
+        let faces = z.is_over(zero);
+        let length = V::pick(faces, square.root(), V::splat(f32::NAN));
+        let inverse = V::splat(1.0) / length;
+        let inverse2 = inverse * inverse;
+        let streamed = place.streamed;
+        V::store_interleaved([x * inverse, y * inverse, z * inverse], &mut place.normals[3 * at..], streamed);
+        (length * V::splat(per_full_scale)).store(&mut place.albedo[at..], streamed);
+        // See `confidence`: the squared standard error over the squared half-way point, with one division in all.
+        let freedom = facets.kept - V::splat(2.0);
+        let squares = square.times_plus(V::splat(PRIOR2), facets.squared_residuals);
+        let turning = (facets.trace - facets.along * inverse2).at_least(zero);
+        let certainty = freedom / (squares * turning).times_plus(inverse2 * V::splat(DEG2), freedom);
+        V::pick(faces, certainty, zero).store(&mut place.confidence[at..], streamed);
+        self.valid |= V::bits(faces) << at;
+    }
+}
+
+/// A bit for every value of a vector.
+#[inline(always)]
+pub(super) fn all_bits<V: Vector>() -> u64 {
+    (1 << V::WIDTH) - 1
+}
+
+#[inline(always)]
+fn squared_length<V: Vector>([x, y, z]: [V; 3]) -> V {
+    x.times_plus(x, y.times_plus(y, z * z))
+}

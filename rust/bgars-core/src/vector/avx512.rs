@@ -1,0 +1,137 @@
+//! Sixteen floats of AVX-512.
+
+use std::arch::x86_64::{
+    __m512, __m512i, _CMP_GT_OQ, _mm512_add_ps, _mm512_cmp_ps_mask, _mm512_cvtepi32_ps, _mm512_cvtepu8_epi32,
+    _mm512_cvtepu16_epi32, _mm512_div_ps, _mm512_fmadd_ps, _mm512_mask_blend_ps, _mm512_mask_permutexvar_ps,
+    _mm512_maskz_mov_ps, _mm512_max_ps, _mm512_mul_ps, _mm512_permutexvar_ps, _mm512_set1_epi32, _mm512_set1_ps,
+    _mm512_sqrt_ps, _mm512_srli_epi32, _mm512_stream_ps, _mm512_sub_ps, _mm512_test_epi32_mask,
+};
+
+use super::subset_sums::SubsetSums;
+use super::{Vector, first, interleaved};
+
+/// Sixteen floats.
+#[derive(Clone, Copy)]
+pub(crate) struct Avx512(__m512);
+
+const WIDTH: usize = 16;
+
+/// Calls intrinsics where they are compiled in.
+macro_rules! here {
+    ($call:expr) => {{
+        // SAFETY: the type is named only where AVX-512F is compiled in (see `Vector`), and the one store stays within a
+        // slice of WIDTH values and is aligned.
+        #[allow(unsafe_code)]
+        unsafe {
+            $call
+        }
+    }};
+}
+
+super::operators!(Avx512, _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps, _mm512_div_ps);
+
+/// Sixteen bytes as integers.
+#[inline(always)]
+fn widened(bytes: &[u8]) -> __m512i {
+    here!(_mm512_cvtepu8_epi32(bytemuck::must_cast(first::<_, WIDTH>(bytes))))
+}
+
+impl Vector for Avx512 {
+    const WIDTH: usize = WIDTH;
+    type Mask = u16;
+
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self(here!(_mm512_set1_ps(value)))
+    }
+
+    #[inline(always)]
+    fn load(from: &[f32]) -> Self {
+        Self(bytemuck::must_cast(first::<_, WIDTH>(from)))
+    }
+
+    #[inline(always)]
+    fn from_bytes(from: &[u8]) -> Self {
+        Self(here!(_mm512_cvtepi32_ps(widened(from))))
+    }
+
+    #[inline(always)]
+    fn from_words(from: &[u16]) -> Self {
+        Self(here!(_mm512_cvtepi32_ps(_mm512_cvtepu16_epi32(bytemuck::must_cast(first::<_, WIDTH>(from))))))
+    }
+
+    #[inline(always)]
+    fn store(self, to: &mut [f32], streamed: bool) {
+        let to = &mut to[..WIDTH];
+        if streamed && to.as_ptr().addr().is_multiple_of(size_of::<Self>()) {
+            here!(_mm512_stream_ps(to.as_mut_ptr(), self.0));
+        } else {
+            to.copy_from_slice(&bytemuck::must_cast::<_, [f32; WIDTH]>(self.0));
+        }
+    }
+
+    #[inline(always)]
+    fn store_interleaved([x, y, z]: [Self; 3], to: &mut [f32], streamed: bool) {
+        const PLACES: [[[i32; WIDTH]; 3]; 3] = interleaved::places();
+        const FILLED: [[u16; 3]; 3] = interleaved::filled::<WIDTH>();
+        for (vector, to) in to[..3 * WIDTH].chunks_exact_mut(WIDTH).enumerate() {
+            let from = |plane: usize| -> __m512i { bytemuck::must_cast(PLACES[plane][vector]) };
+            let mixed = here!(_mm512_permutexvar_ps(from(0), x.0));
+            let mixed = here!(_mm512_mask_permutexvar_ps(mixed, FILLED[1][vector], from(1), y.0));
+            Self(here!(_mm512_mask_permutexvar_ps(mixed, FILLED[2][vector], from(2), z.0))).store(to, streamed);
+        }
+    }
+
+    #[inline(always)]
+    fn times_plus(self, factor: Self, term: Self) -> Self {
+        Self(here!(_mm512_fmadd_ps(self.0, factor.0, term.0)))
+    }
+
+    #[inline(always)]
+    fn root(self) -> Self {
+        Self(here!(_mm512_sqrt_ps(self.0)))
+    }
+
+    #[inline(always)]
+    fn is_over(self, other: Self) -> u16 {
+        here!(_mm512_cmp_ps_mask::<_CMP_GT_OQ>(self.0, other.0))
+    }
+
+    #[inline(always)]
+    fn at_least(self, other: Self) -> Self {
+        Self(here!(_mm512_max_ps(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn both(a: u16, b: u16) -> u16 {
+        a & b
+    }
+
+    #[inline(always)]
+    fn pick(mask: u16, yes: Self, no: Self) -> Self {
+        Self(here!(_mm512_mask_blend_ps(mask, no.0, yes.0)))
+    }
+
+    #[inline(always)]
+    fn bits(mask: u16) -> u64 {
+        u64::from(mask)
+    }
+
+    #[inline(always)]
+    fn where_bit(self, bytes: &[u8], bit: usize) -> Self {
+        let mask = here!(_mm512_test_epi32_mask(widened(bytes), _mm512_set1_epi32(1 << bit)));
+        Self(here!(_mm512_maskz_mov_ps(mask, self.0)))
+    }
+
+    #[inline(always)]
+    fn add_sums_of<const ENTRIES: usize>(bytes: &[u8], sums: &SubsetSums<ENTRIES>, to: &mut [Self; ENTRIES]) {
+        // A permutation looks at the lowest four bits alone; the tables repeat after three.
+        let first = widened(bytes);
+        let groups = here!([first, _mm512_srli_epi32::<3>(first), _mm512_srli_epi32::<6>(first)]);
+        for (entry, to) in to.iter_mut().enumerate() {
+            for (tables, group) in sums.tables.iter().zip(groups) {
+                *to = *to + Self(here!(_mm512_permutexvar_ps(group, Self::load(&tables[entry]).0)));
+            }
+        }
+    }
+}

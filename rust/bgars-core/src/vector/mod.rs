@@ -1,0 +1,96 @@
+//! Vectors of floats, for the one loop where a compiler's own vectors cost a factor of two.
+//!
+//! One body of code, written against [`Vector`], is compiled for each instruction set inside a function that enables it.
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+#[cfg(target_arch = "x86_64")]
+mod interleaved;
+mod portable;
+pub mod subset_sums;
+#[cfg(test)]
+mod tests;
+
+use std::ops::{Add, Div, Mul, Sub};
+
+/// The four operators of a vector by its intrinsics; `here!` says why they may be called.
+#[cfg(target_arch = "x86_64")]
+macro_rules! operators {
+    ($vector:ident, $add:ident, $sub:ident, $mul:ident, $div:ident) => {
+        super::operators!(@one $vector, Add add $add);
+        super::operators!(@one $vector, Sub sub $sub);
+        super::operators!(@one $vector, Mul mul $mul);
+        super::operators!(@one $vector, Div div $div);
+    };
+    (@one $vector:ident, $trait:ident $method:ident $call:ident) => {
+        impl std::ops::$trait for $vector {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self(here!($call(self.0, other.0)))
+            }
+        }
+    };
+}
+#[cfg(target_arch = "x86_64")]
+use operators;
+
+#[cfg(target_arch = "x86_64")]
+pub(crate) use avx2::Avx2;
+#[cfg(target_arch = "x86_64")]
+pub(crate) use avx512::Avx512;
+pub(crate) use portable::Portable;
+use subset_sums::SubsetSums;
+
+/// `WIDTH` floats that are worked on at once. Slices hold at least as many values; of longer ones the first count.
+///
+/// A type may be named only where its instructions are there: in a function compiled for them.
+pub trait Vector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> {
+    /// Number of values.
+    const WIDTH: usize;
+    /// True or false for each value.
+    type Mask: Copy;
+
+    /// The same value everywhere.
+    fn splat(value: f32) -> Self;
+    /// Values of a slice.
+    fn load(from: &[f32]) -> Self;
+    /// Bytes as floats.
+    fn from_bytes(from: &[u8]) -> Self;
+    /// Words of 16 bits as floats.
+    fn from_words(from: &[u16]) -> Self;
+    /// Writes the values; past the caches where `streamed`, supported, and aligned ([`crate::stream::finish`] must follow).
+    fn store(self, to: &mut [f32], streamed: bool);
+    /// Writes `x[0] y[0] z[0] x[1] ...`.
+    fn store_interleaved(vectors: [Self; 3], to: &mut [f32], streamed: bool);
+
+    /// `self factor + term`, in one rounding where the processor does so at no cost.
+    fn times_plus(self, factor: Self, term: Self) -> Self;
+    /// Square root.
+    fn root(self) -> Self;
+    /// `self > other`; false for NaN.
+    fn is_over(self, other: Self) -> Self::Mask;
+    /// The larger of both; `other` where one is NaN.
+    fn at_least(self, other: Self) -> Self;
+    /// True where both are.
+    fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// `yes` where the mask is true, `no` elsewhere.
+    fn pick(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// Bit k: value k of the mask.
+    fn bits(mask: Self::Mask) -> u64;
+    /// The value where bit `bit` of its byte is set, 0 elsewhere.
+    fn where_bit(self, bytes: &[u8], bit: usize) -> Self;
+    /// Adds, for each byte, the sums over the elements whose bits are set.
+    fn add_sums_of<const ENTRIES: usize>(bytes: &[u8], sums: &SubsetSums<ENTRIES>, to: &mut [Self; ENTRIES]);
+}
+
+/// The first values of a slice.
+#[inline(always)]
+fn first<T: Copy + Default, const N: usize>(values: &[T]) -> [T; N] {
+    let mut first = [T::default(); N];
+    first.copy_from_slice(&values[..N]);
+    first
+}

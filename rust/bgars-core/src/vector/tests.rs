@@ -1,0 +1,126 @@
+//! Every vector does what its values would do one by one.
+
+#![allow(clippy::float_cmp)]
+
+use super::subset_sums::SubsetSums;
+use super::{Portable, Vector};
+
+/// More than the widest vector needs.
+const VALUES: usize = 16;
+
+fn values<V: Vector>(vector: V) -> Vec<f32> {
+    let mut out = [f32::NAN; VALUES];
+    vector.store(&mut out, false);
+    assert!(out[V::WIDTH..].iter().all(|value| value.is_nan()), "written past the end");
+    out[..V::WIDTH].to_vec()
+}
+
+/// `vector` holds `expected(k)` at place k.
+fn assert_values<V: Vector>(vector: V, expected: impl Fn(usize) -> f32) {
+    for (lane, &value) in values(vector).iter().enumerate() {
+        let expected = expected(lane);
+        assert!(value == expected || value.is_nan() && expected.is_nan(), "{lane}: {value}, expected {expected}");
+    }
+}
+
+fn check<V: Vector>() {
+    let a: [f32; VALUES] = std::array::from_fn(|lane| lane as f32 - 3.0);
+    let b: [f32; VALUES] = std::array::from_fn(|lane| [0.5, -2.0, 7.0, f32::NAN][lane % 4]);
+    let (x, y) = (V::load(&a), V::load(&b));
+    assert_values(x, |lane| a[lane]);
+    assert_values(V::splat(2.5), |_| 2.5);
+    assert_values(x + y, |lane| a[lane] + b[lane]);
+    assert_values(x - y, |lane| a[lane] - b[lane]);
+    assert_values(x * y, |lane| a[lane] * b[lane]);
+    assert_values(x / y, |lane| a[lane] / b[lane]);
+    assert_values(x.times_plus(y, V::splat(1.0)), |lane| a[lane] * b[lane] + 1.0); // exact for these values
+    assert_values((x * x).root(), |lane| a[lane].abs());
+    assert_values(V::splat(-1.0).root(), |_| f32::NAN);
+    assert_values(V::pick(x.is_over(y), x, V::splat(0.0)), |lane| if a[lane] > b[lane] { a[lane] } else { 0.0 });
+    assert_values(y.at_least(V::splat(0.0)), |lane| if b[lane] > 0.0 { b[lane] } else { 0.0 });
+    let both = V::both(x.is_over(y), x.is_over(V::splat(4.0)));
+    assert_values(V::pick(both, x, y), |lane| if a[lane] > b[lane] && a[lane] > 4.0 { a[lane] } else { b[lane] });
+    let bits = (0..V::WIDTH).filter(|&lane| a[lane] > b[lane]).fold(0, |bits, lane| bits | 1 << lane);
+    assert_eq!(V::bits(x.is_over(y)), bits);
+
+    let bytes: [u8; VALUES] = std::array::from_fn(|lane| (lane * 37 % 256) as u8);
+    let words: [u16; VALUES] = std::array::from_fn(|lane| (lane * 4099) as u16);
+    assert_values(V::from_bytes(&bytes), |lane| f32::from(bytes[lane]));
+    assert_values(V::from_words(&words), |lane| f32::from(words[lane]));
+    for bit in 0..8 {
+        assert_values(x.where_bit(&bytes, bit), |lane| if bytes[lane] >> bit & 1 == 1 { a[lane] } else { 0.0 });
+    }
+}
+
+fn check_sums<V: Vector>() {
+    for elements in [3, 5, 8] {
+        // Whole numbers: sums are exact in any order.
+        let table: Vec<[f32; 2]> = (0..elements).map(|index| [(1 << index) as f32, -(index as f32)]).collect();
+        let sums = SubsetSums::new(&table);
+        for first in (0..1 << elements).step_by(V::WIDTH) {
+            let bytes: [u8; VALUES] = std::array::from_fn(|lane| ((first + lane) & ((1 << elements) - 1)) as u8);
+            let mut found = [V::splat(0.5); 2];
+            V::add_sums_of(&bytes, &sums, &mut found);
+            for (entry, found) in found.into_iter().enumerate() {
+                assert_values(found, |lane| {
+                    let kept = table.iter().enumerate().filter(|(index, _)| bytes[lane] >> index & 1 == 1);
+                    0.5 + kept.map(|(_, element)| element[entry]).sum::<f32>()
+                });
+            }
+        }
+    }
+}
+
+fn check_stores<V: Vector>() {
+    #[repr(align(64))]
+    struct Lines([f32; 4 * VALUES]);
+    let planes: [[f32; VALUES]; 3] = [0, 1, 2].map(|plane| std::array::from_fn(|lane| (3 * lane + plane) as f32));
+    for (start, streamed) in [(0, true), (0, false), (1, true), (5, false)] {
+        let mut out = Lines([-1.0; 4 * VALUES]);
+        V::store_interleaved(planes.map(|plane| V::load(&plane)), &mut out.0[start..], streamed);
+        crate::stream::finish();
+        for (at, &value) in out.0.iter().enumerate() {
+            let inside = (start..start + 3 * V::WIDTH).contains(&at);
+            assert_eq!(value, if inside { (at - start) as f32 } else { -1.0 });
+        }
+    }
+}
+
+fn check_all<V: Vector>() {
+    check::<V>();
+    check_sums::<V>();
+    check_stores::<V>();
+}
+
+#[test]
+fn portable() {
+    check_all::<Portable>();
+}
+
+#[test]
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code)]
+fn avx2() {
+    #[target_feature(enable = "avx2,fma")]
+    fn checked() {
+        check_all::<super::Avx2>();
+    }
+    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        // SAFETY: the processor has the instructions.
+        unsafe { checked() }
+    }
+}
+
+#[test]
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code)]
+fn avx512() {
+    #[target_feature(enable = "avx512f")]
+    fn checked() {
+        check_all::<super::Avx512>();
+    }
+    if is_x86_feature_detected!("avx512f") {
+        // SAFETY: the processor has the instructions.
+        unsafe { checked() }
+    }
+}

@@ -1,0 +1,82 @@
+"""Arrays whose pages are used again never share them while somebody holds one."""
+
+from __future__ import annotations
+
+import gc
+
+import bgars
+import numpy as np
+import pytest
+from bgars import large_arrays
+from bgars.large_arrays import MIN_BYTES, any_content
+
+SHAPE = (MIN_BYTES // 4, 3)
+
+
+@pytest.fixture(autouse=True)
+def no_pages_kept() -> None:
+    large_arrays._free.clear()
+
+
+def test_an_array_starts_on_a_page_and_is_zero_at_first() -> None:
+    array = any_content(SHAPE, np.float32)
+    assert array.shape == SHAPE
+    assert array.dtype == np.float32
+    assert array.flags.c_contiguous
+    assert array.flags.writeable
+    assert array.ctypes.data % 4096 == 0
+    assert not array.any()
+
+
+def test_pages_are_used_again_by_the_next_array_of_the_size() -> None:
+    array = any_content(SHAPE, np.float32)
+    place = array.ctypes.data
+    array[:] = 1
+    del array
+    other_size = any_content((2 * SHAPE[0], 3), np.float32)
+    assert other_size.ctypes.data != place
+    assert any_content((3, SHAPE[0]), np.uint32).ctypes.data == place
+
+
+def test_a_view_keeps_its_pages() -> None:
+    array = any_content(SHAPE, np.float32)
+    array[:] = 7
+    column = array[:, 1]
+    del array
+    gc.collect()
+    others = [any_content(SHAPE, np.float32) for _ in range(3)]
+    for other in others:
+        assert not np.shares_memory(other, column)
+        other[:] = 8
+    assert (column == 7).all()
+
+
+def test_no_more_pages_are_kept_than_promised() -> None:
+    arrays = [any_content((MIN_BYTES,), np.uint8) for _ in range(large_arrays.KEPT_ARRAYS + 5)]
+    del arrays
+    assert len(large_arrays._free) == large_arrays.KEPT_ARRAYS
+
+
+def test_small_arrays_are_zeros_of_numpy() -> None:
+    array = any_content((10, 3), np.uint16)
+    assert array.flags.owndata
+    assert not array.any()
+
+
+@pytest.mark.parametrize("method", ["specular-filter", "robust-filter"])
+def test_a_field_on_used_pages_is_the_same(method: str) -> None:
+    side = 1200
+    rng = np.random.default_rng(5)
+    directions = bgars.LightRig.ring(8, elevation_deg=50.0).directions
+    bright, dim = (rng.integers(0, top, (8, side, side), dtype=np.uint8) for top in (256, 90))
+    mask = rng.random((side, side)) > 0.3
+
+    def estimate(images: np.ndarray) -> bgars.NormalField:
+        return bgars.estimate_normals(images, directions, method=method, mask=mask, keep_sets=True)
+
+    expected = estimate(dim)
+    place = estimate(bright).normals.ctypes.data  # garbage at once
+    again = estimate(dim)
+    assert again.normals.ctypes.data == place
+    for name in ("normals", "albedo", "mask", "confidence", "measured", "lights_kept", "kept_sets"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(expected, name), err_msg=name)
