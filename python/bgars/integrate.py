@@ -133,8 +133,9 @@ def integrate_normals(
     tol : float
         Bilateral: stop when the energy changes by less than this times itself.
     solver : {"converged", "compatible"}
-        Bilateral: every system solved by multigrid to 1e-6, or by Jacobi-preconditioned conjugate gradient to 1e-3 as
-        published. Stopped that early, jumps depend on how far the solver happened to come, and so on details of it.
+        Bilateral: every system solved by multigrid to 1e-6, or the published iteration, Jacobi-preconditioned conjugate
+        gradient to 1e-3. Stopped that early, jumps depend on how far the solver happened to come. Under a camera whose
+        two focal lengths differ, "compatible" also takes the published approximation for it.
     precision : {"double", "single"}
         Bilateral, compatible: numbers inside a solve; "single" is faster, and what a solve changes is still added in
         double.
