@@ -32,6 +32,7 @@ TITLES = {
     "normals": "Normals: 8 lights of 8 bit, published filter",
     "glossy": "Normals of glossy balls: 8 lights of 8 bit, I_d 0.25",
     "integrate": "Integration to a relative residual of 1e-6",
+    "bilateral": "Bilateral integration, the same inner tolerance on both sides",
     "read": "Files to normals",
     "write": "Height map to mesh file",
 }

@@ -1,6 +1,6 @@
 """Measure bgars against its peers, side by side in one run, and print the ratios.
 
-python benches/peers/compare.py [--quick] [--only normals|glossy|integrate|read|write] [--json out.json]
+python benches/peers/compare.py [--quick] [--only normals|glossy|integrate|bilateral|read|write] [--json out.json]
 """
 
 from __future__ import annotations
@@ -12,11 +12,12 @@ import sys
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from bilateral import MAPS
 from machine import describe
 from process import run_script
 from table import group_lines, machine_line
 
-GROUPS = ("normals", "glossy", "integrate", "read", "write")
+GROUPS = ("normals", "glossy", "integrate", "bilateral", "read", "write")
 THREADS = (1, 2)
 
 
@@ -35,6 +36,7 @@ def tasks(*, quick: bool) -> list[Task]:
         *_normals(quick=quick),
         *_glossy(quick=quick),
         *_integrate(quick=quick),
+        *_bilateral(quick=quick),
         *_files(quick=quick),
         *_meshes(quick=quick),
     ]
@@ -64,6 +66,11 @@ def _integrate(*, quick: bool) -> list[Task]:
         found += [Task("integrate", "scaling.py", (shape, str(side))) for side in sides]
     side = str(1024 if quick else 4096)
     return found + [Task("integrate", "roofline.py", ("iteration", side), threads) for threads in THREADS]
+
+
+def _bilateral(*, quick: bool) -> list[Task]:
+    # The peer works on one thread whatever it is given.
+    return [Task("bilateral", "bilateral.py", (name,)) for name in (("diligent/cat",) if quick else MAPS)]
 
 
 def _files(*, quick: bool) -> list[Task]:

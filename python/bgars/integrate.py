@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal, get_args, overload
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, get_args, overload
 
 import numpy as np
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import ArrayLike
+    from typing_extensions import Unpack
 
     from bgars.records import BoolArray, FloatArray
     from bgars.surface_records import Anchors
@@ -30,48 +31,35 @@ Precision = Literal["double", "single"]
 NORMALS_NDIM = 3
 LEAST_SQUARES_ITERS, BILATERAL_ITERS = 2_000, 150
 
+if TYPE_CHECKING:
+
+    class _Options(TypedDict, total=False):
+        """Everything but the camera, which alone decides what comes back."""
+
+        mask: ArrayLike | None
+        method: IntegrationMethod
+        difference: Difference
+        weights: Literal["confidence"] | ArrayLike | None
+        relative_tolerance: float
+        absolute_tolerance: float
+        max_iters: int | None
+        k: float
+        tol: float
+        solver: Solver
+        precision: Precision
+        anchors: Anchors | None
+        pixel_pitch_um: float | None
+        threads: int | None
+        progress: Callable[[int, float], object] | None
+
 
 @overload
 def integrate_normals(
-    normals: NormalField | ArrayLike,
-    *,
-    mask: ArrayLike | None = None,
-    method: IntegrationMethod = "least-squares",
-    difference: Difference = "trapezoid",
-    weights: Literal["confidence"] | ArrayLike | None = None,
-    relative_tolerance: float = 1e-8,
-    absolute_tolerance: float = 1e-12,
-    max_iters: int | None = None,
-    k: float = 2.0,
-    tol: float = 1e-4,
-    solver: Solver = "converged",
-    precision: Precision = "double",
-    camera: None = None,
-    anchors: Anchors | None = None,
-    pixel_pitch_um: float | None = None,
-    threads: int | None = None,
-    progress: Callable[[int, float], object] | None = None,
+    normals: NormalField | ArrayLike, *, camera: None = None, **options: Unpack[_Options]
 ) -> HeightMap: ...
 @overload
 def integrate_normals(
-    normals: NormalField | ArrayLike,
-    *,
-    mask: ArrayLike | None = None,
-    method: IntegrationMethod = "least-squares",
-    difference: Difference = "trapezoid",
-    weights: Literal["confidence"] | ArrayLike | None = None,
-    relative_tolerance: float = 1e-8,
-    absolute_tolerance: float = 1e-12,
-    max_iters: int | None = None,
-    k: float = 2.0,
-    tol: float = 1e-4,
-    solver: Solver = "converged",
-    precision: Precision = "double",
-    camera: Pinhole,
-    anchors: Anchors | None = None,
-    pixel_pitch_um: float | None = None,
-    threads: int | None = None,
-    progress: Callable[[int, float], object] | None = None,
+    normals: NormalField | ArrayLike, *, camera: Pinhole, **options: Unpack[_Options]
 ) -> DepthMap: ...
 def integrate_normals(
     normals: NormalField | ArrayLike,
@@ -133,8 +121,9 @@ def integrate_normals(
     tol : float
         Bilateral: stop when the energy changes by less than this times itself.
     solver : {"converged", "compatible"}
-        Bilateral: every system solved by multigrid to 1e-6, or by Jacobi-preconditioned conjugate gradient to 1e-3 as
-        published. Stopped that early, jumps depend on how far the solver happened to come, and so on details of it.
+        Bilateral: every system solved by multigrid to 1e-6, or the published iteration, Jacobi-preconditioned conjugate
+        gradient to 1e-3. Stopped that early, jumps depend on how far the solver happened to come. Under a camera whose
+        two focal lengths differ, "compatible" also takes the published approximation for it.
     precision : {"double", "single"}
         Bilateral, compatible: numbers inside a solve; "single" is faster, and what a solve changes is still added in
         double.

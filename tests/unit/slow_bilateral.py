@@ -16,12 +16,18 @@ if TYPE_CHECKING:
 MAX_ARGUMENT = 70.0
 
 
-def slants(normals: Array, matrix_px: Array | None) -> tuple[Array, Array]:
-    """``g`` of both axes: n_z, or in perspective -f times the product of normal and ray."""
+def slants(normals: Array, matrix_px: Array | None, *, published: bool = False) -> tuple[Array, Array]:
+    """``g`` of both axes: n_z, or in perspective -f times the product of normal and ray.
+
+    As published: eq. 8 for one focal length, each axis with its own in place of it.
+    """
     if matrix_px is None:
         return normals[..., 2], normals[..., 2]
     (f_x, _, c_x), (_, f_y, c_y), _ = matrix_px
     row, col = np.indices(normals.shape[:2])
+    if published:
+        across = normals[..., 0] * (col - c_x) + normals[..., 1] * (c_y - row)
+        return f_x * normals[..., 2] - across, f_y * normals[..., 2] - across
     rays = np.stack([(col - c_x) / f_x, (c_y - row) / f_y, -np.ones(row.shape)], axis=-1)
     facing = -(normals * rays).sum(-1)
     return f_x * facing, f_y * facing
@@ -49,9 +55,10 @@ def integrate(
     tol: float = 1e-4,
     inner_tolerance: float = 1e-10,
     rounds: int = 150,
+    published: bool = False,
 ) -> tuple[Array, list[float], int]:
     """Return height (NaN outside the mask), energies, and the iterations of the inner solver."""
-    g_x, g_y = slants(normals, matrix_px)
+    g_x, g_y = slants(normals, matrix_px, published=published)
     steps = [
         one_sided(mask, g, shift, sign)
         for g, shift, sign in ((g_x, (0, 1), 1.0), (g_x, (0, -1), -1.0), (g_y, (-1, 0), 1.0), (g_y, (1, 0), -1.0))

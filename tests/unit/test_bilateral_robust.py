@@ -86,14 +86,14 @@ def test_lanes_of_one_pixel(shape: str, solver: str) -> None:
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_a_quarter_of_a_million_islands(solver: str) -> None:
+def test_a_million_islands(solver: str) -> None:
     """Pixels without a neighbour: a component each, of height 0."""
-    mask = np.zeros((1000, 1000), bool)
+    mask = np.zeros((2000, 2000), bool)
     mask[::2, ::2] = True
-    normals = np.zeros((1000, 1000, 3))
+    normals = np.zeros((2000, 2000, 3))
     normals[..., 0], normals[..., 2] = 0.6, 0.8
     found = solve(normals, solver, mask=mask)
-    assert len(found.components) == 250_000
+    assert len(found.components) == 1_000_000
     assert (found.height_px[mask] == 0).all()
 
 

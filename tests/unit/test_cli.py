@@ -66,6 +66,14 @@ def test_normals_then_mesh(tmp_path: Path) -> None:
     facts = json.loads(run.stdout)
     assert facts["unit"] == "um"
     assert len(trimesh.load_mesh(mesh).vertices) == facts["vertices"]
+    smooth = np.ptp(trimesh.load_mesh(mesh).vertices[:, 2])
+    options = ("--method", "bilateral", "--k", 1, "--solver", "compatible")
+    run = bgars_command("mesh", tmp_path / "n" / "normals.png", "-o", mesh, "--pixel-pitch-um", 3.4, *options, "--json")
+    assert run.returncode == 0, run.stderr
+    facts = json.loads(run.stdout)
+    assert facts["converged"]
+    assert facts["reweightings"] >= 2
+    assert 0.5 < np.ptp(trimesh.load_mesh(mesh).vertices[:, 2]) / smooth < 2.0
 
 
 def test_height_map_to_mesh_keeps_its_scale(tmp_path: Path) -> None:
@@ -122,6 +130,12 @@ def test_every_command_has_help(command: str) -> None:
         (["reconstruct", "nowhere", "-o", "out"], "nowhere: no such folder"),
         (["reconstruct", "nowhere", "-o", "out", "--method", "magic"], "magic"),
         (["mesh", "nowhere.tif", "-o", "out.ply"], "nowhere.tif"),
+        (["mesh", "h.tif", "-o", "out.ply", "--method", "bilateral"], "h.tif is a height map, which is not integrated"),
+        (
+            ["mesh", "n.png", "-o", "out.ply", "--k", 2],
+            "--k: only --method bilateral has it, got --method least-squares",
+        ),
+        (["mesh", "n.png", "-o", "out.ply", "--solver", "best"], "best"),
         (["evaluate", "nowhere"], "nowhere"),
         (["inspect", "nowhere", "-o", "out"], "nowhere: no such folder"),
         (["inspect", "nowhere", "-o", "out", "--recipe", "none.toml"], "none.toml: cannot be read"),

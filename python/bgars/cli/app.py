@@ -19,15 +19,14 @@ from bgars.cli.evaluation import choice_in_words, evaluation_table
 from bgars.cli.experiment import register as register_experiment
 from bgars.cli.grr import register as register_grr
 from bgars.cli.inspect import register as register_inspect
+from bgars.cli.mesh import register as register_mesh
 from bgars.cli.outputs import write_normals, write_reconstruction
 from bgars.cli.report import register as register_report
 from bgars.cli.simulate import register as register_simulate
 from bgars.cli.spc import register as register_spc
 from bgars.errors import BgarsError
-from bgars.io.mesh_files import MESH_SUFFIXES
 from bgars.light_files import read_filenames
 from bgars.normals import DEFAULT_METHOD, METHODS, Method
-from bgars.pipeline import solver_fraction
 
 __all__ = ["main"]
 
@@ -205,39 +204,7 @@ def normals(
     _list_files(output, files)
 
 
-@app.command()
-def mesh(
-    source: Annotated[
-        Path,
-        typer.Argument(
-            metavar="FILE", help="normals.png, or a height map (.tif, .npy; NaN = invalid).", show_default=False
-        ),
-    ],
-    output: Annotated[
-        Path,
-        typer.Option(
-            "--output", "-o", metavar="MESH", help=f"Mesh file: {', '.join(MESH_SUFFIXES)}.", show_default=False
-        ),
-    ],
-    pixel_pitch_um: Annotated[
-        float | None,
-        typer.Option(
-            help="Pixel pitch; a height map is then taken as um. A .tif of bgars brings its own.", show_default=False
-        ),
-    ] = None,
-    directx: Annotated[bool, typer.Option("--directx", help="The normal map has green = y down.")] = False,
-    as_json: JsonOption = False,
-) -> None:
-    """Turn a normal map or a height map into a mesh."""
-    with stage_progress() as report:
-        height = _height_from(source, pixel_pitch_um, directx, report)
-    surface = bgars.mesh_from_height(height)
-    bgars.write_mesh(surface, output)
-    summary = {"vertices": len(surface.vertices), "faces": len(surface.faces), "unit": height.unit, "file": str(output)}
-    if as_json:
-        print_json(summary)
-        return
-    say(f"{output}: {summary['vertices']} vertices, {summary['faces']} faces, in {height.unit}")
+register_mesh(app)
 
 
 @app.command()
@@ -328,19 +295,6 @@ def _reconstruct_to(
 
 def _material_from(path: Path | None) -> bgars.SurfaceMaterial | None:
     return None if path is None else bgars.read_material(path)
-
-
-def _height_from(
-    source: Path, pixel_pitch_um: float | None, directx: bool, report: Callable[[str, float], None]
-) -> bgars.HeightMap:
-    if source.suffix.lower() == ".png":
-        return bgars.integrate_normals(
-            bgars.read_normal_map(source, directx=directx),
-            pixel_pitch_um=pixel_pitch_um,
-            progress=lambda _, residual: report("height", solver_fraction(residual)),
-        )
-    values, stored_pitch_um = bgars.read_height(source)
-    return bgars.HeightMap.from_array(values, pixel_pitch_um=pixel_pitch_um or stored_pitch_um)
 
 
 def _list_files(folder: Path, files: dict[str, str]) -> None:

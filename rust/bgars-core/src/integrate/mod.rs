@@ -3,7 +3,7 @@
 //! Each edge between two pixels of the mask asks `n_z dz = -n_x` (along x) or `n_z dz = -n_y` (along y, up). The normal
 //! equations are a weighted graph Laplacian, a 5-point stencil that is never stored as a matrix.
 //!
-//! The way through the files: `operator` makes weights and right side of the normals on a `checkerboard`; `reduction`
+//! The way through the files: `operator` makes `edges` of the normals, these the system on a `checkerboard`; `reduction`
 //! eliminates every other pixel; `conjugate_gradient` solves for the rest, preconditioned by `multigrid`, whose grids come
 //! from `coarsen` (after `fill` has closed the smallest holes) and talk to each other by `transfer`. What a coarser grid
 //! cannot hold, nor lead around (`detours`), is found by `lost`; it goes as `strays` to the `graph` that takes over from the last grid.
@@ -14,6 +14,7 @@ mod coarsen;
 mod components;
 mod conjugate_gradient;
 mod detours;
+mod edges;
 mod fill;
 mod graph;
 mod lost;

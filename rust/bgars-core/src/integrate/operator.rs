@@ -1,10 +1,8 @@
 //! The normal equations: a weighted graph Laplacian on the pixels of the mask, its blacks eliminated.
 
-use rayon::prelude::*;
-
 use super::Difference;
-use super::checkerboard::{BAND_ROWS, Grid, Weights, split_row};
-use crate::memory::zeros;
+use super::checkerboard::{Grid, Weights};
+use super::edges::{Axis, Colours, EdgeRow, from_edges};
 
 /// Smallest n_z of an edge: a normal seen edge-on has no finite slope.
 const MIN_N_Z: f64 = 1e-3;
@@ -24,13 +22,6 @@ pub struct Field<'a> {
     pub width: usize,
 }
 
-/// A right side, or a solution, by colour.
-#[derive(Debug)]
-pub(super) struct Colours {
-    pub reds: Vec<f64>,
-    pub blacks: Vec<f64>,
-}
-
 /// One row of the field with its components apart; pixels outside the mask face the camera and are not trusted.
 #[derive(Debug, Default, Clone)]
 struct FieldRow {
@@ -38,13 +29,6 @@ struct FieldRow {
     n_z: Vec<f32>,
     /// Square root of the pixel's weight, 0 outside the mask.
     trust: Vec<f64>,
-}
-
-/// Weights of the edges from a row's pixels to the next ones, and the height steps these ask for times the weights.
-#[derive(Debug, Default, Clone)]
-struct EdgeRow {
-    weight: Vec<f32>,
-    push: Vec<f64>,
 }
 
 impl FieldRow {
@@ -77,7 +61,6 @@ impl EdgeRow {
     /// normal the forward difference takes.
     ///
     /// `n_z^2` is the weight that the paper's rows `n_z dz = -n_x` imply.
-    #[allow(clippy::too_many_arguments)]
     fn join(
         &mut self,
         a: (&[f32], &[f32], &[f64]),
@@ -87,10 +70,6 @@ impl EdgeRow {
         lead_is_a: bool,
     ) {
         let edges = a.2.len().min(b.2.len());
-        self.weight.clear();
-        self.weight.resize(a.2.len(), 0.0);
-        self.push.clear();
-        self.push.resize(a.2.len(), 0.0);
         let (share_a, share_b) = match (difference, lead_is_a) {
             (Difference::Trapezoid, _) => (0.5, 0.5),
             (Difference::Forward, true) => (1.0, 0.0),
@@ -115,12 +94,21 @@ impl EdgeRow {
             }
         }
     }
+}
 
-    fn clear(&mut self, width: usize) {
-        self.weight.clear();
-        self.weight.resize(width, 0.0);
-        self.push.clear();
-        self.push.resize(width, 0.0);
+/// The last two rows of a field that were asked for.
+#[derive(Default)]
+struct FieldRows {
+    rows: [FieldRow; 2],
+    loaded: [Option<usize>; 2],
+}
+
+impl FieldRows {
+    fn load(&mut self, field: Field<'_>, row: usize) {
+        if self.loaded[row % 2] != Some(row) {
+            self.rows[row % 2].load(field, row);
+            self.loaded[row % 2] = Some(row);
+        }
     }
 }
 
@@ -128,72 +116,26 @@ impl EdgeRow {
 pub(super) fn assemble(field: Field<'_>, difference: Difference) -> (Weights, Colours) {
     let width = field.width;
     let grid = Grid { height: field.mask.len() / width, width };
-    let half = grid.half();
-    let mut weights = Weights::zeros(grid);
-    let mut right = Colours { reds: zeros(grid.half_pixels()), blacks: zeros(grid.half_pixels()) };
-    let bands = weights
-        .bands_mut()
-        .zip(right.reds.par_chunks_mut(BAND_ROWS * half))
-        .zip(right.blacks.par_chunks_mut(BAND_ROWS * half))
-        .enumerate();
-    bands.for_each(|(band, ((mut sides, reds), blacks))| {
-        let first = band * BAND_ROWS;
-        let rows = reds.len() / half;
-        let [mut here, mut next] = [FieldRow::default(), FieldRow::default()];
-        let [mut above, mut along, mut below] = [EdgeRow::default(), EdgeRow::default(), EdgeRow::default()];
-        let join_rows = |upper: &FieldRow, lower: &FieldRow, edges: &mut EdgeRow| {
-            // y grows upward: the forward difference starts at the lower pixel.
-            edges.join(
-                (&upper.along[1], &upper.n_z, &upper.trust),
-                (&lower.along[1], &lower.n_z, &lower.trust),
-                -1.0,
-                difference,
-                false,
-            );
-        };
-        here.load(field, first);
-        above.clear(width);
-        if first > 0 {
-            next.load(field, first - 1);
-            join_rows(&next, &here, &mut above);
-            above.cut(field, (first - 1) * width, width);
+    from_edges(grid, || {
+        let mut rows = FieldRows::default();
+        move |axis: Axis, row: usize, edges: &mut EdgeRow| {
+            rows.load(field, row);
+            let FieldRow { along, n_z, trust } = &rows.rows[row % 2];
+            match axis {
+                Axis::Right => {
+                    let (a, b) = ((&along[0][..], &n_z[..], &trust[..]), (&along[0][1..], &n_z[1..], &trust[1..]));
+                    edges.join(a, b, 1.0, difference, true);
+                    edges.cut(field, row * width, 1);
+                }
+                Axis::Below => {
+                    rows.load(field, row + 1);
+                    let [upper, lower] = [&rows.rows[row % 2], &rows.rows[(row + 1) % 2]];
+                    let a = (&upper.along[1][..], &upper.n_z[..], &upper.trust[..]);
+                    // y grows upward: the forward difference starts at the lower pixel.
+                    edges.join(a, (&lower.along[1], &lower.n_z, &lower.trust), -1.0, difference, false);
+                    edges.cut(field, row * width, width);
+                }
+            }
         }
-        let mut left = vec![0.0f32; width];
-        let mut unused = vec![0.0f32; half];
-        let mut divergence = vec![0.0f64; width];
-        for offset in 0..rows {
-            let row = first + offset;
-            along.join(
-                (&here.along[0], &here.n_z, &here.trust),
-                (&here.along[0][1..], &here.n_z[1..], &here.trust[1..]),
-                1.0,
-                difference,
-                true,
-            );
-            along.cut(field, row * width, 1);
-            if row + 1 < grid.height {
-                next.load(field, row + 1);
-                join_rows(&here, &next, &mut below);
-                below.cut(field, row * width, width);
-            } else {
-                below.clear(width);
-            }
-            left[1..].copy_from_slice(&along.weight[..width - 1]);
-            let pixels = [&left, &along.weight, &above.weight, &below.weight];
-            for (side, pixels) in sides.iter_mut().zip(pixels) {
-                split_row(row, pixels, &mut side[offset * (half + 1)..][..half], &mut unused);
-            }
-            for k in 0..width {
-                divergence[k] = (above.push[k] - below.push[k]) - along.push[k];
-            }
-            for k in 1..width {
-                divergence[k] += along.push[k - 1];
-            }
-            let span = offset * half..(offset + 1) * half;
-            split_row(row, &divergence, &mut reds[span.clone()], &mut blacks[span]);
-            std::mem::swap(&mut above, &mut below);
-            std::mem::swap(&mut here, &mut next);
-        }
-    });
-    (weights, right)
+    })
 }

@@ -43,4 +43,13 @@ impl Pinhole {
         let facing = normal[2] - normal[0] * ray_x - normal[1] * ray_y;
         [self.f_x_px * facing, self.f_y_px * facing]
     }
+
+    /// The same as published: eq. 8 knows one focal length, and with two each axis puts its own in place of it.
+    ///
+    /// `g = f n_z - n_x (col - c_x) - n_y (c_y - row)`, which is [`Self::slants`] where both focal lengths are equal. Where
+    /// they differ by 0.35 % (DiLiGenT) this moves the mean depth error of a map by up to a sixth.
+    pub(super) fn published_slants(self, normal: [f64; 3], row: usize, col: usize) -> [f64; 2] {
+        let across = normal[0] * (col as f64 - self.c_x_px) + normal[1] * (self.c_y_px - row as f64);
+        [self.f_x_px * normal[2] - across, self.f_y_px * normal[2] - across]
+    }
 }

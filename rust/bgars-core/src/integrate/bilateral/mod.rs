@@ -10,16 +10,21 @@
 //! normal along the axis; `g` is `n_z`, or what `camera` says in perspective, where z is minus the logarithm of the depth.
 //! A difference to a pixel outside the mask counts as zero, as published; its term is a constant that only the weights feel.
 //!
-//! The way through the files: `pixels` holds what does not change, `reweigh` makes the weights of a surface, `assemble` the
-//! 5-point system of the weights; `solve` alternates, with `jacobi` or with the multigrid of least squares inside.
+//! The way through the files: `pixels` holds what does not change, `reweigh` makes the weights of a surface, and `solve`
+//! alternates. Inside, `assemble` makes the 5-point system of the weights for the multigrid of least squares; or
+//! `normal_equations` makes it in a `frame` for `jacobi`, which takes two iterations in a `sweep`.
 
 mod assemble;
 mod camera;
+mod frame;
 mod jacobi;
+mod normal_equations;
+mod number;
 mod pixels;
 mod reweigh;
-mod scaled;
+mod rows;
 mod solve;
+mod sweep;
 
 pub use camera::Pinhole;
 pub use solve::integrate_bilateral;
@@ -29,7 +34,8 @@ use super::Component;
 /// How exactly the systems between two re-weightings are solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Setting {
-    /// As published: Jacobi-preconditioned conjugate gradient to a thousandth, started from the last surface.
+    /// As published: Jacobi-preconditioned conjugate gradient to a thousandth, started from the last surface; and one equation
+    /// for both focal lengths of a camera, exact where they are equal.
     Compatible,
     /// Multigrid-preconditioned conjugate gradient to a millionth.
     Converged,

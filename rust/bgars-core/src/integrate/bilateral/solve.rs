@@ -7,16 +7,18 @@ use rayon::prelude::*;
 use super::super::checkerboard::{Weights, join_row, split_row};
 use super::super::components::Runs;
 use super::super::conjugate_gradient::{conjugate_gradients, square_sum};
+use super::super::edges::Colours;
 use super::super::fill::fill_corners;
-use super::super::operator::{Colours, Field};
+use super::super::operator::Field;
 use super::super::reduction::{eliminate_blacks, fill_blacks, multiply};
 use super::super::solve::{check_finite, check_lengths, check_pixel, check_pixels};
 use super::super::{Params, Progress};
 use super::assemble::assemble;
-use super::jacobi::correct;
+use super::frame::Frame;
+use super::normal_equations::NormalEquations;
 use super::pixels::Pixels;
 use super::reweigh::{even, reweigh};
-use super::{BilateralParams, BilateralSurface, Pinhole, Precision, Setting};
+use super::{BilateralParams, BilateralSurface, Pinhole, Precision, Setting, jacobi};
 use crate::{Error, Result};
 
 /// Largest relative residual of an inner solve: as published.
@@ -26,8 +28,10 @@ const CONVERGED_TOLERANCE: f64 = 1e-6;
 /// Least share of a side in a system that multigrid solves. Weaker ties than this hold nothing within the tolerance, and the
 /// preconditioner's `f32` could not carry them.
 const CONVERGED_LEAST_SHARE: f64 = 1e-6;
-/// Most iterations of an inner solve by Jacobi, each two of the published ones.
-const COMPATIBLE_ITERS: usize = 2_500;
+/// Most iterations of an inner solve by Jacobi: as published.
+const COMPATIBLE_ITERS: usize = 5_000;
+/// Iterations between two looks at the callback, which cost more than a small iteration.
+const PATIENCE: usize = 128;
 /// The same by multigrid.
 const CONVERGED_ITERS: usize = 500;
 
@@ -72,16 +76,25 @@ pub fn integrate_bilateral(
 ) -> Result<BilateralSurface> {
     let Field { mask, width, .. } = field;
     check(field, camera, params)?;
-    let pixels = Pixels::new(field, camera);
-    let mut z = vec![0.0; pixels.all.len()];
+    let pixels = Pixels::new(field, camera, params.setting);
+    let grid = pixels.crop.grid;
+    let frame = Frame::new(grid.height, grid.width, |row, col| pixels.used(row * grid.width + col));
+    let mut z = vec![0.0; pixels.len()];
     let mut shares = even(&pixels);
-    let least_share = if params.setting == Setting::Converged { CONVERGED_LEAST_SHARE } else { 0.0 };
     let mut fit = Progressed::default();
     let mut energies: Vec<f64> = Vec::new();
     let mut converged = false;
     while energies.len() < params.max_iters && !converged {
-        let (system, right) = assemble(&pixels, &shares, least_share);
-        improve(system, right, &mut z, params, &mut fit, on_progress)?;
+        match params.setting {
+            Setting::Compatible => {
+                let system = NormalEquations::new(&frame, &pixels, &shares);
+                improve_as_published(&frame, &system, &mut z, params.precision, &mut fit, on_progress)?;
+            }
+            Setting::Converged => {
+                let (system, right) = assemble(&pixels, &shares, CONVERGED_LEAST_SHARE);
+                improve(system, right, &mut z, &mut fit, on_progress)?;
+            }
+        }
         let energy = reweigh(&pixels, &z, params.k, &mut shares);
         let before = energies.last().copied().unwrap_or(f64::INFINITY);
         energies.push(energy);
@@ -160,12 +173,58 @@ struct Progressed {
     residual: f64,
 }
 
-/// Brings `z` (row-major in the box) closer to the solution of a system.
+/// Brings `z` (row-major in the box) closer to the solution of a system by conjugate gradient as published.
+fn improve_as_published(
+    frame: &Frame,
+    system: &NormalEquations,
+    z: &mut [f64],
+    precision: Precision,
+    fit: &mut Progressed,
+    on_progress: OnReweigh<'_>,
+) -> Result<()> {
+    let scale = square_sum(&system.source).sqrt();
+    if scale == 0.0 {
+        z.fill(0.0);
+        return Ok(());
+    }
+    let (stride, width) = (frame.stride(), z.len() / frame.height);
+    let mut framed = vec![0.0; frame.len()];
+    let rows = |framed: &mut Vec<f64>, copy: &mut dyn FnMut(usize, &mut [f64])| {
+        let first = frame.start(0);
+        framed[first..]
+            .chunks_mut(stride)
+            .take(frame.height)
+            .enumerate()
+            .for_each(|(row, f)| copy(row, &mut f[..width]));
+    };
+    rows(&mut framed, &mut |row, framed| framed.copy_from_slice(&z[row * width..][..width]));
+    let mut stopped = false;
+    let mut done = 0;
+    let state = Progress { iteration: fit.rounds, residual: fit.change };
+    let each = || {
+        done += 2;
+        stopped = done % PATIENCE == 0 && on_progress(state).is_break();
+        !stopped
+    };
+    let target = COMPATIBLE_TOLERANCE * scale;
+    let (iterations, left) = match precision {
+        Precision::Double => jacobi::improve::<f64>(frame, system, &mut framed, target, COMPATIBLE_ITERS, each),
+        Precision::Single => jacobi::improve::<f32>(frame, system, &mut framed, target, COMPATIBLE_ITERS, each),
+    };
+    if stopped {
+        return Err(Error::Cancelled);
+    }
+    rows(&mut framed, &mut |row, framed| z[row * width..][..width].copy_from_slice(framed));
+    fit.inner_iterations += iterations;
+    fit.residual = fit.residual.max(left / scale);
+    Ok(())
+}
+
+/// Brings `z` (row-major in the box) to the solution of a system by multigrid.
 fn improve(
     mut weights: Weights,
     mut right: Colours,
     z: &mut [f64],
-    params: &BilateralParams,
     fit: &mut Progressed,
     on_progress: OnReweigh<'_>,
 ) -> Result<()> {
@@ -176,9 +235,7 @@ fn improve(
         z.fill(0.0);
         return Ok(());
     }
-    if params.setting == Setting::Converged {
-        fill_corners(&mut weights);
-    }
+    fill_corners(&mut weights);
     let [mut reds, mut before] = [vec![0.0; grid.half_pixels()], vec![0.0; grid.half_pixels()]];
     reds.par_chunks_mut(half)
         .zip(before.par_chunks_mut(half))
@@ -190,39 +247,12 @@ fn improve(
     let mut residual = before;
     multiply(&weights, &reds, &mut residual);
     residual.par_iter_mut().zip(&right.reds).for_each(|(residual, b)| *residual = b - *residual);
-    let (iterations, left) = match params.setting {
-        Setting::Compatible => {
-            let target = COMPATIBLE_TOLERANCE * scale;
-            let mut stopped = false;
-            let Progressed { rounds, change, .. } = *fit;
-            let mut done = 0;
-            let each = || {
-                done += 1;
-                // A look at the callback costs more than a small iteration.
-                stopped = done % 64 == 0 && on_progress(Progress { iteration: rounds, residual: change }).is_break();
-                !stopped
-            };
-            let outcome = match params.precision {
-                Precision::Double => correct::<f64>(&weights, &residual, &mut reds, target, COMPATIBLE_ITERS, each),
-                Precision::Single => correct::<f32>(&weights, &residual, &mut reds, target, COMPATIBLE_ITERS, each),
-            };
-            if stopped {
-                return Err(Error::Cancelled);
-            }
-            (outcome.0, outcome.1 / scale)
-        }
-        Setting::Converged => {
-            let inner =
-                Params { relative_tolerance: CONVERGED_TOLERANCE, max_iters: CONVERGED_ITERS, ..Params::default() };
-            let (rounds, change) = (fit.rounds, fit.change);
-            let mut report = |_: Progress| on_progress(Progress { iteration: rounds, residual: change });
-            let solution = conjugate_gradients(&weights, &residual, scale, &inner, &mut report)?;
-            reds.par_iter_mut().zip(&solution.x).for_each(|(red, change)| *red += change);
-            (solution.iterations, solution.residual)
-        }
-    };
-    fit.inner_iterations += iterations;
-    fit.residual = fit.residual.max(left);
+    let inner = Params { relative_tolerance: CONVERGED_TOLERANCE, max_iters: CONVERGED_ITERS, ..Params::default() };
+    let state = Progress { iteration: fit.rounds, residual: fit.change };
+    let solution = conjugate_gradients(&weights, &residual, scale, &inner, &mut |_: Progress| on_progress(state))?;
+    reds.par_iter_mut().zip(&solution.x).for_each(|(red, change)| *red += change);
+    fit.inner_iterations += solution.iterations;
+    fit.residual = fit.residual.max(solution.residual);
     fill_blacks(&weights, &reds, &mut right.blacks);
     z.par_chunks_mut(width)
         .zip(reds.par_chunks(half))

@@ -1,0 +1,125 @@
+"""`bgars mesh`: a normal map or a height map becomes a mesh."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, get_args
+
+import typer
+
+import bgars
+from bgars.cli.console import print_json, say, stage_progress
+from bgars.errors import InputError
+from bgars.integrate import IntegrationMethod, Solver
+from bgars.io.mesh_files import MESH_SUFFIXES
+from bgars.pipeline import solver_fraction
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+NORMAL_MAP_SUFFIX = ".png"
+
+
+def register(app: typer.Typer) -> None:
+    """Give the command to an app."""
+    app.command()(mesh)
+
+
+def mesh(
+    source: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="normals.png, or a height map (.tif, .npy; NaN = invalid).", show_default=False
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "--output", "-o", metavar="MESH", help=f"Mesh file: {', '.join(MESH_SUFFIXES)}.", show_default=False
+        ),
+    ],
+    pixel_pitch_um: Annotated[
+        float | None,
+        typer.Option(
+            help="Pixel pitch; a height map is then taken as um. A .tif of bgars brings its own.", show_default=False
+        ),
+    ] = None,
+    directx: Annotated[bool, typer.Option("--directx", help="The normal map has green = y down.")] = False,
+    method: Annotated[
+        IntegrationMethod | None,
+        typer.Option(
+            "--method",
+            "-m",
+            help="Integrator of a normal map; bilateral keeps jumps. By default least-squares.",
+            show_default=False,
+        ),
+    ] = None,
+    k: Annotated[
+        float | None,
+        typer.Option("--k", help="bilateral: sharpness of jumps, at least 0; by default 2.", show_default=False),
+    ] = None,
+    solver: Annotated[
+        Solver | None,
+        typer.Option(
+            "--solver", help="bilateral: how its systems are solved; by default converged.", show_default=False
+        ),
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
+    ] = False,
+) -> None:
+    """Turn a normal map or a height map into a mesh."""
+    options = _integration(source, method, k, solver)
+    with stage_progress() as report:
+        height = _height_from(source, pixel_pitch_um, directx, options, report)
+    surface = bgars.mesh_from_height(height)
+    bgars.write_mesh(surface, output)
+    summary: dict[str, Any] = {"vertices": len(surface.vertices), "faces": len(surface.faces), "unit": height.unit}
+    summary["file"] = str(output)
+    if height.bilateral is not None:
+        summary["reweightings"] = len(height.bilateral.energies)
+        summary["converged"] = height.bilateral.converged
+    if as_json:
+        print_json(summary)
+        return
+    say(f"{output}: {summary['vertices']} vertices, {summary['faces']} faces, in {height.unit}")
+    if height.bilateral is not None and not height.bilateral.converged:
+        say(f"The energy still moved after {summary['reweightings']} re-weightings.")
+
+
+def _integration(
+    source: Path, method: IntegrationMethod | None, k: float | None, solver: Solver | None
+) -> dict[str, Any]:
+    """What was asked of the integrator; refused where nothing would listen."""
+    given = {"--method": method, "--k": k, "--solver": solver}
+    for name, value in given.items():
+        if value is None:
+            continue
+        if source.suffix.lower() != NORMAL_MAP_SUFFIX:
+            msg = f"{name}: {source} is a height map, which is not integrated; leave {name} out"
+            raise InputError(msg)
+        if name != "--method" and method != "bilateral":
+            msg = f"{name}: only --method bilateral has it, got --method {method or get_args(IntegrationMethod)[0]}"
+            raise InputError(msg)
+    named = {"method": method, "k": k, "solver": solver}
+    return {name: value for name, value in named.items() if value is not None}
+
+
+def _height_from(
+    source: Path,
+    pixel_pitch_um: float | None,
+    directx: bool,
+    options: dict[str, Any],
+    report: Callable[[str, float], None],
+) -> bgars.HeightMap:
+    if source.suffix.lower() == NORMAL_MAP_SUFFIX:
+        tolerance = 1e-4 if options.get("method") == "bilateral" else 1e-8
+        height: bgars.HeightMap = bgars.integrate_normals(
+            bgars.read_normal_map(source, directx=directx),
+            pixel_pitch_um=pixel_pitch_um,
+            progress=lambda _, residual: report("height", solver_fraction(residual, tolerance)),
+            **options,
+        )
+        return height
+    values, stored_pitch_um = bgars.read_height(source)
+    return bgars.HeightMap.from_array(values, pixel_pitch_um=pixel_pitch_um or stored_pitch_um)

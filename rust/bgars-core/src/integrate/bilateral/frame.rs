@@ -1,0 +1,92 @@
+//! Rows of the box in a frame of zeros, and the part of each row that the mask reaches.
+
+use std::ops::{Deref, DerefMut};
+
+use super::number::Number;
+
+/// Numbers that a loop takes at a time.
+pub(super) const LANES: usize = 16;
+
+/// The layout of a *framed* array: each row is followed by numbers of no pixel, and a row of such lies before the first and
+/// after the last. They stay zero, so a neighbour can be read without asking whether there is one.
+///
+/// Rows are widened to whole [`LANES`], and so are the spans of the mask in them: loops over them have no remainder.
+#[derive(Clone, Debug)]
+pub(super) struct Frame {
+    pub height: usize,
+    pub width: usize,
+    /// First and last (exclusive) column of the mask in each row, outward to whole lanes; both 0 in an empty row.
+    spans: Vec<(usize, usize)>,
+}
+
+impl Frame {
+    /// `used` tells the pixels of the mask by row and column.
+    pub fn new(height: usize, width: usize, used: impl Fn(usize, usize) -> bool) -> Self {
+        let span = |row: usize| {
+            let first = (0..width).find(|&col| used(row, col))?;
+            Some((first, 1 + (0..width).rfind(|&col| used(row, col))?))
+        };
+        let widened = |(lo, hi): (usize, usize)| (lo / LANES * LANES, hi.next_multiple_of(LANES));
+        let spans = (0..height).map(|row| span(row).map_or((0, 0), widened)).collect();
+        Self { height, width: width.next_multiple_of(LANES), spans }
+    }
+
+    /// Numbers from a pixel to the one below.
+    pub fn stride(&self) -> usize {
+        self.width + LANES
+    }
+
+    /// Numbers of a framed array.
+    pub fn len(&self) -> usize {
+        LANES + (self.height + 2) * self.stride()
+    }
+
+    /// Where a row starts in a framed array.
+    pub fn start(&self, row: usize) -> usize {
+        LANES + (row + 1) * self.stride()
+    }
+
+    /// A framed array of zeros.
+    pub fn zeros<T: Number>(&self) -> Aligned<T> {
+        Aligned::zeros(self.len())
+    }
+
+    /// The columns of a row that the mask reaches; none in rows outside the box.
+    pub fn span(&self, row: isize) -> (usize, usize) {
+        usize::try_from(row).ok().and_then(|row| self.spans.get(row)).copied().unwrap_or((0, 0))
+    }
+}
+
+/// Numbers that start at a cache line: a load of whole lanes then touches one line, not two.
+#[derive(Debug)]
+pub(super) struct Aligned<T> {
+    memory: Vec<T>,
+    start: usize,
+    len: usize,
+}
+
+impl<T: Number> Aligned<T> {
+    pub fn zeros(len: usize) -> Self {
+        /// Bytes.
+        const CACHE_LINE: usize = 64;
+        let memory = vec![T::default(); len + CACHE_LINE / size_of::<T>()];
+        let start = memory.as_ptr().align_offset(CACHE_LINE).min(memory.len() - len);
+        Self { memory, start, len }
+    }
+}
+
+impl<T> Deref for Aligned<T> {
+    type Target = [T];
+
+    #[inline(always)]
+    fn deref(&self) -> &[T] {
+        &self.memory[self.start..self.start + self.len]
+    }
+}
+
+impl<T> DerefMut for Aligned<T> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [T] {
+        &mut self.memory[self.start..self.start + self.len]
+    }
+}

@@ -1,0 +1,25 @@
+//! What the inner solver of the compatible setting counts in.
+
+use std::ops::{AddAssign, Sub};
+
+use super::super::checkerboard::Real;
+
+/// A number of the inner solver.
+pub(super) trait Number: Real + Sub<Output = Self> + AddAssign {
+    /// Rounded from `f64`.
+    fn of(value: f64) -> Self;
+}
+
+impl Number for f32 {
+    #[inline(always)]
+    fn of(value: f64) -> Self {
+        value as f32
+    }
+}
+
+impl Number for f64 {
+    #[inline(always)]
+    fn of(value: f64) -> Self {
+        value
+    }
+}

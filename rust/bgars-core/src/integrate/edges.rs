@@ -1,0 +1,92 @@
+//! A 5-point system from its edges: the one frame of least squares and bilateral integration.
+
+use rayon::prelude::*;
+
+use super::checkerboard::{BAND_ROWS, Grid, Weights, split_row};
+use crate::memory::zeros;
+
+/// A right side, or a solution, by colour.
+#[derive(Debug)]
+pub(super) struct Colours {
+    pub reds: Vec<f64>,
+    pub blacks: Vec<f64>,
+}
+
+/// Where the edges of a row lead.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Axis {
+    /// From each pixel to the one to its right.
+    Right,
+    /// From each pixel to the one below.
+    Below,
+}
+
+/// Weights of a row's edges, and how much of the right side each moves from its first pixel to its second.
+#[derive(Debug, Default, Clone)]
+pub(super) struct EdgeRow {
+    pub weight: Vec<f32>,
+    pub push: Vec<f64>,
+}
+
+impl EdgeRow {
+    fn clear(&mut self, width: usize) {
+        self.weight.clear();
+        self.weight.resize(width, 0.0);
+        self.push.clear();
+        self.push.resize(width, 0.0);
+    }
+}
+
+/// Weights and right side of a graph on the pixels of a grid.
+///
+/// Each band of rows asks `joiner` for a function that sets the edges of a row, which come to it zero; the rows come in order,
+/// each to the right and then below, after the edges above the band's first row.
+pub(super) fn from_edges<Join>(grid: Grid, joiner: impl Fn() -> Join + Sync) -> (Weights, Colours)
+where
+    Join: FnMut(Axis, usize, &mut EdgeRow),
+{
+    let (width, half) = (grid.width, grid.half());
+    let mut weights = Weights::zeros(grid);
+    let mut right = Colours { reds: zeros(grid.half_pixels()), blacks: zeros(grid.half_pixels()) };
+    let bands = weights
+        .bands_mut()
+        .zip(right.reds.par_chunks_mut(BAND_ROWS * half))
+        .zip(right.blacks.par_chunks_mut(BAND_ROWS * half))
+        .enumerate();
+    bands.for_each(|(band, ((mut sides, reds), blacks))| {
+        let mut join = joiner();
+        let first = band * BAND_ROWS;
+        let [mut above, mut along, mut below] = [EdgeRow::default(), EdgeRow::default(), EdgeRow::default()];
+        above.clear(width);
+        if first > 0 {
+            join(Axis::Below, first - 1, &mut above);
+        }
+        let mut left = vec![0.0f32; width];
+        let mut unused = vec![0.0f32; half];
+        let mut divergence = vec![0.0f64; width];
+        for offset in 0..reds.len() / half {
+            let row = first + offset;
+            along.clear(width);
+            join(Axis::Right, row, &mut along);
+            below.clear(width);
+            if row + 1 < grid.height {
+                join(Axis::Below, row, &mut below);
+            }
+            left[1..].copy_from_slice(&along.weight[..width - 1]);
+            let sources = [&left, &along.weight, &above.weight, &below.weight];
+            for (side, source) in sides.iter_mut().zip(sources) {
+                split_row(row, source, &mut side[offset * (half + 1)..][..half], &mut unused);
+            }
+            for k in 0..width {
+                divergence[k] = (above.push[k] - below.push[k]) - along.push[k];
+            }
+            for k in 1..width {
+                divergence[k] += along.push[k - 1];
+            }
+            let span = offset * half..(offset + 1) * half;
+            split_row(row, &divergence, &mut reds[span.clone()], &mut blacks[span]);
+            std::mem::swap(&mut above, &mut below);
+        }
+    });
+    (weights, right)
+}
