@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::reduction::sum;
 use crate::memory::zeros;
 
 /// One connected component of the mask (4-neighbourhood).
@@ -104,10 +105,19 @@ impl Runs {
         labels
     }
 
-    /// Mean of `value(row, col)` over each component; summed in an order that does not depend on the threads.
-    pub fn means(&self, value: impl Fn(usize, usize) -> f64 + Sync) -> Vec<f64> {
-        let run_sum = |run: &Run| (run.start..run.end).map(|col| value(run.row, col)).sum::<f64>();
-        let run_sums: Vec<f64> = self.all.par_iter().map(run_sum).collect();
+    /// Mean of the values of each component; `fill` writes the values of a row, of its runs at least.
+    ///
+    /// Summed in an order that does not depend on the threads.
+    pub fn means(&self, fill: impl Fn(usize, &mut [f64]) + Sync) -> Vec<f64> {
+        let row_sums = |values: &mut Vec<f64>, row: usize| -> Vec<f64> {
+            let runs = self.row(row);
+            if !runs.is_empty() {
+                fill(row, values);
+            }
+            runs.iter().map(|run| sum(&values[run.start..run.end])).collect()
+        };
+        let rows = (0..self.row_starts.len() - 1).into_par_iter();
+        let run_sums: Vec<f64> = rows.map_init(|| vec![0.0; self.width], row_sums).flatten_iter().collect();
         let mut means = vec![0.0; self.components.len()];
         for (run, sum) in self.all.iter().zip(run_sums) {
             means[run.component] += sum;
@@ -199,7 +209,11 @@ mod tests {
     #[test]
     fn means_are_taken_a_component() {
         let mask = [true, true, false, true, false, false];
-        let means = Runs::new(&mask, None, 3).means(|row, col| (10 * row + col) as f64);
+        let means = Runs::new(&mask, None, 3).means(|row, values| {
+            for (col, value) in values.iter_mut().enumerate() {
+                *value = (10 * row + col) as f64;
+            }
+        });
         // Row 0: columns 0 and 1; row 1: column 0, below column 0.
         assert_eq!(means, [(0.0 + 1.0 + 10.0) / 3.0]);
     }

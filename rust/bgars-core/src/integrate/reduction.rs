@@ -73,6 +73,18 @@ fn multiply_band(weights: &Weights, x: &[f64], band: usize, out: &mut [f64]) -> 
     product
 }
 
+/// Sum in eight lanes, so that it vectorises and has one order.
+pub(super) fn sum(values: &[f64]) -> f64 {
+    let (blocks, rest) = values.as_chunks::<8>();
+    let mut lanes = [0.0; 8];
+    for block in blocks {
+        for (lane, value) in lanes.iter_mut().zip(block) {
+            *lane += value;
+        }
+    }
+    lanes.iter().chain(rest).sum()
+}
+
 /// Sum of products in eight lanes, so that it vectorises and has one order.
 #[inline(always)]
 pub(super) fn dot<A: Real, B: Real>(a: &[A], b: &[B]) -> f64 {

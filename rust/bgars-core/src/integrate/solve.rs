@@ -1,7 +1,10 @@
 //! The least-squares integrator: checks, the solver, constants.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
+use super::checkerboard::join_row;
 use super::components::Runs;
 use super::conjugate_gradient::{Solution, conjugate_gradients, square_sum};
 use super::fill::fill_corners;
@@ -81,20 +84,25 @@ pub fn integrate_field(field: Field<'_>, params: &Params, on_progress: OnProgres
         conjugate_gradients(&weights, &right.reds, scale, params, on_progress)?;
     fill_blacks(&weights, &reds, &mut right.blacks);
     let half = weights.grid.half();
-    let value = |row: usize, col: usize| {
-        let colour = if (row + col).is_multiple_of(2) { &reds } else { &right.blacks };
-        colour[row * half + col / 2]
+    let fill = |row: usize, values: &mut [f64]| {
+        let span = row * half..(row + 1) * half;
+        join_row(row, &reds[span.clone()], &right.blacks[span], values);
     };
-    let means = runs.means(value);
+    let means = runs.means(fill);
     let mut height_px = zeros(mask.len());
-    height_px.par_chunks_mut(width).enumerate().for_each(|(row, height_px)| {
-        height_px.fill(f32::NAN);
-        for run in runs.row(row) {
-            for col in run.start..run.end {
-                height_px[col] = (value(row, col) - means[run.component]) as f32;
+    height_px.par_chunks_mut(width).enumerate().for_each_init(
+        || vec![0.0; width],
+        |values, (row, height_px)| {
+            fill(row, values);
+            height_px.fill(f32::NAN);
+            for run in runs.row(row) {
+                let mean = means[run.component];
+                for (height_px, value) in height_px[run.start..run.end].iter_mut().zip(&values[run.start..run.end]) {
+                    *height_px = (value - mean) as f32;
+                }
             }
-        }
-    });
+        },
+    );
     Ok(Surface { height_px, labels: runs.labels(), components: runs.components, iterations, residual })
 }
 
@@ -120,7 +128,7 @@ pub fn usable(normals: &[f32]) -> Vec<bool> {
 /// Refuses what the solver cannot work on.
 pub(super) fn check(field: Field<'_>, params: &Params) -> Result<()> {
     check_lengths(field)?;
-    check_pixels(field, check_pixel)?;
+    check_pixels(field, Facing::Camera)?;
     for (argument, value) in
         [("relative_tolerance", params.relative_tolerance), ("absolute_tolerance", params.absolute_tolerance)]
     {
@@ -154,38 +162,55 @@ pub(super) fn check_lengths(field: Field<'_>) -> Result<()> {
     Ok(())
 }
 
-/// Refuses the first pixel of the image that `check` refuses.
-pub(super) fn check_pixels(field: Field<'_>, check: impl Fn(Field<'_>, usize) -> Result<()> + Sync) -> Result<()> {
+/// Where normals may point.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Facing {
+    /// `n_z >= 0`.
+    Camera,
+    /// In perspective the camera may see a normal with `n_z < 0`.
+    Anywhere,
+}
+
+/// Refuses normals and weights inside the mask that mean nothing.
+pub(super) fn check_pixels(field: Field<'_>, facing: Facing) -> Result<()> {
     // Nearly always all is well, and that shows quickly; only otherwise the first offender is looked for.
-    let mask = field.mask;
-    if !mask.par_chunks(CHECK_PIXELS).enumerate().all(|(chunk, mask)| {
-        let first = chunk * CHECK_PIXELS;
-        (first..first + mask.len()).all(|pixel| check(field, pixel).is_ok())
-    }) {
-        (0..mask.len()).try_for_each(|pixel| check(field, pixel))?;
+    let pixels = field.mask.len();
+    let chunks = (0..pixels.div_ceil(CHECK_PIXELS)).into_par_iter();
+    let sound = |chunk: usize| are_sound(field, facing, chunk * CHECK_PIXELS..((chunk + 1) * CHECK_PIXELS).min(pixels));
+    if !chunks.map(sound).all(|sound| sound) {
+        (0..pixels).try_for_each(|pixel| check_pixel(field, facing, pixel))?;
     }
     Ok(())
+}
+
+/// True when [`check_pixel`] refuses none of some pixels; without branches.
+#[allow(clippy::needless_bitwise_bool)]
+fn are_sound(field: Field<'_>, facing: Facing, pixels: Range<usize>) -> bool {
+    // NaN and infinity spread into products with zero.
+    let is_finite = |value: f32| value * 0.0 == 0.0;
+    let mask = &field.mask[pixels.clone()];
+    let normals = field.normals[3 * pixels.start..3 * pixels.end].as_chunks::<3>().0;
+    let away = facing == Facing::Anywhere;
+    let mut sound = true;
+    for (&[x, y, z], &used) in normals.iter().zip(mask) {
+        sound &= !used | (is_finite(x) & is_finite(y) & is_finite(z) & (away | (z >= 0.0)));
+    }
+    for (&weight, &used) in field.weights.map_or(&[][..], |weights| &weights[pixels]).iter().zip(mask) {
+        sound &= !used | (is_finite(weight) & (weight >= 0.0));
+    }
+    sound
 }
 
 /// Refuses a normal or a weight inside the mask that means nothing.
-pub(super) fn check_pixel(field: Field<'_>, pixel: usize) -> Result<()> {
-    check_finite(field, pixel)?;
-    let n_z = field.normals[pixel * 3 + 2];
-    if field.mask[pixel] && n_z < 0.0 {
-        return Err(Error::BadNormal { row: pixel / field.width, col: pixel % field.width, n_z: f64::from(n_z) });
-    }
-    Ok(())
-}
-
-/// The same for perspective, where the camera may see a normal with `n_z < 0`.
-pub(super) fn check_finite(field: Field<'_>, pixel: usize) -> Result<()> {
+fn check_pixel(field: Field<'_>, facing: Facing, pixel: usize) -> Result<()> {
     let Field { normals, mask, weights, width, .. } = field;
     if !mask[pixel] {
         return Ok(());
     }
     let (row, col) = (pixel / width, pixel % width);
     let normal = &normals[pixel * 3..pixel * 3 + 3];
-    if !normal.iter().all(|component| component.is_finite()) {
+    let is_finite = normal.iter().all(|component| component.is_finite());
+    if !is_finite || facing == Facing::Camera && normal[2] < 0.0 {
         return Err(Error::BadNormal { row, col, n_z: f64::from(normal[2]) });
     }
     if let Some(weights) = weights

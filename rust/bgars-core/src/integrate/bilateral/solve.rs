@@ -11,7 +11,7 @@ use super::super::edges::Colours;
 use super::super::fill::fill_corners;
 use super::super::operator::Field;
 use super::super::reduction::{eliminate_blacks, fill_blacks, multiply};
-use super::super::solve::{check_finite, check_lengths, check_pixel, check_pixels};
+use super::super::solve::{Facing, check_lengths, check_pixels};
 use super::super::{Params, Progress};
 use super::assemble::assemble;
 use super::frame::Frame;
@@ -107,7 +107,10 @@ pub fn integrate_bilateral(
     }
     let runs = Runs::new(mask, field.regions, width);
     let crop = pixels.crop;
-    let means = runs.means(|row, col| z[(row - crop.row) * crop.grid.width + (col - crop.col)]);
+    let means = runs.means(|row, values| {
+        let start = (row - crop.row) * crop.grid.width;
+        values[crop.col..crop.col + crop.grid.width].copy_from_slice(&z[start..start + crop.grid.width]);
+    });
     let labels = runs.labels();
     let mean_at = |pixel: usize| {
         let (row, col) = (pixel / crop.grid.width + crop.row, pixel % crop.grid.width + crop.col);
@@ -130,10 +133,10 @@ pub fn integrate_bilateral(
 fn check(field: Field<'_>, camera: Option<Pinhole>, params: &BilateralParams) -> Result<()> {
     check_lengths(field)?;
     match camera {
-        None => check_pixels(field, check_pixel)?,
+        None => check_pixels(field, Facing::Camera)?,
         Some(camera) => {
             camera.check()?;
-            check_pixels(field, check_finite)?;
+            check_pixels(field, Facing::Anywhere)?;
             check_facing(field, camera)?;
         }
     }
