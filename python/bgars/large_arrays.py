@@ -1,12 +1,13 @@
 """Large arrays on pages that are used again.
 
-Memory fresh from the operating system costs about as long as the estimate that is written to it. An array that nobody holds any more
-leaves its pages here for the next one of the same size. The system is told that it may take them back whenever it wants
-(``MADV_FREE``), so that they stand in nobody's way.
+Memory fresh from the operating system costs about as long as the estimate that is written to it. An array that nobody
+holds any more leaves its pages here for the next one of the same size. The system is told that it may take them back
+whenever it wants (``MADV_FREE``), so that they stand in nobody's way.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
 import mmap
 import weakref
@@ -68,13 +69,19 @@ def _taken(nbytes: int) -> mmap.mmap | None:
 def _fresh(nbytes: int) -> mmap.mmap:
     """Pages of zeros, large ones where the system has them."""
     pages = mmap.mmap(-1, nbytes, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
-    if hasattr(mmap, "MADV_HUGEPAGE"):
-        pages.madvise(mmap.MADV_HUGEPAGE)
+    _advise(pages, "MADV_HUGEPAGE")
     return pages
 
 
 def _give_back(pages: mmap.mmap) -> None:
     """Keep pages for the next array; what is kept longest goes to the system."""
-    if hasattr(mmap, "MADV_FREE"):
-        pages.madvise(mmap.MADV_FREE)
+    _advise(pages, "MADV_FREE")
     _free.append(pages)
+
+
+def _advise(pages: mmap.mmap, name: str) -> None:
+    """Give the system an advice, where it takes it."""
+    advice = getattr(mmap, name, None)
+    if advice is not None:
+        with contextlib.suppress(OSError):  # a kernel without it
+            pages.madvise(advice)

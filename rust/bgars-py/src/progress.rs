@@ -40,7 +40,8 @@ where
             let (sender, receiver) = channel();
             let run = move || match &pool {
                 Some(pool) => pool.install(|| work(&mut report)),
-                None => work(&mut report),
+                // On a thread of the pool: from outside, each parallel loop would wake it up anew.
+                None => rayon::scope(|_| work(&mut report)),
             };
             let worker = scope.spawn(move || {
                 let outcome = run();
