@@ -1,7 +1,7 @@
 //! Writes past the caches, for results that are larger than these.
 //!
 //! An ordinary store first reads the cache line that it overwrites. A kernel that writes more than it reads loses half of its
-//! memory rate that way; a streaming store does not read. This module holds the one instruction that safe Rust has no word for.
+//! memory rate that way; a streaming store does not read. Safe Rust has no word for it.
 
 /// Arrays of at least this many pixels are streamed: nothing of them would be left in the caches anyway.
 pub(crate) const MIN_PIXELS: usize = 1 << 20;

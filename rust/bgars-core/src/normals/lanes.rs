@@ -209,8 +209,7 @@ fn run_blocks_with<K: Pixel, V: Vector>(
     }
 }
 
-/// Normals, albedo, mask, confidence and counts of a block; facets seen from the side, and
-/// values far from 1, are left to the careful kernel, too.
+/// Mask and counts of a block, and what its unused pixels say.
 #[inline(always)]
 fn write(finished: &Finished, used: Option<&[bool]>, span: Range<usize>, out: &mut Out<'_>) {
     let valid: [bool; LANES] = std::array::from_fn(|lane| finished.valid >> lane & 1 == 1);
