@@ -95,8 +95,8 @@ def estimate_normals(
     keep_sets : bool
         Also return which lights were kept: `NormalField.kept_sets`, (H, W, L) bool.
     out : NormalField, optional
-        Result of an earlier call on images of the same size, to be overwritten and returned. Without it, the memory of a
-        result that nobody holds any more is used again, too, and lent to the system until then.
+        Result of an earlier call on images of the same size, to be overwritten and returned. Without it, the memory of
+        a result that nobody holds any more is used again, too, and lent to the system until then.
     threads : int, optional
         Most threads to work on; by default what the environment variable ``RAYON_NUM_THREADS`` says, else one a core.
         The result does not depend on it.
