@@ -7,6 +7,7 @@
 mod confidence;
 mod cutoff;
 mod finish;
+mod fused;
 mod kept;
 mod kernel;
 mod lane_solve;

@@ -6,6 +6,7 @@
 use multiversion::{multiversion, target::target_cfg_f};
 
 use super::cutoff::{LANES, Lanes};
+use super::fused::{add_product, dot};
 use super::lane_solve::{BYTE_LIGHTS, Careful, ENTRIES};
 use super::ranked::{CLIPPED, Ranked, Row, WIDTH};
 use super::robust::{DROPPED_WEIGHT, MIN_DETERMINANT, RobustFilter, cost_factor, prior_squares};
@@ -298,17 +299,6 @@ impl Best {
         }
         kept
     }
-}
-
-/// `sum + a b`.
-#[inline(always)]
-fn add_product<const FMA: bool>(sum: f32, a: f32, b: f32) -> f32 {
-    if FMA { a.mul_add(b, sum) } else { sum + a * b }
-}
-
-#[inline(always)]
-fn dot<const FMA: bool>([a, b, c]: [f32; 3], [x, y, z]: [f32; 3]) -> f32 {
-    add_product::<FMA>(add_product::<FMA>(a * x, b, y), c, z)
 }
 
 #[cfg(test)]
