@@ -12,6 +12,7 @@ from bgars.ball_records import BallLayout
 from bgars.inspection.judge import judge_part
 from bgars.part_material import part_material
 from bgars.part_recipe import Limits, PartRecipe
+from solder_fit import SOLDER_FIT
 from synthetic_parts import measured_part
 
 LIMITS = Limits(
@@ -27,18 +28,6 @@ LIMITS = Limits(
 RECIPE = PartRecipe(
     "two by three", BallLayout(2, 3, 1000.0), limits=LIMITS, gravity_um=(0.0, 10.0), file=Path("p.toml")
 )
-
-
-SOLDER = bgars.SurfaceMaterial(
-    diffuse_level=31.5,
-    grazing=0.0,
-    ambient_level=0.7,
-    lobes=(bgars.SurfaceLobe(strength_level=255.0, roughness=0.2, tail=0.98),),
-    masking="smith",
-    gains=(1.0, 0.98, 1.02, 1.0),
-    standard_errors={"diffuse": 0.21, "ambient": 0.05, "strength_1": 1.9, "roughness_1": 0.0012, "tail_1": 0.02},
-)
-FIT = bgars.ReflectanceFit(SOLDER, 0.043, True, (), (False, True), True, (0.4, 0.5), (None, None))
 
 
 def judged(
@@ -66,7 +55,7 @@ def judged(
     return replace(
         result,
         method="reflectance",
-        material=part_material(FIT, from_file=False),
+        material=part_material(SOLDER_FIT, from_file=False),
         capture=f"part {part}",
         serial="SN-1",
         inspected_utc="2026-01-31T12:00:00Z",

@@ -13,6 +13,7 @@ from bgars.inspection.judge import judge_part
 from bgars.part_material import part_material
 from bgars.part_recipe import Limits, PartRecipe
 from bgars.part_result import BallResult
+from solder_fit import SOLDER_FIT
 from synthetic_parts import measured_part
 
 NASTY = "</script><script>document.title='owned'</script><img src=x onerror=\"document.title='owned'\">"
@@ -49,23 +50,11 @@ def simulated(kind: str) -> tuple[bgars.Capture, bgars.SimulatedTruth]:
     return bgars.simulate(scene, RIG, bgars.Material(), CAMERA)
 
 
-SOLDER = bgars.SurfaceMaterial(
-    diffuse_level=31.5,
-    grazing=0.0,
-    ambient_level=0.7,
-    lobes=(bgars.SurfaceLobe(strength_level=255.0, roughness=0.2, tail=0.98),),
-    masking="smith",
-    gains=(1.0, 0.98, 1.02, 1.0),
-    standard_errors={"diffuse": 0.21, "ambient": 0.05, "strength_1": 1.9, "roughness_1": 0.0012, "gain_1": 0.004},
-)
-FIT = bgars.ReflectanceFit(SOLDER, 0.043, True, (), (False, True), True, (0.4, 0.5), (None, None))
-
-
 def inspected(kind: str, recipe: PartRecipe | None) -> bgars.PartResult:
     _, truth = simulated(kind)
     files = (("light_00.png", "0" * 64), ("capture.toml", "f" * 64))
     result = judge_part(*measured_part(truth), recipe, pixel_pitch_um=25.0, files=files, version="1.2.3")
-    return replace(result, material=part_material(FIT, from_file=False))
+    return replace(result, material=part_material(SOLDER_FIT, from_file=False))
 
 
 RECIPE = PartRecipe("demo 4x5", BallLayout(4, 5, 1000.0), limits=LIMITS)
