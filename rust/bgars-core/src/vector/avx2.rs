@@ -9,7 +9,7 @@ use std::arch::x86_64::{
 };
 
 use super::subset_sums::SubsetSums;
-use super::{Vector, first, interleaved};
+use super::{Packed, Vector, first, interleaved};
 
 /// Eight floats.
 #[derive(Clone, Copy)]
@@ -37,9 +37,9 @@ fn widened(bytes: &[u8]) -> __m256i {
     here!(_mm256_cvtepu8_epi32(_mm_cvtsi64_si128(i64::from_le_bytes(first(bytes)))))
 }
 
-impl Vector for Avx2 {
+impl Packed for Avx2 {
+    type Number = f32;
     const WIDTH: usize = WIDTH;
-    type Mask = __m256;
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
@@ -50,6 +50,20 @@ impl Vector for Avx2 {
     fn load(from: &[f32]) -> Self {
         Self(bytemuck::must_cast(first::<_, WIDTH>(from)))
     }
+
+    #[inline(always)]
+    fn write(self, to: &mut [f32]) {
+        self.store(to, false);
+    }
+
+    #[inline(always)]
+    fn times_plus(self, factor: Self, term: Self) -> Self {
+        Self(here!(_mm256_fmadd_ps(self.0, factor.0, term.0)))
+    }
+}
+
+impl Vector for Avx2 {
+    type Mask = __m256;
 
     #[inline(always)]
     fn from_bytes(from: &[u8]) -> Self {
@@ -88,11 +102,6 @@ impl Vector for Avx2 {
         store!(0);
         store!(1);
         store!(2);
-    }
-
-    #[inline(always)]
-    fn times_plus(self, factor: Self, term: Self) -> Self {
-        Self(here!(_mm256_fmadd_ps(self.0, factor.0, term.0)))
     }
 
     #[inline(always)]

@@ -8,7 +8,7 @@ use std::arch::x86_64::{
 };
 
 use super::subset_sums::SubsetSums;
-use super::{Vector, first, interleaved};
+use super::{Packed, Vector, first, interleaved};
 
 /// Sixteen floats.
 #[derive(Clone, Copy)]
@@ -36,9 +36,9 @@ fn widened(bytes: &[u8]) -> __m512i {
     here!(_mm512_cvtepu8_epi32(bytemuck::must_cast(first::<_, WIDTH>(bytes))))
 }
 
-impl Vector for Avx512 {
+impl Packed for Avx512 {
+    type Number = f32;
     const WIDTH: usize = WIDTH;
-    type Mask = u16;
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
@@ -49,6 +49,20 @@ impl Vector for Avx512 {
     fn load(from: &[f32]) -> Self {
         Self(bytemuck::must_cast(first::<_, WIDTH>(from)))
     }
+
+    #[inline(always)]
+    fn write(self, to: &mut [f32]) {
+        self.store(to, false);
+    }
+
+    #[inline(always)]
+    fn times_plus(self, factor: Self, term: Self) -> Self {
+        Self(here!(_mm512_fmadd_ps(self.0, factor.0, term.0)))
+    }
+}
+
+impl Vector for Avx512 {
+    type Mask = u16;
 
     #[inline(always)]
     fn from_bytes(from: &[u8]) -> Self {
@@ -80,11 +94,6 @@ impl Vector for Avx512 {
             let mixed = here!(_mm512_mask_permutexvar_ps(mixed, FILLED[1][vector], from(1), y.0));
             Self(here!(_mm512_mask_permutexvar_ps(mixed, FILLED[2][vector], from(2), z.0))).store(to, streamed);
         }
-    }
-
-    #[inline(always)]
-    fn times_plus(self, factor: Self, term: Self) -> Self {
-        Self(here!(_mm512_fmadd_ps(self.0, factor.0, term.0)))
     }
 
     #[inline(always)]

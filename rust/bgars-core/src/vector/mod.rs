@@ -1,4 +1,4 @@
-//! Vectors of floats, for the one loop where a compiler's own vectors cost a factor of two.
+//! Vectors of numbers, for the loops where a compiler's own vectors cost a factor of two.
 //!
 //! One body of code, written against [`Vector`], is compiled for each instruction set inside a function that enables it.
 
@@ -6,23 +6,25 @@
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
+mod doubles;
 #[cfg(target_arch = "x86_64")]
 mod interleaved;
+mod packed;
 mod portable;
 pub mod subset_sums;
 #[cfg(test)]
 mod tests;
 
-use std::ops::{Add, Div, Mul, Sub};
+use std::ops::Div;
 
-/// The four operators of a vector by its intrinsics; `here!` says why they may be called.
+/// Operators of a vector by its intrinsics; `here!` says why they may be called.
 #[cfg(target_arch = "x86_64")]
 macro_rules! operators {
-    ($vector:ident, $add:ident, $sub:ident, $mul:ident, $div:ident) => {
+    ($vector:ident, $add:ident, $sub:ident, $mul:ident $(, $div:ident)?) => {
         super::operators!(@one $vector, Add add $add);
         super::operators!(@one $vector, Sub sub $sub);
         super::operators!(@one $vector, Mul mul $mul);
-        super::operators!(@one $vector, Div div $div);
+        $(super::operators!(@one $vector, Div div $div);)?
     };
     (@one $vector:ident, $trait:ident $method:ident $call:ident) => {
         impl std::ops::$trait for $vector {
@@ -42,22 +44,18 @@ use operators;
 pub(crate) use avx2::Avx2;
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx512::Avx512;
+pub(crate) use doubles::PortableDouble;
+#[cfg(target_arch = "x86_64")]
+pub(crate) use doubles::{Avx2Double, Avx512Double};
+pub(crate) use packed::Packed;
 pub(crate) use portable::Portable;
 use subset_sums::SubsetSums;
 
-/// `WIDTH` floats that are worked on at once. Slices hold at least as many values; of longer ones the first count.
-///
-/// A type may be named only where its instructions are there: in a function compiled for them.
-pub trait Vector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> {
-    /// Number of values.
-    const WIDTH: usize;
+/// Packed floats, with what an image asks of them.
+pub trait Vector: Packed<Number = f32> + Div<Output = Self> {
     /// True or false for each value.
     type Mask: Copy;
 
-    /// The same value everywhere.
-    fn splat(value: f32) -> Self;
-    /// Values of a slice.
-    fn load(from: &[f32]) -> Self;
     /// Bytes as floats.
     fn from_bytes(from: &[u8]) -> Self;
     /// Words of 16 bits as floats.
@@ -67,8 +65,6 @@ pub trait Vector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = 
     /// Writes `x[0] y[0] z[0] x[1] ...`.
     fn store_interleaved(vectors: [Self; 3], to: &mut [f32], streamed: bool);
 
-    /// `self factor + term`, in one rounding where the processor does so at no cost.
-    fn times_plus(self, factor: Self, term: Self) -> Self;
     /// Square root.
     fn root(self) -> Self;
     /// `self > other`; false for NaN.

@@ -5,7 +5,7 @@ use std::ops::{Add, Div, Mul, Sub};
 use wide::f32x8;
 
 use super::subset_sums::{GROUP, SubsetSums};
-use super::{Vector, first};
+use super::{Packed, Vector, first};
 
 /// Eight floats.
 #[derive(Clone, Copy)]
@@ -37,9 +37,9 @@ impl Portable {
     }
 }
 
-impl Vector for Portable {
+impl Packed for Portable {
+    type Number = f32;
     const WIDTH: usize = WIDTH;
-    type Mask = f32x8;
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
@@ -50,6 +50,20 @@ impl Vector for Portable {
     fn load(from: &[f32]) -> Self {
         Self(f32x8::new(first(from)))
     }
+
+    #[inline(always)]
+    fn write(self, to: &mut [f32]) {
+        self.store(to, false);
+    }
+
+    #[inline(always)]
+    fn times_plus(self, factor: Self, term: Self) -> Self {
+        if cfg!(target_arch = "aarch64") { Self(self.0.mul_add(factor.0, term.0)) } else { self * factor + term }
+    }
+}
+
+impl Vector for Portable {
+    type Mask = f32x8;
 
     #[inline(always)]
     fn from_bytes(from: &[u8]) -> Self {
@@ -72,11 +86,6 @@ impl Vector for Portable {
         for (lane, triple) in to[..3 * WIDTH].as_chunks_mut::<3>().0.iter_mut().enumerate() {
             *triple = planes.map(|plane| plane[lane]);
         }
-    }
-
-    #[inline(always)]
-    fn times_plus(self, factor: Self, term: Self) -> Self {
-        if cfg!(target_arch = "aarch64") { Self(self.0.mul_add(factor.0, term.0)) } else { self * factor + term }
     }
 
     #[inline(always)]

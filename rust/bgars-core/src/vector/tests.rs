@@ -3,7 +3,7 @@
 #![allow(clippy::float_cmp)]
 
 use super::subset_sums::SubsetSums;
-use super::{Portable, Vector};
+use super::{Packed, Portable, PortableDouble, Vector};
 
 /// More than the widest vector needs.
 const VALUES: usize = 16;
@@ -27,13 +27,7 @@ fn check<V: Vector>() {
     let a: [f32; VALUES] = std::array::from_fn(|lane| lane as f32 - 3.0);
     let b: [f32; VALUES] = std::array::from_fn(|lane| [0.5, -2.0, 7.0, f32::NAN][lane % 4]);
     let (x, y) = (V::load(&a), V::load(&b));
-    assert_values(x, |lane| a[lane]);
-    assert_values(V::splat(2.5), |_| 2.5);
-    assert_values(x + y, |lane| a[lane] + b[lane]);
-    assert_values(x - y, |lane| a[lane] - b[lane]);
-    assert_values(x * y, |lane| a[lane] * b[lane]);
     assert_values(x / y, |lane| a[lane] / b[lane]);
-    assert_values(x.times_plus(y, V::splat(1.0)), |lane| a[lane] * b[lane] + 1.0); // exact for these values
     assert_values((x * x).root(), |lane| a[lane].abs());
     assert_values(V::splat(-1.0).root(), |_| f32::NAN);
     assert_values(V::pick(x.is_over(y), x, V::splat(0.0)), |lane| if a[lane] > b[lane] { a[lane] } else { 0.0 });
@@ -50,6 +44,30 @@ fn check<V: Vector>() {
     for bit in 0..8 {
         assert_values(x.where_bit(&bytes, bit), |lane| if bytes[lane] >> bit & 1 == 1 { a[lane] } else { 0.0 });
     }
+}
+
+fn check_packed<V: Packed>()
+where
+    V::Number: From<f32> + PartialEq + std::fmt::Debug + Default,
+{
+    let number = |value: f32| V::Number::from(value);
+    let a: [V::Number; VALUES] = std::array::from_fn(|lane| number(lane as f32 - 3.0));
+    let b: [V::Number; VALUES] = std::array::from_fn(|lane| number([0.5, -2.0, 7.0][lane % 3]));
+    let (x, y, two) = (V::load(&a), V::load(&b), V::splat(number(2.0)));
+    let assert_numbers = |vector: V, expected: &dyn Fn(f32, f32) -> f32| {
+        let mut out = [number(f32::MAX); VALUES];
+        vector.write(&mut out);
+        for (lane, out) in out.into_iter().enumerate() {
+            let expected = expected(lane as f32 - 3.0, [0.5, -2.0, 7.0][lane % 3]);
+            assert_eq!(out, number(if lane < V::WIDTH { expected } else { f32::MAX }), "{lane}");
+        }
+    };
+    assert_numbers(x, &|a, _| a);
+    assert_numbers(two, &|_, _| 2.0);
+    assert_numbers(x + y, &|a, b| a + b);
+    assert_numbers(x - y, &|a, b| a - b);
+    assert_numbers(x * y, &|a, b| a * b);
+    assert_numbers(x.times_plus(y, two), &|a, b| a * b + 2.0); // exact for these values
 }
 
 fn check_sums<V: Vector>() {
@@ -86,7 +104,9 @@ fn check_stores<V: Vector>() {
     }
 }
 
-fn check_all<V: Vector>() {
+fn check_all<V: Vector, Double: Packed<Number = f64>>() {
+    check_packed::<V>();
+    check_packed::<Double>();
     check::<V>();
     check_sums::<V>();
     check_stores::<V>();
@@ -94,7 +114,7 @@ fn check_all<V: Vector>() {
 
 #[test]
 fn portable() {
-    check_all::<Portable>();
+    check_all::<Portable, PortableDouble>();
 }
 
 #[test]
@@ -103,7 +123,7 @@ fn portable() {
 fn avx2() {
     #[target_feature(enable = "avx2,fma")]
     fn checked() {
-        check_all::<super::Avx2>();
+        check_all::<super::Avx2, super::Avx2Double>();
     }
     if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
         // SAFETY: the processor has the instructions.
@@ -117,7 +137,7 @@ fn avx2() {
 fn avx512() {
     #[target_feature(enable = "avx512f")]
     fn checked() {
-        check_all::<super::Avx512>();
+        check_all::<super::Avx512, super::Avx512Double>();
     }
     if is_x86_feature_detected!("avx512f") {
         // SAFETY: the processor has the instructions.

@@ -1,50 +1,128 @@
 //! Jacobi-preconditioned conjugate gradient (Hestenes and Stiefel 1952) from the last surface, as published.
 
+use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::frame::{Aligned, Frame};
+use super::frame::Frame;
 use super::normal_equations::NormalEquations;
 use super::number::Number;
 use super::sweep::{Products, Scaled, Steps, Vectors, sweep};
 
-/// Brings `z` (framed) closer to the solution of a system, in numbers of type `T`.
-///
-/// Stops when the norm of the residual is at most `target`, or after `max_iters`; `each`, called every other iteration, may stop
-/// it by `false`. Returns the iterations and that norm.
-pub(super) fn improve<T: Number>(
-    frame: &Frame,
-    system: &NormalEquations,
-    z: &mut [f64],
-    target: f64,
-    max_iters: usize,
-    mut each: impl FnMut() -> bool,
-) -> (usize, f64) {
-    let roots = inverse_roots(&system.diagonal);
-    let r = scaled_residual::<T>(frame, system, &roots, z);
-    let scaled = scale(frame, system, &roots);
-    let mut vectors = Vectors { x: frame.zeros(), p: frame.zeros(), next: [frame.zeros(), frame.zeros()], r };
-    vectors.p.copy_from_slice(&vectors.r);
-    let mut steps = Steps::default();
-    let mut iterations = 0;
-    let norm = loop {
-        let now = sweep(&scaled, steps, &mut vectors);
-        let norm = now.r_d_r.max(0.0).sqrt();
-        if norm <= target || iterations >= max_iters || !(now.p_v > 0.0) || !each() {
-            break norm;
-        }
-        let (a0, norm_between) = first_step(&now);
-        iterations += 1;
-        if let Some(next) = both_steps(&now, a0).filter(|_| norm_between > target && iterations < max_iters) {
+/// The memory of a solver in numbers of type `T`, used again from system to system.
+pub(super) struct Jacobi<'a, T> {
+    scaled: Scaled<'a, T>,
+    vectors: Vectors<T>,
+    /// `D^-1/2`, framed.
+    roots: Vec<f64>,
+}
+
+impl<'a, T: Number> Jacobi<'a, T> {
+    /// For systems in a frame.
+    pub fn new(frame: &'a Frame) -> Self {
+        let [right, below, diagonal] = std::array::from_fn(|_| frame.zeros());
+        let scaled = Scaled { frame, right, below, diagonal };
+        Self { scaled, vectors: Vectors::new(frame), roots: vec![0.0; frame.len()] }
+    }
+
+    /// Brings `z` (framed) closer to the solution of a system.
+    ///
+    /// Stops when the norm of the residual is at most `target`, or after `max_iters`; `each`, called every other iteration, may
+    /// stop it by `false`. Returns the iterations and that norm.
+    pub fn improve(
+        &mut self,
+        system: &NormalEquations,
+        z: &mut [f64],
+        target: f64,
+        max_iters: usize,
+        mut each: impl FnMut() -> bool,
+    ) -> (usize, f64) {
+        self.begin(system, z);
+        let Self { scaled, vectors, roots } = self;
+        let mut steps = Steps::default();
+        let mut iterations = 0;
+        let norm = loop {
+            let now = sweep(scaled, steps, vectors);
+            let norm = now.r_d_r.max(0.0).sqrt();
+            if norm <= target || iterations >= max_iters || !(now.p_v > 0.0) || !each() {
+                break norm;
+            }
+            let (a0, norm_between) = first_step(&now);
             iterations += 1;
-            steps = next;
-        } else {
-            let a0 = T::of(a0);
-            vectors.x.par_iter_mut().zip(vectors.p.par_iter()).for_each(|(x, p)| *x += a0 * *p);
-            break norm_between;
-        }
-    };
-    z.par_iter_mut().zip(vectors.x.par_iter()).zip(&roots).for_each(|((z, x), root)| *z += x.to_f64() * root);
-    (iterations, norm)
+            if let Some(next) = both_steps(&now, a0).filter(|_| norm_between > target && iterations < max_iters) {
+                iterations += 1;
+                steps = next;
+            } else {
+                let a0 = T::of(a0);
+                vectors.x.par_iter_mut().zip(vectors.p.par_iter()).for_each(|(x, p)| *x += a0 * *p);
+                break norm_between;
+            }
+        };
+        z.par_iter_mut()
+            .zip(vectors.x.par_iter())
+            .zip(roots.par_iter())
+            .for_each(|((z, x), root)| *z += x.to_f64() * root);
+        (iterations, norm)
+    }
+
+    /// Scales the system to a diagonal of ones, `D^-1/2 A D^-1/2`, and starts at the residual of `z`.
+    fn begin(&mut self, system: &NormalEquations, z: &[f64]) {
+        let Self { scaled: Scaled { frame, right, below, diagonal }, vectors, roots } = self;
+        let roots_of = |(roots, diagonal): (&mut [f64], &[f64])| inverse_roots(diagonal, roots);
+        let stride = frame.stride();
+        roots.par_chunks_mut(stride).zip(system.diagonal.par_chunks(stride)).for_each(roots_of);
+        vectors.clear();
+        let first = frame.start(0);
+        let [right, below, diagonal, r] =
+            [right, below, diagonal, &mut vectors.r].map(|array| array[first..].par_chunks_mut(stride));
+        (right, below, diagonal, r).into_par_iter().take(frame.height).enumerate().for_each(
+            |(row, (right, below, diagonal, r))| {
+                let (lo, hi) = frame.span(row as isize);
+                let at = frame.start(row) + lo;
+                let outs = [&mut right[lo..hi], &mut below[lo..hi], &mut diagonal[lo..hi], &mut r[lo..hi]];
+                scale_row(system, roots, z, at, stride, outs);
+            },
+        );
+        vectors.p.copy_from_slice(&vectors.r);
+    }
+}
+
+/// `1 / sqrt(d)`, 0 for a pixel without edges.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn inverse_roots(diagonal: &[f64], roots: &mut [f64]) {
+    for (root, &d) in roots.iter_mut().zip(diagonal) {
+        *root = if d > 0.0 { d.sqrt().recip() } else { 0.0 };
+    }
+}
+
+/// A row of `-C`, where `D^-1/2 A D^-1/2 = I - C`, to the right and below, of D, and of `D^-1/2 (b - A z)`; `at` is the place of its first pixel.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn scale_row<'a, T: Number>(
+    system: &'a NormalEquations,
+    roots: &'a [f64],
+    z: &'a [f64],
+    at: usize,
+    stride: usize,
+    [right, below, diagonal, r]: [&mut [T]; 4],
+) {
+    let n = right.len();
+    let around = |array: &'a [f64]| [at, at - 1, at + 1, at - stride, at + stride].map(|at| &array[at..at + n]);
+    let ([root, _, root_right, _, root_below], [z, z_left, z_right, z_up, z_down]) = (around(roots), around(z));
+    let ([tie_right, tie_left, ..], [tie_down, _, _, tie_up, _]) = (around(&system.right), around(&system.below));
+    let ([d, ..], [source, ..]) = (around(&system.diagonal), around(&system.source));
+    for k in 0..n {
+        right[k] = T::of(-tie_right[k] * root[k] * root_right[k]);
+    }
+    for k in 0..n {
+        below[k] = T::of(-tie_down[k] * root[k] * root_below[k]);
+    }
+    for k in 0..n {
+        diagonal[k] = T::of(d[k]);
+    }
+    for k in 0..n {
+        let along = tie_right[k] * (z_right[k] - z[k]) - tie_left[k] * (z[k] - z_left[k]);
+        let across = tie_down[k] * (z_down[k] - z[k]) - tie_up[k] * (z[k] - z_up[k]);
+        r[k] = T::of((source[k] + (along + across)) * root[k]);
+    }
 }
 
 /// Length of the step along p, and the norm of the unscaled residual after it.
@@ -67,51 +145,6 @@ fn both_steps(now: &Products, a0: f64) -> Option<Steps> {
     let r2_r2 = r1_r1 - 2.0 * a1 * (r1_a_r1 + b0 * r1_v) + a1 * a1 * a_p1_squared;
     let b1 = r2_r2 / r1_r1;
     (r1_r1 > 0.0 && p1_a_p1 > 0.0 && r2_r2 >= 0.0).then_some(Steps { a0, b0, a1, b1 })
-}
-
-/// `1 / sqrt(d)`, 0 for a pixel without edges.
-fn inverse_roots(diagonal: &[f64]) -> Vec<f64> {
-    diagonal.par_iter().with_min_len(1 << 13).map(|&d| if d > 0.0 { d.sqrt().recip() } else { 0.0 }).collect()
-}
-
-/// `D^-1/2 (b - A z)`.
-fn scaled_residual<T: Number>(frame: &Frame, system: &NormalEquations, roots: &[f64], z: &[f64]) -> Aligned<T> {
-    let (stride, mut residual) = (frame.stride(), frame.zeros::<T>());
-    residual[frame.start(0)..].par_chunks_mut(stride).take(frame.height).enumerate().for_each(|(row, residual)| {
-        let (lo, hi) = frame.span(row as isize);
-        let start = frame.start(row);
-        for k in lo..hi {
-            let i = start + k;
-            let along = system.right[i] * (z[i + 1] - z[i]) - system.right[i - 1] * (z[i] - z[i - 1]);
-            let across = system.below[i] * (z[i + stride] - z[i]) - system.below[i - stride] * (z[i] - z[i - stride]);
-            residual[k] = T::of((system.source[i] + (along + across)) * roots[i]);
-        }
-    });
-    residual
-}
-
-/// `D^-1/2 A D^-1/2 = I - C`.
-fn scale<'a, T: Number>(frame: &'a Frame, system: &NormalEquations, roots: &[f64]) -> Scaled<'a, T> {
-    let stride = frame.stride();
-    let [mut right, mut below, mut diagonal] = std::array::from_fn(|_| frame.zeros::<T>());
-    let first = frame.start(0);
-    right[first..]
-        .par_chunks_mut(stride)
-        .zip(below[first..].par_chunks_mut(stride))
-        .zip(diagonal[first..].par_chunks_mut(stride))
-        .take(frame.height)
-        .enumerate()
-        .for_each(|(row, ((right, below), diagonal))| {
-            let (lo, hi) = frame.span(row as isize);
-            let start = frame.start(row);
-            for k in lo..hi {
-                let i = start + k;
-                right[k] = T::of(system.right[i] * roots[i] * roots[i + 1]);
-                below[k] = T::of(system.below[i] * roots[i] * roots[i + stride]);
-                diagonal[k] = T::of(system.diagonal[i]);
-            }
-        });
-    Scaled { frame, right, below, diagonal }
 }
 
 #[cfg(test)]
@@ -142,7 +175,9 @@ mod tests {
                 }
             }
         }
-        (frame, NormalEquations { right, below, diagonal, source })
+        let mut system = NormalEquations::new(&frame);
+        (system.right, system.below, system.diagonal, system.source) = (right, below, diagonal, source);
+        (frame, system)
     }
 
     fn multiply(frame: &Frame, system: &NormalEquations, x: &[f64]) -> Vec<f64> {
@@ -198,7 +233,8 @@ mod tests {
                 // As many iterations as pixels end where rounding is all there is.
                 let max_iters = max_iters.min(height * width / 4);
                 let [mut fast, mut slow] = [start.clone(), start.clone()];
-                let (iterations, _) = improve::<f64>(&frame, &system, &mut fast, tolerance * norm, max_iters, || true);
+                let (iterations, _) =
+                    Jacobi::<f64>::new(&frame).improve(&system, &mut fast, tolerance * norm, max_iters, || true);
                 assert_eq!(
                     iterations,
                     textbook(&frame, &system, &mut slow, tolerance * norm, max_iters),
@@ -215,7 +251,7 @@ mod tests {
     fn what_is_outside_the_mask_stays_zero() {
         let (frame, system) = system(40, 50);
         let mut z = vec![0.0; frame.len()];
-        improve::<f32>(&frame, &system, &mut z, 1e-6, 100, || true);
+        Jacobi::<f32>::new(&frame).improve(&system, &mut z, 1e-6, 100, || true);
         assert!(z.iter().zip(&system.diagonal).all(|(z, &d)| d > 0.0 || *z == 0.0));
         assert!(z.iter().any(|z| *z != 0.0));
     }

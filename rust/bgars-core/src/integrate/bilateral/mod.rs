@@ -21,6 +21,7 @@ mod jacobi;
 mod normal_equations;
 mod number;
 mod pixels;
+mod published;
 mod reweigh;
 mod rows;
 mod solve;

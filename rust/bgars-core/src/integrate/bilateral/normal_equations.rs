@@ -17,15 +17,23 @@ pub(super) struct NormalEquations {
     pub diagonal: Vec<f64>,
     /// Right side.
     pub source: Vec<f64>,
+    /// How much of the right side each edge moves from its first pixel to its second.
+    push_right: Vec<f64>,
+    push_below: Vec<f64>,
 }
 
 impl NormalEquations {
-    /// The system for the shares of a surface.
-    pub fn new(frame: &Frame, pixels: &Pixels, shares: &Shares) -> Self {
+    /// No edges.
+    pub fn new(frame: &Frame) -> Self {
+        let [right, below, diagonal, source, push_right, push_below] = std::array::from_fn(|_| vec![0.0; frame.len()]);
+        Self { right, below, diagonal, source, push_right, push_below }
+    }
+
+    /// Makes it the system for the shares of a surface.
+    pub fn set(&mut self, frame: &Frame, pixels: &Pixels, shares: &Shares) {
         let (stride, first, width) = (frame.stride(), frame.start(0), pixels.crop.grid.width);
-        let [mut right, mut below, mut diagonal, mut source] = std::array::from_fn(|_| vec![0.0; frame.len()]);
-        let [mut push_right, mut push_below] = std::array::from_fn(|_| vec![0.0; frame.len()]);
-        for (weights, pushes, axis) in [(&mut right, &mut push_right, 0), (&mut below, &mut push_below, 1)] {
+        let Self { right, below, diagonal, source, push_right, push_below } = self;
+        for (weights, pushes, axis) in [(&mut *right, &mut *push_right, 0), (&mut *below, &mut *push_below, 1)] {
             let rows = weights[first..].par_chunks_mut(stride).zip(pushes[first..].par_chunks_mut(stride));
             rows.take(frame.height).enumerate().for_each(|(row, (weights, pushes))| {
                 let edges = Edges { pixels, share: &shares[axis], least: 0.0, axis };
@@ -42,6 +50,5 @@ impl NormalEquations {
                 source[k] = (push_below[i - stride] - push_below[i]) + (push_right[i - 1] - push_right[i]);
             }
         });
-        Self { right, below, diagonal, source }
     }
 }

@@ -6,6 +6,7 @@ use super::super::checkerboard::Grid;
 use super::super::operator::Field;
 use super::Setting;
 use super::camera::Pinhole;
+use super::frame::Frame;
 use crate::memory::zeros;
 
 /// The bounding box of the mask, its first row and column in the image.
@@ -92,6 +93,12 @@ impl Pixels {
     /// Pixels of the box.
     pub fn len(&self) -> usize {
         self.mask.len()
+    }
+
+    /// The frame of the box.
+    pub fn frame(&self) -> Frame {
+        let Grid { height, width } = self.crop.grid;
+        Frame::new(height, width, |row, col| self.used(row * width + col))
     }
 
     /// True for a pixel of the mask.

@@ -14,25 +14,18 @@ use super::super::reduction::{eliminate_blacks, fill_blacks, multiply};
 use super::super::solve::{Facing, check_lengths, check_pixels};
 use super::super::{Params, Progress};
 use super::assemble::assemble;
-use super::frame::Frame;
-use super::normal_equations::NormalEquations;
 use super::pixels::Pixels;
+use super::published::Published;
 use super::reweigh::{even, reweigh};
-use super::{BilateralParams, BilateralSurface, Pinhole, Precision, Setting, jacobi};
+use super::{BilateralParams, BilateralSurface, Pinhole, Setting};
 use crate::{Error, Result};
 
-/// Largest relative residual of an inner solve: as published.
-const COMPATIBLE_TOLERANCE: f64 = 1e-3;
-/// The same where every system is solved.
+/// Largest relative residual of an inner solve.
 const CONVERGED_TOLERANCE: f64 = 1e-6;
 /// Least share of a side in a system that multigrid solves. Weaker ties than this hold nothing within the tolerance, and the
 /// preconditioner's `f32` could not carry them.
 const CONVERGED_LEAST_SHARE: f64 = 1e-6;
-/// Most iterations of an inner solve by Jacobi: as published.
-const COMPATIBLE_ITERS: usize = 5_000;
-/// Iterations between two looks at the callback, which cost more than a small iteration.
-const PATIENCE: usize = 128;
-/// The same by multigrid.
+/// Most iterations of an inner solve.
 const CONVERGED_ITERS: usize = 500;
 
 /// Callback of [`integrate_bilateral`], once a re-weighting, with the relative change of the energy in place of the residual.
@@ -77,23 +70,22 @@ pub fn integrate_bilateral(
     let Field { mask, width, .. } = field;
     check(field, camera, params)?;
     let pixels = Pixels::new(field, camera, params.setting);
-    let grid = pixels.crop.grid;
-    let frame = Frame::new(grid.height, grid.width, |row, col| pixels.used(row * grid.width + col));
+    let frame = pixels.frame();
+    let mut published = match params.setting {
+        Setting::Compatible => Some(Published::new(&frame, params.precision)),
+        Setting::Converged => None,
+    };
     let mut z = vec![0.0; pixels.len()];
     let mut shares = even(&pixels);
     let mut fit = Progressed::default();
     let mut energies: Vec<f64> = Vec::new();
     let mut converged = false;
     while energies.len() < params.max_iters && !converged {
-        match params.setting {
-            Setting::Compatible => {
-                let system = NormalEquations::new(&frame, &pixels, &shares);
-                improve_as_published(&frame, &system, &mut z, params.precision, &mut fit, on_progress)?;
-            }
-            Setting::Converged => {
-                let (system, right) = assemble(&pixels, &shares, CONVERGED_LEAST_SHARE);
-                improve(system, right, &mut z, &mut fit, on_progress)?;
-            }
+        if let Some(published) = &mut published {
+            published.improve(&pixels, &shares, &mut z, &mut fit, on_progress)?;
+        } else {
+            let (system, right) = assemble(&pixels, &shares, CONVERGED_LEAST_SHARE);
+            improve(system, right, &mut z, &mut fit, on_progress)?;
         }
         let energy = reweigh(&pixels, &z, params.k, &mut shares);
         let before = energies.last().copied().unwrap_or(f64::INFINITY);
@@ -169,58 +161,11 @@ fn check_facing(field: Field<'_>, camera: Pinhole) -> Result<()> {
 
 /// What the inner solves add up to.
 #[derive(Default)]
-struct Progressed {
-    rounds: usize,
-    change: f64,
-    inner_iterations: usize,
-    residual: f64,
-}
-
-/// Brings `z` (row-major in the box) closer to the solution of a system by conjugate gradient as published.
-fn improve_as_published(
-    frame: &Frame,
-    system: &NormalEquations,
-    z: &mut [f64],
-    precision: Precision,
-    fit: &mut Progressed,
-    on_progress: OnReweigh<'_>,
-) -> Result<()> {
-    let scale = square_sum(&system.source).sqrt();
-    if scale == 0.0 {
-        z.fill(0.0);
-        return Ok(());
-    }
-    let (stride, width) = (frame.stride(), z.len() / frame.height);
-    let mut framed = vec![0.0; frame.len()];
-    let rows = |framed: &mut Vec<f64>, copy: &mut dyn FnMut(usize, &mut [f64])| {
-        let first = frame.start(0);
-        framed[first..]
-            .chunks_mut(stride)
-            .take(frame.height)
-            .enumerate()
-            .for_each(|(row, f)| copy(row, &mut f[..width]));
-    };
-    rows(&mut framed, &mut |row, framed| framed.copy_from_slice(&z[row * width..][..width]));
-    let mut stopped = false;
-    let mut done = 0;
-    let state = Progress { iteration: fit.rounds, residual: fit.change };
-    let each = || {
-        done += 2;
-        stopped = done % PATIENCE == 0 && on_progress(state).is_break();
-        !stopped
-    };
-    let target = COMPATIBLE_TOLERANCE * scale;
-    let (iterations, left) = match precision {
-        Precision::Double => jacobi::improve::<f64>(frame, system, &mut framed, target, COMPATIBLE_ITERS, each),
-        Precision::Single => jacobi::improve::<f32>(frame, system, &mut framed, target, COMPATIBLE_ITERS, each),
-    };
-    if stopped {
-        return Err(Error::Cancelled);
-    }
-    rows(&mut framed, &mut |row, framed| z[row * width..][..width].copy_from_slice(framed));
-    fit.inner_iterations += iterations;
-    fit.residual = fit.residual.max(left / scale);
-    Ok(())
+pub(super) struct Progressed {
+    pub rounds: usize,
+    pub change: f64,
+    pub inner_iterations: usize,
+    pub residual: f64,
 }
 
 /// Brings `z` (row-major in the box) to the solution of a system by multigrid.

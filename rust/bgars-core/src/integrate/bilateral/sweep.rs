@@ -2,29 +2,34 @@
 //!
 //! Plain conjugate gradient reads and writes every vector at least once an iteration. Two iterations take only `A p`, `A A p`
 //! and `A r` of the vectors before them, and all their coefficients follow from products of these five (Chronopoulos and Gear,
-//! "s-step iterative methods for symmetric linear systems", 1989, with s = 2). A sweep makes the five row by row, updates with
-//! them, and at once takes the products that the next two iterations need; between sweeps only x, p and r are kept. What each
-//! iteration does is otherwise that of the textbook, and so is where it ends.
+//! "s-step iterative methods for symmetric linear systems", 1989, with s = 2). The five are kept; a sweep updates them row by
+//! row, multiplies twice by A (`A p` follows from `A r`, as p from r), and at once takes the products that the next two
+//! iterations need. What each iteration does is otherwise that of the textbook, and so is where it ends.
 
-use multiversion::multiversion;
+use multiversion::{multiversion, target::target_cfg_f};
 use rayon::prelude::*;
 
-use super::frame::{Aligned, Frame, LANES};
+use super::frame::{Aligned, Frame};
 use super::number::Number;
-use super::rows::{Ring, Row, Sides};
+use super::rows::{Factors, Rings, SUMS, Stencil, add_products, advance, flush, multiply, step};
+use crate::vector::Packed;
 
-/// Rows that one task sweeps; it makes three more on either side for itself.
+/// Rows that one task sweeps; of two more on either side it updates the residual for itself.
 const BAND: usize = 64;
+/// Rows beside the first row of a band that change before the band is done with them: two on either side.
+const EDGE: usize = 4;
+/// Vectors that a band needs of the rows beside it: r, A p, A r and A A p.
+const KEPT: usize = 4;
 /// Rows after which the sums of `f32` go over into `f64`.
-const FLUSH: isize = 8;
+const FLUSH: usize = 8;
 
 /// `I - C` of a 5-point system scaled to a diagonal of ones. Arrays are framed.
 #[derive(Debug)]
 pub(super) struct Scaled<'a, T> {
     pub frame: &'a Frame,
-    /// `C` between each pixel and its right neighbour.
+    /// `-C` between each pixel and its right neighbour.
     pub right: Aligned<T>,
-    /// `C` between each pixel and the one below.
+    /// `-C` between each pixel and the one below.
     pub below: Aligned<T>,
     /// The diagonal that was scaled to one.
     pub diagonal: Aligned<T>,
@@ -57,34 +62,76 @@ pub(super) struct Products {
     pub u_w: f64,
 }
 
-/// The vectors of conjugate gradient, framed; `next` holds p and r while they are made.
+/// The vectors of conjugate gradient, framed.
 #[derive(Debug)]
 pub(super) struct Vectors<T> {
     pub x: Aligned<T>,
     pub p: Aligned<T>,
     pub r: Aligned<T>,
-    pub next: [Aligned<T>; 2],
+    /// A p.
+    v: Aligned<T>,
+    /// A r.
+    u: Aligned<T>,
+    /// A A p.
+    w: Aligned<T>,
+    /// r, v, u and w of the rows beside each band but the first as they were before a sweep: two above and two below its
+    /// first row's upper side.
+    edges: Aligned<T>,
+}
+
+impl<T: Number> Vectors<T> {
+    /// All zero.
+    pub fn new(frame: &Frame) -> Self {
+        let [x, p, r, v, u, w] = std::array::from_fn(|_| frame.zeros());
+        let edges = Aligned::zeros((bands(frame) - 1) * EDGE * KEPT * frame.stride());
+        Self { x, p, r, v, u, w, edges }
+    }
+
+    /// Sets x and the products to zero. A sweep of no steps, p and r given, makes the products.
+    pub fn clear(&mut self) {
+        for vector in [&mut self.x, &mut self.v, &mut self.u, &mut self.w] {
+            vector.fill(T::default());
+        }
+    }
+
+    /// Keeps the rows on which two bands depend.
+    fn keep_edges(&mut self, frame: &Frame) {
+        let Self { r, v, u, w, edges, .. } = self;
+        let (stride, kept) = (frame.stride(), [&*r, &*v, &*u, &*w]);
+        edges.par_chunks_mut(EDGE * KEPT * stride).enumerate().for_each(|(band, edges)| {
+            let first = (band + 1) * BAND - EDGE / 2;
+            for (row, edges) in (first..frame.height).zip(edges.chunks_mut(KEPT * stride)) {
+                for (vector, edge) in kept.iter().zip(edges.chunks_mut(stride)) {
+                    edge.copy_from_slice(&vector[frame.start(row)..][..stride]);
+                }
+            }
+        });
+    }
+}
+
+fn bands(frame: &Frame) -> usize {
+    frame.height.div_ceil(BAND)
 }
 
 /// Takes two iterations and returns the products of the vectors after them, summed in an order without threads.
 pub(super) fn sweep<T: Number>(system: &Scaled<'_, T>, steps: Steps, vectors: &mut Vectors<T>) -> Products {
-    let chunk = BAND * system.frame.stride();
-    let first = system.frame.start(0);
-    let Vectors { x, p, r, next: [next_p, next_r] } = vectors;
-    let old = [&p[..], &r[..]];
-    let sums: Vec<[f64; 13]> = x[first..]
-        .par_chunks_mut(chunk)
-        .zip(next_p[first..].par_chunks_mut(chunk))
-        .zip(next_r[first..].par_chunks_mut(chunk))
-        .take(system.frame.height.div_ceil(BAND))
+    let frame = system.frame;
+    vectors.keep_edges(frame);
+    let (chunk, first) = (BAND * frame.stride(), frame.start(0));
+    let Vectors { x, p, r, v, u, w, edges } = vectors;
+    let [x, p, r, v, u, w] = [x, p, r, v, u, w].map(|vector| vector[first..].par_chunks_mut(chunk));
+    let sums: Vec<[f64; SUMS]> = (x, p, r, v, u, w)
+        .into_par_iter()
+        .take(bands(frame))
         .enumerate()
-        .map(|(band, ((x, next_p), next_r))| {
-            sweep_band(system, steps, old, band * BAND, Out { x, p: next_p, r: next_r })
-        })
+        .map_init(
+            || Rings::new(frame.width),
+            |rings, (band, (x, p, r, v, u, w))| {
+                sweep_band(system, steps, edges, band, &mut Own { x, p, r, v, u, w }, rings)
+            },
+        )
         .collect();
-    std::mem::swap(p, next_p);
-    std::mem::swap(r, next_r);
-    let mut total = [0.0; 13];
+    let mut total = [0.0; SUMS];
     for sums in sums {
         for (total, sum) in total.iter_mut().zip(sums) {
             *total += sum;
@@ -94,185 +141,177 @@ pub(super) fn sweep<T: Number>(system: &Scaled<'_, T>, steps: Steps, vectors: &m
     Products { r_r, p_v, r_v, v_v, r_d_r, r_d_v, v_d_v, r_u, u_v, u_u, v_w, w_w, u_w }
 }
 
-/// One band of a sweep. A row goes through four stages, each a row behind the one before, whose neighbours it needs.
-struct Band<'a, T> {
-    system: &'a Scaled<'a, T>,
-    steps: Steps,
-    /// Of the vectors as they were: A p and A r.
-    old: [Ring<T>; 2],
-    /// A p1.
-    between: Ring<T>,
-    /// The vectors as they become: p, r, A p and A r.
-    new: [Ring<T>; 4],
-    /// A A p of one row.
-    squared: Aligned<T>,
-    lanes: [[T; LANES]; 13],
-}
-
-/// Where a band writes: the rows of x, p and r that it owns.
-struct Out<'a, T> {
+/// The rows of the vectors that a band owns.
+struct Own<'a, T> {
     x: &'a mut [T],
     p: &'a mut [T],
     r: &'a mut [T],
-}
-
-impl<T: Number> Band<'_, T> {
-    #[inline(always)]
-    fn place(&self, row: isize, (lo, hi): (usize, usize)) -> Row {
-        let frame = self.system.frame;
-        Row { at: frame.start(row as usize) + lo, n: hi - lo, stride: frame.stride() }
-    }
-
-    /// A p and A r.
-    #[inline(always)]
-    fn multiply(&mut self, row: isize, p: &[T], r: &[T]) {
-        let span = self.system.frame.span(row);
-        let place = (span.0 < span.1).then(|| self.place(row, span));
-        let [v, u] = &mut self.old;
-        let outs = [v.begin(row, span), u.begin(row, span)];
-        if let Some(place) = place {
-            Sides::new(self.system, place).apply_both([p, r], place, outs);
-        }
-    }
-
-    /// A A p, and with it both iterations; `out` for a row of the band's own, and its place there.
-    #[inline(always)]
-    fn iterate(&mut self, row: isize, p: &[T], r: &[T], out: Option<(&mut Out<'_, T>, usize)>) {
-        let span = self.system.frame.span(row);
-        let Steps { a0, b0, a1, b1 } = self.steps;
-        // r2 = r - of_v v - a1 u + of_w w
-        let (of_v, of_w) = (T::of(a0 + a1 * b0), T::of(a0 * a1));
-        let [a0, b0, a1, b1] = [a0, b0, a1, b1].map(T::of);
-        let [new_p, new_r, ..] = &mut self.new;
-        let (new_p, new_r, between) = (new_p.begin(row, span), new_r.begin(row, span), self.between.begin(row, span));
-        if span.0 == span.1 {
-            return;
-        }
-        let n = span.1 - span.0;
-        let at = self.system.frame.start(row as usize) + span.0;
-        let w = &mut self.squared[..n];
-        let [v, u] = &self.old;
-        Sides::new(self.system, Row { at, n, stride: self.system.frame.stride() }).apply(v, row, span, w);
-        let (v, u) = (&v.row(row, span)[..n], &u.row(row, span)[..n]);
-        let (p, r) = (&p[at..][..n], &r[at..][..n]);
-        let (new_p, new_r, between) = (&mut new_p[..n], &mut new_r[..n], &mut between[..n]);
-        for k in 0..n {
-            let p1 = (r[k] - a0 * v[k]) + b0 * p[k];
-            let r2 = (r[k] - of_v * v[k]) - (a1 * u[k] - of_w * w[k]);
-            new_r[k] = r2;
-            new_p[k] = r2 + b1 * p1;
-            between[k] = (u[k] - a0 * w[k]) + b0 * v[k];
-        }
-        if let Some((out, offset)) = out {
-            let place = offset + span.0;
-            out.p[place..][..n].copy_from_slice(new_p);
-            out.r[place..][..n].copy_from_slice(new_r);
-            let x = &mut out.x[place..][..n];
-            for k in 0..n {
-                let p1 = (r[k] - a0 * v[k]) + b0 * p[k];
-                x[k] += a0 * p[k] + a1 * p1;
-            }
-        }
-    }
-
-    /// A r of the new r, and with it A p of the new p: `A p2 = A r2 + b1 A p1`.
-    #[inline(always)]
-    fn multiply_new(&mut self, row: isize) {
-        let span = self.system.frame.span(row);
-        let b1 = T::of(self.steps.b1);
-        let place = (span.0 < span.1).then(|| self.place(row, span));
-        let [_, r, v, u] = &mut self.new;
-        let (v, u) = (v.begin(row, span), u.begin(row, span));
-        let Some(place) = place else { return };
-        Sides::new(self.system, place).apply(r, row, span, u);
-        let (v, u, between) = (&mut v[..place.n], &u[..place.n], &self.between.row(row, span)[..place.n]);
-        for k in 0..place.n {
-            v[k] = u[k] + b1 * between[k];
-        }
-    }
-
-    /// A A p of the new p, and the products.
-    #[inline(always)]
-    fn add_products(&mut self, row: isize) {
-        let span = self.system.frame.span(row);
-        if span.0 == span.1 {
-            return;
-        }
-        let place = self.place(row, span);
-        let w = &mut self.squared[..place.n];
-        let [p, r, v, u] = &self.new;
-        Sides::new(self.system, place).apply(v, row, span, w);
-        let (p, r, v, u) = (p.row(row, span), r.row(row, span), v.row(row, span), u.row(row, span));
-        let d = &self.system.diagonal[place.at..][..place.n];
-        let [r_r, p_v, r_v, v_v, r_d_r, r_d_v, v_d_v, r_u, u_v, u_u, v_w, w_w, u_w] = &mut self.lanes;
-        add([r, p, v], [r_r, p_v, r_v, v_v], |[r, p, v]| [r * r, p * v, r * v, v * v]);
-        add([r, v, d], [r_d_r, r_d_v, v_d_v], |[r, v, d]| [d * r * r, d * r * v, d * v * v]);
-        add([r, u, v], [r_u, u_v, u_u], |[r, u, v]| [r * u, u * v, u * u]);
-        add([v, w, u], [v_w, w_w, u_w], |[v, w, u]| [v * w, w * w, u * w]);
-    }
+    v: &'a mut [T],
+    u: &'a mut [T],
+    w: &'a mut [T],
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 fn sweep_band<T: Number>(
     system: &Scaled<'_, T>,
     steps: Steps,
-    [p, r]: [&[T]; 2],
-    first: usize,
-    mut out: Out<'_, T>,
-) -> [f64; 13] {
-    let width = system.frame.width;
-    let mut band = Band {
-        system,
-        steps,
-        old: std::array::from_fn(|_| Ring::new(width)),
-        between: Ring::new(width),
-        new: std::array::from_fn(|_| Ring::new(width)),
-        squared: Aligned::zeros(width),
-        lanes: [[T::default(); LANES]; 13],
+    edges: &[T],
+    band: usize,
+    own: &mut Own<'_, T>,
+    rings: &mut Rings<T>,
+) -> [f64; SUMS] {
+    #[cfg(target_arch = "x86_64")]
+    {
+        if target_cfg_f!(target_feature = "avx512f") {
+            return sweep_band_with::<T, T::Avx512>(system, steps, edges, band, own, rings);
+        }
+        if target_cfg_f!(target_feature = "avx2") {
+            return sweep_band_with::<T, T::Avx2>(system, steps, edges, band, own, rings);
+        }
+    }
+    sweep_band_with::<T, T::Portable>(system, steps, edges, band, own, rings)
+}
+
+/// A row goes through three stages, each a row behind the one before, whose neighbours it needs.
+#[inline(always)]
+fn sweep_band_with<T: Number, V: Packed<Number = T>>(
+    system: &Scaled<'_, T>,
+    steps: Steps,
+    edges: &[T],
+    band: usize,
+    own: &mut Own<'_, T>,
+    rings: &mut Rings<T>,
+) -> [f64; SUMS] {
+    let frame = system.frame;
+    let stride = frame.stride();
+    let (start, end) = ((band * BAND) as isize, ((band + 1) * BAND).min(frame.height) as isize);
+    let factors = Factors::<V>::new(steps);
+    let Rings { r: new_r, between, v: new_v } = rings;
+    let mut lanes = [V::splat(T::default()); SUMS];
+    let mut sums = [0.0; SUMS];
+    let place = |row: isize, span: (usize, usize)| {
+        (start..end).contains(&row).then(|| (row - start) as usize * stride + span.0)
     };
-    let mut sums = [0.0; 13];
-    let (start, end) = (first as isize, (first + BAND).min(system.frame.height) as isize);
-    for row in start - 3..end + 3 {
-        band.multiply(row, p, r);
-        if row > start - 2 {
-            let own = (start..end).contains(&(row - 1));
-            let offset = (row - 1 - start) * system.frame.stride() as isize;
-            band.iterate(row - 1, p, r, own.then_some((&mut out, offset as usize)));
+    for row in start - 2..end + 2 {
+        let span = frame.span(row);
+        let outs = [new_r.begin(row, span), between.begin(row, span)];
+        if let Some(at) = place(row, span) {
+            step(&factors, [&own.r[at..], &own.v[at..], &own.u[at..], &own.w[at..]], outs);
+            let vectors = [&mut own.x[at..], &mut own.p[at..], &mut own.r[at..]];
+            advance(&factors, new_r.row(row, span), &own.v[at..], vectors);
+        } else if span.0 < span.1 {
+            // Two rows above the band are the first of its edge, two below it the last of the next one's.
+            let before = if row < start { (band - 1) * EDGE + 2 } else { band * EDGE + 2 };
+            let first = before.wrapping_add_signed(if row < start { row - start } else { row - end }) * KEPT;
+            let kept = |vector: usize| &edges[(first + vector) * stride..][span.0..span.1];
+            step(&factors, [kept(0), kept(1), kept(2), kept(3)], outs);
         }
-        if row > start {
-            band.multiply_new(row - 2);
+
+        let row = row - 1;
+        if row < start - 1 {
+            continue;
         }
-        if row > start + 2 {
-            band.add_products(row - 3);
-            if (row - 3 - start) % FLUSH == FLUSH - 1 || row - 3 == end - 1 {
-                for (sum, lanes) in sums.iter_mut().zip(&mut band.lanes) {
-                    *sum += lanes.iter().map(|lane| lane.to_f64()).sum::<f64>();
-                    *lanes = [T::default(); LANES];
-                }
-            }
+        let span = frame.span(row);
+        let out = new_v.begin(row, span);
+        if span.0 < span.1 {
+            let product = Stencil::new(system, new_r, row, span);
+            let own = place(row, span).map(|at| [&mut own.u[at..], &mut own.v[at..]]);
+            multiply(&factors, &product, between.row(row, span), out, own);
+        }
+
+        let row = row - 1;
+        let span = frame.span(row);
+        let Some(at) = place(row, span) else { continue };
+        if span.0 < span.1 {
+            let product = Stencil::new(system, new_v, row, span);
+            let diagonal = &system.diagonal[frame.start(row as usize) + span.0..];
+            let vectors = [new_r.row(row, span), &own.p[at..], &own.u[at..], diagonal];
+            add_products(&product, vectors, &mut own.w[at..], &mut lanes);
+        }
+        if (row - start) as usize % FLUSH == FLUSH - 1 || row == end - 1 {
+            flush(&mut lanes, &mut sums);
         }
     }
     sums
 }
 
-/// Adds to each of `sums` its product of three rows, whose length is a multiple of [`LANES`].
-#[inline(always)]
-fn add<T: Number, const N: usize>(rows: [&[T]; 3], sums: [&mut [T; LANES]; N], products: impl Fn([T; 3]) -> [T; N]) {
-    let n = rows[0].len();
-    let (a, b, c) = (&rows[0][..n], &rows[1][..n], &rows[2][..n]);
-    let mut lanes = [[T::default(); LANES]; N];
-    for i in 0..N {
-        lanes[i] = *sums[i];
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vector::{Portable, PortableDouble};
+
+    fn number(seed: usize) -> f64 {
+        ((seed * 2_654_435_761) >> 7) as f64 % 1000.0 / 1000.0
     }
-    for ((a, b), c) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)).zip(c.chunks_exact(LANES)) {
-        for lane in 0..LANES {
-            let products = products([a[lane], b[lane], c[lane]]);
-            for i in 0..N {
-                lanes[i][lane] += products[i];
+
+    /// Ties below a fifth on all edges between pixels of a disc, so that rows differ in length.
+    fn disc<T: Number>(frame: &Frame) -> (Scaled<'_, T>, Vectors<T>) {
+        let mut system = Scaled { frame, right: frame.zeros(), below: frame.zeros(), diagonal: frame.zeros() };
+        let mut vectors = Vectors::new(frame);
+        for row in 0..frame.height {
+            let (lo, hi) = frame.span(row as isize);
+            for col in lo..hi {
+                let at = frame.start(row) + col;
+                let ends_below = frame.span(row as isize + 1);
+                system.right[at] = T::of(if col + 1 < hi { -0.2 * number(at) } else { 0.0 });
+                system.below[at] =
+                    T::of(if (ends_below.0..ends_below.1).contains(&col) { -0.2 * number(at + 7) } else { 0.0 });
+                system.diagonal[at] = T::of(1.0 + number(at + 3));
+                for (shift, vector) in
+                    [&mut vectors.x, &mut vectors.p, &mut vectors.r, &mut vectors.v, &mut vectors.u, &mut vectors.w]
+                        .into_iter()
+                        .enumerate()
+                {
+                    vector[at] = T::of(number(at * 6 + shift) - 0.5);
+                }
             }
         }
+        (system, vectors)
     }
-    for (sum, lanes) in sums.into_iter().zip(lanes) {
-        *sum = lanes;
+
+    /// The vectors after a sweep, in which each band is worked on by `band`.
+    fn swept<T: Number>(
+        frame: &Frame,
+        steps: Steps,
+        band: impl Fn(&Scaled<'_, T>, Steps, &[T], usize, &mut Own<'_, T>, &mut Rings<T>) -> [f64; SUMS],
+    ) -> (Vec<f64>, Vec<f64>) {
+        let (system, mut vectors) = disc::<T>(frame);
+        vectors.keep_edges(frame);
+        let Vectors { x, p, r, v, u, w, edges } = &mut vectors;
+        let chunk = BAND * frame.stride();
+        let mut sums = Vec::new();
+        for index in 0..bands(frame) {
+            let from = frame.start(0) + index * chunk;
+            let [x, p, r, v, u, w] = [&mut *x, p, r, v, u, w].map(|vector| {
+                let end = (from + chunk).min(vector.len());
+                &mut vector[from..end]
+            });
+            let mut own = Own { x, p, r, v, u, w };
+            sums.extend(band(&system, steps, edges, index, &mut own, &mut Rings::new(frame.width)));
+        }
+        let all = [&*x, p, r, v, u, w].into_iter().flat_map(|vector| vector.iter().map(|number| number.to_f64()));
+        (all.collect(), sums)
+    }
+
+    fn assert_near(a: &[f64], b: &[f64], rounding: f64) {
+        assert_eq!(a.len(), b.len());
+        for (a, b) in a.iter().zip(b) {
+            assert!((a - b).abs() <= rounding * (1.0 + b.abs()), "{a} for {b}");
+        }
+    }
+
+    #[test]
+    fn every_instruction_set_takes_the_same_steps() {
+        let frame = Frame::new(150, 90, |row, col| (row as f64 - 75.0).hypot(col as f64 - 45.0) < 44.5);
+        let steps = Steps { a0: 0.7, b0: 0.3, a1: 0.9, b1: 0.2 };
+        let (fast, plain) =
+            (swept::<f64>(&frame, steps, sweep_band), swept(&frame, steps, sweep_band_with::<f64, PortableDouble>));
+        assert_near(&fast.0, &plain.0, 1e-14);
+        assert_near(&fast.1, &plain.1, 1e-12);
+        let (single, portable) =
+            (swept::<f32>(&frame, steps, sweep_band), swept(&frame, steps, sweep_band_with::<f32, Portable>));
+        assert_near(&single.0, &portable.0, 1e-6);
+        assert_near(&single.0, &plain.0, 1e-6);
+        assert_near(&single.1, &plain.1, 1e-4);
     }
 }
