@@ -14,6 +14,11 @@ mod reflectance;
 mod rims;
 mod shadows;
 
+/// It keeps pages that are free for the next call: with the system's allocator a call on a quarter of a megapixel spent a
+/// fifth of its time on page faults.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 #[pyo3::pymodule]
 mod _bgars {
     #[pymodule_export]

@@ -1,18 +1,21 @@
 //! The pixel grid as a checkerboard: every edge joins a red and a black pixel.
 //!
-//! Pixel (row, col) is red where row + col is even. A row of `width` pixels is kept as `half = ceil(width / 2)` reds and as
-//! many blacks: red k of an even row is column 2k and black k column 2k + 1; in odd rows it is the other way round (a missing
-//! last pixel is one without edges). Then the neighbours of red k above and below are black k, and left and right are two
+//! Pixel (row, col) is red where row + col is even. A row of `width` pixels is kept as `half = ceil(width / 2)` reds (or a few more, see [`LANES`]) and as
+//! many blacks: red k of an even row is column 2k and black k column 2k + 1; in odd rows it is the other way round (missing
+//! pixels at the end are ones without edges). Then the neighbours of red k above and below are black k, and left and right are two
 //! blacks that follow each other, so every stencil runs over contiguous memory.
-
-use std::ops::{Add, Mul};
 
 use rayon::prelude::*;
 
-use crate::memory::zeros;
+use super::stencil::{Sides, Stencil};
+use crate::memory::Aligned;
+use crate::vector::Packed;
 
 /// Rows of pixels that one task works on; even, so that tasks own whole rows of the next coarser grid.
 pub(super) const BAND_ROWS: usize = 32;
+
+/// Pixels of one colour that a row is whole multiples of, unless it has fewer: whole vectors of any processor.
+pub(super) const LANES: usize = 16;
 
 /// Size of a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,8 +26,21 @@ pub(super) struct Grid {
 
 impl Grid {
     /// Pixels of one colour in a row.
+    #[inline]
     pub fn half(self) -> usize {
-        self.width.div_ceil(2)
+        let half = self.width.div_ceil(2);
+        if half < LANES { half } else { half.next_multiple_of(LANES) }
+    }
+
+    /// Zeros between rows of weights.
+    #[inline]
+    fn pad(self) -> usize {
+        if self.half() < LANES { 1 } else { LANES }
+    }
+
+    /// True where rows are whole vectors.
+    pub fn has_lanes(self) -> bool {
+        self.half() >= LANES
     }
 
     /// Pixels of one colour.
@@ -43,44 +59,6 @@ impl Grid {
     }
 }
 
-/// A floating-point number of a kernel: `f32` in the preconditioner, `f64` in the operator.
-pub(super) trait Real:
-    Copy + Default + PartialOrd + Send + Sync + From<f32> + Add<Output = Self> + Mul<Output = Self>
-{
-    /// `1 / self`, or 0 for a pixel without edges.
-    fn inverse(self) -> Self;
-
-    /// Rounded to `f32`.
-    fn to_f32(self) -> f32;
-
-    /// Exactly as `f64`.
-    fn to_f64(self) -> f64;
-}
-
-macro_rules! real {
-    ($type:ty) => {
-        impl Real for $type {
-            #[inline(always)]
-            fn inverse(self) -> Self {
-                if self > 0.0 { 1.0 / self } else { 0.0 }
-            }
-
-            #[inline(always)]
-            #[allow(clippy::unnecessary_cast)]
-            fn to_f32(self) -> f32 {
-                self as f32
-            }
-
-            #[inline(always)]
-            fn to_f64(self) -> f64 {
-                f64::from(self)
-            }
-        }
-    };
-}
-real!(f32);
-real!(f64);
-
 /// The weights of all edges, kept at their red pixels: 8 bytes a pixel.
 ///
 /// A negative weight belongs to a *virtual* edge (see `fill`): it carries values between grids, but it is no part of
@@ -88,55 +66,70 @@ real!(f64);
 #[derive(Debug)]
 pub(super) struct Weights {
     pub grid: Grid,
-    /// To the left, right, upper and lower neighbour. A zero pads each row, a row of zeros each end.
-    sides: [Vec<f32>; 4],
+    /// To the left, right, upper and lower neighbour. Zeros pad each row, a row of zeros each end.
+    sides: [Aligned<f32>; 4],
 }
 
 /// A row of one side's weights with a zero on either end: red k is at `k + 1`.
 pub(super) type PaddedRow<'a, T> = &'a [T];
 
-const LEFT: usize = 0;
-const RIGHT: usize = 1;
-const UP: usize = 2;
-const DOWN: usize = 3;
+pub(super) const LEFT: usize = 0;
+pub(super) const RIGHT: usize = 1;
+pub(super) const UP: usize = 2;
+pub(super) const DOWN: usize = 3;
 
 impl Weights {
     /// No edges.
     pub fn zeros(grid: Grid) -> Self {
-        let length = 1 + (grid.height + 2) * (grid.half() + 1);
-        Self { grid, sides: std::array::from_fn(|_| zeros(length)) }
+        let length = grid.pad() + (grid.height + 2) * (grid.half() + grid.pad());
+        Self { grid, sides: std::array::from_fn(|_| Aligned::zeros(length)) }
     }
 
+    /// Weights from one red to the one below.
+    #[inline]
+    pub fn stride(&self) -> usize {
+        self.grid.half() + self.grid.pad()
+    }
+
+    /// Where the weights of a row start.
+    #[inline]
+    fn start(&self, row: isize) -> usize {
+        self.grid.pad() + (row + 1) as usize * self.stride()
+    }
+
+    #[inline(always)]
     fn side(&self, side: usize, row: isize) -> PaddedRow<'_, f32> {
-        let half = self.grid.half();
-        let start = (row + 1) as usize * (half + 1);
-        &self.sides[side][start..start + half + 2]
+        &self.sides[side][self.start(row) - 1..][..self.grid.half() + 2]
     }
 
     /// Weights from the reds of `row` (-1 to `height`) to their left neighbours.
+    #[inline]
     pub fn left(&self, row: isize) -> PaddedRow<'_, f32> {
         self.side(LEFT, row)
     }
 
     /// The same to the right.
+    #[inline]
     pub fn right(&self, row: isize) -> PaddedRow<'_, f32> {
         self.side(RIGHT, row)
     }
 
     /// The same upward.
+    #[inline]
     pub fn up(&self, row: isize) -> PaddedRow<'_, f32> {
         self.side(UP, row)
     }
 
     /// The same downward.
+    #[inline]
     pub fn down(&self, row: isize) -> PaddedRow<'_, f32> {
         self.side(DOWN, row)
     }
 
-    /// The weights of each band of rows, to write: rows of `half` weights and a zero each, left, right, up, down.
+    /// The weights of each band of rows, to write, left, right, up, down: rows of `half` weights, `stride` apart.
     pub fn bands_mut(&mut self) -> impl IndexedParallelIterator<Item = [&mut [f32]; 4]> {
-        let stride = self.grid.half() + 1;
-        let inner = 1 + stride..1 + stride * (self.grid.height + 1);
+        let stride = self.stride();
+        let inner = self.start(0)..self.start(self.grid.height as isize);
         let chunk = BAND_ROWS * stride;
         let [left, right, up, down] = self.sides.each_mut().map(|side| side[inner.clone()].par_chunks_mut(chunk));
         (left, right, up, down).into_par_iter().map(|(left, right, up, down)| [left, right, up, down])
@@ -144,58 +137,43 @@ impl Weights {
 
     /// Sets the weights of red `k` of `row`: left, right, up, down.
     pub fn set_red(&mut self, row: usize, k: usize, weights: [f32; 4]) {
-        let index = 1 + (row + 1) * (self.grid.half() + 1) + k;
+        let index = self.start(row as isize) + k;
         for (side, weight) in self.sides.iter_mut().zip(weights) {
             side[index] = weight;
         }
     }
 
-    /// The weights of the edges of the reds of `row`: left, right, up, down.
+    /// The weights of the edges of the reds of `row`.
     #[inline(always)]
-    fn red_sides(&self, row: isize) -> [&[f32]; 4] {
-        let n = self.grid.half();
-        [LEFT, RIGHT, UP, DOWN].map(|side| &self.side(side, row)[1..=n])
+    pub fn reds<V: Packed>(&self, row: isize) -> Sides<'_, V> {
+        let n = self.grid.half() / V::WIDTH;
+        Sides([LEFT, RIGHT, UP, DOWN].map(|side| V::floats(&self.side(side, row)[1..], n)))
     }
 
-    /// The weights of the edges of the blacks of `row`, kept at their four reds: left, right, up, down.
+    /// The weights of the edges of the blacks of `row`, kept at their four reds.
     #[inline(always)]
-    fn black_sides(&self, row: isize) -> [&[f32]; 4] {
-        let n = self.grid.half();
+    pub fn blacks<V: Packed>(&self, row: isize) -> Sides<'_, V> {
+        let n = self.grid.half() / V::WIDTH;
         let odd = is_odd(row);
         // Left and right red of black k: k and k + 1 in even rows, k - 1 and k in odd ones.
-        [
-            &self.right(row)[1 - odd..][..n],
-            &self.left(row)[2 - odd..][..n],
-            &self.down(row - 1)[1..=n],
-            &self.up(row + 1)[1..=n],
-        ]
+        Sides([
+            V::floats(&self.right(row)[1 - odd..], n),
+            V::floats(&self.left(row)[2 - odd..], n),
+            V::floats(&self.down(row - 1)[1..], n),
+            V::floats(&self.up(row + 1)[1..], n),
+        ])
     }
 
-    /// Calls `visit(k, sum of weights, sum of weights times neighbours)` for the reds of `row`; `blacks` are the padded rows
-    /// above, at and below it.
+    /// The reds of `row` among the blacks: of the rows above, at and below.
     #[inline(always)]
-    pub fn each_red<T: Real>(&self, row: isize, blacks: [PaddedRow<'_, T>; 3], visit: impl FnMut(usize, T, T)) {
-        let odd = is_odd(row);
-        each(self.grid.half(), self.red_sides(row), blacks, odd, visit);
+    pub fn red_stencil<'a, V: Packed>(&'a self, row: isize, blacks: [PaddedRow<'a, V::Number>; 3]) -> Stencil<'a, V> {
+        Stencil::new(self.reds(row), blacks, is_odd(row))
     }
 
-    /// The same for the blacks of `row`.
+    /// The blacks of `row` among the reds.
     #[inline(always)]
-    pub fn each_black<T: Real>(&self, row: isize, reds: [PaddedRow<'_, T>; 3], visit: impl FnMut(usize, T, T)) {
-        let odd = is_odd(row);
-        each(self.grid.half(), self.black_sides(row), reds, 1 - odd, visit);
-    }
-
-    /// `out_k = b_k / diagonal_k` for the reds of `row`; 0 where there are no edges.
-    #[inline(always)]
-    pub fn scale_reds<T: Real>(&self, row: isize, b: impl Fn(usize) -> T, out: &mut [T]) {
-        scale(self.grid.half(), self.red_sides(row), b, out);
-    }
-
-    /// The same for the blacks of `row`.
-    #[inline(always)]
-    pub fn scale_blacks<T: Real>(&self, row: isize, b: impl Fn(usize) -> T, out: &mut [T]) {
-        scale(self.grid.half(), self.black_sides(row), b, out);
+    pub fn black_stencil<'a, V: Packed>(&'a self, row: isize, reds: [PaddedRow<'a, V::Number>; 3]) -> Stencil<'a, V> {
+        Stencil::new(self.blacks(row), reds, 1 - is_odd(row))
     }
 }
 
@@ -203,71 +181,6 @@ impl Weights {
 #[inline(always)]
 fn is_odd(row: isize) -> usize {
     row.rem_euclid(2) as usize
-}
-
-/// `shift` is 0 where the left neighbour of pixel k is pixel k - 1 of the other colour, 1 where it is pixel k.
-#[inline(always)]
-fn each<T: Real>(
-    n: usize,
-    [left, right, up, down]: [&[f32]; 4],
-    [above, here, below]: [PaddedRow<'_, T>; 3],
-    shift: usize,
-    mut visit: impl FnMut(usize, T, T),
-) {
-    let (above, below) = (&above[1..=n], &below[1..=n]);
-    let (here_left, here_right) = (&here[shift..][..n], &here[1 + shift..][..n]);
-    let (left, right, up, down) = (&left[..n], &right[..n], &up[..n], &down[..n]);
-    for k in 0..n {
-        let [left, right, up, down] = [left[k], right[k], up[k], down[k]].map(real::<T>);
-        let sum = (left * here_left[k] + right * here_right[k]) + (up * above[k] + down * below[k]);
-        visit(k, (left + right) + (up + down), sum);
-    }
-}
-
-#[inline(always)]
-fn scale<T: Real>(n: usize, [left, right, up, down]: [&[f32]; 4], b: impl Fn(usize) -> T, out: &mut [T]) {
-    let (left, right, up, down) = (&left[..n], &right[..n], &up[..n], &down[..n]);
-    let out = &mut out[..n];
-    for k in 0..n {
-        let [left, right, up, down] = [left[k], right[k], up[k], down[k]].map(real::<T>);
-        out[k] = b(k) * ((left + right) + (up + down)).inverse();
-    }
-}
-
-/// The weight of an edge of the system; 0 for a virtual edge.
-#[inline(always)]
-fn real<T: Real>(weight: f32) -> T {
-    T::from(weight.max(0.0))
-}
-
-/// The last four padded rows of a quantity that is computed row after row.
-pub(super) struct Ring<T> {
-    rows: [Vec<T>; 4],
-}
-
-impl<T: Real> Ring<T> {
-    pub fn new(half: usize) -> Self {
-        Self { rows: std::array::from_fn(|_| vec![T::default(); half + 2]) }
-    }
-
-    #[inline(always)]
-    pub fn row(&self, row: isize) -> PaddedRow<'_, T> {
-        &self.rows[row.rem_euclid(4) as usize]
-    }
-
-    /// The rows above, at and below `row`.
-    #[inline(always)]
-    pub fn around(&self, row: isize) -> [PaddedRow<'_, T>; 3] {
-        [self.row(row - 1), self.row(row), self.row(row + 1)]
-    }
-
-    /// The `half` values of a row, to write.
-    #[inline(always)]
-    pub fn row_mut(&mut self, row: isize) -> &mut [T] {
-        let row = &mut self.rows[row.rem_euclid(4) as usize];
-        let end = row.len() - 1;
-        &mut row[1..end]
-    }
 }
 
 /// Splits a row of pixels into its reds and blacks.

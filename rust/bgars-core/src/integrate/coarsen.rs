@@ -57,19 +57,19 @@ pub(super) fn coarsen(weights: &Weights) -> Weights {
         },
     );
     let mut out = Weights::zeros(coarse);
-    let half = coarse.half();
+    let (half, stride) = (coarse.half(), out.stride());
     out.bands_mut().enumerate().for_each(|(band, mut sides)| {
         let mut unused = vec![0.0; half];
         let mut leftward = vec![0.0; coarse.width];
         let none = vec![0.0; coarse.width];
-        for offset in 0..sides[0].len() / (half + 1) {
+        for offset in 0..sides[0].len() / stride {
             let row = band * BAND_ROWS + offset;
             let here = &rightward[row * coarse.width..][..coarse.width];
             leftward[1..].copy_from_slice(&here[..coarse.width - 1]);
             let upward = if row > 0 { &downward[(row - 1) * coarse.width..][..coarse.width] } else { &none };
             let below = &downward[row * coarse.width..][..coarse.width];
             for (side, pixels) in sides.iter_mut().zip([&leftward, here, upward, below]) {
-                split_row(row, pixels, &mut side[offset * (half + 1)..][..half], &mut unused);
+                split_row(row, pixels, &mut side[offset * stride..][..half], &mut unused);
             }
         }
     });

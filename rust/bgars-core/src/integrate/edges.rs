@@ -47,6 +47,7 @@ where
 {
     let (width, half) = (grid.width, grid.half());
     let mut weights = Weights::zeros(grid);
+    let stride = weights.stride();
     let mut right = Colours { reds: zeros(grid.half_pixels()), blacks: zeros(grid.half_pixels()) };
     let bands = weights
         .bands_mut()
@@ -75,7 +76,7 @@ where
             left[1..].copy_from_slice(&along.weight[..width - 1]);
             let sources = [&left, &along.weight, &above.weight, &below.weight];
             for (side, source) in sides.iter_mut().zip(sources) {
-                split_row(row, source, &mut side[offset * (half + 1)..][..half], &mut unused);
+                split_row(row, source, &mut side[offset * stride..][..half], &mut unused);
             }
             for k in 0..width {
                 divergence[k] = (above.push[k] - below.push[k]) - along.push[k];

@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use super::checkerboard::Weights;
+use super::checkerboard::{PaddedRow, Weights};
 use super::coarsen::series;
 
 /// Ties every corner without edges to the neighbours around it.
@@ -17,8 +17,8 @@ pub(super) fn fill_corners(weights: &mut Weights) {
         .into_par_iter()
         .flat_map_iter(|coarse_row| {
             let row = 2 * coarse_row;
-            let weights = &*weights;
-            (0..n).filter_map(move |k| virtual_ties(weights, row as isize, k).map(|ties| (row, k, ties)))
+            let around = Around::new(weights, row as isize);
+            (0..n).filter_map(move |k| around.virtual_ties(k).map(|ties| (row, k, ties)))
         })
         .collect();
     for (row, k, ties) in found {
@@ -26,44 +26,54 @@ pub(super) fn fill_corners(weights: &mut Weights) {
     }
 }
 
-/// Weights to the left, right, upper and lower neighbour of corner `k`; `None` if it has edges, or nothing to be tied to.
-fn virtual_ties(weights: &Weights, row: isize, k: usize) -> Option<[f32; 4]> {
-    let red = k + 1;
-    let edges = weights.left(row)[red] + weights.right(row)[red] + weights.up(row)[red] + weights.down(row)[red];
-    if edges != 0.0 {
-        return None;
+/// The weights in and beside a row of corners: left, right, up, down.
+struct Around<'a> {
+    above: [PaddedRow<'a, f32>; 4],
+    here: [PaddedRow<'a, f32>; 4],
+    below: [PaddedRow<'a, f32>; 4],
+}
+
+impl<'a> Around<'a> {
+    fn new(weights: &'a Weights, row: isize) -> Self {
+        let sides = |row| [weights.left(row), weights.right(row), weights.up(row), weights.down(row)];
+        Self { above: sides(row - 1), here: sides(row), below: sides(row + 1) }
     }
-    let (above, below) = (row - 1, row + 1);
-    // The four ways around, each through one centre: left-up, up-right, right-down, down-left.
-    let left_up = series(weights.down(above)[k], weights.right(above)[k]);
-    let up_right = series(weights.left(above)[red], weights.down(above)[red]);
-    let (right_down, down_left) = if weights.grid.contains(below) {
-        (
-            series(weights.up(below)[red], weights.left(below)[red]),
-            series(weights.right(below)[k], weights.up(below)[k]),
-        )
-    } else {
-        (0.0, 0.0)
-    };
-    let arcs = [left_up, up_right, right_down, down_left];
-    let open: Vec<usize> = (0..4).filter(|&arc| arcs[arc] > 0.0).collect();
-    // Neighbours in the order of the arcs: left, up, right, down; arc a joins neighbours a and a + 1.
-    let mut group = [0.0; 4];
-    match open.as_slice() {
-        [] => return None,
-        // Opposite arcs alone: two groups, the better one.
-        &[a, b] if b - a == 2 => {
-            let arc = if arcs[a] >= arcs[b] { a } else { b };
-            group[arc] += arcs[arc];
-            group[(arc + 1) % 4] += arcs[arc];
+
+    /// Weights to the left, right, upper and lower neighbour of corner `k`; `None` if it has edges, or nothing to be tied to.
+    fn virtual_ties(&self, k: usize) -> Option<[f32; 4]> {
+        let red = k + 1;
+        if self.here.iter().any(|side| side[red] != 0.0) {
+            return None;
         }
-        _ => {
-            for arc in open {
+        let ([left_above, right_above, _, down_above], [left_below, right_below, up_below, _]) =
+            (self.above, self.below);
+        // The four ways around, each through one centre.
+        let left_up = series(down_above[k], right_above[k]);
+        let up_right = series(left_above[red], down_above[red]);
+        let right_down = series(up_below[red], left_below[red]);
+        let down_left = series(right_below[k], up_below[k]);
+        let arcs = [left_up, up_right, right_down, down_left];
+        if arcs.iter().all(|&arc| arc <= 0.0) {
+            return None;
+        }
+        let open: Vec<usize> = (0..4).filter(|&arc| arcs[arc] > 0.0).collect();
+        // Neighbours in the order of the arcs: left, up, right, down; arc a joins neighbours a and a + 1.
+        let mut group = [0.0; 4];
+        match open.as_slice() {
+            // Opposite arcs alone: two groups, the better one.
+            &[a, b] if b - a == 2 => {
+                let arc = if arcs[a] >= arcs[b] { a } else { b };
                 group[arc] += arcs[arc];
                 group[(arc + 1) % 4] += arcs[arc];
             }
+            _ => {
+                for arc in open {
+                    group[arc] += arcs[arc];
+                    group[(arc + 1) % 4] += arcs[arc];
+                }
+            }
         }
+        let [left, up, right, down] = group;
+        Some([left, right, up, down])
     }
-    let [left, up, right, down] = group;
-    Some([left, right, up, down])
 }

@@ -37,7 +37,10 @@ impl Lost {
         let rows = (0..coarser.grid.height).into_par_iter();
         let found = rows.flat_map_iter(|coarse_row| {
             let row = 2 * coarse_row as isize;
-            let alone = (0..half).filter(move |&k| is_alone(coarser, coarse_row, k));
+            let sides = [weights.left(row), weights.right(row), weights.up(row), weights.down(row)];
+            // A corner without edges is tied to nothing.
+            let tied = (0..half).filter(move |k| sides.iter().any(|side| side[k + 1] != 0.0));
+            let alone = tied.filter(move |&k| is_alone(coarser, coarse_row, k));
             alone.flat_map(move |k| {
                 let own = (diagonal(blacks_around(weights, (row, k))) > 0.0).then_some((row, k));
                 own.into_iter().chain(tied_centres(weights, row, k))

@@ -7,11 +7,12 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
-use super::checkerboard::{Grid, Real, Weights, join_row};
+use super::checkerboard::{Grid, Weights, join_row};
 use super::coarsen::coarsen;
 use super::fill::fill_corners;
 use super::graph::{GraphCycle, GraphVectors};
 use super::lost::Lost;
+use super::real::Real;
 use super::reduction::{eliminate_blacks, fill_blacks};
 use super::strays::Strays;
 use super::transfer::{prolong, restrict};
@@ -47,6 +48,7 @@ struct Vectors {
 #[derive(Debug)]
 struct LevelVectors {
     width: usize,
+    half: usize,
     reds: Vec<f32>,
     blacks: Vec<f32>,
     red_solution: Vec<f32>,
@@ -58,12 +60,19 @@ impl LevelVectors {
     fn new(weights: &Weights) -> Self {
         let grid = weights.grid;
         let [reds, blacks, red_solution] = std::array::from_fn(|_| zeros(grid.half_pixels()));
-        Self { width: grid.width, reds, blacks, red_solution, solution: zeros(grid.height * grid.width) }
+        Self {
+            width: grid.width,
+            half: grid.half(),
+            reds,
+            blacks,
+            red_solution,
+            solution: zeros(grid.height * grid.width),
+        }
     }
 
     /// The solution from the reds and the blacks (which lie where their right side was).
     fn join(&mut self) {
-        let half = self.width.div_ceil(2);
+        let half = self.half;
         self.solution
             .par_chunks_mut(self.width)
             .zip(self.red_solution.par_chunks(half))

@@ -1,15 +1,20 @@
 //! The blacks eliminated: `S = D_red - W D_black^-1 W^T` acts on the reds alone, and half the pixels are gone exactly.
 
-use multiversion::multiversion;
+use multiversion::{multiversion, target::target_cfg_f};
 use rayon::prelude::*;
 
-use super::checkerboard::{BAND_ROWS, Real, Ring, Weights};
+use super::checkerboard::{BAND_ROWS, Weights};
+use super::real::{Real, on_vectors};
+use super::ring::Ring;
+use crate::vector::Packed;
 
 /// `out = S x`; returns `<x, S x>`, summed in an order that does not depend on the threads.
-pub(super) fn multiply(weights: &Weights, x: &[f64], out: &mut [f64]) -> f64 {
+pub(super) fn multiply<T: Real>(weights: &Weights, x: &[T], out: &mut [f64]) -> f64 {
     let chunk = BAND_ROWS * weights.grid.half();
     let bands = out.par_chunks_mut(chunk).enumerate();
-    let products: Vec<f64> = bands.map(|(band, out)| multiply_band(weights, x, band, out)).collect();
+    let rows = || [Ring::new(weights.grid.half()), Ring::new(weights.grid.half())];
+    let products: Vec<f64> =
+        bands.map_init(rows, |rows, (band, out)| multiply_band(weights, x, band, rows, out)).collect();
     products.iter().sum()
 }
 
@@ -27,47 +32,72 @@ pub(super) fn fill_blacks<T: Real>(weights: &Weights, reds: &[T], blacks: &mut [
 
 /// `D_black^-1 W^T reds` of a row; zeros outside the grid.
 #[inline(always)]
-pub(super) fn solve_blacks<T: Real>(weights: &Weights, row: isize, reds: &Ring<T>, blacks: &mut Ring<T>) {
+pub(super) fn solve_blacks<V: Packed<Number: Real>>(
+    weights: &Weights,
+    row: isize,
+    reds: &Ring<V::Number>,
+    blacks: &mut Ring<V::Number>,
+) {
     let out = blacks.row_mut(row);
-    if weights.grid.contains(row) {
-        weights.each_black(row, reds.around(row), |k, diagonal, sum| out[k] = sum * diagonal.inverse());
-    } else {
-        out.fill(T::default());
+    if !weights.grid.contains(row) {
+        out.fill(V::Number::default());
+        return;
+    }
+    let stencil = weights.black_stencil::<V>(row, reds.around(row));
+    let out = V::chunks_mut(out, stencil.len());
+    for k in 0..stencil.len() {
+        (stencil.sum(k) * stencil.diagonal(k).inverse()).put(&mut out[k]);
     }
 }
 
-/// Copies a row of `values` into a padded row; zeros outside the grid.
+/// Copies a row of `values` into a padded row, converted; zeros outside the grid.
 #[inline(always)]
-fn load<T: Real>(weights: &Weights, values: &[T], row: isize, out: &mut [T]) {
+fn load<T: Real, U: Real>(weights: &Weights, values: &[T], row: isize, out: &mut [U], convert: impl Fn(T) -> U) {
     let n = weights.grid.half();
     if weights.grid.contains(row) {
-        out.copy_from_slice(&values[row as usize * n..][..n]);
+        for (out, value) in out.iter_mut().zip(&values[row as usize * n..][..n]) {
+            *out = convert(*value);
+        }
     } else {
-        out.fill(T::default());
+        out.fill(U::default());
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn multiply_band(weights: &Weights, x: &[f64], band: usize, out: &mut [f64]) -> f64 {
+fn multiply_band<T: Real>(weights: &Weights, x: &[T], band: usize, rows: &mut [Ring<f64>; 2], out: &mut [f64]) -> f64 {
+    on_vectors!(weights.grid, f64, multiply_band_with::<T>(weights, x, band, rows, out))
+}
+
+#[inline(always)]
+fn multiply_band_with<T: Real, V: Packed<Number = f64>>(
+    weights: &Weights,
+    x: &[T],
+    band: usize,
+    [reds, blacks]: &mut [Ring<f64>; 2],
+    out: &mut [f64],
+) -> f64 {
     let n = weights.grid.half();
     let first = (band * BAND_ROWS) as isize;
     let end = first + (out.len() / n) as isize;
-    let [mut reds, mut blacks] = std::array::from_fn(|_| Ring::<f64>::new(n));
     let mut product = 0.0;
     for row in first - 2..=end + 1 {
-        load(weights, x, row, reds.row_mut(row));
+        load(weights, x, row, reds.row_mut(row), T::to_f64);
         let row = row - 1;
         if row < first - 1 {
             continue;
         }
-        solve_blacks(weights, row, &reds, &mut blacks);
+        solve_blacks::<V>(weights, row, reds, blacks);
         let row = row - 1;
         if row < first {
             continue;
         }
         let here = &reds.row(row)[1..=n];
         let out = &mut out[(row - first) as usize * n..][..n];
-        weights.each_red(row, blacks.around(row), |k, diagonal, sum| out[k] = diagonal * here[k] - sum);
+        let stencil = weights.red_stencil::<V>(row, blacks.around(row));
+        let (x, products) = (V::chunks(here, stencil.len()), V::chunks_mut(out, stencil.len()));
+        for k in 0..stencil.len() {
+            (stencil.diagonal(k) * V::read(&x[k]) - stencil.sum(k)).put(&mut products[k]);
+        }
         product += dot(here, out);
     }
     product
@@ -102,41 +132,70 @@ pub(super) fn dot<A: Real, B: Real>(a: &[A], b: &[B]) -> f64 {
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 fn eliminate_band<T: Real>(weights: &Weights, blacks: &[T], band: usize, reds: &mut [T]) {
+    on_vectors!(weights.grid, T, eliminate_band_with(weights, blacks, band, reds));
+}
+
+#[inline(always)]
+fn eliminate_band_with<V: Packed<Number: Real>>(
+    weights: &Weights,
+    blacks: &[V::Number],
+    band: usize,
+    reds: &mut [V::Number],
+) {
     let n = weights.grid.half();
     let first = (band * BAND_ROWS) as isize;
     let end = first + (reds.len() / n) as isize;
-    let mut scaled = Ring::<T>::new(n);
+    let mut scaled = Ring::<V::Number>::new(n);
     for row in first - 1..=end {
+        let out = scaled.row_mut(row);
         if weights.grid.contains(row) {
-            let blacks = &blacks[row as usize * n..][..n];
-            weights.scale_blacks(row, |k| blacks[k], scaled.row_mut(row));
+            let sides = weights.blacks::<V>(row);
+            let out = V::chunks_mut(out, sides.len());
+            let blacks = V::chunks(&blacks[row as usize * n..], sides.len());
+            for k in 0..sides.len() {
+                (V::read(&blacks[k]) * sides.diagonal(k).inverse()).put(&mut out[k]);
+            }
         } else {
-            scaled.row_mut(row).fill(T::default());
+            out.fill(V::Number::default());
         }
         let row = row - 1;
         if row < first {
             continue;
         }
-        let reds = &mut reds[(row - first) as usize * n..][..n];
-        weights.each_red(row, scaled.around(row), |k, _, sum| reds[k] = reds[k] + sum);
+        let stencil = weights.red_stencil::<V>(row, scaled.around(row));
+        let reds = V::chunks_mut(&mut reds[(row - first) as usize * n..], stencil.len());
+        for k in 0..stencil.len() {
+            (V::read(&reds[k]) + stencil.sum(k)).put(&mut reds[k]);
+        }
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 fn fill_band<T: Real>(weights: &Weights, reds: &[T], band: usize, blacks: &mut [T]) {
+    on_vectors!(weights.grid, T, fill_band_with(weights, reds, band, blacks));
+}
+
+#[inline(always)]
+fn fill_band_with<V: Packed<Number: Real>>(
+    weights: &Weights,
+    reds: &[V::Number],
+    band: usize,
+    blacks: &mut [V::Number],
+) {
     let n = weights.grid.half();
     let first = (band * BAND_ROWS) as isize;
     let end = first + (blacks.len() / n) as isize;
-    let mut here = Ring::<T>::new(n);
+    let mut here = Ring::<V::Number>::new(n);
     for row in first - 1..=end {
-        load(weights, reds, row, here.row_mut(row));
+        load(weights, reds, row, here.row_mut(row), |value| value);
         let row = row - 1;
         if row < first {
             continue;
         }
-        let blacks = &mut blacks[(row - first) as usize * n..][..n];
-        weights.each_black(row, here.around(row), |k, diagonal, sum| {
-            blacks[k] = (blacks[k] + sum) * diagonal.inverse();
-        });
+        let stencil = weights.black_stencil::<V>(row, here.around(row));
+        let blacks = V::chunks_mut(&mut blacks[(row - first) as usize * n..], stencil.len());
+        for k in 0..stencil.len() {
+            ((V::read(&blacks[k]) + stencil.sum(k)) * stencil.diagonal(k).inverse()).put(&mut blacks[k]);
+        }
     }
 }

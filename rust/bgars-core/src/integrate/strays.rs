@@ -5,10 +5,11 @@
 //! neighbours are there. Between the grids a stray follows its *base*, the mean of the neighbours that are none, so that the
 //! functions of the coarser grid have no hole in its place; the graph's correction comes on top.
 
-use super::checkerboard::{Real, Weights};
+use super::checkerboard::Weights;
 use super::graph::Rows;
 use super::lost::{Lost, Rim};
 use super::places::{Place, blacks_around, diagonal, reds_around, ties};
+use super::real::Real;
 
 /// The strays of one grid.
 #[derive(Debug)]
@@ -22,6 +23,7 @@ pub(super) struct Strays {
     /// That less what the transfer between the grids gives the stray.
     adopted: Rows,
     coarse_width: usize,
+    coarse_half: usize,
 }
 
 /// How far from other reds strays still have a base, in steps.
@@ -67,6 +69,7 @@ impl Strays {
             base: Rows::from_lists(&base, coarse_pixels),
             adopted: Rows::from_lists(&adopted, coarse_pixels),
             coarse_width: coarser.grid.width,
+            coarse_half: coarser.grid.half(),
         }
     }
 
@@ -91,7 +94,7 @@ impl Strays {
 
     /// What is left of `b` at the strays after smoothing, to `own` and to the coarse right side.
     pub fn restrict<T: Real>(&self, b: &[T], own: &mut [f32], coarse_reds: &mut [f32], coarse_blacks: &mut [f32]) {
-        let half = self.coarse_width.div_ceil(2);
+        let half = self.coarse_half;
         for (stray, own) in own.iter_mut().enumerate() {
             *own = self.smoothing.pairs(stray).map(|(red, factor)| factor * b[red].to_f32()).sum();
             for (pixel, share) in self.adopted.pairs(stray) {

@@ -51,7 +51,7 @@ impl System {
         Ok(Self { weights, right_side: right.reds })
     }
 
-    /// `b`, one value a red pixel (row + column even; rows are padded to equal length).
+    /// `b`, one value a red pixel (row + column even); every row of the image has equally many, the last of them zeros.
     #[must_use]
     pub fn right_side(&self) -> &[f64] {
         &self.right_side

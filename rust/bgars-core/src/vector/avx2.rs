@@ -1,13 +1,14 @@
 //! Eight floats of AVX2 with fused products.
 
 use std::arch::x86_64::{
-    __m256, __m256i, _CMP_GT_OQ, _mm_cvtsi64_si128, _mm256_add_ps, _mm256_and_ps, _mm256_and_si256, _mm256_blend_ps,
-    _mm256_blendv_ps, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi32, _mm256_cvtepi32_ps, _mm256_cvtepu8_epi32,
-    _mm256_cvtepu16_epi32, _mm256_div_ps, _mm256_fmadd_ps, _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_ps,
-    _mm256_permutevar8x32_ps, _mm256_set1_epi32, _mm256_set1_ps, _mm256_sqrt_ps, _mm256_srli_epi32, _mm256_stream_ps,
-    _mm256_sub_ps,
+    __m256, __m256i, _CMP_GT_OQ, _mm_cvtsi64_si128, _mm256_add_ps, _mm256_and_ps, _mm256_and_si256, _mm256_andnot_ps,
+    _mm256_blend_ps, _mm256_blendv_ps, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi32, _mm256_cvtepi32_ps,
+    _mm256_cvtepu8_epi32, _mm256_cvtepu16_epi32, _mm256_div_ps, _mm256_fmadd_ps, _mm256_max_ps, _mm256_movemask_ps,
+    _mm256_mul_ps, _mm256_permutevar8x32_ps, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setzero_ps, _mm256_sqrt_ps,
+    _mm256_srli_epi32, _mm256_stream_ps, _mm256_sub_ps,
 };
 
+use super::packed::chunked;
 use super::subset_sums::SubsetSums;
 use super::{Packed, Vector, first, interleaved};
 
@@ -38,8 +39,7 @@ fn widened(bytes: &[u8]) -> __m256i {
 }
 
 impl Packed for Avx2 {
-    type Number = f32;
-    const WIDTH: usize = WIDTH;
+    chunked!(f32, WIDTH, |from| Self::load(from));
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
@@ -59,6 +59,27 @@ impl Packed for Avx2 {
     #[inline(always)]
     fn times_plus(self, factor: Self, term: Self) -> Self {
         Self(here!(_mm256_fmadd_ps(self.0, factor.0, term.0)))
+    }
+
+    #[inline(always)]
+    fn magnitude(self) -> Self {
+        Self(here!(_mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0)))
+    }
+
+    #[inline(always)]
+    fn positive_part(self) -> Self {
+        Self(here!(_mm256_max_ps(self.0, _mm256_setzero_ps())))
+    }
+
+    #[inline(always)]
+    fn where_positive(self, other: Self) -> Self {
+        Self(here!(_mm256_and_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(other.0, _mm256_setzero_ps()), self.0)))
+    }
+
+    #[inline(always)]
+    fn inverse(self) -> Self {
+        let above = here!(_mm256_cmp_ps::<_CMP_GT_OQ>(self.0, _mm256_setzero_ps()));
+        Self(here!(_mm256_and_ps(above, _mm256_div_ps(_mm256_set1_ps(1.0), self.0))))
     }
 }
 

@@ -1,12 +1,14 @@
 //! Sixteen floats of AVX-512.
 
 use std::arch::x86_64::{
-    __m512, __m512i, _CMP_GT_OQ, _mm512_add_ps, _mm512_cmp_ps_mask, _mm512_cvtepi32_ps, _mm512_cvtepu8_epi32,
-    _mm512_cvtepu16_epi32, _mm512_div_ps, _mm512_fmadd_ps, _mm512_mask_blend_ps, _mm512_mask_permutexvar_ps,
-    _mm512_maskz_mov_ps, _mm512_max_ps, _mm512_mul_ps, _mm512_permutexvar_ps, _mm512_set1_epi32, _mm512_set1_ps,
-    _mm512_sqrt_ps, _mm512_srli_epi32, _mm512_stream_ps, _mm512_sub_ps, _mm512_test_epi32_mask,
+    __m512, __m512i, _CMP_GT_OQ, _mm512_abs_ps, _mm512_add_ps, _mm512_cmp_ps_mask, _mm512_cvtepi32_ps,
+    _mm512_cvtepu8_epi32, _mm512_cvtepu16_epi32, _mm512_div_ps, _mm512_fmadd_ps, _mm512_mask_blend_ps,
+    _mm512_mask_permutexvar_ps, _mm512_maskz_div_ps, _mm512_maskz_mov_ps, _mm512_max_ps, _mm512_mul_ps,
+    _mm512_permutexvar_ps, _mm512_set1_epi32, _mm512_set1_ps, _mm512_setzero_ps, _mm512_sqrt_ps, _mm512_srli_epi32,
+    _mm512_stream_ps, _mm512_sub_ps, _mm512_test_epi32_mask,
 };
 
+use super::packed::chunked;
 use super::subset_sums::SubsetSums;
 use super::{Packed, Vector, first, interleaved};
 
@@ -37,8 +39,7 @@ fn widened(bytes: &[u8]) -> __m512i {
 }
 
 impl Packed for Avx512 {
-    type Number = f32;
-    const WIDTH: usize = WIDTH;
+    chunked!(f32, WIDTH, |from| Self::load(from));
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
@@ -58,6 +59,28 @@ impl Packed for Avx512 {
     #[inline(always)]
     fn times_plus(self, factor: Self, term: Self) -> Self {
         Self(here!(_mm512_fmadd_ps(self.0, factor.0, term.0)))
+    }
+
+    #[inline(always)]
+    fn magnitude(self) -> Self {
+        Self(here!(_mm512_abs_ps(self.0)))
+    }
+
+    #[inline(always)]
+    fn positive_part(self) -> Self {
+        Self(here!(_mm512_max_ps(self.0, _mm512_setzero_ps())))
+    }
+
+    #[inline(always)]
+    fn where_positive(self, other: Self) -> Self {
+        let above = here!(_mm512_cmp_ps_mask::<_CMP_GT_OQ>(other.0, _mm512_setzero_ps()));
+        Self(here!(_mm512_maskz_mov_ps(above, self.0)))
+    }
+
+    #[inline(always)]
+    fn inverse(self) -> Self {
+        let above = here!(_mm512_cmp_ps_mask::<_CMP_GT_OQ>(self.0, _mm512_setzero_ps()));
+        Self(here!(_mm512_maskz_div_ps(above, _mm512_set1_ps(1.0), self.0)))
     }
 }
 

@@ -2,13 +2,16 @@
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::{
-    __m256d, __m512d, _mm256_add_pd, _mm256_fmadd_pd, _mm256_mul_pd, _mm256_set1_pd, _mm256_sub_pd, _mm512_add_pd,
-    _mm512_fmadd_pd, _mm512_mul_pd, _mm512_set1_pd, _mm512_sub_pd,
+    __m256d, __m512d, _CMP_GT_OQ, _mm256_add_pd, _mm256_and_pd, _mm256_andnot_pd, _mm256_cmp_pd, _mm256_cvtps_pd,
+    _mm256_div_pd, _mm256_fmadd_pd, _mm256_max_pd, _mm256_mul_pd, _mm256_set1_pd, _mm256_setzero_pd, _mm256_sub_pd,
+    _mm512_abs_pd, _mm512_add_pd, _mm512_cmp_pd_mask, _mm512_cvtps_pd, _mm512_fmadd_pd, _mm512_maskz_div_pd,
+    _mm512_maskz_mov_pd, _mm512_max_pd, _mm512_mul_pd, _mm512_set1_pd, _mm512_setzero_pd, _mm512_sub_pd,
 };
 use std::ops::{Add, Mul, Sub};
 
 use wide::f64x4;
 
+use super::packed::chunked;
 use super::{Packed, first};
 
 #[cfg(target_arch = "x86_64")]
@@ -22,9 +25,14 @@ macro_rules! here {
     }};
 }
 
+/// A type by its intrinsics; what takes more than one is written for `x` and `y`.
 #[cfg(target_arch = "x86_64")]
 macro_rules! double {
-    ($(#[$doc:meta])* $vector:ident($raw:ty), $width:literal, $splat:ident, $add:ident, $sub:ident, $mul:ident, $fused:ident) => {
+    (
+        $(#[$doc:meta])* $vector:ident($raw:ty), $width:literal, $splat:ident, $add:ident, $sub:ident, $mul:ident,
+        $fused:ident, $max:ident, $zero:ident, $convert:ident,
+        |$x:ident, $y:ident| magnitude $magnitude:expr, where_positive $where_positive:expr, inverse $inverse:expr
+    ) => {
         $(#[$doc])*
         #[derive(Clone, Copy)]
         pub(crate) struct $vector($raw);
@@ -32,8 +40,7 @@ macro_rules! double {
         super::operators!($vector, $add, $sub, $mul);
 
         impl Packed for $vector {
-            type Number = f64;
-            const WIDTH: usize = $width;
+            chunked!(f64, $width, |from| Self(here!($convert(bytemuck::must_cast(*from)))));
 
             #[inline(always)]
             fn splat(value: f64) -> Self {
@@ -54,6 +61,29 @@ macro_rules! double {
             fn times_plus(self, factor: Self, term: Self) -> Self {
                 Self(here!($fused(self.0, factor.0, term.0)))
             }
+
+            #[inline(always)]
+            fn magnitude(self) -> Self {
+                let $x = self.0;
+                Self(here!($magnitude))
+            }
+
+            #[inline(always)]
+            fn positive_part(self) -> Self {
+                Self(here!($max(self.0, $zero())))
+            }
+
+            #[inline(always)]
+            fn where_positive(self, other: Self) -> Self {
+                let ($x, $y) = (self.0, other.0);
+                Self(here!($where_positive))
+            }
+
+            #[inline(always)]
+            fn inverse(self) -> Self {
+                let $x = self.0;
+                Self(here!($inverse))
+            }
         }
     };
 }
@@ -61,12 +91,20 @@ macro_rules! double {
 #[cfg(target_arch = "x86_64")]
 double!(
     /// Eight doubles of AVX-512.
-    Avx512Double(__m512d), 8, _mm512_set1_pd, _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_fmadd_pd
+    Avx512Double(__m512d), 8, _mm512_set1_pd, _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_fmadd_pd,
+    _mm512_max_pd, _mm512_setzero_pd, _mm512_cvtps_pd,
+    |x, y| magnitude _mm512_abs_pd(x),
+    where_positive _mm512_maskz_mov_pd(_mm512_cmp_pd_mask::<_CMP_GT_OQ>(y, _mm512_setzero_pd()), x),
+    inverse _mm512_maskz_div_pd(_mm512_cmp_pd_mask::<_CMP_GT_OQ>(x, _mm512_setzero_pd()), _mm512_set1_pd(1.0), x)
 );
 #[cfg(target_arch = "x86_64")]
 double!(
     /// Four doubles of AVX2 with fused products.
-    Avx2Double(__m256d), 4, _mm256_set1_pd, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_fmadd_pd
+    Avx2Double(__m256d), 4, _mm256_set1_pd, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_fmadd_pd,
+    _mm256_max_pd, _mm256_setzero_pd, _mm256_cvtps_pd,
+    |x, y| magnitude _mm256_andnot_pd(_mm256_set1_pd(-0.0), x),
+    where_positive _mm256_and_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(y, _mm256_setzero_pd()), x),
+    inverse _mm256_and_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(x, _mm256_setzero_pd()), _mm256_div_pd(_mm256_set1_pd(1.0), x))
 );
 
 /// Four doubles on whatever the processor has.
@@ -90,8 +128,12 @@ operator!(Sub sub);
 operator!(Mul mul);
 
 impl Packed for PortableDouble {
-    type Number = f64;
-    const WIDTH: usize = 4;
+    chunked!(f64, 4, |from| Self(f64x4::new([
+        f64::from(from[0]),
+        f64::from(from[1]),
+        f64::from(from[2]),
+        f64::from(from[3])
+    ])));
 
     #[inline(always)]
     fn splat(value: f64) -> Self {
@@ -111,5 +153,25 @@ impl Packed for PortableDouble {
     #[inline(always)]
     fn times_plus(self, factor: Self, term: Self) -> Self {
         self * factor + term
+    }
+
+    #[inline(always)]
+    fn magnitude(self) -> Self {
+        Self(self.0.abs())
+    }
+
+    #[inline(always)]
+    fn positive_part(self) -> Self {
+        Self(self.0.fast_max(f64x4::ZERO))
+    }
+
+    #[inline(always)]
+    fn where_positive(self, other: Self) -> Self {
+        Self(self.0 & other.0.simd_gt(f64x4::ZERO))
+    }
+
+    #[inline(always)]
+    fn inverse(self) -> Self {
+        Self((f64x4::ONE / self.0) & self.0.simd_gt(f64x4::ZERO))
     }
 }

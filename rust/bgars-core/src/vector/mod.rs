@@ -9,6 +9,7 @@ mod avx512;
 mod doubles;
 #[cfg(target_arch = "x86_64")]
 mod interleaved;
+mod one;
 mod packed;
 mod portable;
 pub mod subset_sums;
@@ -47,6 +48,7 @@ pub(crate) use avx512::Avx512;
 pub(crate) use doubles::PortableDouble;
 #[cfg(target_arch = "x86_64")]
 pub(crate) use doubles::{Avx2Double, Avx512Double};
+pub(crate) use one::One;
 pub(crate) use packed::Packed;
 pub(crate) use portable::Portable;
 use subset_sums::SubsetSums;

@@ -8,6 +8,10 @@ use std::ops::{Add, Mul, Sub};
 pub trait Packed: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
     /// `f32` or `f64`.
     type Number: Copy;
+    /// The numbers of a vector in memory.
+    type Chunk;
+    /// As many floats in memory.
+    type Floats;
     /// Numbers in a vector.
     const WIDTH: usize;
 
@@ -17,6 +21,69 @@ pub trait Packed: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = 
     fn load(from: &[Self::Number]) -> Self;
     /// Writes the numbers.
     fn write(self, to: &mut [Self::Number]);
+
+    /// The first `n` vectors of a row: loops over several rows of `n` ask for no bound.
+    fn chunks(row: &[Self::Number], n: usize) -> &[Self::Chunk];
+    /// The same, to write.
+    fn chunks_mut(row: &mut [Self::Number], n: usize) -> &mut [Self::Chunk];
+    /// The same of a row of floats.
+    fn floats(row: &[f32], n: usize) -> &[Self::Floats];
+    /// A vector of a row.
+    fn read(from: &Self::Chunk) -> Self;
+    /// Writes a vector of a row.
+    fn put(self, to: &mut Self::Chunk);
+    /// Floats as numbers.
+    fn widen(from: &Self::Floats) -> Self;
+
     /// `self factor + term`, in one rounding where the processor does so at no cost.
     fn times_plus(self, factor: Self, term: Self) -> Self;
+    /// Without its sign.
+    fn magnitude(self) -> Self;
+    /// 0 where below.
+    fn positive_part(self) -> Self;
+    /// 0 where `other` is not above 0.
+    fn where_positive(self, other: Self) -> Self;
+    /// `1 / self`, or 0 where that is not above 0.
+    fn inverse(self) -> Self;
 }
+
+/// The part of [`Packed`] that only moves numbers.
+macro_rules! chunked {
+    ($number:ty, $width:expr, |$floats:ident| $widen:expr) => {
+        type Number = $number;
+        type Chunk = [$number; $width];
+        type Floats = [f32; $width];
+        const WIDTH: usize = $width;
+
+        #[inline(always)]
+        fn chunks(row: &[$number], n: usize) -> &[[$number; $width]] {
+            &row.as_chunks().0[..n]
+        }
+
+        #[inline(always)]
+        fn chunks_mut(row: &mut [$number], n: usize) -> &mut [[$number; $width]] {
+            &mut row.as_chunks_mut().0[..n]
+        }
+
+        #[inline(always)]
+        fn floats(row: &[f32], n: usize) -> &[[f32; $width]] {
+            &row.as_chunks().0[..n]
+        }
+
+        #[inline(always)]
+        fn read(from: &[$number; $width]) -> Self {
+            Self::load(from)
+        }
+
+        #[inline(always)]
+        fn put(self, to: &mut [$number; $width]) {
+            self.write(to);
+        }
+
+        #[inline(always)]
+        fn widen($floats: &[f32; $width]) -> Self {
+            $widen
+        }
+    };
+}
+pub(super) use chunked;

@@ -4,6 +4,7 @@ use std::ops::{Add, Div, Mul, Sub};
 
 use wide::f32x8;
 
+use super::packed::chunked;
 use super::subset_sums::{GROUP, SubsetSums};
 use super::{Packed, Vector, first};
 
@@ -38,8 +39,7 @@ impl Portable {
 }
 
 impl Packed for Portable {
-    type Number = f32;
-    const WIDTH: usize = WIDTH;
+    chunked!(f32, WIDTH, |from| Self::load(from));
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
@@ -59,6 +59,26 @@ impl Packed for Portable {
     #[inline(always)]
     fn times_plus(self, factor: Self, term: Self) -> Self {
         if cfg!(target_arch = "aarch64") { Self(self.0.mul_add(factor.0, term.0)) } else { self * factor + term }
+    }
+
+    #[inline(always)]
+    fn magnitude(self) -> Self {
+        Self(self.0.abs())
+    }
+
+    #[inline(always)]
+    fn positive_part(self) -> Self {
+        Self(self.0.fast_max(f32x8::ZERO))
+    }
+
+    #[inline(always)]
+    fn where_positive(self, other: Self) -> Self {
+        Self(self.0 & other.0.simd_gt(f32x8::ZERO))
+    }
+
+    #[inline(always)]
+    fn inverse(self) -> Self {
+        Self((f32x8::ONE / self.0) & self.0.simd_gt(f32x8::ZERO))
     }
 }
 

@@ -3,7 +3,7 @@
 #![allow(clippy::float_cmp)]
 
 use super::subset_sums::SubsetSums;
-use super::{Packed, Portable, PortableDouble, Vector};
+use super::{One, Packed, Portable, PortableDouble, Vector};
 
 /// More than the widest vector needs.
 const VALUES: usize = 16;
@@ -68,6 +68,27 @@ where
     assert_numbers(x - y, &|a, b| a - b);
     assert_numbers(x * y, &|a, b| a * b);
     assert_numbers(x.times_plus(y, two), &|a, b| a * b + 2.0); // exact for these values
+    assert_numbers(y.magnitude(), &|_, b| b.abs());
+    assert_numbers(y.positive_part(), &|_, b| b.max(0.0));
+    assert_numbers(x.where_positive(y), &|a, b| if b > 0.0 { a } else { 0.0 });
+    let powers: [V::Number; VALUES] = std::array::from_fn(|lane| number([0.0, -4.0, 0.25, 8.0][lane % 4]));
+    let mut out = [number(f32::MAX); VALUES];
+    V::load(&powers).inverse().write(&mut out);
+    for (lane, out) in out[..V::WIDTH].iter().enumerate() {
+        assert_eq!(*out, number([0.0, 0.0, 4.0, 0.125][lane % 4]), "{lane}");
+    }
+
+    // The second of two vectors of a row.
+    let row: Vec<f32> = (0..=2 * V::WIDTH).map(|place| place as f32).collect();
+    let numbers: Vec<V::Number> = row.iter().map(|&value| number(value)).collect();
+    let mut copy = vec![number(-1.0); 2 * V::WIDTH + 1];
+    let chunks = V::chunks_mut(&mut copy, 2);
+    V::read(&V::chunks(&numbers, 2)[1]).put(&mut chunks[0]);
+    V::widen(&V::floats(&row, 2)[1]).put(&mut chunks[1]);
+    for (place, copied) in copy.into_iter().enumerate() {
+        let expected = if place < 2 * V::WIDTH { (V::WIDTH + place % V::WIDTH) as f32 } else { -1.0 };
+        assert_eq!(copied, number(expected), "{place}");
+    }
 }
 
 fn check_sums<V: Vector>() {
@@ -110,6 +131,12 @@ fn check_all<V: Vector, Double: Packed<Number = f64>>() {
     check::<V>();
     check_sums::<V>();
     check_stores::<V>();
+}
+
+#[test]
+fn one() {
+    check_packed::<One<f32>>();
+    check_packed::<One<f64>>();
 }
 
 #[test]

@@ -1,8 +1,7 @@
 //! Rows of the box in a frame of zeros, and the part of each row that the mask reaches.
 
-use std::ops::{Deref, DerefMut};
-
 use super::number::Number;
+use crate::memory::Aligned;
 
 /// Numbers that a loop takes at a time.
 pub(super) const LANES: usize = 16;
@@ -54,39 +53,5 @@ impl Frame {
     /// The columns of a row that the mask reaches; none in rows outside the box.
     pub fn span(&self, row: isize) -> (usize, usize) {
         usize::try_from(row).ok().and_then(|row| self.spans.get(row)).copied().unwrap_or((0, 0))
-    }
-}
-
-/// Numbers that start at a cache line: a load of whole lanes then touches one line, not two.
-#[derive(Debug)]
-pub(super) struct Aligned<T> {
-    memory: Vec<T>,
-    start: usize,
-    len: usize,
-}
-
-impl<T: Number> Aligned<T> {
-    pub fn zeros(len: usize) -> Self {
-        /// Bytes.
-        const CACHE_LINE: usize = 64;
-        let memory = vec![T::default(); len + CACHE_LINE / size_of::<T>()];
-        let start = memory.as_ptr().align_offset(CACHE_LINE).min(memory.len() - len);
-        Self { memory, start, len }
-    }
-}
-
-impl<T> Deref for Aligned<T> {
-    type Target = [T];
-
-    #[inline(always)]
-    fn deref(&self) -> &[T] {
-        &self.memory[self.start..self.start + self.len]
-    }
-}
-
-impl<T> DerefMut for Aligned<T> {
-    #[inline(always)]
-    fn deref_mut(&mut self) -> &mut [T] {
-        &mut self.memory[self.start..self.start + self.len]
     }
 }

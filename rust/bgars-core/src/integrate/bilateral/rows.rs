@@ -2,9 +2,10 @@
 //!
 //! A row here is whole [`LANES`]: slices may be longer, and what is done to them ends with the shortest that sets the length.
 
-use super::frame::{Aligned, LANES};
+use super::frame::LANES;
 use super::number::Number;
 use super::sweep::{Scaled, Steps};
+use crate::memory::Aligned;
 use crate::vector::Packed;
 
 /// Sums of [`super::sweep::Products`], in its order.

@@ -9,9 +9,10 @@
 use multiversion::{multiversion, target::target_cfg_f};
 use rayon::prelude::*;
 
-use super::frame::{Aligned, Frame};
+use super::frame::Frame;
 use super::number::Number;
 use super::rows::{Factors, Rings, SUMS, Stencil, add_products, advance, flush, multiply, step};
+use crate::memory::Aligned;
 use crate::vector::Packed;
 
 /// Rows that one task sweeps; of two more on either side it updates the residual for itself.

@@ -19,7 +19,8 @@ mod splitting;
 
 use rayon::prelude::*;
 
-use super::checkerboard::{Real, Weights};
+use super::checkerboard::Weights;
+use super::real::Real;
 use super::reduction::dot;
 use super::strays::Strays;
 use crate::memory::zeros;

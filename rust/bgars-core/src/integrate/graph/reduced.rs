@@ -4,8 +4,9 @@ use rayon::prelude::*;
 
 use super::CHUNK;
 use super::matrix::{Part, Rows};
-use crate::integrate::checkerboard::{Real, Weights};
+use crate::integrate::checkerboard::Weights;
 use crate::integrate::places::ties;
+use crate::integrate::real::Real;
 
 /// Which reds are nodes: those with an edge, row by row.
 #[derive(Debug)]

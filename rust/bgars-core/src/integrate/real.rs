@@ -1,0 +1,76 @@
+//! The numbers that kernels count in, and the vectors of them.
+
+use std::ops::{Add, Mul};
+
+use bytemuck::Zeroable;
+
+use crate::vector::{One, Packed};
+
+/// A floating-point number of a kernel: `f32` in the preconditioner, `f64` in the operator.
+pub(super) trait Real:
+    Copy + Default + Zeroable + PartialOrd + Send + Sync + From<f32> + Add<Output = Self> + Mul<Output = Self>
+{
+    /// As many as AVX-512 works on at once.
+    #[cfg(target_arch = "x86_64")]
+    type Avx512: Packed<Number = Self>;
+    /// The same of AVX2.
+    #[cfg(target_arch = "x86_64")]
+    type Avx2: Packed<Number = Self>;
+    /// The same of any processor.
+    type Portable: Packed<Number = Self>;
+    /// A single one.
+    type Single: Packed<Number = Self>;
+
+    /// Rounded to `f32`.
+    fn to_f32(self) -> f32;
+
+    /// Exactly as `f64`.
+    fn to_f64(self) -> f64;
+}
+
+macro_rules! real {
+    ($type:ty, $avx512:ident, $avx2:ident, $portable:ident) => {
+        impl Real for $type {
+            #[cfg(target_arch = "x86_64")]
+            type Avx512 = crate::vector::$avx512;
+            #[cfg(target_arch = "x86_64")]
+            type Avx2 = crate::vector::$avx2;
+            type Portable = crate::vector::$portable;
+            type Single = One<$type>;
+
+            #[inline(always)]
+            #[allow(clippy::unnecessary_cast)]
+            fn to_f32(self) -> f32 {
+                self as f32
+            }
+
+            #[inline(always)]
+            fn to_f64(self) -> f64 {
+                f64::from(self)
+            }
+        }
+    };
+}
+real!(f32, Avx512, Avx2, Portable);
+real!(f64, Avx512Double, Avx2Double, PortableDouble);
+
+/// Calls `function::<.., V>(..)` with the vectors `V` of numbers of type `T` that the enclosing function is compiled for;
+/// single numbers where the rows of the grid are too short for any.
+macro_rules! on_vectors {
+    ($grid:expr, $number:ty, $function:ident $(::<$generic:ty>)? ($($argument:expr),* $(,)?)) => {{
+        if !$grid.has_lanes() {
+            return $function::<$($generic,)? <$number as Real>::Single>($($argument),*);
+        }
+        #[cfg(target_arch = "x86_64")]
+        {
+            if target_cfg_f!(target_feature = "avx512f") {
+                return $function::<$($generic,)? <$number as Real>::Avx512>($($argument),*);
+            }
+            if target_cfg_f!(target_feature = "avx2") {
+                return $function::<$($generic,)? <$number as Real>::Avx2>($($argument),*);
+            }
+        }
+        $function::<$($generic,)? <$number as Real>::Portable>($($argument),*)
+    }};
+}
+pub(super) use on_vectors;

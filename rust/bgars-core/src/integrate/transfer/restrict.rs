@@ -1,0 +1,164 @@
+//! Down: smoothed from zero, and what is left taken to the coarser grid.
+
+use multiversion::{multiversion, target::target_cfg_f};
+use rayon::prelude::*;
+
+use super::{black_ties, divide_by_centre_ties, smoothed_row};
+use crate::integrate::checkerboard::{BAND_ROWS, PaddedRow, Weights, split_row};
+use crate::integrate::real::{Real, on_vectors};
+use crate::integrate::reduction::solve_blacks;
+use crate::integrate::ring::Ring;
+use crate::vector::Packed;
+
+/// `coarse = P^T (b - S D^-1 b)`: smooths `b` from zero and restricts what is left to the coarser grid, as reds and blacks.
+pub(in crate::integrate) fn restrict<T: Real>(
+    weights: &Weights,
+    b: &[T],
+    coarse_reds: &mut [f32],
+    coarse_blacks: &mut [f32],
+) {
+    let coarse_half = weights.grid.coarser().half();
+    let chunk = BAND_ROWS / 2 * coarse_half;
+    coarse_reds.par_chunks_mut(chunk).zip(coarse_blacks.par_chunks_mut(chunk)).enumerate().for_each_init(
+        || Restricting::new(weights.grid.half()),
+        |rows, (band, (reds, blacks))| restrict_band(weights, b, band, rows, [reds, blacks]),
+    );
+}
+
+/// Rows on their way through the restriction of a band.
+pub(super) struct Restricting {
+    smooth: Ring<f32>,
+    blacks: Ring<f32>,
+    residual: Ring<f32>,
+    centres: Ring<f32>,
+    vertical: Ring<f32>,
+    horizontal: Ring<f32>,
+    ties: Ring<f32>,
+    /// The right side of a row.
+    rounded: Vec<f32>,
+    coarse: Vec<f32>,
+}
+
+impl Restricting {
+    pub fn new(n: usize) -> Self {
+        let [smooth, blacks, residual, centres, vertical, horizontal, ties] = std::array::from_fn(|_| Ring::new(n));
+        let [rounded, coarse] = std::array::from_fn(|_| vec![0.0; n]);
+        Self { smooth, blacks, residual, centres, vertical, horizontal, ties, rounded, coarse }
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+pub(super) fn restrict_band<T: Real>(
+    weights: &Weights,
+    b: &[T],
+    band: usize,
+    rows: &mut Restricting,
+    coarse: [&mut [f32]; 2],
+) {
+    on_vectors!(weights.grid, f32, restrict_band_with::<T>(weights, b, band, rows, coarse));
+}
+
+#[inline(always)]
+pub(super) fn restrict_band_with<T: Real, V: Packed<Number = f32>>(
+    weights: &Weights,
+    b: &[T],
+    band: usize,
+    rows: &mut Restricting,
+    [coarse_reds, coarse_blacks]: [&mut [f32]; 2],
+) {
+    let grid = weights.grid;
+    let coarse_half = grid.coarser().half();
+    let first = (band * BAND_ROWS) as isize;
+    let coarse_rows = coarse_reds.len() / coarse_half;
+    let end = first + 2 * coarse_rows as isize;
+    for row in first - 3..=end + 1 {
+        smoothed_row::<T, V>(weights, b, row, &mut rows.rounded, rows.smooth.row_mut(row));
+
+        let row = row - 1;
+        if row < first - 2 {
+            continue;
+        }
+        solve_blacks::<V>(weights, row, &rows.smooth, &mut rows.blacks);
+        black_ties::<V>(weights, row, rows.ties.row_mut(row));
+
+        // The residual: D - N applied to D^-1 b leaves N D^-1 b.
+        let row = row - 1;
+        if row < first - 1 {
+            continue;
+        }
+        let out = rows.residual.row_mut(row);
+        if grid.contains(row) {
+            let stencil = weights.red_stencil::<V>(row, rows.blacks.around(row));
+            let out = V::chunks_mut(out, stencil.len());
+            for k in 0..stencil.len() {
+                stencil.sum(k).put(&mut out[k]);
+            }
+        } else {
+            out.fill(0.0);
+        }
+        if row.rem_euclid(2) == 0 {
+            continue;
+        }
+        centres_to_blacks::<V>(weights, row, rows);
+        if row <= first {
+            continue;
+        }
+        let row = row - 1;
+        blacks_to_corners::<V>(weights, row, rows);
+        let coarse_row = (row - first) as usize / 2;
+        let span = coarse_row * coarse_half..(coarse_row + 1) * coarse_half;
+        split_row((row / 2) as usize, &rows.coarse, &mut coarse_reds[span.clone()], &mut coarse_blacks[span]);
+    }
+}
+
+/// The centres of an odd row to the blacks beside them.
+#[inline(always)]
+fn centres_to_blacks<V: Packed<Number = f32>>(weights: &Weights, row: isize, rows: &mut Restricting) {
+    let (values, out) = (rows.centres.row_mut(row), rows.vertical.row_mut(row));
+    if !weights.grid.contains(row) {
+        values.fill(0.0);
+        out.fill(0.0);
+        return;
+    }
+    values.copy_from_slice(&rows.residual.row(row)[1..=values.len()]);
+    divide_by_centre_ties::<V>(weights, row, &rows.ties, values);
+    let n = out.len() / V::WIDTH;
+    let here = rows.centres.row(row);
+    let (before, after) = (V::chunks(here, n), V::chunks(&here[1..], n));
+    let (right, left) = (V::chunks(weights.right(row), n), V::chunks(&weights.left(row)[1..], n));
+    let (tie, out) = (V::chunks(&rows.ties.row(row)[1..], n), V::chunks_mut(out, n));
+    for k in 0..n {
+        let sum = V::read(&right[k]).times_plus(V::read(&before[k]), V::read(&left[k]) * V::read(&after[k]));
+        (sum * V::read(&tie[k]).inverse()).put(&mut out[k]);
+    }
+}
+
+/// The blacks around the corners of an even row to these; the blacks of the row itself take from the centres first.
+#[inline(always)]
+fn blacks_to_corners<V: Packed<Number = f32>>(weights: &Weights, row: isize, rows: &mut Restricting) {
+    let n = rows.coarse.len() / V::WIDTH;
+    let (down, up) = (V::chunks(&weights.down(row - 1)[1..], n), V::chunks(&weights.up(row + 1)[1..], n));
+    let [above, _, below] = rows.centres.around(row);
+    let (above, below) = (V::chunks(&above[1..], n), V::chunks(&below[1..], n));
+    let (tie, out) = (V::chunks(&rows.ties.row(row)[1..], n), V::chunks_mut(rows.horizontal.row_mut(row), n));
+    for k in 0..n {
+        let sum = V::read(&down[k]).times_plus(V::read(&above[k]), V::read(&up[k]) * V::read(&below[k]));
+        (sum * V::read(&tie[k]).inverse()).put(&mut out[k]);
+    }
+    let ([above, _, below], along) = (rows.vertical.around(row), rows.horizontal.row(row));
+    let sides: [(PaddedRow<'_, f32>, PaddedRow<'_, f32>); 4] = [
+        (&weights.left(row)[1..], along),
+        (&weights.right(row)[1..], &along[1..]),
+        (&weights.up(row)[1..], &above[1..]),
+        (&weights.down(row)[1..], &below[1..]),
+    ];
+    let sides = sides.map(|(weight, value)| (V::chunks(weight, n), V::chunks(value, n)));
+    let (corner, coarse) = (V::chunks(&rows.residual.row(row)[1..], n), V::chunks_mut(&mut rows.coarse, n));
+    for k in 0..n {
+        let mut sum = V::read(&corner[k]);
+        for (weight, value) in sides {
+            sum = V::read(&weight[k]).magnitude().times_plus(V::read(&value[k]), sum);
+        }
+        sum.put(&mut coarse[k]);
+    }
+}

@@ -1,0 +1,87 @@
+//! A number as a vector of itself, for rows that are no multiple of any other.
+
+use std::ops::{Add, Mul, Sub};
+
+use super::Packed;
+use super::packed::chunked;
+
+/// One number.
+#[derive(Clone, Copy)]
+pub(crate) struct One<T>(T);
+
+macro_rules! one {
+    ($number:ty) => {
+        impl Add for One<$number> {
+            type Output = Self;
+
+            #[inline(always)]
+            fn add(self, other: Self) -> Self {
+                Self(self.0 + other.0)
+            }
+        }
+
+        impl Sub for One<$number> {
+            type Output = Self;
+
+            #[inline(always)]
+            fn sub(self, other: Self) -> Self {
+                Self(self.0 - other.0)
+            }
+        }
+
+        impl Mul for One<$number> {
+            type Output = Self;
+
+            #[inline(always)]
+            fn mul(self, other: Self) -> Self {
+                Self(self.0 * other.0)
+            }
+        }
+
+        impl Packed for One<$number> {
+            chunked!($number, 1, |from| Self(<$number>::from(from[0])));
+
+            #[inline(always)]
+            fn splat(value: $number) -> Self {
+                Self(value)
+            }
+
+            #[inline(always)]
+            fn load(from: &[$number]) -> Self {
+                Self(from[0])
+            }
+
+            #[inline(always)]
+            fn write(self, to: &mut [$number]) {
+                to[0] = self.0;
+            }
+
+            #[inline(always)]
+            fn times_plus(self, factor: Self, term: Self) -> Self {
+                self * factor + term
+            }
+
+            #[inline(always)]
+            fn magnitude(self) -> Self {
+                Self(self.0.abs())
+            }
+
+            #[inline(always)]
+            fn positive_part(self) -> Self {
+                Self(self.0.max(0.0))
+            }
+
+            #[inline(always)]
+            fn where_positive(self, other: Self) -> Self {
+                Self(if other.0 > 0.0 { self.0 } else { 0.0 })
+            }
+
+            #[inline(always)]
+            fn inverse(self) -> Self {
+                Self(if self.0 > 0.0 { 1.0 / self.0 } else { 0.0 })
+            }
+        }
+    };
+}
+one!(f32);
+one!(f64);
