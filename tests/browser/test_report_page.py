@@ -201,8 +201,12 @@ def test_on_a_phone_nothing_sticks_out(failed_page: Path, open_page: Open) -> No
     page = opened.page
     assert page.evaluate("document.documentElement.scrollWidth") == 390
     assert page.locator("#verdict").bounding_box()["y"] < 300  # type: ignore[index]
+    named = "document.querySelector('[data-figure=coplanarity]')._fullLayout.xaxis.tickvals.length"
+    few = page.evaluate(named)
+    assert 2 <= few <= 390 / 28, "names of balls have room"
     page.set_viewport_size({"width": 700, "height": 844})
     page.wait_for_function("() => document.querySelector('[data-figure=coplanarity] .main-svg').clientWidth > 500")
+    page.wait_for_function(f"() => {named} > {few}")
     page.set_viewport_size({"width": 390, "height": 844})
     page.wait_for_function("() => document.querySelector('[data-figure=coplanarity] .main-svg').clientWidth < 390")
     wide = page.eval_on_selector_all(".js-plotly-plot", "all => all.filter(c => c.scrollWidth > 390).length")
@@ -222,6 +226,8 @@ def test_on_paper_charts_and_the_3d_view_are_there(
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert page.locator("#scene-still").is_visible()
     assert page.locator("#scene-keys").is_visible()
+    heads = page.eval_on_selector_all("#balls thead button", "all => all.map(b => getComputedStyle(b).display)")
+    assert set(heads) == {"contents"}, "a button would not be painted in the heads of further sheets"
     assert not page.locator("[data-figure=scene]").is_visible()
     data = page.evaluate("document.getElementById('scene-still').src").partition("base64,")[2]
     picture = iio.imread(io.BytesIO(base64.b64decode(data)), extension=".png")[..., :3].astype(int)

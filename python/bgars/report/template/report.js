@@ -140,11 +140,19 @@
   };
   // Thin marks on a dark page need lighter colours; the 3-D view has its own light.
   const lighter = { "#0072B2": "#56B4E9", "#B0578D": "#E39AC6", "#D55E00": "#FF8A3D" };
-  const shape = (name, isDark, size) => {
+  const NAME_PX = 28;
+  const thinned = (axis, width) => {
+    const step = Math.ceil((axis.tickvals.length * NAME_PX) / Math.max(width - 100, NAME_PX));
+    const [tickvals, ticktext] = [axis.tickvals, axis.ticktext].map((all) => all.filter((_, at) => at % step === 0));
+    return { ...axis, tickvals, ticktext };
+  };
+  const shape = (node, isDark, size) => {
+    const name = node.dataset.figure;
     let figure = page.figures[name];
     if (isDark && name !== "scene") figure = JSON.parse(JSON.stringify(figure).replace(/#(0072B2|B0578D|D55E00)/g, (color) => lighter[color]));
     const margin = figure.layout.margin || { l: 64, r: 14, t: 40, b: 56 };
     const layout = { ...figure.layout, ...size, margin, template: look(isDark), dragmode: name === "scene" ? "orbit" : false };
+    if (layout.xaxis && layout.xaxis.tickvals) layout.xaxis = thinned(layout.xaxis, size.width || node.clientWidth);
     if (!(name in page.places)) return { data: figure.data, layout };
     // The last trace is the mark of the chosen ball.
     const [x, y, z] = markedAt(name);
@@ -171,7 +179,7 @@
   const draw = async (node) => {
     library();
     const name = node.dataset.figure;
-    const { data, layout } = shape(name, dark.matches && !printing, printing ? paper(node) : {});
+    const { data, layout } = shape(node, dark.matches && !printing, printing ? paper(node) : {});
     const drawn = Plotly.newPlot(node, data, layout, name === "scene" ? { ...config, displayModeBar: true, modeBarButtons: VIEW_BUTTONS } : config);
     charts.set(name, node);
     undrawn.delete(node);
@@ -249,8 +257,8 @@
   if (opener) opener.addEventListener("click", openScene);
   const repaint = (isDark, sizeOf) => {
     for (const [name, node] of charts) {
-      if (name === "scene") { if (!sizeOf) Plotly.relayout(node, { template: look(isDark) }); continue; }
-      const { data, layout } = shape(name, isDark, sizeOf ? sizeOf(node) : { autosize: true });
+      if (name === "scene") { if (!sizeOf) Plotly.relayout(node, { template: look(isDark), autosize: true }); continue; }
+      const { data, layout } = shape(node, isDark, sizeOf ? sizeOf(node) : { autosize: true });
       Plotly.react(node, data, layout);
     }
   };
@@ -270,7 +278,7 @@
   window.addEventListener("afterprint", () => { printing = false; repaint(dark.matches); });
   window.addEventListener("resize", () => {
     clearTimeout(waiting);
-    waiting = setTimeout(() => { if (!printing) for (const node of charts.values()) Plotly.Plots.resize(node); }, 150);
+    waiting = setTimeout(() => { if (!printing) repaint(dark.matches); }, 150);
   });
   reached("usable");
   parsed.then(() => requestAnimationFrame(() => setTimeout(watch, 0)));
