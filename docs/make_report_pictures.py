@@ -35,7 +35,7 @@ def main() -> None:
         for name, (scheme, place, chosen) in VIEWS.items():
             page = browser.new_page(viewport={"width": 1280, "height": 1000}, color_scheme=scheme)
             page.goto((Path(folder) / "report.html").as_uri())
-            page.wait_for_selector("html[data-charted]", state="attached")
+            page.wait_for_selector("html[data-settled]", state="attached")
             if chosen == VIEW_3D:
                 page.click("#open-scene")
                 page.wait_for_selector("html[data-drawn]", state="attached")

@@ -18,6 +18,7 @@ OPTIONS = [
     "--force-device-scale-factor=1",
 ]
 HOW = "install Chromium (Debian: apt-get install chromium), or name one in BGARS_BROWSER"
+CHARTS = "[data-figure]:not([data-figure=scene])"
 
 
 def find_browser() -> str | None:
@@ -60,13 +61,23 @@ class Opened:
         self.page.wait_for_selector("html[data-usable]", state="attached")
 
     def wait(self, stage: str) -> Opened:
-        """Until charts ("charted") or the 3-D view ("drawn") are there."""
+        """Until what is near the first screen ("settled") or the 3-D view ("drawn") is there."""
         self.page.wait_for_selector(f"html[data-{stage}]", state="attached")
+        return self
+
+    def scroll_through(self) -> Opened:
+        """As a reader does: each chart is drawn when it comes near. Then back to the top."""
+        self.wait("settled")
+        for name in self.page.eval_on_selector_all(CHARTS, "all => all.map(node => node.dataset.figure)"):
+            self.page.locator(f"[data-figure={name}]").evaluate("node => node.scrollIntoView({ block: 'center' })")
+            self.page.wait_for_selector(f"[data-figure={name}] .main-svg", state="attached")
+        self.wait("charted")
+        self.page.evaluate("scrollTo(0, 0)")
         return self
 
     def open_scene(self) -> Opened:
         """Ask for the 3-D view, which is a still until then."""
-        self.wait("charted")
+        self.scroll_through()
         self.page.click("#open-scene")
         return self.wait("drawn")
 

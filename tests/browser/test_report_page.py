@@ -48,7 +48,7 @@ def test_every_kind_of_result_opens_in_silence_and_alone(kind: str, tmp_path: Pa
     result = RESULTS[kind]()
     path = tmp_path / "report.html"
     bgars.write_report(result, path)
-    opened = open_page(path).wait("charted")
+    opened = open_page(path).scroll_through()
     if kind in {"undecided", "list of positions"}:
         opened.open_scene()
     assert opened.errors == []
@@ -86,7 +86,7 @@ def test_numbers_are_those_of_the_result(failed_page: Path, open_page: Open) -> 
 def test_hostile_texts_are_only_texts(tmp_path: Path, open_page: Open) -> None:
     path = tmp_path / "report.html"
     bgars.write_report(hostile(), path)
-    opened = open_page(path).wait("charted")
+    opened = open_page(path).scroll_through()
     page = opened.page
     assert "owned" not in page.title().split("document.title='owned'")[0]
     assert page.evaluate("document.scripts.length") == 5
@@ -174,7 +174,7 @@ def test_a_ball_is_chosen_in_picture_table_and_charts(failed_page: Path, open_pa
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_the_3d_view_draws_balls(scheme: str, failed_page: Path, open_page: Open) -> None:
-    opened = open_page(failed_page, color_scheme=scheme).wait("charted")
+    opened = open_page(failed_page, color_scheme=scheme).scroll_through()
     assert opened.page.evaluate("document.querySelectorAll('canvas').length") == 0, (
         "nothing is drawn before it is asked for"
     )
@@ -197,12 +197,16 @@ def test_the_3d_view_draws_balls(scheme: str, failed_page: Path, open_page: Open
 
 
 def test_on_a_phone_nothing_sticks_out(failed_page: Path, open_page: Open) -> None:
-    opened = open_page(failed_page, viewport={"width": 390, "height": 844}, has_touch=True).wait("charted")
+    opened = open_page(failed_page, viewport={"width": 390, "height": 844}, has_touch=True).scroll_through()
     page = opened.page
     assert page.evaluate("document.documentElement.scrollWidth") == 390
     assert page.locator("#verdict").bounding_box()["y"] < 300  # type: ignore[index]
+    named = "document.querySelector('[data-figure=coplanarity]')._fullLayout.xaxis.tickvals.length"
+    few = page.evaluate(named)
+    assert 2 <= few <= 390 / 28, "names of balls have room"
     page.set_viewport_size({"width": 700, "height": 844})
     page.wait_for_function("() => document.querySelector('[data-figure=coplanarity] .main-svg').clientWidth > 500")
+    page.wait_for_function(f"() => {named} > {few}")
     page.set_viewport_size({"width": 390, "height": 844})
     page.wait_for_function("() => document.querySelector('[data-figure=coplanarity] .main-svg').clientWidth < 390")
     wide = page.eval_on_selector_all(".js-plotly-plot", "all => all.filter(c => c.scrollWidth > 390).length")
@@ -214,7 +218,7 @@ def test_on_a_phone_nothing_sticks_out(failed_page: Path, open_page: Open) -> No
 def test_on_paper_charts_and_the_3d_view_are_there(
     opened_before: bool, failed_page: Path, open_page: Open, tmp_path: Path
 ) -> None:
-    opened = open_page(failed_page, color_scheme="dark").wait("charted")
+    opened = open_page(failed_page, color_scheme="dark").scroll_through()
     page = opened.page
     if opened_before:
         opened.open_scene()
@@ -222,6 +226,8 @@ def test_on_paper_charts_and_the_3d_view_are_there(
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert page.locator("#scene-still").is_visible()
     assert page.locator("#scene-keys").is_visible()
+    heads = page.eval_on_selector_all("#balls thead button", "all => all.map(b => getComputedStyle(b).display)")
+    assert set(heads) == {"contents"}, "a button would not be painted in the heads of further sheets"
     assert not page.locator("[data-figure=scene]").is_visible()
     data = page.evaluate("document.getElementById('scene-still').src").partition("base64,")[2]
     picture = iio.imread(io.BytesIO(base64.b64decode(data)), extension=".png")[..., :3].astype(int)
@@ -245,7 +251,7 @@ def test_without_webgl_the_page_says_so(failed_page: Path, browser: object, open
     context.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
     page = context.new_page()
     page.goto(failed_page.as_uri())
-    page.wait_for_selector("html[data-charted]", state="attached")
+    page.wait_for_selector("html[data-usable]", state="attached")
     page.click("#open-scene")
     page.wait_for_selector(".missing-view")
     assert page.locator("#scene-still").is_visible(), "the still remains"

@@ -286,6 +286,15 @@ def test_a_damaged_result_makes_a_page_or_a_clear_error(
         json.loads(Page(page_text(read_page_source(file))).scripts["page-data"])
 
 
+def test_a_board_at_an_absurd_height_has_no_still() -> None:
+    """All its places fall together in floating point: the still has no width to divide by."""
+    values = failing().to_dict()
+    values["board_coefficients_um"][0] = 2.2353734930616452e21
+    tags = [tag for tag, _ in Page(page_text(PageSource(values))).elements]
+    assert "svg" in tags
+    assert "img" not in tags
+
+
 def test_what_lies_beside_a_result_is_checked(tmp_path: Path) -> None:
     capture, _ = simulated("good")
     (tmp_path / "result.json").write_text(passing().to_json(), encoding="utf-8")

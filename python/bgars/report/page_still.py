@@ -102,7 +102,8 @@ def still_of(figure: dict[str, Any]) -> Still | None:
         [outline, *(sheet for sheet, _ in sheets), *(each.corners.reshape(-1, 2) for each in layers)]
     )
     low, high = places.min(axis=0), places.max(axis=0)
-    if not (np.isfinite(high - low).all() and LEAST_SHAPE < (high - low)[1] / (high - low)[0] < 1 / LEAST_SHAPE):
+    sides = high - low
+    if not (np.isfinite(sides).all() and sides.min() > LEAST_SHAPE * sides.max()):
         return None
     axes, size = _canvas(low, high)
     for layer, order in zip(layers, (1, 3), strict=False):

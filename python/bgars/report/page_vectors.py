@@ -18,7 +18,12 @@ LONGEST_ARROW = 0.9
 """Length of the longest arrow, of the pitch."""
 LARGEST_ZONE = 0.6
 """Radius up to which circles of the limit are drawn, of the pitch: larger ones run into each other."""
+LARGEST_HEAD_PX = 9.0
+HEADS_PX = 160.0
+"""All heads side by side along one side of the map: where there are many, they are small."""
 CIRCLE_POINTS = 25
+LINE_OF_MAP = 0.04
+"""Height of a line of text, of the map."""
 DECIMALS = 1
 
 
@@ -82,7 +87,9 @@ def _arrows(balls: list[dict[str, Any]], known: list[int], nominal: Any, tips: A
         if not mine:
             continue
         start, tip = nominal[mine], tips[mine]
-        shafts = {"type": "scatter", "mode": "lines", "line": {"color": color, "width": 2}, "hoverinfo": "skip"}
+        head_px = round(min(LARGEST_HEAD_PX, HEADS_PX / math.sqrt(len(known))), 1)
+        line = {"color": color, "width": max(1.0, round(2.0 * head_px / LARGEST_HEAD_PX, 1))}
+        shafts = {"type": "scatter", "mode": "lines", "line": line, "hoverinfo": "skip"}
         x, y = (_broken(start[:, at], tip[:, at]) for at in (0, 1))
         traces.append({**shafts, "x": x, "y": y, "showlegend": False, "name": words})
         turn = np.degrees(np.arctan2(*(tip - start).T)).round(2)
@@ -99,7 +106,7 @@ def _arrows(balls: list[dict[str, Any]], known: list[int], nominal: Any, tips: A
                     [known[row], ball["true_position_um"], *(tip[at] - start[at]).round(3).tolist()]
                     for at, (row, ball) in enumerate(zip(mine, chosen, strict=True))
                 ],
-                "marker": {"symbol": "triangle-up", "size": 9, "angle": turn.tolist(), "color": color},
+                "marker": {"symbol": "triangle-up", "size": head_px, "angle": turn.tolist(), "color": color},
                 "hovertemplate": "%{text}: true position %{customdata[1]:.2f} µm<extra></extra>",
             }
         )
@@ -149,7 +156,8 @@ def _key(nominal: Any, magnification: float, longest_um: float, room_um: float) 
     """An arrow of a round length under the map, with what it stands for."""
     length_um = round_down(longest_um)
     x = float(nominal[:, 0].min())
-    y = float(nominal[:, 1].min() - room_um)
+    # Clear of the lowest arrows, by a line of text.
+    y = float(nominal[:, 1].min() - LONGEST_ARROW * room_um - LINE_OF_MAP * max(room_um, np.ptp(nominal[:, 1])))
     return {
         "type": "scatter",
         "mode": "lines+text",

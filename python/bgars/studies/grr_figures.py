@@ -81,6 +81,9 @@ def deviation_figure(readings: Readings, figures: GaugeFigures, placements: Sequ
         axes.plot(x, deviations[:, place].ravel(), ".", color=colour, markersize=4, alpha=0.8)
     ev = figures.spread("EV").sigma
     axes.axhspan(-3 * ev, 3 * ev, color="0.92", zorder=0)
+    reach = 1.12 * max(3 * ev, float(np.abs(deviations).max()))
+    if reach > 0:
+        axes.set_ylim(-reach, reach)
     axes.axhline(0.0, color="0.5", linewidth=0.8)
     parts = [part for part, _ in readings.labels]
     starts = [at for at in range(n) if at == 0 or parts[at] != parts[at - 1]]

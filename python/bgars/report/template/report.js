@@ -10,7 +10,11 @@
   const panel = document.getElementById("chosen");
   const hint = panel ? [...panel.childNodes].map((node) => node.cloneNode(true)) : [];
   const charts = new Map();
-  const reached = (stage) => { document.documentElement.dataset[stage] = "yes"; performance.mark(stage); };
+  const reached = (stage) => {
+    if (stage in document.documentElement.dataset) return;
+    document.documentElement.dataset[stage] = "yes";
+    performance.mark(stage);
+  };
   let chosen = null;
 
   // --- choosing a ball: picture, table and charts show the same one ---
@@ -44,10 +48,11 @@
     if (ball !== null) markAs(ball, "hover", true);
     tell(ball === null ? chosen : ball);
   };
+  const markedAt = (name) => (chosen !== null && page.places[name][chosen]) || (name === "scene" ? [[], [], []] : [[], []]);
   const mark = () => {
-    for (const [name, places] of Object.entries(page.places)) {
+    for (const name of Object.keys(page.places)) {
       const node = charts.get(name);
-      const [x, y, z] = (chosen !== null && places[chosen]) || [[], [], []];
+      const [x, y, z] = markedAt(name);
       if (node) Plotly.restyle(node, z ? { x: [x], y: [y], z: [z] } : { x: [x], y: [y] }, [node.data.length - 1]);
     }
   };
@@ -135,12 +140,23 @@
   };
   // Thin marks on a dark page need lighter colours; the 3-D view has its own light.
   const lighter = { "#0072B2": "#56B4E9", "#B0578D": "#E39AC6", "#D55E00": "#FF8A3D" };
-  const shape = (name, isDark, size) => {
+  const NAME_PX = 28;
+  const thinned = (axis, width) => {
+    const step = Math.ceil((axis.tickvals.length * NAME_PX) / Math.max(width - 100, NAME_PX));
+    const [tickvals, ticktext] = [axis.tickvals, axis.ticktext].map((all) => all.filter((_, at) => at % step === 0));
+    return { ...axis, tickvals, ticktext };
+  };
+  const shape = (node, isDark, size) => {
+    const name = node.dataset.figure;
     let figure = page.figures[name];
     if (isDark && name !== "scene") figure = JSON.parse(JSON.stringify(figure).replace(/#(0072B2|B0578D|D55E00)/g, (color) => lighter[color]));
     const margin = figure.layout.margin || { l: 64, r: 14, t: 40, b: 56 };
     const layout = { ...figure.layout, ...size, margin, template: look(isDark), dragmode: name === "scene" ? "orbit" : false };
-    return { data: figure.data, layout };
+    if (layout.xaxis && layout.xaxis.tickvals) layout.xaxis = thinned(layout.xaxis, size.width || node.clientWidth);
+    if (!(name in page.places)) return { data: figure.data, layout };
+    // The last trace is the mark of the chosen ball.
+    const [x, y, z] = markedAt(name);
+    return { data: [...figure.data.slice(0, -1), { ...figure.data.at(-1), x, y, ...(z && { z }) }], layout };
   };
   // Named one by one: plotly.js would add a button that sends the chart's data to its makers.
   const VIEW_BUTTONS = [["toImage", "zoom3d", "pan3d", "orbitRotation", "resetCameraDefault3d"]];
@@ -150,11 +166,24 @@
     const index = Array.isArray(data) ? data[0] : data;
     return Number.isInteger(index) ? String(index) : null;
   };
+  // plotly.js ends the page, as text: to run it takes longer than all before, and only charts need it.
+  const parsed = new Promise((next) => document.addEventListener("DOMContentLoaded", next));
+  const library = () => {
+    const text = document.getElementById("plotly");
+    if (!text) return;
+    const script = document.createElement("script");
+    script.textContent = text.textContent;
+    text.replaceWith(script);
+    if (!window.Plotly) document.documentElement.dataset.chartless = "yes";
+  };
   const draw = async (node) => {
+    library();
     const name = node.dataset.figure;
-    const { data, layout } = shape(name, dark.matches);
-    await Plotly.newPlot(node, data, layout, name === "scene" ? { ...config, displayModeBar: true, modeBarButtons: VIEW_BUTTONS } : config);
+    const { data, layout } = shape(node, dark.matches && !printing, printing ? paper(node) : {});
+    const drawn = Plotly.newPlot(node, data, layout, name === "scene" ? { ...config, displayModeBar: true, modeBarButtons: VIEW_BUTTONS } : config);
     charts.set(name, node);
+    undrawn.delete(node);
+    await drawn;
     if (!(name in page.places)) return;
     node.on("plotly_hover", (event) => hover(ballAt(event)));
     node.on("plotly_unhover", () => hover(null));
@@ -165,9 +194,42 @@
     return Boolean(context);
   };
   const pause = () => new Promise((next) => setTimeout(next, 0));
-  const drawAll = async () => {
-    for (const node of document.querySelectorAll("[data-figure]:not([data-figure=scene])")) { await draw(node); await pause(); }
-    reached("charted");
+  // A chart is drawn when the reader comes within a screen of it, each in a task of its own; near: those whose turn it is.
+  const undrawn = new Set(document.querySelectorAll("[data-figure]:not([data-figure=scene])"));
+  const near = new Set();
+  const offCentre = (node) => {
+    const { top, bottom } = node.getBoundingClientRect();
+    return Math.abs(top + bottom - innerHeight);
+  };
+  let drawing = false;
+  const drawNear = async () => {
+    if (drawing) return;
+    drawing = true;
+    try {
+      while (near.size) {
+        await pause();
+        library();
+        await pause();
+        const [node] = [...near].sort((one, two) => offCentre(one) - offCentre(two));
+        near.delete(node);
+        if (undrawn.has(node)) await draw(node);
+      }
+    } finally {
+      drawing = false;
+    }
+    reached("settled");
+    if (!undrawn.size) reached("charted");
+  };
+  const watch = () => {
+    if (!undrawn.size || !("IntersectionObserver" in window)) {
+      undrawn.forEach((node) => near.add(node));
+      return drawNear();
+    }
+    const watcher = new IntersectionObserver((entries) => {
+      for (const { target, isIntersecting } of entries) near[isIntersecting ? "add" : "delete"](target);
+      drawNear();
+    }, { rootMargin: "100% 0px" });
+    undrawn.forEach((node) => watcher.observe(node));
   };
   // Without a graphics card a 3-D view takes its time: it is drawn when it is asked for, and until then there is a still.
   const opener = document.getElementById("open-scene");
@@ -180,6 +242,7 @@
       return;
     }
     note.textContent = "drawing ...";
+    await parsed;
     await pause();
     await pause();
     page.figures.scene = JSON.parse(document.getElementById("scene-data").textContent);
@@ -189,17 +252,15 @@
     document.getElementById("scene-keys").hidden = true;
     await draw(node);
     opener.parentElement.hidden = true;
-    if (chosen !== null) mark();
     reached("drawn");
   };
   if (opener) opener.addEventListener("click", openScene);
   const repaint = (isDark, sizeOf) => {
     for (const [name, node] of charts) {
-      if (name === "scene") { if (!sizeOf) Plotly.relayout(node, { template: look(isDark) }); continue; }
-      const { data, layout } = shape(name, isDark, sizeOf ? sizeOf(node) : { autosize: true });
+      if (name === "scene") { if (!sizeOf) Plotly.relayout(node, { template: look(isDark), autosize: true }); continue; }
+      const { data, layout } = shape(node, isDark, sizeOf ? sizeOf(node) : { autosize: true });
       Plotly.react(node, data, layout);
     }
-    if (chosen !== null) mark();
   };
   const paper = (node) => {
     if (node.parentElement.classList.contains("grid")) return { width: 228, height: 225 };
@@ -209,13 +270,16 @@
   let printing = false;
   let waiting = 0;
   dark.addEventListener("change", () => { if (!printing) repaint(dark.matches); });
-  window.addEventListener("beforeprint", () => { printing = true; repaint(false, paper); });
+  window.addEventListener("beforeprint", () => {
+    printing = true;
+    repaint(false, paper);
+    if (document.readyState !== "loading") undrawn.forEach((node) => draw(node));
+  });
   window.addEventListener("afterprint", () => { printing = false; repaint(dark.matches); });
   window.addEventListener("resize", () => {
     clearTimeout(waiting);
-    waiting = setTimeout(() => { if (!printing) for (const node of charts.values()) Plotly.Plots.resize(node); }, 150);
+    waiting = setTimeout(() => { if (!printing) repaint(dark.matches); }, 150);
   });
   reached("usable");
-  // The charts' library comes after this script: the tables answer before it is read.
-  document.addEventListener("DOMContentLoaded", () => requestAnimationFrame(() => setTimeout(drawAll, 0)));
+  parsed.then(() => requestAnimationFrame(() => setTimeout(watch, 0)));
 })();
