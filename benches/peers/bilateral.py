@@ -1,11 +1,20 @@
 """Bilateral integration against plain sparse matrices (SciPy, Jacobi-preconditioned) of the same equations, in turn.
 
-BGARS_DATA=... python benches/peers/bilateral.py [MAP ...]     one thread each, the same inner tolerance on both sides
+BGARS_DATA=... python benches/peers/bilateral.py [MAP ...]     the same inner tolerance on both sides
+
+The published code is run too, where $BILATERAL_PUBLIC holds the command of its CPU version (python and script): it is
+another process, measured by the seconds that it prints, which leave its start and its files out.
 """
 
 from __future__ import annotations
 
+import os
+import re
+import shlex
+import shutil
+import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +38,10 @@ SETTINGS = (("compatible", "double", 1e-3), ("compatible", "single", 1e-3), ("co
 MIN_N_Z = 1e-3
 PAIRS = 3
 """The peer takes up to a minute a run."""
+SPARSE_LIMITS = {"Fig5_plant": 5.0}
+"""How many times as fast as plain sparse matrices a map has to be."""
+PUBLIC_LIMITS = {1: 8.0, 2: 12.0}
+"""How many times as fast as the published code the compatible setting has to be, by threads."""
 
 
 def read_map(folder: Path) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64] | None]:
@@ -63,9 +76,48 @@ def compare(name: str, folder: Path) -> None:
 
         what = f"{Path(name).name}, {solver}, {precision}"
         timed = alternate(ours, theirs, PAIRS)
-        emit_ratio(GROUP, what, size, own_threads(), f"scipy cg to {tolerance:g}, Jacobi", timed)
+        limit = SPARSE_LIMITS.get(Path(name).name)
+        emit_ratio(GROUP, what, size, own_threads(), f"scipy cg to {tolerance:g}, Jacobi", timed, limit=limit)
         apart = abs(last["ours"] / last["theirs"] - 1.0)
         emit_check(GROUP, f"{what}: last energies apart", size, own_threads(), apart, "relative")
+
+
+def against_public(name: str, folder: Path) -> None:
+    """The compatible setting and the published code on one map, in turn."""
+    command = os.environ.get("BILATERAL_PUBLIC")
+    if not command:
+        emit(Skipped(GROUP, f"published code, {name}", "its command is not in $BILATERAL_PUBLIC"))
+        return
+    normals, mask, matrix = read_map(folder)
+    vectors, camera = normals.astype(np.float32), None if matrix is None else bgars.Pinhole(matrix)
+    with tempfile.TemporaryDirectory() as copy:
+        for file in ("normal_map.png", "mask.png", "K.txt"):
+            if (folder / file).exists():
+                shutil.copy(folder / file, copy)
+        line = [*shlex.split(command), "-p", copy, "-k", "2", "--iter", "150", "--tol", "1e-4"]
+
+        def published() -> str:
+            return subprocess.run(line, check=True, capture_output=True, text=True).stdout
+
+        for precision in ("double", "single"):
+            options: dict[str, Any] = {"camera": camera, "solver": "compatible", "precision": precision}
+
+            def ours(options: dict[str, Any] = options) -> None:
+                bgars.integrate_normals(vectors, mask=mask, method="bilateral", **options)
+
+            timed = alternate(ours, published, PAIRS, peer_seconds=lambda run: printed_seconds(str(run())))
+            what, limit = f"{Path(name).name}, compatible, {precision}", PUBLIC_LIMITS.get(own_threads())
+            size = f"{mask.sum()} pixels"
+            emit_ratio(GROUP, what, size, own_threads(), "published code (one thread)", timed, limit=limit)
+
+
+def printed_seconds(output: str) -> float:
+    """The time that the published code prints."""
+    found = re.search(r"Total time: ([0-9.]+) sec", output)
+    if found is None:
+        msg = f"no 'Total time: ... sec' among {output[-200:]!r}"
+        raise ValueError(msg)
+    return float(found[1])
 
 
 def main() -> None:
@@ -74,7 +126,10 @@ def main() -> None:
         folder = data_folder() / "normal_maps" / name
         if not folder.is_dir():
             emit(Skipped(GROUP, name, "the map is not in $BGARS_DATA/normal_maps"))
-        elif has(GROUP, name, "scipy"):
+            continue
+        against_public(name, folder)
+        # Plain matrices take minutes a map, on one thread whatever they are given.
+        if own_threads() == 1 and has(GROUP, name, "scipy"):
             compare(name, folder)
 
 

@@ -69,8 +69,8 @@ def _integrate(*, quick: bool) -> list[Task]:
 
 
 def _bilateral(*, quick: bool) -> list[Task]:
-    # The peer works on one thread whatever it is given.
-    return [Task("bilateral", "bilateral.py", (name,)) for name in (("diligent/cat",) if quick else MAPS)]
+    maps = ("diligent/cat",) if quick else MAPS
+    return [Task("bilateral", "bilateral.py", (name,), threads) for name in maps for threads in THREADS]
 
 
 def _files(*, quick: bool) -> list[Task]:

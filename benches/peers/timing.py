@@ -40,17 +40,22 @@ def seconds(run: Callable[[], object]) -> float:
     return elapsed
 
 
-def alternate(bgars: Callable[[], object], peer: Callable[[], object], pairs: int = PAIRS) -> Timed:
+def alternate(
+    bgars: Callable[[], object],
+    peer: Callable[[], object],
+    pairs: int = PAIRS,
+    peer_seconds: Callable[[Callable[[], object]], float] = seconds,
+) -> Timed:
     """Warm up both sides, then run them in turn; who goes first changes from pair to pair."""
     seconds(bgars)
-    seconds(peer)
+    peer_seconds(peer)
     runs = []
     for pair in range(pairs):
         if pair % 2 == 0:
             bgars_s = seconds(bgars)
-            runs.append((bgars_s, seconds(peer)))
+            runs.append((bgars_s, peer_seconds(peer)))
         else:
-            peer_s = seconds(peer)
+            peer_s = peer_seconds(peer)
             runs.append((seconds(bgars), peer_s))
     bgars_times, peer_times = zip(*runs, strict=True)
     return Timed(
