@@ -1,9 +1,9 @@
 //! The pixel grid as a checkerboard: every edge joins a red and a black pixel.
 //!
-//! Pixel (row, col) is red where row + col is even. A row of `width` pixels is kept as `half = ceil(width / 2)` reds (or a few more, see [`LANES`]) and as
-//! many blacks: red k of an even row is column 2k and black k column 2k + 1; in odd rows it is the other way round (missing
-//! pixels at the end are ones without edges). Then the neighbours of red k above and below are black k, and left and right are two
-//! blacks that follow each other, so every stencil runs over contiguous memory.
+//! Pixel (row, col) is red where row + col is even. A row of `width` pixels is kept as `half = ceil(width / 2)` reds (or a few
+//! more, see [`LANES`]) and as many blacks: red k of an even row is column 2k and black k column 2k + 1; in odd rows it is the
+//! other way round (missing pixels at the end are ones without edges). Then the neighbours of red k above and below are black
+//! k, and left and right are two blacks that follow each other, so every stencil runs over contiguous memory.
 
 use rayon::prelude::*;
 

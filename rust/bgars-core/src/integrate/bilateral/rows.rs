@@ -1,6 +1,6 @@
 //! Rows of vectors on their way through a sweep, and what is done to a row.
 //!
-//! A row here is whole [`LANES`]: slices may be longer, and what is done to them ends with the shortest that sets the length.
+//! A row here is whole [`LANES`]; of a slice that is longer the rest is left alone.
 
 use super::frame::LANES;
 use super::number::Number;
@@ -10,32 +10,6 @@ use crate::vector::Packed;
 
 /// Sums of [`super::sweep::Products`], in its order.
 pub(super) const SUMS: usize = 13;
-
-/// A row in whole lanes.
-type Chunks<'a, T> = &'a [[T; LANES]];
-
-/// The first `n` whole lanes of a row.
-#[inline(always)]
-fn lanes<T>(row: &[T], n: usize) -> Chunks<'_, T> {
-    &row.as_chunks().0[..n]
-}
-
-#[inline(always)]
-fn lanes_mut<T>(row: &mut [T], n: usize) -> &mut [[T; LANES]] {
-    &mut row.as_chunks_mut().0[..n]
-}
-
-/// Runs the body for each vector of a row: `$chunk` whole lanes, from `$from` of them on.
-macro_rules! each_vector {
-    ($n:expr, $chunk:ident, $from:ident, $body:block) => {
-        for $chunk in 0..$n {
-            for part in 0..LANES / V::WIDTH {
-                let $from = part * V::WIDTH;
-                $body
-            }
-        }
-    };
-}
 
 /// The rows on their way through a band.
 pub(super) struct Rings<T> {
@@ -89,24 +63,25 @@ impl<T: Number> Ring<T> {
     }
 }
 
+/// What ties a row's pixels to their neighbours on a side, and the vector there.
+type Side<'a, V> = (&'a [<V as Packed>::Chunk], &'a [<V as Packed>::Chunk]);
+
 /// A row of the system times a vector whose last rows are in a ring.
-pub(super) struct Stencil<'a, T> {
-    n: usize,
+pub(super) struct Stencil<'a, V: Packed> {
     /// The vector at each pixel.
-    here: Chunks<'a, T>,
-    /// To the left, right, above and below: what ties a pixel to its neighbour, and the vector there.
-    sides: [(Chunks<'a, T>, Chunks<'a, T>); 4],
+    here: &'a [V::Chunk],
+    /// To the left, right, above and below.
+    sides: [Side<'a, V>; 4],
 }
 
-impl<'a, T: Number> Stencil<'a, T> {
+impl<'a, T: Number, V: Packed<Number = T>> Stencil<'a, V> {
     #[inline(always)]
     pub fn new(system: &'a Scaled<'_, T>, x: &'a Ring<T>, row: isize, span: (usize, usize)) -> Self {
         let Scaled { frame, right, below, .. } = system;
-        let (at, stride, n) = (frame.start(row as usize) + span.0, frame.stride(), (span.1 - span.0) / LANES);
-        let side = |ties, neighbours| (lanes(ties, n), lanes(neighbours, n));
+        let (at, stride, n) = (frame.start(row as usize) + span.0, frame.stride(), (span.1 - span.0) / V::WIDTH);
+        let side = |ties, neighbours| (V::chunks(ties, n), V::chunks(neighbours, n));
         Self {
-            n,
-            here: lanes(x.row(row, span), n),
+            here: V::chunks(x.row(row, span), n),
             sides: [
                 side(&right[at - 1..], x.after(LANES - 1, row, span)),
                 side(&right[at..], x.after(LANES + 1, row, span)),
@@ -116,11 +91,17 @@ impl<'a, T: Number> Stencil<'a, T> {
         }
     }
 
+    /// How many vectors there are.
     #[inline(always)]
-    fn at<V: Packed<Number = T>>(&self, chunk: usize, from: usize) -> V {
-        let mut product = V::load(&self.here[chunk][from..]);
+    fn len(&self) -> usize {
+        self.here.len()
+    }
+
+    #[inline(always)]
+    fn at(&self, k: usize) -> V {
+        let mut product = V::read(&self.here[k]);
         for (ties, values) in &self.sides {
-            product = V::load(&ties[chunk][from..]).times_plus(V::load(&values[chunk][from..]), product);
+            product = V::read(&ties[k]).times_plus(V::read(&values[k]), product);
         }
         product
     }
@@ -162,16 +143,16 @@ pub(super) fn step<T: Number, V: Packed<Number = T>>(
     [r, v, u, w]: [&[T]; 4],
     [new_r, between]: [&mut [T]; 2],
 ) {
-    let n = new_r.len() / LANES;
-    let (r, v, u, w) = (lanes(r, n), lanes(v, n), lanes(u, n), lanes(w, n));
-    let (new_r, between) = (lanes_mut(new_r, n), lanes_mut(between, n));
-    each_vector!(n, chunk, from, {
-        let (v, u) = (V::load(&v[chunk][from..]), V::load(&u[chunk][from..]));
-        let w = V::load(&w[chunk][from..]);
-        let r = by.of_w.times_plus(w, by.of_v.times_plus(v, V::load(&r[chunk][from..])));
-        by.minus_a1.times_plus(u, r).write(&mut new_r[chunk][from..]);
-        by.minus_a0.times_plus(w, by.b0.times_plus(v, u)).write(&mut between[chunk][from..]);
-    });
+    let n = new_r.len() / V::WIDTH;
+    let (r, v, u, w) = (V::chunks(r, n), V::chunks(v, n), V::chunks(u, n), V::chunks(w, n));
+    let (new_r, between) = (V::chunks_mut(new_r, n), V::chunks_mut(between, n));
+    for k in 0..n {
+        let (v, u) = (V::read(&v[k]), V::read(&u[k]));
+        let w = V::read(&w[k]);
+        let r = by.of_w.times_plus(w, by.of_v.times_plus(v, V::read(&r[k])));
+        by.minus_a1.times_plus(u, r).put(&mut new_r[k]);
+        by.minus_a0.times_plus(w, by.b0.times_plus(v, u)).put(&mut between[k]);
+    }
 }
 
 /// Takes x, p and r of a row over both iterations.
@@ -182,64 +163,64 @@ pub(super) fn advance<T: Number, V: Packed<Number = T>>(
     v: &[T],
     [x, p, r]: [&mut [T]; 3],
 ) {
-    let n = new_r.len() / LANES;
-    let (new_r, v) = (lanes(new_r, n), lanes(v, n));
-    let (x, p, r) = (lanes_mut(x, n), lanes_mut(p, n), lanes_mut(r, n));
-    each_vector!(n, chunk, from, {
-        let p0 = V::load(&p[chunk][from..]);
-        let p1 = by.minus_a0.times_plus(V::load(&v[chunk][from..]), by.b0.times_plus(p0, V::load(&r[chunk][from..])));
-        let r2 = V::load(&new_r[chunk][from..]);
-        by.a1.times_plus(p1, by.a0.times_plus(p0, V::load(&x[chunk][from..]))).write(&mut x[chunk][from..]);
-        by.b1.times_plus(p1, r2).write(&mut p[chunk][from..]);
-        r2.write(&mut r[chunk][from..]);
-    });
+    let n = new_r.len() / V::WIDTH;
+    let (new_r, v) = (V::chunks(new_r, n), V::chunks(v, n));
+    let (x, p, r) = (V::chunks_mut(x, n), V::chunks_mut(p, n), V::chunks_mut(r, n));
+    for k in 0..n {
+        let p0 = V::read(&p[k]);
+        let p1 = by.minus_a0.times_plus(V::read(&v[k]), by.b0.times_plus(p0, V::read(&r[k])));
+        let r2 = V::read(&new_r[k]);
+        by.a1.times_plus(p1, by.a0.times_plus(p0, V::read(&x[k]))).put(&mut x[k]);
+        by.b1.times_plus(p1, r2).put(&mut p[k]);
+        r2.put(&mut r[k]);
+    }
 }
 
 /// A r of the new r, and with it A p of the new p: `A p2 = A r2 + b1 A p1`. A row of the band's own keeps both.
 #[inline(always)]
 pub(super) fn multiply<T: Number, V: Packed<Number = T>>(
     by: &Factors<V>,
-    product: &Stencil<'_, T>,
+    product: &Stencil<'_, V>,
     between: &[T],
     new_v: &mut [T],
     own: Option<[&mut [T]; 2]>,
 ) {
-    let (between, new_v) = (lanes(between, product.n), lanes_mut(new_v, product.n));
+    let (between, new_v) = (V::chunks(between, product.len()), V::chunks_mut(new_v, product.len()));
     let Some([u, v]) = own else {
-        each_vector!(product.n, chunk, from, {
-            let v = by.b1.times_plus(V::load(&between[chunk][from..]), product.at(chunk, from));
-            v.write(&mut new_v[chunk][from..]);
-        });
+        for k in 0..product.len() {
+            let v = by.b1.times_plus(V::read(&between[k]), product.at(k));
+            v.put(&mut new_v[k]);
+        }
         return;
     };
-    let (u, v) = (lanes_mut(u, product.n), lanes_mut(v, product.n));
-    each_vector!(product.n, chunk, from, {
-        let product: V = product.at(chunk, from);
-        product.write(&mut u[chunk][from..]);
-        let sum = by.b1.times_plus(V::load(&between[chunk][from..]), product);
-        sum.write(&mut v[chunk][from..]);
-        sum.write(&mut new_v[chunk][from..]);
-    });
+    let (u, v) = (V::chunks_mut(u, product.len()), V::chunks_mut(v, product.len()));
+    for k in 0..product.len() {
+        let product: V = product.at(k);
+        product.put(&mut u[k]);
+        let sum = by.b1.times_plus(V::read(&between[k]), product);
+        sum.put(&mut v[k]);
+        sum.put(&mut new_v[k]);
+    }
 }
 
 /// A A p of a row, and its share of the products.
 #[inline(always)]
 pub(super) fn add_products<T: Number, V: Packed<Number = T>>(
-    product: &Stencil<'_, T>,
+    product: &Stencil<'_, V>,
     [r, p, u, d]: [&[T]; 4],
     w: &mut [T],
     sums: &mut [V; SUMS],
 ) {
-    let n = product.n;
-    let (r, p, u, d, out) = (lanes(r, n), lanes(p, n), lanes(u, n), lanes(d, n), lanes_mut(w, n));
+    let n = product.len();
+    let (r, p, u, d, out) = (V::chunks(r, n), V::chunks(p, n), V::chunks(u, n), V::chunks(d, n), V::chunks_mut(w, n));
     let [mut r_r, mut p_v, mut r_v, mut v_v, mut r_d_r, mut r_d_v, mut v_d_v, ..] = *sums;
     let [.., mut r_u, mut u_v, mut u_u, mut v_w, mut w_w, mut u_w] = *sums;
-    each_vector!(n, chunk, from, {
-        let w: V = product.at(chunk, from);
-        w.write(&mut out[chunk][from..]);
-        let (r, p) = (V::load(&r[chunk][from..]), V::load(&p[chunk][from..]));
-        let (v, u) = (V::load(&product.here[chunk][from..]), V::load(&u[chunk][from..]));
-        let d = V::load(&d[chunk][from..]);
+    for k in 0..n {
+        let w: V = product.at(k);
+        w.put(&mut out[k]);
+        let (r, p) = (V::read(&r[k]), V::read(&p[k]));
+        let (v, u) = (V::read(&product.here[k]), V::read(&u[k]));
+        let d = V::read(&d[k]);
         let (d_r, d_v) = (d * r, d * v);
         r_r = r.times_plus(r, r_r);
         p_v = p.times_plus(v, p_v);
@@ -254,7 +235,7 @@ pub(super) fn add_products<T: Number, V: Packed<Number = T>>(
         v_w = v.times_plus(w, v_w);
         w_w = w.times_plus(w, w_w);
         u_w = u.times_plus(w, u_w);
-    });
+    }
     *sums = [r_r, p_v, r_v, v_v, r_d_r, r_d_v, v_d_v, r_u, u_v, u_u, v_w, w_w, u_w];
 }
 

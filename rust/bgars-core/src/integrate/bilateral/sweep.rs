@@ -17,7 +17,7 @@ use crate::vector::Packed;
 
 /// Rows that one task sweeps; of two more on either side it updates the residual for itself.
 const BAND: usize = 64;
-/// Rows beside the first row of a band that change before the band is done with them: two on either side.
+/// Rows that are kept at the border of two bands: two on either side.
 const EDGE: usize = 4;
 /// Vectors that a band needs of the rows beside it: r, A p, A r and A A p.
 const KEPT: usize = 4;
@@ -75,8 +75,7 @@ pub(super) struct Vectors<T> {
     u: Aligned<T>,
     /// A A p.
     w: Aligned<T>,
-    /// r, v, u and w of the rows beside each band but the first as they were before a sweep: two above and two below its
-    /// first row's upper side.
+    /// At each border of two bands, row by row: r, v, u and w as they were before the sweep.
     edges: Aligned<T>,
 }
 
