@@ -55,7 +55,7 @@ def test_a_chart_far_below_waits_and_then_bears_what_was_chosen(page_path: Path,
     assert not any(drawn(page).values())
     assert page.evaluate("typeof Plotly") == "undefined", "nothing needed it"
     told = page.eval_on_selector_all(CHARTS, "all => all.map(n => getComputedStyle(n, '::before').content)")
-    assert set(told) == {'"drawing the chart ..."'}
+    assert set(told) == {'"drawn when you come near"'}
     index = next(at for at, ball in enumerate(failing().balls) if ball.name == "A3")
     page.locator(f"#ball-{index} button.choose").evaluate("button => button.click()")  # no scrolling
     before = places(page)
