@@ -54,13 +54,10 @@ macro_rules! real {
 real!(f32, Avx512, Avx2, Portable);
 real!(f64, Avx512Double, Avx2Double, PortableDouble);
 
-/// Calls `function::<.., V>(..)` with the vectors `V` of numbers of type `T` that the enclosing function is compiled for;
-/// single numbers where the rows of the grid are too short for any.
+/// Calls `function::<.., V>(..)` with the vectors `V` of a type of numbers that the enclosing function is compiled for; where a
+/// grid comes first, with single numbers if its rows are too short for any.
 macro_rules! on_vectors {
-    ($grid:expr, $number:ty, $function:ident $(::<$generic:ty>)? ($($argument:expr),* $(,)?)) => {{
-        if !$grid.has_lanes() {
-            return $function::<$($generic,)? <$number as Real>::Single>($($argument),*);
-        }
+    ($number:ty, $function:ident $(::<$generic:ty>)? ($($argument:expr),* $(,)?)) => {{
         #[cfg(target_arch = "x86_64")]
         {
             if target_cfg_f!(target_feature = "avx512f") {
@@ -71,6 +68,12 @@ macro_rules! on_vectors {
             }
         }
         $function::<$($generic,)? <$number as Real>::Portable>($($argument),*)
+    }};
+    ($grid:expr, $number:ty, $function:ident $(::<$generic:ty>)? ($($argument:expr),* $(,)?)) => {{
+        if !$grid.has_lanes() {
+            return $function::<$($generic,)? <$number as Real>::Single>($($argument),*);
+        }
+        on_vectors!($number, $function $(::<$generic>)? ($($argument),*))
     }};
 }
 pub(super) use on_vectors;

@@ -1,20 +1,15 @@
-//! Vectors of `f64`: what linear algebra needs.
+//! Vectors of `f64` by their intrinsics: what linear algebra needs.
 
-#[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::{
     __m256d, __m512d, _CMP_GT_OQ, _mm256_add_pd, _mm256_and_pd, _mm256_andnot_pd, _mm256_cmp_pd, _mm256_cvtps_pd,
     _mm256_div_pd, _mm256_fmadd_pd, _mm256_max_pd, _mm256_mul_pd, _mm256_set1_pd, _mm256_setzero_pd, _mm256_sub_pd,
     _mm512_abs_pd, _mm512_add_pd, _mm512_cmp_pd_mask, _mm512_cvtps_pd, _mm512_fmadd_pd, _mm512_maskz_div_pd,
     _mm512_maskz_mov_pd, _mm512_max_pd, _mm512_mul_pd, _mm512_set1_pd, _mm512_setzero_pd, _mm512_sub_pd,
 };
-use std::ops::{Add, Mul, Sub};
-
-use wide::f64x4;
 
 use super::packed::chunked;
 use super::{Packed, first};
 
-#[cfg(target_arch = "x86_64")]
 macro_rules! here {
     ($call:expr) => {{
         // SAFETY: the types are named only where their instructions are compiled in (see `Packed`).
@@ -26,7 +21,6 @@ macro_rules! here {
 }
 
 /// A type by its intrinsics; what takes more than one is written for `x` and `y`.
-#[cfg(target_arch = "x86_64")]
 macro_rules! double {
     (
         $(#[$doc:meta])* $vector:ident($raw:ty), $width:literal, $splat:ident, $add:ident, $sub:ident, $mul:ident,
@@ -88,7 +82,6 @@ macro_rules! double {
     };
 }
 
-#[cfg(target_arch = "x86_64")]
 double!(
     /// Eight doubles of AVX-512.
     Avx512Double(__m512d), 8, _mm512_set1_pd, _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_fmadd_pd,
@@ -97,7 +90,6 @@ double!(
     where_positive _mm512_maskz_mov_pd(_mm512_cmp_pd_mask::<_CMP_GT_OQ>(y, _mm512_setzero_pd()), x),
     inverse _mm512_maskz_div_pd(_mm512_cmp_pd_mask::<_CMP_GT_OQ>(x, _mm512_setzero_pd()), _mm512_set1_pd(1.0), x)
 );
-#[cfg(target_arch = "x86_64")]
 double!(
     /// Four doubles of AVX2 with fused products.
     Avx2Double(__m256d), 4, _mm256_set1_pd, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_fmadd_pd,
@@ -106,72 +98,3 @@ double!(
     where_positive _mm256_and_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(y, _mm256_setzero_pd()), x),
     inverse _mm256_and_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(x, _mm256_setzero_pd()), _mm256_div_pd(_mm256_set1_pd(1.0), x))
 );
-
-/// Four doubles on whatever the processor has.
-#[derive(Clone, Copy)]
-pub(crate) struct PortableDouble(f64x4);
-
-macro_rules! operator {
-    ($trait:ident $method:ident) => {
-        impl $trait for PortableDouble {
-            type Output = Self;
-
-            #[inline(always)]
-            fn $method(self, other: Self) -> Self {
-                Self(self.0.$method(other.0))
-            }
-        }
-    };
-}
-operator!(Add add);
-operator!(Sub sub);
-operator!(Mul mul);
-
-impl Packed for PortableDouble {
-    chunked!(f64, 4, |from| Self(f64x4::new([
-        f64::from(from[0]),
-        f64::from(from[1]),
-        f64::from(from[2]),
-        f64::from(from[3])
-    ])));
-
-    #[inline(always)]
-    fn splat(value: f64) -> Self {
-        Self(f64x4::splat(value))
-    }
-
-    #[inline(always)]
-    fn load(from: &[f64]) -> Self {
-        Self(f64x4::new(first(from)))
-    }
-
-    #[inline(always)]
-    fn write(self, to: &mut [f64]) {
-        to[..Self::WIDTH].copy_from_slice(&self.0.to_array());
-    }
-
-    #[inline(always)]
-    fn times_plus(self, factor: Self, term: Self) -> Self {
-        self * factor + term
-    }
-
-    #[inline(always)]
-    fn magnitude(self) -> Self {
-        Self(self.0.abs())
-    }
-
-    #[inline(always)]
-    fn positive_part(self) -> Self {
-        Self(self.0.fast_max(f64x4::ZERO))
-    }
-
-    #[inline(always)]
-    fn where_positive(self, other: Self) -> Self {
-        Self(self.0 & other.0.simd_gt(f64x4::ZERO))
-    }
-
-    #[inline(always)]
-    fn inverse(self) -> Self {
-        Self((f64x4::ONE / self.0) & self.0.simd_gt(f64x4::ZERO))
-    }
-}

@@ -1,11 +1,12 @@
 //! Vectors of numbers, for the loops where a compiler's own vectors cost a factor of two.
 //!
-//! One body of code, written against [`Vector`], is compiled for each instruction set inside a function that enables it.
+//! One body of code, written against [`Packed`] or [`Vector`], is compiled for each instruction set inside a function that enables it.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
+#[cfg(target_arch = "x86_64")]
 mod doubles;
 #[cfg(target_arch = "x86_64")]
 mod interleaved;
@@ -45,12 +46,11 @@ use operators;
 pub(crate) use avx2::Avx2;
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx512::Avx512;
-pub(crate) use doubles::PortableDouble;
 #[cfg(target_arch = "x86_64")]
 pub(crate) use doubles::{Avx2Double, Avx512Double};
 pub(crate) use one::One;
 pub(crate) use packed::Packed;
-pub(crate) use portable::Portable;
+pub(crate) use portable::{Portable, PortableDouble};
 use subset_sums::SubsetSums;
 
 /// Packed floats, with what an image asks of them.

@@ -1,22 +1,75 @@
-//! Eight floats on whatever the processor has: two vectors of SSE2 or NEON, through the crate `wide`.
+//! Vectors of whatever the processor has, SSE2 or NEON, through the crate `wide`.
 
 use std::ops::{Add, Div, Mul, Sub};
 
-use wide::f32x8;
+use wide::{f32x8, f64x4};
 
 use super::packed::chunked;
 use super::subset_sums::{GROUP, SubsetSums};
 use super::{Packed, Vector, first};
 
-/// Eight floats.
-#[derive(Clone, Copy)]
-pub(crate) struct Portable(f32x8);
-
 const WIDTH: usize = 8;
 
-macro_rules! operator {
-    ($trait:ident $method:ident) => {
-        impl $trait for Portable {
+macro_rules! portable {
+    ($(#[$doc:meta])* $vector:ident($raw:ident), $number:ty, $width:literal, |$floats:ident| $widen:expr) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy)]
+        pub(crate) struct $vector($raw);
+
+        portable!(@operator $vector, Add add);
+        portable!(@operator $vector, Sub sub);
+        portable!(@operator $vector, Mul mul);
+
+        impl Packed for $vector {
+            chunked!($number, $width, |$floats| $widen);
+
+            #[inline(always)]
+            fn splat(value: $number) -> Self {
+                Self($raw::splat(value))
+            }
+
+            #[inline(always)]
+            fn load(from: &[$number]) -> Self {
+                Self($raw::new(first(from)))
+            }
+
+            #[inline(always)]
+            fn write(self, to: &mut [$number]) {
+                to[..$width].copy_from_slice(&self.0.to_array());
+            }
+
+            #[inline(always)]
+            fn times_plus(self, factor: Self, term: Self) -> Self {
+                if cfg!(target_arch = "aarch64") {
+                    Self(self.0.mul_add(factor.0, term.0))
+                } else {
+                    self * factor + term
+                }
+            }
+
+            #[inline(always)]
+            fn magnitude(self) -> Self {
+                Self(self.0.abs())
+            }
+
+            #[inline(always)]
+            fn positive_part(self) -> Self {
+                Self(self.0.fast_max($raw::ZERO))
+            }
+
+            #[inline(always)]
+            fn where_positive(self, other: Self) -> Self {
+                Self(self.0 & other.0.simd_gt($raw::ZERO))
+            }
+
+            #[inline(always)]
+            fn inverse(self) -> Self {
+                Self(($raw::ONE / self.0) & self.0.simd_gt($raw::ZERO))
+            }
+        }
+    };
+    (@operator $vector:ident, $trait:ident $method:ident) => {
+        impl $trait for $vector {
             type Output = Self;
 
             #[inline(always)]
@@ -26,59 +79,21 @@ macro_rules! operator {
         }
     };
 }
-operator!(Add add);
-operator!(Sub sub);
-operator!(Mul mul);
-operator!(Div div);
+
+portable!(
+    /// Eight floats.
+    Portable(f32x8), f32, 8, |from| Self::load(from)
+);
+portable!(@operator Portable, Div div);
+portable!(
+    /// Four doubles.
+    PortableDouble(f64x4), f64, 4, |from| Self(f64x4::new(from.map(f64::from)))
+);
 
 impl Portable {
     #[inline(always)]
     fn from_fn(value: impl FnMut(usize) -> f32) -> Self {
         Self(f32x8::new(std::array::from_fn(value)))
-    }
-}
-
-impl Packed for Portable {
-    chunked!(f32, WIDTH, |from| Self::load(from));
-
-    #[inline(always)]
-    fn splat(value: f32) -> Self {
-        Self(f32x8::splat(value))
-    }
-
-    #[inline(always)]
-    fn load(from: &[f32]) -> Self {
-        Self(f32x8::new(first(from)))
-    }
-
-    #[inline(always)]
-    fn write(self, to: &mut [f32]) {
-        self.store(to, false);
-    }
-
-    #[inline(always)]
-    fn times_plus(self, factor: Self, term: Self) -> Self {
-        if cfg!(target_arch = "aarch64") { Self(self.0.mul_add(factor.0, term.0)) } else { self * factor + term }
-    }
-
-    #[inline(always)]
-    fn magnitude(self) -> Self {
-        Self(self.0.abs())
-    }
-
-    #[inline(always)]
-    fn positive_part(self) -> Self {
-        Self(self.0.fast_max(f32x8::ZERO))
-    }
-
-    #[inline(always)]
-    fn where_positive(self, other: Self) -> Self {
-        Self(self.0 & other.0.simd_gt(f32x8::ZERO))
-    }
-
-    #[inline(always)]
-    fn inverse(self) -> Self {
-        Self((f32x8::ONE / self.0) & self.0.simd_gt(f32x8::ZERO))
     }
 }
 
@@ -97,7 +112,7 @@ impl Vector for Portable {
 
     #[inline(always)]
     fn store(self, to: &mut [f32], _streamed: bool) {
-        to[..WIDTH].copy_from_slice(&self.0.to_array());
+        self.write(to);
     }
 
     #[inline(always)]

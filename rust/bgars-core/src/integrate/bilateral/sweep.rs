@@ -9,6 +9,7 @@
 use multiversion::{multiversion, target::target_cfg_f};
 use rayon::prelude::*;
 
+use super::super::real::{Real, on_vectors};
 use super::frame::Frame;
 use super::number::Number;
 use super::rows::{Factors, Rings, SUMS, Stencil, add_products, advance, flush, multiply, step};
@@ -160,16 +161,7 @@ fn sweep_band<T: Number>(
     own: &mut Own<'_, T>,
     rings: &mut Rings<T>,
 ) -> [f64; SUMS] {
-    #[cfg(target_arch = "x86_64")]
-    {
-        if target_cfg_f!(target_feature = "avx512f") {
-            return sweep_band_with::<T, T::Avx512>(system, steps, edges, band, own, rings);
-        }
-        if target_cfg_f!(target_feature = "avx2") {
-            return sweep_band_with::<T, T::Avx2>(system, steps, edges, band, own, rings);
-        }
-    }
-    sweep_band_with::<T, T::Portable>(system, steps, edges, band, own, rings)
+    on_vectors!(T, sweep_band_with::<T>(system, steps, edges, band, own, rings))
 }
 
 /// A row goes through three stages, each a row behind the one before, whose neighbours it needs.
