@@ -70,11 +70,8 @@ pub fn integrate_bilateral(
     let Field { mask, width, .. } = field;
     check(field, camera, params)?;
     let pixels = Pixels::new(field, camera, params.setting);
-    let frame = pixels.frame();
-    let mut published = match params.setting {
-        Setting::Compatible => Some(Published::new(&frame, params.precision)),
-        Setting::Converged => None,
-    };
+    let frame = (params.setting == Setting::Compatible).then(|| pixels.frame());
+    let mut published = frame.as_ref().map(|frame| Published::new(frame, params.precision));
     let mut z = vec![0.0; pixels.len()];
     let mut shares = even(&pixels);
     let mut fit = Progressed::default();
