@@ -245,6 +245,42 @@ fn a_millionth_takes_ten_iterations_at_any_size_and_fifteen_with_slits() {
 }
 
 #[test]
+fn large_smooth_surfaces_converge_to_the_default_tolerance() {
+    // Large heights, a right side at the border alone: what rounding does to a component's constant shows here first.
+    let size = 2048;
+    let sphere = |row: usize, col: usize| {
+        let [x, y] = [col, row].map(|place| (place as f64 + 0.5) / size as f64 - 0.5);
+        [x, -y, (1.0 - x * x - y * y).sqrt()]
+    };
+    let plane = |_: usize, _: usize| [0.1, 0.0, 0.99f64.sqrt()];
+    let normals = |of: &dyn Fn(usize, usize) -> [f64; 3]| -> Vec<f32> {
+        (0..size * size).flat_map(|pixel| of(pixel / size, pixel % size).map(|component| component as f32)).collect()
+    };
+    for (name, normals) in [("plane", normals(&plane)), ("sphere", normals(&sphere))] {
+        let surface = solve(&normals, &vec![true; size * size], size, Params::default().relative_tolerance);
+        assert!(surface.residual <= Params::default().relative_tolerance);
+        assert!(surface.iterations <= 10, "{name}: {} iterations", surface.iterations);
+    }
+}
+
+#[test]
+fn a_ten_billionth_is_reached_with_directions_in_single_precision() {
+    let size = 700;
+    let params = Params { relative_tolerance: 1e-10, absolute_tolerance: 1e-15, ..Params::default() };
+    let shapes = [("plane", [0.1, 0.0, 0.99f32.sqrt()].repeat(size * size)), ("waves", wavy_normals(size, size, 4))];
+    for (shape, normals) in shapes {
+        for (name, mask) in
+            [("rectangle", mask(size, size, |_, _| true)), ("disc with holes", mask(size, size, disc_with_holes))]
+        {
+            let proceed = &mut |_| ControlFlow::Continue(());
+            let surface = integrate(&normals, &mask, size, None, &params, proceed).unwrap();
+            assert!(surface.residual <= 1e-10, "{shape}, {name}: {}", surface.residual);
+            assert!(surface.iterations <= 16, "{shape}, {name}: {} iterations", surface.iterations);
+        }
+    }
+}
+
+#[test]
 fn a_millionth_takes_fifteen_iterations_on_thin_slits_of_any_kind() {
     for size in [255, 512, 777] {
         let normals = wavy_normals(size, size, 4);

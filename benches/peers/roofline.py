@@ -35,9 +35,9 @@ NORMAL_OPERATIONS = {
 }
 """Of a pixel that loses a light; where a block keeps all of them, the Gram matrix falls away."""
 ITERATION_BYTES = {
-    "direction: z and p read, p written": 2 + 4 + 4,
-    "product: weights and p read, q written": 8 + 4 + 4,
-    "step: x and r read and written, p and q read": 16 + 8,
+    "direction: z and p read, p written": 2 + 2 + 2,
+    "product: weights and p read, q written": 8 + 2 + 4,
+    "step: x and r read and written, p and q read": 16 + 2 + 4,
     "restriction: weights and r read, coarse right side written": 8 + 4 + 1,
     "prolongation: weights, r and coarse solution read, z written": 8 + 4 + 1 + 2,
     "coarser grids: 60 bytes for each of their pixels, a third as many": 20,

@@ -42,9 +42,9 @@ pub(super) fn conjugate_gradients(
     let target = (params.relative_tolerance * scale).max(params.absolute_tolerance * (2.0 * size as f64).sqrt());
     let preconditioner = Multigrid::new(weights);
     let Solution { x, iterations, residual } = &mut solution;
-    let (mut p, mut q): (Vec<f64>, Vec<f64>) = (zeros(size), zeros(size));
-    let mut z: Vec<f32> = zeros(size);
-    let mut r: Vec<f64> = zeros(size);
+    // A direction may be any; what x and r take along it agrees in `f64`.
+    let [mut p, mut z]: [Vec<f32>; 2] = [zeros(size), zeros(size)];
+    let [mut q, mut r]: [Vec<f64>; 2] = [zeros(size), zeros(size)];
     r.par_chunks_mut(BLOCK).zip(b.par_chunks(BLOCK)).for_each(|(r, b)| r.copy_from_slice(b));
     loop {
         let mut norm = square_sum(&r).sqrt();
@@ -65,9 +65,10 @@ pub(super) fn conjugate_gradients(
             let r_z = preconditioner.cycle(&r, &mut z);
             let beta = r_z / r_z_before;
             r_z_before = r_z;
+            let rounded = beta as f32;
             p.par_chunks_mut(BLOCK).zip(z.par_chunks(BLOCK)).for_each(|(p, z)| {
                 for (p, &z) in p.iter_mut().zip(z) {
-                    *p = f64::from(z) + beta * *p;
+                    *p = z + rounded * *p;
                 }
             });
             let p_q = multiply(weights, &p, &mut q);
@@ -81,7 +82,7 @@ pub(super) fn conjugate_gradients(
                 return Err(Error::Cancelled);
             }
         }
-        multiply(weights, x, &mut q);
+        multiply(weights, x.as_slice(), &mut q);
         r.par_chunks_mut(BLOCK).zip(b.par_chunks(BLOCK)).zip(q.par_chunks(BLOCK)).for_each(|((r, b), q)| {
             for ((r, b), q) in r.iter_mut().zip(b).zip(q) {
                 *r = b - q;
@@ -91,13 +92,13 @@ pub(super) fn conjugate_gradients(
 }
 
 /// `x += alpha p`, `r -= alpha q`; returns `<r, r>`.
-fn step(x: &mut [f64], r: &mut [f64], p: &[f64], q: &[f64], alpha: f64) -> f64 {
+fn step(x: &mut [f64], r: &mut [f64], p: &[f32], q: &[f64], alpha: f64) -> f64 {
     let squares: Vec<f64> =
         (x.par_chunks_mut(BLOCK), r.par_chunks_mut(BLOCK), p.par_chunks(BLOCK), q.par_chunks(BLOCK))
             .into_par_iter()
             .map(|(x, r, p, q)| {
-                for (x, p) in x.iter_mut().zip(p) {
-                    *x += alpha * p;
+                for (x, &p) in x.iter_mut().zip(p) {
+                    *x += alpha * f64::from(p);
                 }
                 for (r, q) in r.iter_mut().zip(q) {
                     *r -= alpha * q;

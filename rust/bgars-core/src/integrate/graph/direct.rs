@@ -4,75 +4,97 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::matrix::Rows;
 
-/// The inverse of a small graph's Laplacian by Cholesky factorisation.
+/// The pseudo-inverse of a small graph's Laplacian by Cholesky factorisation.
 #[derive(Debug)]
 pub(super) struct Direct {
     len: usize,
-    /// The nodes with edges; the value of any other is free.
-    nodes: Vec<u32>,
+    /// The nodes with edges by connected component; the value of any other is free.
+    components: Vec<Vec<u32>>,
     factor: Option<Cholesky<f64, Dyn>>,
 }
 
 impl Direct {
     pub fn new(graph: &Rows) -> Self {
-        let nodes: Vec<u32> = (0..graph.len() as u32).filter(|&node| !graph.row(node as usize).0.is_empty()).collect();
-        let place = |node: usize| nodes.binary_search(&(node as u32)).ok();
+        let components = components(graph);
+        let nodes = components.concat();
+        let mut place = vec![None; graph.len()];
+        for (here, &node) in nodes.iter().enumerate() {
+            place[node as usize] = Some(here);
+        }
         let mut matrix = DMatrix::<f64>::zeros(nodes.len(), nodes.len());
         for (here, &node) in nodes.iter().enumerate() {
             for (other, weight) in graph.pairs(node as usize) {
                 let weight = f64::from(weight);
                 matrix[(here, here)] += weight;
-                if let Some(there) = place(other) {
+                if let Some(there) = place[other] {
                     // Half from either end, so that rounding cannot make it asymmetric.
                     matrix[(here, there)] -= 0.5 * weight;
                     matrix[(there, here)] -= 0.5 * weight;
                 }
             }
         }
-        // The constant of a component is free: one of its nodes is tied to zero, and nothing else changes.
-        for first in first_of_components(&matrix) {
+        // The constant of a component is free: its first node is tied to zero, which makes the matrix definite.
+        let mut first = 0;
+        for component in &components {
             matrix[(first, first)] *= 2.0;
+            first += component.len();
         }
-        Self { len: graph.len(), factor: Cholesky::new(matrix), nodes }
+        Self { len: graph.len(), components, factor: Cholesky::new(matrix) }
     }
 
     pub fn len(&self) -> usize {
         self.len
     }
 
-    /// `x = L^-1 b`.
+    /// `x = L^+ b`: of each component, the right side without its mean, and the solution of mean zero.
+    ///
+    /// A right side is consistent but for rounding. Were that rounding kept, its constant would outgrow all else in `x` once
+    /// the residual of a large smooth surface is small.
     pub fn solve(&self, b: &[f32], x: &mut [f32]) {
         x.fill(0.0);
         let Some(factor) = &self.factor else { return };
-        let values = self.nodes.iter().map(|&node| f64::from(b[node as usize]));
-        let mut vector = DVector::from_iterator(self.nodes.len(), values);
+        let nodes = || self.components.iter().flatten().map(|&node| node as usize);
+        let mut vector = DVector::from_iterator(nodes().count(), nodes().map(|node| f64::from(b[node])));
+        self.remove_means(vector.as_mut_slice());
         factor.solve_mut(&mut vector);
-        for (&node, &value) in self.nodes.iter().zip(&vector) {
-            x[node as usize] = value as f32;
+        self.remove_means(vector.as_mut_slice());
+        for (node, &value) in nodes().zip(&vector) {
+            x[node] = value as f32;
+        }
+    }
+
+    /// Subtracts from the values of each component their mean.
+    fn remove_means(&self, mut values: &mut [f64]) {
+        for component in &self.components {
+            let (here, rest) = values.split_at_mut(component.len());
+            let mean = here.iter().sum::<f64>() / here.len() as f64;
+            here.iter_mut().for_each(|value| *value -= mean);
+            values = rest;
         }
     }
 }
 
-/// The first node of each connected component.
-fn first_of_components(matrix: &DMatrix<f64>) -> Vec<usize> {
-    let n = matrix.nrows();
-    let mut seen = vec![false; n];
-    let mut firsts = Vec::new();
-    for first in 0..n {
-        if seen[first] {
+/// The nodes with edges by connected component.
+fn components(graph: &Rows) -> Vec<Vec<u32>> {
+    let mut seen = vec![false; graph.len()];
+    let mut components = Vec::new();
+    for first in 0..graph.len() {
+        if seen[first] || graph.row(first).0.is_empty() {
             continue;
         }
-        firsts.push(first);
         seen[first] = true;
-        let mut open = vec![first];
-        while let Some(node) = open.pop() {
-            for other in 0..n {
-                if !seen[other] && matrix[(node, other)] != 0.0 {
+        let mut component = vec![first as u32];
+        let mut next = 0;
+        while let Some(&node) = component.get(next) {
+            for (other, _) in graph.pairs(node as usize) {
+                if !seen[other] {
                     seen[other] = true;
-                    open.push(other);
+                    component.push(other as u32);
                 }
             }
+            next += 1;
         }
+        components.push(component);
     }
-    firsts
+    components
 }
