@@ -1,9 +1,12 @@
-//! Large arrays on large pages, and arrays that start at a cache line.
+//! Large arrays on large pages, and arrays of numbers on memory that is used again.
 //!
 //! A fresh array of an image costs a page fault every 4 KiB, which can take longer than the work on it. Asked for large pages
 //! (2 MiB), Linux faults 512 times less often; elsewhere, and where they are turned off, nothing changes.
 
 use std::ops::{Deref, DerefMut};
+use std::sync::{Mutex, PoisonError};
+
+use rayon::prelude::*;
 
 /// `len` zeros, on large pages where there are enough of them.
 pub fn zeros<T: bytemuck::Zeroable + Clone>(len: usize) -> Vec<T> {
@@ -13,24 +16,52 @@ pub fn zeros<T: bytemuck::Zeroable + Clone>(len: usize) -> Vec<T> {
 }
 
 /// Numbers that start at a cache line: a load of a whole vector then touches one line, not two.
+///
+/// The memory of large arrays is used again by the next of the same size. The system is told meanwhile that it may take the
+/// pages whenever it wants (`MADV_FREE`), so that they stand in nobody's way.
 #[derive(Debug)]
-pub(crate) struct Aligned<T> {
+pub(crate) struct Aligned<T: Reused> {
     memory: Vec<T>,
     start: usize,
     len: usize,
 }
 
-impl<T: bytemuck::Zeroable + Clone> Aligned<T> {
+impl<T: Reused> Aligned<T> {
     pub fn zeros(len: usize) -> Self {
+        let (mut aligned, is_fresh) = Self::new(len);
+        if !is_fresh {
+            /// Numbers that a task clears.
+            const BLOCK: usize = 1 << 14;
+            aligned.par_chunks_mut(BLOCK).for_each(|block| block.fill(T::zeroed()));
+        }
+        aligned
+    }
+
+    /// Numbers of any value, to be written before they are read.
+    pub fn any(len: usize) -> Self {
+        Self::new(len).0
+    }
+
+    /// An array, and whether it holds zeros.
+    fn new(len: usize) -> (Self, bool) {
         /// Bytes.
         const CACHE_LINE: usize = 64;
-        let memory: Vec<T> = zeros(len + CACHE_LINE / size_of::<T>());
-        let start = memory.as_ptr().align_offset(CACHE_LINE).min(memory.len() - len);
-        Self { memory, start, len }
+        let room = len + CACHE_LINE / size_of::<T>();
+        let kept = take::<T>(room);
+        let is_fresh = kept.is_none();
+        let memory = kept.unwrap_or_else(|| zeros(room));
+        let start = memory.as_ptr().align_offset(CACHE_LINE).min(room - len);
+        (Self { memory, start, len }, is_fresh)
     }
 }
 
-impl<T> Deref for Aligned<T> {
+impl<T: Reused> Drop for Aligned<T> {
+    fn drop(&mut self) {
+        give_back(std::mem::take(&mut self.memory));
+    }
+}
+
+impl<T: Reused> Deref for Aligned<T> {
     type Target = [T];
 
     #[inline(always)]
@@ -39,32 +70,125 @@ impl<T> Deref for Aligned<T> {
     }
 }
 
-impl<T> DerefMut for Aligned<T> {
+impl<T: Reused> DerefMut for Aligned<T> {
     #[inline(always)]
     fn deref_mut(&mut self) -> &mut [T] {
         &mut self.memory[self.start..self.start + self.len]
     }
 }
 
-/// Asks for large pages under memory that has not been touched yet.
-pub(crate) fn prefer_large_pages<T>(memory: &mut [T]) {
+/// Arrays that wait for the next of their size, the longest waiting first.
+pub(crate) type Waiting<T> = Mutex<Vec<Vec<T>>>;
+
+/// A number whose arrays are used again.
+pub(crate) trait Reused: bytemuck::Zeroable + Copy + Send + Sync + 'static {
+    fn waiting() -> &'static Waiting<Self>;
+}
+
+macro_rules! reused {
+    ($($number:ty)*) => {$(
+        impl Reused for $number {
+            fn waiting() -> &'static Waiting<Self> {
+                static WAITING: Waiting<$number> = Mutex::new(Vec::new());
+                &WAITING
+            }
+        }
+    )*};
+}
+reused!(f32 f64);
+
+/// Most arrays of a type that wait: those of two large integrations.
+const WAITING_ARRAYS: usize = 64;
+
+/// Smallest array that waits, in bytes; smaller ones are the allocator's.
+const MIN_WAITING_BYTES: usize = 1 << 17;
+
+/// Smallest array whose pages are lent meanwhile, in bytes: to say so takes longer than to clear a smaller one.
+const MIN_LENT_BYTES: usize = 2 << 20;
+
+/// An array of this length that was given back, if there is one.
+fn take<T: Reused>(len: usize) -> Option<Vec<T>> {
+    if len * size_of::<T>() < MIN_WAITING_BYTES {
+        return None;
+    }
+    let mut waiting = T::waiting().lock().unwrap_or_else(PoisonError::into_inner);
+    // The last one given back may still be in a cache.
+    let index = waiting.iter().rposition(|memory| memory.len() == len)?;
+    Some(waiting.remove(index))
+}
+
+/// Keeps an array for the next of its length, where the system can be told that it may take the pages.
+fn give_back<T: Reused>(mut memory: Vec<T>) {
+    let bytes = size_of_val(&memory[..]);
+    if bytes < MIN_WAITING_BYTES || bytes >= MIN_LENT_BYTES && !lend_pages(&mut memory) {
+        return;
+    }
+    let mut waiting = T::waiting().lock().unwrap_or_else(PoisonError::into_inner);
+    let oldest = (waiting.len() == WAITING_ARRAYS).then(|| waiting.remove(0));
+    waiting.push(memory);
+    drop(waiting);
+    drop(oldest);
+}
+
+/// Tells the system that it may take the pages of an array whose content nobody needs; they then read as zeros. False where
+/// it cannot be told.
+fn lend_pages<T: bytemuck::Zeroable>(memory: &mut [T]) -> bool {
     #[cfg(target_os = "linux")]
     {
-        /// Smallest array for which it pays, in bytes.
-        const MIN_BYTES: usize = 4 << 20;
-        const PAGE: usize = 4096;
-        let bytes = std::mem::size_of_val(memory);
-        if bytes < MIN_BYTES {
-            return;
-        }
-        let start = memory.as_mut_ptr() as usize;
-        let first_page = start.next_multiple_of(PAGE);
-        // SAFETY: the pages lie inside an array that is borrowed mutably, and the advice changes no content.
-        #[allow(unsafe_code)]
-        unsafe {
-            libc::madvise(first_page as *mut libc::c_void, start + bytes - first_page, libc::MADV_HUGEPAGE);
-        }
+        advise(memory, libc::MADV_FREE)
     }
     #[cfg(not(target_os = "linux"))]
-    let _ = memory;
+    {
+        let _ = memory;
+        false
+    }
+}
+
+/// Asks for large pages under memory that has not been touched yet.
+pub(crate) fn prefer_large_pages<T>(memory: &mut [T]) {
+    /// Smallest array for which it pays, in bytes.
+    const MIN_BYTES: usize = 4 << 20;
+    if size_of_val(memory) >= MIN_BYTES {
+        #[cfg(target_os = "linux")]
+        advise(memory, libc::MADV_HUGEPAGE);
+    }
+}
+
+/// Gives the system an advice on the whole pages inside an array; true where it takes it.
+#[cfg(target_os = "linux")]
+fn advise<T>(memory: &mut [T], advice: libc::c_int) -> bool {
+    const PAGE: usize = 4096;
+    let start = memory.as_mut_ptr() as usize;
+    let first_page = start.next_multiple_of(PAGE);
+    let end = (start + size_of_val(memory)) / PAGE * PAGE;
+    if end <= first_page {
+        return false;
+    }
+    // SAFETY: the pages lie inside an array that is borrowed mutably. `MADV_HUGEPAGE` changes no content; `MADV_FREE` may turn
+    // it into zeros, which `lend_pages` asks for with numbers that may be zero alone.
+    #[allow(unsafe_code)]
+    let answer = unsafe { libc::madvise(first_page as *mut libc::c_void, end - first_page, advice) };
+    answer == 0
+}
+
+#[cfg(test)]
+#[allow(clippy::float_cmp)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zeros_are_zeros_on_used_memory() {
+        // A length that no other test has.
+        const LEN: usize = 1_234_567;
+        for _ in 0..3 {
+            let mut numbers = Aligned::<f64>::zeros(LEN);
+            assert_eq!(numbers.as_ptr().align_offset(64), 0);
+            assert!(numbers.iter().all(|&number| number == 0.0));
+            numbers.fill(7.0);
+        }
+        let again = Aligned::<f64>::any(LEN);
+        assert!(again.iter().all(|&number| number == 7.0 || number == 0.0));
+        #[cfg(target_os = "linux")]
+        assert!(f64::waiting().lock().unwrap().iter().all(|memory| memory.len() != again.memory.len()));
+    }
 }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::checkerboard::{BAND_ROWS, Weights, split_row};
-use crate::memory::zeros;
+use crate::memory::Aligned;
 
 /// Halves both sides of a grid.
 ///
@@ -13,8 +13,8 @@ pub(super) fn coarsen(weights: &Weights) -> Weights {
     let grid = weights.grid;
     let n = grid.half();
     let coarse = grid.coarser();
-    let mut rightward = zeros::<f32>(coarse.height * coarse.width);
-    let mut downward = zeros::<f32>(coarse.height * coarse.width);
+    let mut rightward = Aligned::<f32>::any(coarse.height * coarse.width);
+    let mut downward = Aligned::<f32>::zeros(coarse.height * coarse.width);
     rightward.par_chunks_mut(n).zip(downward.par_chunks_mut(n)).enumerate().for_each(
         |(coarse_row, (rightward, downward))| {
             let row = 2 * coarse_row as isize;

@@ -7,9 +7,9 @@ use rayon::prelude::*;
 
 use super::checkerboard::Weights;
 use super::multigrid::Multigrid;
-use super::reduction::{dot, multiply};
+use super::reduction::{dot, multiply, residual_norm};
 use super::{OnProgress, Params, Progress};
-use crate::memory::zeros;
+use crate::memory::Aligned;
 use crate::{Error, Result};
 
 /// Elements of a vector that one task updates.
@@ -17,7 +17,7 @@ const BLOCK: usize = 1 << 14;
 
 /// What [`conjugate_gradients`] found.
 pub(super) struct Solution {
-    pub x: Vec<f64>,
+    pub x: Aligned<f64>,
     pub iterations: usize,
     /// Norm of the true residual, relative to `scale`.
     pub residual: f64,
@@ -35,7 +35,7 @@ pub(super) fn conjugate_gradients(
     on_progress: OnProgress<'_>,
 ) -> Result<Solution> {
     let size = b.len();
-    let mut solution = Solution { x: zeros(size), iterations: 0, residual: 0.0 };
+    let mut solution = Solution { x: Aligned::zeros(size), iterations: 0, residual: 0.0 };
     if scale == 0.0 {
         return Ok(solution);
     }
@@ -43,17 +43,16 @@ pub(super) fn conjugate_gradients(
     let preconditioner = Multigrid::new(weights);
     let Solution { x, iterations, residual } = &mut solution;
     // A direction may be any; what x and r take along it agrees in `f64`.
-    let [mut p, mut z]: [Vec<f32>; 2] = [zeros(size), zeros(size)];
-    let [mut q, mut r]: [Vec<f64>; 2] = [zeros(size), zeros(size)];
+    let [mut p, mut z] = [Aligned::<f32>::any(size), Aligned::any(size)];
+    let [mut q, mut r] = [Aligned::<f64>::any(size), Aligned::any(size)];
     r.par_chunks_mut(BLOCK).zip(b.par_chunks(BLOCK)).for_each(|(r, b)| r.copy_from_slice(b));
+    let mut norm = square_sum(b).sqrt();
     loop {
-        let mut norm = square_sum(&r).sqrt();
         *residual = norm / scale;
         if norm <= target {
             return Ok(solution);
         }
-        let mut r_z_before = f64::INFINITY;
-        p.par_chunks_mut(BLOCK).for_each(|p| p.fill(0.0));
+        let mut r_z_before = None;
         while norm > target {
             let stuck = |iterations, norm: f64| {
                 let tolerance = params.relative_tolerance;
@@ -63,14 +62,16 @@ pub(super) fn conjugate_gradients(
                 return Err(stuck(*iterations, norm));
             }
             let r_z = preconditioner.cycle(&r, &mut z);
-            let beta = r_z / r_z_before;
-            r_z_before = r_z;
-            let rounded = beta as f32;
-            p.par_chunks_mut(BLOCK).zip(z.par_chunks(BLOCK)).for_each(|(p, z)| {
-                for (p, &z) in p.iter_mut().zip(z) {
-                    *p = z + rounded * *p;
-                }
-            });
+            if let Some(before) = r_z_before.replace(r_z) {
+                let beta = (r_z / before) as f32;
+                p.par_chunks_mut(BLOCK).zip(z.par_chunks(BLOCK)).for_each(|(p, z)| {
+                    for (p, &z) in p.iter_mut().zip(z) {
+                        *p = z + beta * *p;
+                    }
+                });
+            } else {
+                std::mem::swap(&mut p, &mut z);
+            }
             let p_q = multiply(weights, &p, &mut q);
             // Both are positive but for rounding; what is lost in it cannot be found again.
             if !(r_z > 0.0 && p_q > 0.0) {
@@ -82,12 +83,15 @@ pub(super) fn conjugate_gradients(
                 return Err(Error::Cancelled);
             }
         }
-        multiply(weights, x.as_slice(), &mut q);
-        r.par_chunks_mut(BLOCK).zip(b.par_chunks(BLOCK)).zip(q.par_chunks(BLOCK)).for_each(|((r, b), q)| {
-            for ((r, b), q) in r.iter_mut().zip(b).zip(q) {
-                *r = b - q;
-            }
-        });
+        norm = residual_norm(weights, x, b);
+        if norm > target {
+            multiply(weights, x, &mut q);
+            r.par_chunks_mut(BLOCK).zip(b.par_chunks(BLOCK)).zip(q.par_chunks(BLOCK)).for_each(|((r, b), q)| {
+                for ((r, b), q) in r.iter_mut().zip(b).zip(q) {
+                    *r = b - q;
+                }
+            });
+        }
     }
 }
 

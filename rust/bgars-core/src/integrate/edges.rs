@@ -3,13 +3,13 @@
 use rayon::prelude::*;
 
 use super::checkerboard::{BAND_ROWS, Grid, Weights, split_row};
-use crate::memory::zeros;
+use crate::memory::Aligned;
 
 /// A right side, or a solution, by colour.
 #[derive(Debug)]
 pub(super) struct Colours {
-    pub reds: Vec<f64>,
-    pub blacks: Vec<f64>,
+    pub reds: Aligned<f64>,
+    pub blacks: Aligned<f64>,
 }
 
 /// Where the edges of a row lead.
@@ -48,7 +48,7 @@ where
     let (width, half) = (grid.width, grid.half());
     let mut weights = Weights::zeros(grid);
     let stride = weights.stride();
-    let mut right = Colours { reds: zeros(grid.half_pixels()), blacks: zeros(grid.half_pixels()) };
+    let mut right = Colours { reds: Aligned::zeros(grid.half_pixels()), blacks: Aligned::zeros(grid.half_pixels()) };
     let bands = weights
         .bands_mut()
         .zip(right.reds.par_chunks_mut(BAND_ROWS * half))

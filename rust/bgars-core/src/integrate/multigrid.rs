@@ -16,7 +16,7 @@ use super::real::Real;
 use super::reduction::{eliminate_blacks, fill_blacks};
 use super::strays::Strays;
 use super::transfer::{prolong, restrict};
-use crate::memory::zeros;
+use crate::memory::Aligned;
 
 /// A grid of at most this many pixels is solved directly.
 const DIRECT_PIXELS: usize = 256;
@@ -49,24 +49,23 @@ struct Vectors {
 struct LevelVectors {
     width: usize,
     half: usize,
-    reds: Vec<f32>,
-    blacks: Vec<f32>,
-    red_solution: Vec<f32>,
+    reds: Aligned<f32>,
+    blacks: Aligned<f32>,
+    red_solution: Aligned<f32>,
     /// Row-major.
-    solution: Vec<f32>,
+    solution: Aligned<f32>,
 }
 
 impl LevelVectors {
     fn new(weights: &Weights) -> Self {
         let grid = weights.grid;
-        let [reds, blacks, red_solution] = std::array::from_fn(|_| zeros(grid.half_pixels()));
         Self {
             width: grid.width,
             half: grid.half(),
-            reds,
-            blacks,
-            red_solution,
-            solution: zeros(grid.height * grid.width),
+            reds: Aligned::zeros(grid.half_pixels()),
+            blacks: Aligned::zeros(grid.half_pixels()),
+            red_solution: Aligned::any(grid.half_pixels()),
+            solution: Aligned::any(grid.height * grid.width),
         }
     }
 

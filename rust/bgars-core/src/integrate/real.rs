@@ -2,13 +2,13 @@
 
 use std::ops::{Add, Mul};
 
-use bytemuck::Zeroable;
+use crate::memory::Reused;
 
 use crate::vector::{One, Packed};
 
 /// A floating-point number of a kernel: `f32` in the preconditioner, `f64` in the operator.
 pub(super) trait Real:
-    Copy + Default + Zeroable + PartialOrd + Send + Sync + From<f32> + Add<Output = Self> + Mul<Output = Self>
+    Reused + Default + PartialOrd + From<f32> + Add<Output = Self> + Mul<Output = Self>
 {
     /// As many as AVX-512 works on at once.
     #[cfg(target_arch = "x86_64")]

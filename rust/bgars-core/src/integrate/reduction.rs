@@ -18,6 +18,25 @@ pub(super) fn multiply<T: Real>(weights: &Weights, x: &[T], out: &mut [f64]) -> 
     products.iter().sum()
 }
 
+/// The norm of `b - S x`.
+pub(super) fn residual_norm(weights: &Weights, x: &[f64], b: &[f64]) -> f64 {
+    let chunk = BAND_ROWS * weights.grid.half();
+    let memory = || ([Ring::new(weights.grid.half()), Ring::new(weights.grid.half())], vec![0.0; chunk]);
+    let squares: Vec<f64> = b
+        .par_chunks(chunk)
+        .enumerate()
+        .map_init(memory, |(rows, product), (band, b)| {
+            let product = &mut product[..b.len()];
+            multiply_band(weights, x, band, rows, product);
+            for (product, b) in product.iter_mut().zip(b) {
+                *product = b - *product;
+            }
+            dot(product, product)
+        })
+        .collect();
+    squares.iter().sum::<f64>().sqrt()
+}
+
 /// `reds += W D_black^-1 blacks`: the right side of the reduced system.
 pub(super) fn eliminate_blacks<T: Real>(weights: &Weights, reds: &mut [T], blacks: &[T]) {
     let chunk = BAND_ROWS * weights.grid.half();

@@ -5,7 +5,7 @@ use super::real::Real;
 use crate::memory::Aligned;
 
 /// The last four padded rows of a quantity that is computed row after row.
-pub(super) struct Ring<T> {
+pub(super) struct Ring<T: Real> {
     rows: Aligned<T>,
     half: usize,
 }

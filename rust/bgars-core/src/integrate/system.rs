@@ -12,6 +12,7 @@ use super::reduction::{eliminate_blacks, multiply};
 use super::solve::check;
 use super::{Difference, Params};
 use crate::Result;
+use crate::memory::Aligned;
 
 /// The normal equations of [`super::integrate`], their black pixels eliminated: `S x = b` on the red ones.
 ///
@@ -20,7 +21,7 @@ use crate::Result;
 #[derive(Debug)]
 pub struct System {
     weights: Weights,
-    right_side: Vec<f64>,
+    right_side: Aligned<f64>,
 }
 
 impl System {

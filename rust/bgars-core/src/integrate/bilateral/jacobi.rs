@@ -9,7 +9,7 @@ use super::number::Number;
 use super::sweep::{Products, Scaled, Steps, Vectors, sweep};
 
 /// The memory of a solver in numbers of type `T`, used again from system to system.
-pub(super) struct Jacobi<'a, T> {
+pub(super) struct Jacobi<'a, T: Number> {
     scaled: Scaled<'a, T>,
     vectors: Vectors<T>,
     /// `D^-1/2`, framed.

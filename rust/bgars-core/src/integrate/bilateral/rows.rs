@@ -12,7 +12,7 @@ use crate::vector::Packed;
 pub(super) const SUMS: usize = 13;
 
 /// The rows on their way through a band.
-pub(super) struct Rings<T> {
+pub(super) struct Rings<T: Number> {
     /// The new r.
     pub r: Ring<T>,
     /// `A p1`, between the two iterations.
@@ -28,7 +28,7 @@ impl<T: Number> Rings<T> {
 }
 
 /// The last three rows of a vector, with zeros at either end.
-pub(super) struct Ring<T> {
+pub(super) struct Ring<T: Number> {
     rows: [Aligned<T>; 3],
     spans: [(usize, usize); 3],
 }

@@ -191,11 +191,11 @@ fn improve(
     eliminate_blacks(&weights, &mut right.reds, &right.blacks);
     let mut residual = before;
     multiply(&weights, &reds, &mut residual);
-    residual.par_iter_mut().zip(&right.reds).for_each(|(residual, b)| *residual = b - *residual);
+    residual.par_iter_mut().zip(right.reds.par_iter()).for_each(|(residual, b)| *residual = b - *residual);
     let inner = Params { relative_tolerance: CONVERGED_TOLERANCE, max_iters: CONVERGED_ITERS, ..Params::default() };
     let state = Progress { iteration: fit.rounds, residual: fit.change };
     let solution = conjugate_gradients(&weights, &residual, scale, &inner, &mut |_: Progress| on_progress(state))?;
-    reds.par_iter_mut().zip(&solution.x).for_each(|(red, change)| *red += change);
+    reds.par_iter_mut().zip(solution.x.par_iter()).for_each(|(red, change)| *red += change);
     fit.inner_iterations += solution.iterations;
     fit.residual = fit.residual.max(solution.residual);
     fill_blacks(&weights, &reds, &mut right.blacks);

@@ -27,7 +27,7 @@ const FLUSH: usize = 8;
 
 /// `I - C` of a 5-point system scaled to a diagonal of ones. Arrays are framed.
 #[derive(Debug)]
-pub(super) struct Scaled<'a, T> {
+pub(super) struct Scaled<'a, T: Number> {
     pub frame: &'a Frame,
     /// `-C` between each pixel and its right neighbour.
     pub right: Aligned<T>,
@@ -66,7 +66,7 @@ pub(super) struct Products {
 
 /// The vectors of conjugate gradient, framed.
 #[derive(Debug)]
-pub(super) struct Vectors<T> {
+pub(super) struct Vectors<T: Number> {
     pub x: Aligned<T>,
     pub p: Aligned<T>,
     pub r: Aligned<T>,

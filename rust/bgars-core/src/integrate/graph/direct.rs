@@ -68,7 +68,9 @@ impl Direct {
         for component in &self.components {
             let (here, rest) = values.split_at_mut(component.len());
             let mean = here.iter().sum::<f64>() / here.len() as f64;
-            here.iter_mut().for_each(|value| *value -= mean);
+            for value in &mut *here {
+                *value -= mean;
+            }
             values = rest;
         }
     }
