@@ -1,8 +1,10 @@
 //! The next coarser grid: its pixels are the corners, its edges what the finer edges conduct between them.
 
+use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::checkerboard::{BAND_ROWS, Weights, split_row};
+use super::checkerboard::{BAND_ROWS, Weights};
+use super::edges::split_weights;
 use crate::memory::Aligned;
 
 /// Halves both sides of a grid.
@@ -15,47 +17,11 @@ pub(super) fn coarsen(weights: &Weights) -> Weights {
     let coarse = grid.coarser();
     let mut rightward = Aligned::<f32>::any(coarse.height * coarse.width);
     let mut downward = Aligned::<f32>::zeros(coarse.height * coarse.width);
-    rightward.par_chunks_mut(n).zip(downward.par_chunks_mut(n)).enumerate().for_each(
-        |(coarse_row, (rightward, downward))| {
-            let row = 2 * coarse_row as isize;
-            // Along the row of the corners: red k, black k, red k + 1.
-            let (right, left) = (&weights.right(row)[1..=n], &weights.left(row)[2..n + 2]);
-            for k in 0..n {
-                rightward[k] = series(right[k], left[k]);
-            }
-            // Beside it: black k, centre k, black k + 1 of the rows above and below.
-            for beside in [row - 1, row + 1] {
-                if !grid.contains(beside) {
-                    continue;
-                }
-                let (left, right) = (&weights.left(beside)[1..=n], &weights.right(beside)[1..=n]);
-                let (down, up) = (&weights.down(beside - 1)[1..n + 2], &weights.up(beside + 1)[1..n + 2]);
-                let (own, other) = if beside < row { (up, down) } else { (down, up) };
-                for k in 0..n {
-                    rightward[k] += series(left[k], right[k]) * share(own, other, k).min(share(own, other, k + 1));
-                }
-            }
-            // Down the column of the corners: red k, black k of the row between, red k.
-            if !grid.contains(row + 2) {
-                return;
-            }
-            let (down, up) = (&weights.down(row)[1..=n], &weights.up(row + 2)[1..=n]);
-            for k in 0..n {
-                downward[k] = series(down[k], up[k]);
-            }
-            // Beside it: black k, centre k, black k of the row of the lower corners. It lies between the corners k and k + 1.
-            let (up, down) = (&weights.up(row + 1)[1..=n], &weights.down(row + 1)[1..=n]);
-            let (top_own, top_next) = (&weights.right(row)[1..=n], &weights.left(row)[2..n + 2]);
-            let (low_own, low_next) = (&weights.right(row + 2)[1..=n], &weights.left(row + 2)[2..n + 2]);
-            for k in 0..n {
-                let path = series(up[k], down[k]);
-                downward[k] += path * share(top_own, top_next, k).min(share(low_own, low_next, k));
-                if k + 1 < n {
-                    downward[k + 1] += path * share(top_next, top_own, k).min(share(low_next, low_own, k));
-                }
-            }
-        },
-    );
+    rightward
+        .par_chunks_mut(n)
+        .zip(downward.par_chunks_mut(n))
+        .enumerate()
+        .for_each(|(coarse_row, (rightward, downward))| conduct(weights, coarse_row, rightward, downward));
     let mut out = Weights::zeros(coarse);
     let (half, stride) = (coarse.half(), out.stride());
     out.bands_mut().enumerate().for_each(|(band, mut sides)| {
@@ -69,11 +35,54 @@ pub(super) fn coarsen(weights: &Weights) -> Weights {
             let upward = if row > 0 { &downward[(row - 1) * coarse.width..][..coarse.width] } else { &none };
             let below = &downward[row * coarse.width..][..coarse.width];
             for (side, pixels) in sides.iter_mut().zip([&leftward, here, upward, below]) {
-                split_row(row, pixels, &mut side[offset * stride..][..half], &mut unused);
+                split_weights(row, pixels, &mut side[offset * stride..][..half], &mut unused);
             }
         }
     });
     out
+}
+
+/// What a row of corners conducts to the right, and to the next row of corners.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn conduct(weights: &Weights, coarse_row: usize, rightward: &mut [f32], downward: &mut [f32]) {
+    let (grid, n) = (weights.grid, rightward.len());
+    let downward = &mut downward[..n];
+    let row = 2 * coarse_row as isize;
+    // Along the row of the corners: red k, black k, red k + 1.
+    let (right, left) = (&weights.right(row)[1..=n], &weights.left(row)[2..n + 2]);
+    for k in 0..n {
+        rightward[k] = series(right[k], left[k]);
+    }
+    // Beside it: black k, centre k, black k + 1 of the rows above and below.
+    for beside in [row - 1, row + 1] {
+        if !grid.contains(beside) {
+            continue;
+        }
+        let (left, right) = (&weights.left(beside)[1..=n], &weights.right(beside)[1..=n]);
+        let (down, up) = (&weights.down(beside - 1)[1..n + 2], &weights.up(beside + 1)[1..n + 2]);
+        let (own, other) = if beside < row { (up, down) } else { (down, up) };
+        for k in 0..n {
+            rightward[k] += series(left[k], right[k]) * share(own, other, k).min(share(own, other, k + 1));
+        }
+    }
+    // Down the column of the corners: red k, black k of the row between, red k.
+    if !grid.contains(row + 2) {
+        return;
+    }
+    let (down, up) = (&weights.down(row)[1..=n], &weights.up(row + 2)[1..=n]);
+    for k in 0..n {
+        downward[k] = series(down[k], up[k]);
+    }
+    // Beside it: black k, centre k, black k of the row of the lower corners. It lies between the corners k and k + 1.
+    let (up, down) = (&weights.up(row + 1)[1..=n], &weights.down(row + 1)[1..=n]);
+    let (top_own, top_next) = (&weights.right(row)[1..=n], &weights.left(row)[2..n + 2]);
+    let (low_own, low_next) = (&weights.right(row + 2)[1..=n], &weights.left(row + 2)[2..n + 2]);
+    for (k, next) in downward[1..].iter_mut().enumerate() {
+        *next += series(up[k], down[k]) * share(top_next, top_own, k).min(share(low_next, low_own, k));
+    }
+    for k in 0..n {
+        downward[k] += series(up[k], down[k]) * share(top_own, top_next, k).min(share(low_own, low_next, k));
+    }
 }
 
 /// Two conductances one after the other.

@@ -1,5 +1,6 @@
 //! A 5-point system from its edges: the one frame of least squares and bilateral integration.
 
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::checkerboard::{BAND_ROWS, Grid, Weights, split_row};
@@ -76,18 +77,38 @@ where
             left[1..].copy_from_slice(&along.weight[..width - 1]);
             let sources = [&left, &along.weight, &above.weight, &below.weight];
             for (side, source) in sides.iter_mut().zip(sources) {
-                split_row(row, source, &mut side[offset * stride..][..half], &mut unused);
+                split_weights(row, source, &mut side[offset * stride..][..half], &mut unused);
             }
-            for k in 0..width {
-                divergence[k] = (above.push[k] - below.push[k]) - along.push[k];
-            }
-            for k in 1..width {
-                divergence[k] += along.push[k - 1];
-            }
+            diverge([&above.push, &along.push, &below.push], &mut divergence);
             let span = offset * half..(offset + 1) * half;
-            split_row(row, &divergence, &mut reds[span.clone()], &mut blacks[span]);
+            split_sources(row, &divergence, &mut reds[span.clone()], &mut blacks[span]);
             std::mem::swap(&mut above, &mut below);
         }
     });
     (weights, right)
+}
+
+/// [`split_row`] of weights.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+pub(super) fn split_weights(row: usize, weights: &[f32], reds: &mut [f32], blacks: &mut [f32]) {
+    split_row(row, weights, reds, blacks);
+}
+
+/// [`split_row`] of a right side.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn split_sources(row: usize, sources: &[f64], reds: &mut [f64], blacks: &mut [f64]) {
+    split_row(row, sources, reds, blacks);
+}
+
+/// What the edges above, along and below a row push onto its pixels, less what they take.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn diverge([above, along, below]: [&[f64]; 3], divergence: &mut [f64]) {
+    let n = divergence.len();
+    let (above, along, below) = (&above[..n], &along[..n], &below[..n]);
+    for k in 0..n {
+        divergence[k] = (above[k] - below[k]) - along[k];
+    }
+    for (divergence, left) in divergence[1..].iter_mut().zip(along) {
+        *divergence += left;
+    }
 }

@@ -1,5 +1,7 @@
 //! The normal equations: a weighted graph Laplacian on the pixels of the mask, its blacks eliminated.
 
+use multiversion::multiversion;
+
 use super::Difference;
 use super::checkerboard::{Grid, Weights};
 use super::edges::{Axis, Colours, EdgeRow, from_edges};
@@ -43,45 +45,40 @@ impl FieldRow {
             }
             None => self.trust.extend(mask.iter().map(|&used| f64::from(u8::from(used)))),
         }
-        let normals = &field.normals[span.start * 3..span.end * 3];
-        let component = |axis: usize, outside: f32| {
-            normals.chunks_exact(3).zip(mask).map(move |(normal, &used)| if used { normal[axis] } else { outside })
-        };
-        for (axis, along) in self.along.iter_mut().enumerate() {
-            along.clear();
-            along.extend(component(axis, 0.0));
+        let [n_x, n_y] = &mut self.along;
+        for component in [&mut *n_x, n_y, &mut self.n_z] {
+            component.resize(mask.len(), 0.0);
         }
-        self.n_z.clear();
-        self.n_z.extend(component(2, 1.0));
+        split_normals(&field.normals[span.start * 3..span.end * 3], mask, [n_x, n_y, &mut self.n_z]);
     }
 }
+
+/// The components of a row of normals.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn split_normals(normals: &[f32], mask: &[bool], [n_x, n_y, n_z]: [&mut [f32]; 3]) {
+    let (normals, n) = (normals.as_chunks::<3>().0, mask.len());
+    let (normals, n_x, n_y, n_z) = (&normals[..n], &mut n_x[..n], &mut n_y[..n], &mut n_z[..n]);
+    for k in 0..n {
+        let [x, y, z] = normals[k];
+        (n_x[k], n_y[k], n_z[k]) = if mask[k] { (x, y, z) } else { (0.0, 0.0, 1.0) };
+    }
+}
+
+/// A row of the field as an edge sees it: the component along its axis, n_z, trust.
+type Ends<'a> = (&'a [f32], &'a [f32], &'a [f64]);
 
 impl EdgeRow {
     /// Edges from pixel k of `a` to pixel k of `b`; `sign` is +1 where the axis grows from `a` to `b`; `lead_is_a` says whose
     /// normal the forward difference takes.
     ///
     /// `n_z^2` is the weight that the paper's rows `n_z dz = -n_x` imply.
-    fn join(
-        &mut self,
-        a: (&[f32], &[f32], &[f64]),
-        b: (&[f32], &[f32], &[f64]),
-        sign: f64,
-        difference: Difference,
-        lead_is_a: bool,
-    ) {
-        let edges = a.2.len().min(b.2.len());
+    fn join(&mut self, a: Ends<'_>, b: Ends<'_>, sign: f64, difference: Difference, lead_is_a: bool) {
         let (share_a, share_b) = match (difference, lead_is_a) {
             (Difference::Trapezoid, _) => (0.5, 0.5),
             (Difference::Forward, true) => (1.0, 0.0),
             (Difference::Forward, false) => (0.0, 1.0),
         };
-        for k in 0..edges {
-            let along = share_a * f64::from(a.0[k]) + share_b * f64::from(b.0[k]);
-            let n_z = (share_a * f64::from(a.1[k]) + share_b * f64::from(b.1[k])).max(MIN_N_Z);
-            let trust = a.2[k] * b.2[k];
-            self.weight[k] = (trust * n_z * n_z) as f32;
-            self.push[k] = -sign * trust * n_z * along;
-        }
+        weigh(a, b, [share_a, share_b], sign, &mut self.weight, &mut self.push);
     }
 
     /// Takes away the edges between regions: from pixel k of the image to pixel k + `stride`, k counted from `first`.
@@ -93,6 +90,23 @@ impl EdgeRow {
                 (*weight, *push) = (0.0, 0.0);
             }
         }
+    }
+}
+
+/// Weight and push of the edges between the pixels of two rows; `shares` are those of their normals in an edge's.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn weigh(a: Ends<'_>, b: Ends<'_>, shares: [f64; 2], sign: f64, weight: &mut [f32], push: &mut [f64]) {
+    let edges = a.2.len().min(b.2.len());
+    let [a_along, a_z, b_along, b_z] = [a.0, a.1, b.0, b.1].map(|values| &values[..edges]);
+    let [a_trust, b_trust] = [a.2, b.2].map(|values| &values[..edges]);
+    let (weight, push) = (&mut weight[..edges], &mut push[..edges]);
+    let [share_a, share_b] = shares;
+    for k in 0..edges {
+        let along = share_a * f64::from(a_along[k]) + share_b * f64::from(b_along[k]);
+        let n_z = (share_a * f64::from(a_z[k]) + share_b * f64::from(b_z[k])).max(MIN_N_Z);
+        let trust = a_trust[k] * b_trust[k];
+        weight[k] = (trust * n_z * n_z) as f32;
+        push[k] = -sign * trust * n_z * along;
     }
 }
 
