@@ -5,6 +5,7 @@
 //! other way round (missing pixels at the end are ones without edges). Then the neighbours of red k above and below are black
 //! k, and left and right are two blacks that follow each other, so every stencil runs over contiguous memory.
 
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::stencil::{Sides, Stencil};
@@ -184,7 +185,7 @@ fn is_odd(row: isize) -> usize {
 }
 
 /// Splits a row of pixels into its reds and blacks.
-#[inline(always)]
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 pub(super) fn split_row<T: Copy>(row: usize, pixels: &[T], reds: &mut [T], blacks: &mut [T]) {
     let (first, second) = if row.is_multiple_of(2) { (reds, blacks) } else { (blacks, reds) };
     for (pair, (first, second)) in pixels.chunks_exact(2).zip(first.iter_mut().zip(second.iter_mut())) {

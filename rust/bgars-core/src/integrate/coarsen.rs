@@ -3,8 +3,7 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::checkerboard::{BAND_ROWS, Weights};
-use super::edges::split_weights;
+use super::checkerboard::{BAND_ROWS, Weights, split_row};
 use crate::memory::Aligned;
 
 /// Halves both sides of a grid.
@@ -35,7 +34,7 @@ pub(super) fn coarsen(weights: &Weights) -> Weights {
             let upward = if row > 0 { &downward[(row - 1) * coarse.width..][..coarse.width] } else { &none };
             let below = &downward[row * coarse.width..][..coarse.width];
             for (side, pixels) in sides.iter_mut().zip([&leftward, here, upward, below]) {
-                split_weights(row, pixels, &mut side[offset * stride..][..half], &mut unused);
+                split_row(row, pixels, &mut side[offset * stride..][..half], &mut unused);
             }
         }
     });

@@ -77,27 +77,15 @@ where
             left[1..].copy_from_slice(&along.weight[..width - 1]);
             let sources = [&left, &along.weight, &above.weight, &below.weight];
             for (side, source) in sides.iter_mut().zip(sources) {
-                split_weights(row, source, &mut side[offset * stride..][..half], &mut unused);
+                split_row(row, source, &mut side[offset * stride..][..half], &mut unused);
             }
             diverge([&above.push, &along.push, &below.push], &mut divergence);
             let span = offset * half..(offset + 1) * half;
-            split_sources(row, &divergence, &mut reds[span.clone()], &mut blacks[span]);
+            split_row(row, &divergence, &mut reds[span.clone()], &mut blacks[span]);
             std::mem::swap(&mut above, &mut below);
         }
     });
     (weights, right)
-}
-
-/// [`split_row`] of weights.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-pub(super) fn split_weights(row: usize, weights: &[f32], reds: &mut [f32], blacks: &mut [f32]) {
-    split_row(row, weights, reds, blacks);
-}
-
-/// [`split_row`] of a right side.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn split_sources(row: usize, sources: &[f64], reds: &mut [f64], blacks: &mut [f64]) {
-    split_row(row, sources, reds, blacks);
 }
 
 /// What the edges above, along and below a row push onto its pixels, less what they take.
