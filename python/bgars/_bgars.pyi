@@ -114,13 +114,15 @@ def integrate_normals(
     weights: NDArray[np.float32] | None,
     regions: NDArray[np.int32] | None,
     *,
+    height_px: NDArray[np.float32],
+    labels: NDArray[np.int32],
     difference: str,
     relative_tolerance: float,
     absolute_tolerance: float,
     max_iters: int,
     threads: int | None,
     progress: Callable[[int, float], object] | None,
-) -> tuple[NDArray[np.float32], NDArray[np.int32], list[tuple[int, int, int]], int, float]: ...
+) -> tuple[list[tuple[int, int, int]], int, float]: ...
 def measure_edges(
     capture: KernelCapture,
     casters: Casters,

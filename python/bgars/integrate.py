@@ -9,6 +9,7 @@ import numpy as np
 from bgars import _bgars
 from bgars.anchoring import anchored
 from bgars.errors import InputError
+from bgars.large_arrays import any_content
 from bgars.records import Component, DepthMap, HeightMap, NormalField
 from bgars.surface_records import BilateralFit, Pinhole
 
@@ -194,8 +195,11 @@ def integrate_normals(
     arrays = (np.ascontiguousarray(vectors), use, _edge_trust(normals, weights, use), regions)
     common: dict[str, Any] = {"threads": threads, "progress": progress}
     if method == "least-squares":
-        height_px, labels, parts, iterations, residual = _bgars.integrate_normals(
+        height_px, labels = any_content(use.shape, np.float32), any_content(use.shape, np.int32)
+        parts, iterations, residual = _bgars.integrate_normals(
             *arrays,
+            height_px=height_px,
+            labels=labels,
             difference=difference,
             relative_tolerance=relative_tolerance,
             absolute_tolerance=absolute_tolerance,

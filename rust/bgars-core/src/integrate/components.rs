@@ -95,6 +95,12 @@ impl Runs {
     /// Index of each pixel's component, row-major; -1 outside the mask.
     pub fn labels(&self) -> Vec<i32> {
         let mut labels = zeros((self.row_starts.len() - 1) * self.width);
+        self.write_labels(&mut labels);
+        labels
+    }
+
+    /// [`Self::labels`] into memory that is there already.
+    pub fn write_labels(&self, labels: &mut [i32]) {
         labels.par_chunks_mut(self.width).enumerate().for_each(|(row, labels)| {
             labels.fill(-1);
             for run in self.row(row) {
@@ -102,7 +108,6 @@ impl Runs {
                 labels[run.start..run.end].fill(run.component as i32);
             }
         });
-        labels
     }
 
     /// Mean of the values of each component; `fill` writes the values of a row, of its runs at least.

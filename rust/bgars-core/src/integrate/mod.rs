@@ -33,7 +33,7 @@ mod transfer;
 pub use bilateral::{BilateralParams, BilateralSurface, Pinhole, Precision, Setting, integrate_bilateral};
 pub use components::Component;
 pub use operator::Field;
-pub use solve::{integrate, integrate_field, usable};
+pub use solve::{integrate, integrate_field, integrate_into, usable};
 pub use system::{Operator, System, VCycle};
 
 use std::ops::ControlFlow;
@@ -82,6 +82,17 @@ pub struct Progress {
 
 /// Callback of [`integrate`]; `Break` stops the solver.
 pub type OnProgress<'a> = &'a mut dyn FnMut(Progress) -> ControlFlow<()>;
+
+/// What [`integrate_into`] says of the surface that it wrote.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The connected components (4-neighbourhood), in the order of their first pixels.
+    pub components: Vec<Component>,
+    /// Iterations of the conjugate gradient.
+    pub iterations: usize,
+    /// True residual norm at the end, relative to the right side.
+    pub residual: f64,
+}
 
 /// A height map in pixels, defined up to one constant a component (chosen so that each has zero mean).
 #[derive(Clone, Debug)]

@@ -10,7 +10,7 @@ use super::conjugate_gradient::{Solution, conjugate_gradients, square_sum};
 use super::fill::fill_corners;
 use super::operator::{Field, assemble};
 use super::reduction::{eliminate_blacks, fill_blacks};
-use super::{OnProgress, Params, Surface};
+use super::{Fit, OnProgress, Params, Surface};
 use crate::memory::zeros;
 use crate::{Error, Result};
 
@@ -73,8 +73,28 @@ pub fn integrate(
 /// # Ok::<(), bgars_core::Error>(())
 /// ```
 pub fn integrate_field(field: Field<'_>, params: &Params, on_progress: OnProgress<'_>) -> Result<Surface> {
+    let (mut height_px, mut labels) = (zeros(field.mask.len()), zeros(field.mask.len()));
+    let fit = integrate_into(field, params, on_progress, &mut height_px, &mut labels)?;
+    let Fit { components, iterations, residual } = fit;
+    Ok(Surface { height_px, labels, components, iterations, residual })
+}
+
+/// [`integrate_field`] into memory that is there already, which may hold anything: fresh pages cost a tenth of a large
+/// integration. After an error the content means nothing.
+///
+/// # Errors
+/// Those of [`integrate`], and memory for another number of pixels than the mask has.
+pub fn integrate_into(
+    field: Field<'_>,
+    params: &Params,
+    on_progress: OnProgress<'_>,
+    height_px: &mut [f32],
+    labels: &mut [i32],
+) -> Result<Fit> {
     check(field, params)?;
     let Field { mask, width, .. } = field;
+    check_length("height_px", mask.len(), height_px.len())?;
+    check_length("labels", mask.len(), labels.len())?;
     let runs = Runs::new(mask, field.regions, width);
     let (mut weights, mut right) = assemble(field, params.difference);
     fill_corners(&mut weights);
@@ -89,7 +109,6 @@ pub fn integrate_field(field: Field<'_>, params: &Params, on_progress: OnProgres
         join_row(row, &reds[span.clone()], &right.blacks[span], values);
     };
     let means = runs.means(fill);
-    let mut height_px = zeros(mask.len());
     height_px.par_chunks_mut(width).enumerate().for_each_init(
         || vec![0.0; width],
         |values, (row, height_px)| {
@@ -103,7 +122,8 @@ pub fn integrate_field(field: Field<'_>, params: &Params, on_progress: OnProgres
             }
         },
     );
-    Ok(Surface { height_px, labels: runs.labels(), components: runs.components, iterations, residual })
+    runs.write_labels(labels);
+    Ok(Fit { components: runs.components, iterations, residual })
 }
 
 /// The pixels whose normal can be integrated: finite, and toward the camera (`n_z > 0`). 3 values a pixel.
@@ -145,21 +165,22 @@ pub(super) fn check(field: Field<'_>, params: &Params) -> Result<()> {
 /// Refuses arrays that do not fit each other, and a mask without a pixel.
 pub(super) fn check_lengths(field: Field<'_>) -> Result<()> {
     let Field { normals, mask, weights, regions, width } = field;
-    let length = |argument, expected, actual| {
-        if expected == actual { Ok(()) } else { Err(Error::LengthMismatch { argument, expected, actual }) }
-    };
-    length("normals", mask.len() * 3, normals.len())?;
+    check_length("normals", mask.len() * 3, normals.len())?;
     if let Some(weights) = weights {
-        length("weights", mask.len(), weights.len())?;
+        check_length("weights", mask.len(), weights.len())?;
     }
     if let Some(regions) = regions {
-        length("regions", mask.len(), regions.len())?;
+        check_length("regions", mask.len(), regions.len())?;
     }
     if width == 0 || !mask.contains(&true) {
         return Err(Error::EmptyMask);
     }
-    length("mask", mask.len().div_ceil(width) * width, mask.len())?;
+    check_length("mask", mask.len().div_ceil(width) * width, mask.len())?;
     Ok(())
+}
+
+fn check_length(argument: &'static str, expected: usize, actual: usize) -> Result<()> {
+    if expected == actual { Ok(()) } else { Err(Error::LengthMismatch { argument, expected, actual }) }
 }
 
 /// Where normals may point.
