@@ -1,5 +1,7 @@
 """Measure bgars against its peers, or read what was measured; rewrite tables and plot of docs/performance.md.
 
+Groups that are not in a given file keep the tables that they have.
+
 python docs/make_performance.py [--json measured.json]
 """
 
@@ -7,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import subprocess
 import sys
 import tempfile
@@ -53,25 +56,32 @@ def measure() -> dict[str, Any]:
         return dict(json.loads(record.read_text(encoding="utf-8")))
 
 
-def page_lines(record: dict[str, Any]) -> list[str]:
-    """Everything between the marks of the page."""
+def section_lines(record: dict[str, Any], group: str) -> list[str]:
+    """The section of a group; nothing for one that was not measured."""
+    tables = group_lines(record["rows"], group)
+    if not tables:
+        return []
     option = " --quick" if record["quick"] else ""
+    lines = [f"## {TITLES[group]}", "", f"`{COMMAND}{option} --only {group}`", "", *tables]
+    if of_kind(record["rows"], "point", group):
+        lines += ["![Seconds a megapixel against megapixels](images/scaling.png)", ""]
+    if of_kind(record["rows"], "roofline", group):
+        lines += [ROOFLINE, ""]
+    return lines
+
+
+def page_text(record: dict[str, Any], before: str) -> str:
+    """Everything between the marks of the page; a group not measured keeps the section it had `before`."""
     lines = [
         f"{machine_line(record['machine'])} Seconds below belong to it; only ratios within one run mean something.",
         "",
     ]
     if record["quick"]:
         lines += ["**Quick run: small sizes only, to see that the tools work.**", ""]
-    for group, title in TITLES.items():
-        tables = group_lines(record["rows"], group)
-        if not tables:
-            continue
-        lines += [f"## {title}", "", f"`{COMMAND}{option} --only {group}`", "", *tables]
-        if of_kind(record["rows"], "point", group):
-            lines += ["![Seconds a megapixel against megapixels](images/scaling.png)", ""]
-        if of_kind(record["rows"], "roofline", group):
-            lines += [ROOFLINE, ""]
-    return lines[:-1]
+    kept = {section.partition("\n")[0]: section for section in re.split(r"(?m)^(?=## )", before)}
+    sections = {group: section_lines(record, group) for group in TITLES}
+    texts = ["\n".join(section) or kept.get(f"## {TITLES[group]}", "") for group, section in sections.items()]
+    return "\n".join(lines + [f"{text.strip()}\n" for text in texts if text])
 
 
 def draw(points: list[dict[str, Any]], path: Path) -> None:
@@ -107,12 +117,11 @@ def draw(points: list[dict[str, Any]], path: Path) -> None:
     plt.close(figure)
 
 
-def rewrite(page: Path, lines: list[str]) -> None:
-    """Put lines between the marks of a page."""
+def rewrite(page: Path, record: dict[str, Any]) -> None:
+    """Put what was measured between the marks of a page."""
     head, rest = page.read_text(encoding="utf-8").split(START)
-    tail = rest.split(END)[1]
-    body = "\n".join(lines)
-    page.write_text(f"{head}{START}\n\n{body}\n\n{END}{tail}", encoding="utf-8")
+    before, tail = rest.split(END)
+    page.write_text(f"{head}{START}\n\n{page_text(record, before)}\n{END}{tail}", encoding="utf-8")
 
 
 def main() -> None:
@@ -126,7 +135,7 @@ def main() -> None:
     points = of_kind(record["rows"], "point")
     if points:
         draw(points, PLOT)
-    rewrite(PAGE, page_lines(record))
+    rewrite(PAGE, record)
 
 
 if __name__ == "__main__":
