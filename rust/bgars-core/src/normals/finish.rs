@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
-use super::confidence::{HALF_DEG, PRIOR_RESIDUAL};
+use super::confidence::HALF_DEG;
 use super::cutoff::{LANES, Lanes};
 use super::lane_solve::Careful;
 use super::out::Out;
+use super::symmetric::Monomials;
 use crate::vector::Vector;
 
 /// `n_z` below which `f32` cannot say whether a facet faces the camera.
@@ -22,11 +23,12 @@ const LEAST: f32 = f32::from_bits(1);
 pub(super) struct Facets<V> {
     /// `g = rho n`, by component.
     pub scaled: [V; 3],
+    /// Of `g`.
+    pub monomials: Monomials<V>,
+    /// With the [prior](super::confidence::PRIOR_RESIDUAL).
     pub squared_residuals: V,
-    /// `tr C`, `C` the inverse in use.
-    pub trace: V,
-    /// `g^T C g`.
-    pub along: V,
+    /// `|g|^2 tr C - g^T C g`, `C` the inverse in use.
+    pub turning: V,
     /// How many lights were kept.
     pub kept: V,
 }
@@ -87,13 +89,13 @@ impl Finished {
     pub fn write<V: Vector>(&mut self, at: usize, facets: &Facets<V>, per_full_scale: f32, place: &mut Place<'_>) {
         const DEG2: f32 =
             ((180.0 / std::f64::consts::PI) * (180.0 / std::f64::consts::PI) / (HALF_DEG * HALF_DEG)) as f32;
-        const PRIOR2: f32 = (PRIOR_RESIDUAL * PRIOR_RESIDUAL) as f32;
         let zero = V::splat(0.0);
         let [x, y, z] = facets.scaled;
-        let square = squared_length(facets.scaled);
+        let square = facets.monomials.square();
         // Not seen from the side, and of a size whose square is in the range of floats; false for NaN.
         let in_range = V::both(square.is_over(V::splat(MIN_SQUARE)), V::splat(1.0 / MIN_SQUARE).is_over(square));
-        let sound = V::bits(V::both(in_range, (z * z).is_over(V::splat(GRAZING * GRAZING) * square)));
+        let sound =
+            V::bits(V::both(in_range, facets.monomials.z_square().is_over(V::splat(GRAZING * GRAZING) * square)));
         if sound != all_bits::<V>() {
             let size = x.at_least(zero - x) + y.at_least(zero - y) + z.at_least(zero - z);
             let is_zero = V::bits(V::splat(LEAST).is_over(size));
@@ -109,9 +111,9 @@ impl Finished {
         (length * V::splat(per_full_scale)).store(&mut place.albedo[at..], streamed);
         // See `confidence`: the squared standard error over the squared half-way point, with one division in all.
         let freedom = facets.kept - V::splat(2.0);
-        let squares = square.times_plus(V::splat(PRIOR2), facets.squared_residuals);
-        let turning = (facets.trace - facets.along * inverse2).at_least(zero);
-        let certainty = freedom / (squares * turning).times_plus(inverse2 * V::splat(DEG2), freedom);
+        let variance = facets.squared_residuals * inverse2;
+        let turning = facets.turning * (inverse2 * V::splat(DEG2));
+        let certainty = freedom / variance.times_plus(turning, freedom);
         V::pick(faces, certainty, zero).store(&mut place.confidence[at..], streamed);
         self.valid |= V::bits(faces) << at;
     }
@@ -121,9 +123,4 @@ impl Finished {
 #[inline(always)]
 pub(super) fn all_bits<V: Vector>() -> u64 {
     (1 << V::WIDTH) - 1
-}
-
-#[inline(always)]
-fn squared_length<V: Vector>([x, y, z]: [V; 3]) -> V {
-    x.times_plus(x, y.times_plus(y, z * z))
 }

@@ -17,10 +17,9 @@ impl<K: Pixel> Kept<K> {
         Self { keys: vec![[K::ZERO; LANES]; lights], bits: vec![[u8::MAX; LANES]; lights.div_ceil(BYTE_LIGHTS)] }
     }
 
-    /// Takes the keys up to the cutoffs; true when these are all.
+    /// Takes the keys up to the cutoffs.
     #[inline(always)]
-    pub fn choose(&mut self, keys: &[&Lanes<K>], cutoffs: &Lanes<K>) -> bool {
-        let mut all = true;
+    pub fn choose(&mut self, keys: &[&Lanes<K>], cutoffs: &Lanes<K>) {
         let bytes = keys.chunks(BYTE_LIGHTS).zip(self.keys.chunks_mut(BYTE_LIGHTS)).zip(&mut self.bits);
         for ((keys, kept_keys), bits) in bytes {
             // Written to once, so that the compiler need not ask what overlaps.
@@ -36,14 +35,12 @@ impl<K: Pixel> Kept<K> {
                 *kept_key = kept;
             }
             *bits = wide.map(K::byte);
-            all &= are_all(bits, keys.len());
         }
-        all
     }
 
-    /// Takes the keys of up to eight lights whose bits are set; true when these are all.
+    /// Takes the keys of up to eight lights whose bits are set.
     #[inline(always)]
-    pub fn choose_bits(&mut self, keys: &[&Lanes<K>], bits: &Lanes<u8>) -> bool {
+    pub fn choose_bits(&mut self, keys: &[&Lanes<K>], bits: Lanes<u8>) {
         for (light, (&&key, kept_key)) in keys.iter().zip(&mut self.keys).enumerate() {
             let mut kept = key;
             for lane in 0..LANES {
@@ -51,8 +48,7 @@ impl<K: Pixel> Kept<K> {
             }
             *kept_key = kept;
         }
-        self.bits[0] = *bits;
-        are_all(bits, keys.len())
+        self.bits[0] = bits;
     }
 
     /// True where a lane keeps a light.
@@ -71,12 +67,6 @@ impl<K: Pixel> Kept<K> {
         }
         counts
     }
-}
-
-/// True when every lane keeps all of up to eight lights.
-#[inline(always)]
-fn are_all(bits: &Lanes<u8>, lights: usize) -> bool {
-    bits.iter().fold(u8::MAX, |everywhere, bits| everywhere & bits) == u8::MAX >> (BYTE_LIGHTS - lights)
 }
 
 /// True for a light that is kept.

@@ -4,10 +4,12 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::confidence::PRIOR_RESIDUAL;
 use super::cutoff::{LANES, Lanes, cutoffs};
 use super::finish::{Facets, Finished, Place, all_bits};
 use super::kept::Kept;
 use super::robust_lanes::{self, RobustLanes};
+use super::symmetric::{ENTRIES, Inverse, Monomials, dot, outer, product, splat, upper};
 use crate::lights::conditioning;
 use crate::vector::Vector;
 use crate::vector::subset_sums::SubsetSums;
@@ -22,9 +24,6 @@ const MIN_ROUGH_CONDITIONING: f32 = 0.1;
 
 /// Lights in one byte of kept bits.
 pub(super) const BYTE_LIGHTS: usize = 8;
-
-/// Entries of a symmetric 3 x 3 matrix: xx, xy, xz, yy, yz, zz.
-pub(super) const ENTRIES: usize = 6;
 
 /// What a block of pixels leaves undone: bit k is set where pixel k wants the careful solver.
 pub(super) type Careful = u64;
@@ -48,10 +47,10 @@ pub(super) struct LaneSolver {
     directions: Vec<[f32; 3]>,
     /// `(L^T L)^-1 L^T`, a column a light.
     pseudo_inverse: Vec<[f32; 3]>,
-    /// `(L^T L)^-1` of all lights.
-    all: [f32; ENTRIES],
-    /// `L^T L` of all lights.
-    gram: [f32; ENTRIES],
+    /// `L^T L` of all lights, less the [prior](PRIOR_RESIDUAL) of the squared residuals.
+    explained: [f32; ENTRIES],
+    /// `(tr C) I - C` of all lights, `C = (L^T L)^-1`.
+    turning: [f32; ENTRIES],
     /// `L^T L` of any lights, a table for every eight of them.
     tables: Vec<SubsetSums<ENTRIES>>,
 }
@@ -68,7 +67,9 @@ impl LaneSolver {
             .chunks(BYTE_LIGHTS)
             .map(|lights| SubsetSums::new(&lights.iter().map(outer).collect::<Vec<_>>()))
             .collect();
-        Some(Self { choice, directions, pseudo_inverse, all: upper(&exact), gram: upper(&gram), tables })
+        let explained = upper(&(gram - Matrix3::from_diagonal_element(PRIOR_RESIDUAL * PRIOR_RESIDUAL)));
+        let turning = upper(&(Matrix3::from_diagonal_element(exact.trace()) - exact));
+        Some(Self { choice, directions, pseudo_inverse, explained, turning, tables })
     }
 
     /// Their number.
@@ -98,9 +99,12 @@ pub(super) fn solve<K: Pixel, V: Vector>(
 ) {
     let Readings { keys, clipped, offset } = *readings;
     (out.careful, out.valid) = (0, 0);
-    let all = match &solver.choice {
-        Choice::All => true,
-        Choice::UpToGap(gap) => kept.choose(keys, &cutoffs(keys, K::gap(*gap))),
+    out.kept = match &solver.choice {
+        Choice::All => [keys.len() as u16; LANES],
+        Choice::UpToGap(gap) => {
+            kept.choose(keys, &cutoffs(keys, K::gap(*gap)));
+            kept.counts()
+        }
         Choice::Window(robust) => {
             let mut bits = [0; LANES];
             let mut values = [[0.0; LANES]; BYTE_LIGHTS];
@@ -110,16 +114,17 @@ pub(super) fn solve<K: Pixel, V: Vector>(
                 }
             }
             out.careful = robust_lanes::choose(robust, &solver.directions, &values, clipped, &mut bits);
-            kept.choose_bits(keys, &bits)
+            kept.choose_bits(keys, bits);
+            kept.counts()
         }
     };
-    out.kept = if all { [keys.len() as u16; LANES] } else { kept.counts() };
+    let lights = V::splat(keys.len() as f32);
     for step in 0..LANES / V::WIDTH {
         let at = step * V::WIDTH;
-        let facets = if all {
+        let count = V::from_words(&out.kept[at..]);
+        let facets = if V::bits(lights.is_over(count)) == 0 {
             solve_all::<K, V>(solver, readings, at)
         } else {
-            let count = V::from_words(&out.kept[at..]);
             let (facets, unusable) = solve_kept::<K, V>(solver, kept, offset, at, count);
             out.careful |= unusable << at;
             facets
@@ -142,13 +147,13 @@ fn solve_all<K: Pixel, V: Vector>(solver: &LaneSolver, readings: &Readings<'_, K
         sums.add(value, column);
     }
     let Sums { vector: scaled, squares } = sums;
-    // |I|^2 - |L g|^2; what rounding leaves is far below the prior of 2 %.
-    let explained = dot(scaled, product(splat6(&solver.gram), scaled));
+    let monomials = Monomials::of(scaled);
     Facets {
         scaled,
-        squared_residuals: (squares - explained).at_least(V::splat(0.0)),
-        trace: V::splat(solver.all[0] + solver.all[3] + solver.all[5]),
-        along: dot(scaled, product(splat6(&solver.all), scaled)),
+        monomials,
+        // |I|^2 - |L g|^2; what rounding leaves is far below the prior of 2 %.
+        squared_residuals: squares - monomials.form(splat(&solver.explained)),
+        turning: monomials.form(splat(&solver.turning)),
         kept: V::splat(readings.keys.len() as f32),
     }
 }
@@ -179,7 +184,6 @@ fn solve_kept<K: Pixel, V: Vector>(
     let inverse = Inverse::of(gram);
     let mut scaled = product(inverse.entries, sums.vector);
     let explained = dot(scaled, sums.vector);
-    let along = dot(scaled, product(inverse.entries, scaled));
     let rough = (inverse.largest * V::splat(MIN_ROUGH_CONDITIONING)).is_over(inverse.determinant);
     if V::bits(rough) != 0 {
         // One step of iterative refinement: what the residuals of the lights correct.
@@ -199,11 +203,15 @@ fn solve_kept<K: Pixel, V: Vector>(
     }
     // Written so that NaN is unusable.
     let usable = V::bits(inverse.determinant.is_over(inverse.largest * V::splat(MIN_LANE_CONDITIONING as f32)));
+    let monomials = Monomials::of(scaled);
+    let square = monomials.square();
+    let trace = inverse.entries[0] + inverse.entries[3] + inverse.entries[5];
     let facets = Facets {
         scaled,
-        squared_residuals: (sums.squares - explained).at_least(V::splat(0.0)),
-        trace: inverse.entries[0] + inverse.entries[3] + inverse.entries[5],
-        along,
+        monomials,
+        squared_residuals: square
+            .times_plus(V::splat((PRIOR_RESIDUAL * PRIOR_RESIDUAL) as f32), sums.squares - explained),
+        turning: trace * square - monomials.form(inverse.entries),
         kept: count,
     };
     (facets, all_bits::<V>() & !usable)
@@ -235,69 +243,6 @@ impl<V: Vector> Sums<V> {
 #[inline(always)]
 fn splat3<V: Vector>(values: &[f32; 3]) -> [V; 3] {
     [V::splat(values[0]), V::splat(values[1]), V::splat(values[2])]
-}
-
-#[inline(always)]
-fn splat6<V: Vector>(values: &[f32; ENTRIES]) -> [V; ENTRIES] {
-    let [xx, xy, xz, yy, yz, zz] = *values;
-    [V::splat(xx), V::splat(xy), V::splat(xz), V::splat(yy), V::splat(yz), V::splat(zz)]
-}
-
-#[inline(always)]
-fn dot<V: Vector>([a, b, c]: [V; 3], [x, y, z]: [V; 3]) -> V {
-    c.times_plus(z, b.times_plus(y, a * x))
-}
-
-/// A symmetric matrix times a vector.
-#[inline(always)]
-fn product<V: Vector>([xx, xy, xz, yy, yz, zz]: [V; ENTRIES], vector: [V; 3]) -> [V; 3] {
-    [dot([xx, xy, xz], vector), dot([xy, yy, yz], vector), dot([xz, yz, zz], vector)]
-}
-
-/// The inverse of a Gram matrix; `determinant / largest` is its conditioning.
-struct Inverse<V> {
-    entries: [V; ENTRIES],
-    determinant: V,
-    /// The largest determinant at this trace.
-    largest: V,
-}
-
-impl<V: Vector> Inverse<V> {
-    #[inline(always)]
-    fn of([xx, xy, xz, yy, yz, zz]: [V; ENTRIES]) -> Self {
-        let cofactors = [
-            minor(yy, zz, yz, yz),
-            minor(xz, yz, xy, zz),
-            minor(xy, yz, xz, yy),
-            minor(xx, zz, xz, xz),
-            minor(xy, xz, xx, yz),
-            minor(xx, yy, xy, xy),
-        ];
-        let determinant = dot([xx, xy, xz], [cofactors[0], cofactors[1], cofactors[2]]);
-        let third = (xx + yy + zz) * V::splat(1.0 / 3.0);
-        let scale = V::splat(1.0) / determinant;
-        let mut entries = cofactors;
-        for entry in &mut entries {
-            *entry = *entry * scale;
-        }
-        Self { entries, determinant, largest: third * third * third }
-    }
-}
-
-/// `a b - c d`.
-#[inline(always)]
-fn minor<V: Vector>(a: V, b: V, c: V, d: V) -> V {
-    a.times_plus(b, (V::splat(0.0) - c) * d)
-}
-
-/// `l l^T`.
-fn outer(&[x, y, z]: &[f32; 3]) -> [f32; ENTRIES] {
-    [x * x, x * y, x * z, y * y, y * z, z * z]
-}
-
-/// The entries of the upper triangle: xx, xy, xz, yy, yz, zz.
-fn upper(matrix: &Matrix3<f64>) -> [f32; ENTRIES] {
-    [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|entry| matrix[entry] as f32)
 }
 
 fn single(vector: &Vector3<f64>) -> [f32; 3] {

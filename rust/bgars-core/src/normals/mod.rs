@@ -18,6 +18,7 @@ mod robust;
 mod robust_lanes;
 mod solve;
 mod specular;
+mod symmetric;
 
 use crate::memory::zeros;
 use crate::{Error, Result};

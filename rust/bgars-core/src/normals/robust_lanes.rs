@@ -7,9 +7,10 @@ use multiversion::{multiversion, target::target_cfg_f};
 
 use super::cutoff::{LANES, Lanes};
 use super::fused::{add_product, dot};
-use super::lane_solve::{BYTE_LIGHTS, Careful, ENTRIES};
+use super::lane_solve::{BYTE_LIGHTS, Careful};
 use super::ranked::{CLIPPED, Ranked, Row, WIDTH};
 use super::robust::{DROPPED_WEIGHT, MIN_DETERMINANT, RobustFilter, cost_factor, prior_squares};
+use super::symmetric::ENTRIES;
 
 /// Costs that differ by less than this share are left to the careful kernel; rounding makes up to 0.6 % in the window that
 /// conditions worst.

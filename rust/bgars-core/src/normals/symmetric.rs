@@ -1,0 +1,105 @@
+//! Symmetric 3 x 3 matrices of many pixels at once, by the entries of the upper triangle: xx, xy, xz, yy, yz, zz.
+
+use nalgebra::Matrix3;
+
+use crate::vector::Vector;
+
+/// Entries of the upper triangle.
+pub(super) const ENTRIES: usize = 6;
+
+/// `a^T b`.
+#[inline(always)]
+pub(super) fn dot<V: Vector>([a, b, c]: [V; 3], [x, y, z]: [V; 3]) -> V {
+    c.times_plus(z, b.times_plus(y, a * x))
+}
+
+/// A matrix times a vector.
+#[inline(always)]
+pub(super) fn product<V: Vector>([xx, xy, xz, yy, yz, zz]: [V; ENTRIES], vector: [V; 3]) -> [V; 3] {
+    [dot([xx, xy, xz], vector), dot([xy, yy, yz], vector), dot([xz, yz, zz], vector)]
+}
+
+/// The products of the components of a vector that every quadratic form of it is a sum of.
+#[derive(Clone, Copy)]
+pub(super) struct Monomials<V>([V; ENTRIES]);
+
+impl<V: Vector> Monomials<V> {
+    #[inline(always)]
+    pub fn of([x, y, z]: [V; 3]) -> Self {
+        let (twice_x, twice_y) = (x + x, y + y);
+        Self([x * x, twice_x * y, twice_x * z, y * y, twice_y * z, z * z])
+    }
+
+    /// `v^T v`.
+    #[inline(always)]
+    pub fn square(&self) -> V {
+        let [xx, _, _, yy, _, zz] = self.0;
+        xx + yy + zz
+    }
+
+    /// `z^2`.
+    #[inline(always)]
+    pub fn z_square(&self) -> V {
+        self.0[5]
+    }
+
+    /// `v^T A v`.
+    #[inline(always)]
+    pub fn form(&self, [xx, xy, xz, yy, yz, zz]: [V; ENTRIES]) -> V {
+        let [first, second, third, fourth, fifth, sixth] = self.0;
+        dot([xx, xy, xz], [first, second, third]) + dot([yy, yz, zz], [fourth, fifth, sixth])
+    }
+}
+
+/// The inverse of a Gram matrix; `determinant / largest` is its conditioning.
+pub(super) struct Inverse<V> {
+    pub entries: [V; ENTRIES],
+    pub determinant: V,
+    /// The largest determinant at this trace.
+    pub largest: V,
+}
+
+impl<V: Vector> Inverse<V> {
+    #[inline(always)]
+    pub fn of([xx, xy, xz, yy, yz, zz]: [V; ENTRIES]) -> Self {
+        let cofactors = [
+            minor(yy, zz, yz, yz),
+            minor(xz, yz, xy, zz),
+            minor(xy, yz, xz, yy),
+            minor(xx, zz, xz, xz),
+            minor(xy, xz, xx, yz),
+            minor(xx, yy, xy, xy),
+        ];
+        let determinant = dot([xx, xy, xz], [cofactors[0], cofactors[1], cofactors[2]]);
+        let third = (xx + yy + zz) * V::splat(1.0 / 3.0);
+        let scale = V::splat(1.0) / determinant;
+        let mut entries = cofactors;
+        for entry in &mut entries {
+            *entry = *entry * scale;
+        }
+        Self { entries, determinant, largest: third * third * third }
+    }
+}
+
+/// `a b - c d`.
+#[inline(always)]
+fn minor<V: Vector>(a: V, b: V, c: V, d: V) -> V {
+    a.times_plus(b, (V::splat(0.0) - c) * d)
+}
+
+/// A vector of each entry.
+#[inline(always)]
+pub(super) fn splat<V: Vector>(entries: &[f32; ENTRIES]) -> [V; ENTRIES] {
+    let [xx, xy, xz, yy, yz, zz] = *entries;
+    [V::splat(xx), V::splat(xy), V::splat(xz), V::splat(yy), V::splat(yz), V::splat(zz)]
+}
+
+/// `l l^T`.
+pub(super) fn outer(&[x, y, z]: &[f32; 3]) -> [f32; ENTRIES] {
+    [x * x, x * y, x * z, y * y, y * z, z * z]
+}
+
+/// The upper triangle of a matrix.
+pub(super) fn upper(matrix: &Matrix3<f64>) -> [f32; ENTRIES] {
+    [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|entry| matrix[entry] as f32)
+}
