@@ -1,11 +1,11 @@
 //! Eight floats of AVX2 with fused products.
 
 use std::arch::x86_64::{
-    __m256, __m256i, _CMP_GT_OQ, _mm_cvtsi64_si128, _mm256_add_ps, _mm256_and_ps, _mm256_and_si256, _mm256_andnot_ps,
-    _mm256_blend_ps, _mm256_blendv_ps, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi32, _mm256_cvtepi32_ps,
-    _mm256_cvtepu8_epi32, _mm256_cvtepu16_epi32, _mm256_div_ps, _mm256_fmadd_ps, _mm256_max_ps, _mm256_movemask_ps,
-    _mm256_mul_ps, _mm256_permutevar8x32_ps, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setzero_ps, _mm256_sqrt_ps,
-    _mm256_srli_epi32, _mm256_stream_ps, _mm256_sub_ps,
+    __m256, __m256i, _CMP_GT_OQ, _mm_cvtsi64_si128, _mm256_add_ps, _mm256_alignr_epi8, _mm256_and_ps, _mm256_and_si256,
+    _mm256_andnot_ps, _mm256_blend_ps, _mm256_blendv_ps, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi32,
+    _mm256_cvtepi32_ps, _mm256_cvtepu8_epi32, _mm256_cvtepu16_epi32, _mm256_div_ps, _mm256_fmadd_ps, _mm256_max_ps,
+    _mm256_movemask_ps, _mm256_mul_ps, _mm256_permute2f128_ps, _mm256_permutevar8x32_ps, _mm256_set1_epi32,
+    _mm256_set1_ps, _mm256_setzero_ps, _mm256_sqrt_ps, _mm256_srli_epi32, _mm256_stream_ps, _mm256_sub_ps,
 };
 
 use super::packed::chunked;
@@ -17,6 +17,9 @@ use super::{Packed, Vector, first, interleaved};
 pub(crate) struct Avx2(__m256);
 
 const WIDTH: usize = 8;
+
+/// The upper half of one vector and the lower half of another.
+const HALVES: i32 = 0x21;
 
 /// Calls intrinsics where they are compiled in.
 macro_rules! here {
@@ -59,6 +62,24 @@ impl Packed for Avx2 {
     #[inline(always)]
     fn times_plus(self, factor: Self, term: Self) -> Self {
         Self(here!(_mm256_fmadd_ps(self.0, factor.0, term.0)))
+    }
+
+    #[inline(always)]
+    fn after_last_of(self, before: Self) -> Self {
+        let middle = here!(_mm256_permute2f128_ps::<HALVES>(before.0, self.0));
+        Self(here!(bytemuck::must_cast(_mm256_alignr_epi8::<12>(
+            bytemuck::must_cast(self.0),
+            bytemuck::must_cast(middle)
+        ))))
+    }
+
+    #[inline(always)]
+    fn before_first_of(self, next: Self) -> Self {
+        let middle = here!(_mm256_permute2f128_ps::<HALVES>(self.0, next.0));
+        Self(here!(bytemuck::must_cast(_mm256_alignr_epi8::<4>(
+            bytemuck::must_cast(middle),
+            bytemuck::must_cast(self.0)
+        ))))
     }
 
     #[inline(always)]

@@ -1,11 +1,11 @@
 //! Sixteen floats of AVX-512.
 
 use std::arch::x86_64::{
-    __m512, __m512i, _CMP_GT_OQ, _mm512_abs_ps, _mm512_add_ps, _mm512_cmp_ps_mask, _mm512_cvtepi32_ps,
-    _mm512_cvtepu8_epi32, _mm512_cvtepu16_epi32, _mm512_div_ps, _mm512_fmadd_ps, _mm512_mask_blend_ps,
-    _mm512_mask_permutexvar_ps, _mm512_maskz_div_ps, _mm512_maskz_mov_ps, _mm512_max_ps, _mm512_mul_ps,
-    _mm512_permutexvar_ps, _mm512_set1_epi32, _mm512_set1_ps, _mm512_setzero_ps, _mm512_sqrt_ps, _mm512_srli_epi32,
-    _mm512_stream_ps, _mm512_sub_ps, _mm512_test_epi32_mask,
+    __m512, __m512i, _CMP_GT_OQ, _mm512_abs_ps, _mm512_add_ps, _mm512_alignr_epi32, _mm512_cmp_ps_mask,
+    _mm512_cvtepi32_ps, _mm512_cvtepu8_epi32, _mm512_cvtepu16_epi32, _mm512_div_ps, _mm512_fmadd_ps,
+    _mm512_mask_blend_ps, _mm512_mask_permutexvar_ps, _mm512_maskz_div_ps, _mm512_maskz_mov_ps, _mm512_max_ps,
+    _mm512_mul_ps, _mm512_permutexvar_ps, _mm512_set1_epi32, _mm512_set1_ps, _mm512_setzero_ps, _mm512_sqrt_ps,
+    _mm512_srli_epi32, _mm512_stream_ps, _mm512_sub_ps, _mm512_test_epi32_mask,
 };
 
 use super::packed::chunked;
@@ -59,6 +59,22 @@ impl Packed for Avx512 {
     #[inline(always)]
     fn times_plus(self, factor: Self, term: Self) -> Self {
         Self(here!(_mm512_fmadd_ps(self.0, factor.0, term.0)))
+    }
+
+    #[inline(always)]
+    fn after_last_of(self, before: Self) -> Self {
+        Self(here!(bytemuck::must_cast(_mm512_alignr_epi32::<15>(
+            bytemuck::must_cast(self.0),
+            bytemuck::must_cast(before.0)
+        ))))
+    }
+
+    #[inline(always)]
+    fn before_first_of(self, next: Self) -> Self {
+        Self(here!(bytemuck::must_cast(_mm512_alignr_epi32::<1>(
+            bytemuck::must_cast(next.0),
+            bytemuck::must_cast(self.0)
+        ))))
     }
 
     #[inline(always)]

@@ -2,13 +2,19 @@
 
 use std::arch::x86_64::{
     __m256d, __m512d, _CMP_GT_OQ, _mm256_add_pd, _mm256_and_pd, _mm256_andnot_pd, _mm256_cmp_pd, _mm256_cvtps_pd,
-    _mm256_div_pd, _mm256_fmadd_pd, _mm256_max_pd, _mm256_mul_pd, _mm256_set1_pd, _mm256_setzero_pd, _mm256_sub_pd,
-    _mm512_abs_pd, _mm512_add_pd, _mm512_cmp_pd_mask, _mm512_cvtps_pd, _mm512_fmadd_pd, _mm512_maskz_div_pd,
-    _mm512_maskz_mov_pd, _mm512_max_pd, _mm512_mul_pd, _mm512_set1_pd, _mm512_setzero_pd, _mm512_sub_pd,
+    _mm256_div_pd, _mm256_fmadd_pd, _mm256_max_pd, _mm256_mul_pd, _mm256_permute2f128_pd, _mm256_set1_pd,
+    _mm256_setzero_pd, _mm256_shuffle_pd, _mm256_sub_pd, _mm512_abs_pd, _mm512_add_pd, _mm512_alignr_epi64,
+    _mm512_cmp_pd_mask, _mm512_cvtps_pd, _mm512_fmadd_pd, _mm512_maskz_div_pd, _mm512_maskz_mov_pd, _mm512_max_pd,
+    _mm512_mul_pd, _mm512_set1_pd, _mm512_setzero_pd, _mm512_sub_pd,
 };
 
 use super::packed::chunked;
 use super::{Packed, first};
+
+/// The upper half of one vector and the lower half of another.
+const HALVES: i32 = 0x21;
+/// Every second number of one vector and of another, in turn: an odd place of the first, an even one of the second.
+const ODD_EVEN: i32 = 0b0101;
 
 macro_rules! here {
     ($call:expr) => {{
@@ -25,7 +31,8 @@ macro_rules! double {
     (
         $(#[$doc:meta])* $vector:ident($raw:ty), $width:literal, $splat:ident, $add:ident, $sub:ident, $mul:ident,
         $fused:ident, $max:ident, $zero:ident, $convert:ident,
-        |$x:ident, $y:ident| magnitude $magnitude:expr, where_positive $where_positive:expr, inverse $inverse:expr
+        |$x:ident, $y:ident| after_last_of $after:expr, before_first_of $before:expr,
+        magnitude $magnitude:expr, where_positive $where_positive:expr, inverse $inverse:expr
     ) => {
         $(#[$doc])*
         #[derive(Clone, Copy)]
@@ -54,6 +61,18 @@ macro_rules! double {
             #[inline(always)]
             fn times_plus(self, factor: Self, term: Self) -> Self {
                 Self(here!($fused(self.0, factor.0, term.0)))
+            }
+
+            #[inline(always)]
+            fn after_last_of(self, before: Self) -> Self {
+                let ($x, $y) = (before.0, self.0);
+                Self(here!($after))
+            }
+
+            #[inline(always)]
+            fn before_first_of(self, next: Self) -> Self {
+                let ($x, $y) = (self.0, next.0);
+                Self(here!($before))
             }
 
             #[inline(always)]
@@ -86,7 +105,9 @@ double!(
     /// Eight doubles of AVX-512.
     Avx512Double(__m512d), 8, _mm512_set1_pd, _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_fmadd_pd,
     _mm512_max_pd, _mm512_setzero_pd, _mm512_cvtps_pd,
-    |x, y| magnitude _mm512_abs_pd(x),
+    |x, y| after_last_of bytemuck::must_cast(_mm512_alignr_epi64::<7>(bytemuck::must_cast(y), bytemuck::must_cast(x))),
+    before_first_of bytemuck::must_cast(_mm512_alignr_epi64::<1>(bytemuck::must_cast(y), bytemuck::must_cast(x))),
+    magnitude _mm512_abs_pd(x),
     where_positive _mm512_maskz_mov_pd(_mm512_cmp_pd_mask::<_CMP_GT_OQ>(y, _mm512_setzero_pd()), x),
     inverse _mm512_maskz_div_pd(_mm512_cmp_pd_mask::<_CMP_GT_OQ>(x, _mm512_setzero_pd()), _mm512_set1_pd(1.0), x)
 );
@@ -94,7 +115,9 @@ double!(
     /// Four doubles of AVX2 with fused products.
     Avx2Double(__m256d), 4, _mm256_set1_pd, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_fmadd_pd,
     _mm256_max_pd, _mm256_setzero_pd, _mm256_cvtps_pd,
-    |x, y| magnitude _mm256_andnot_pd(_mm256_set1_pd(-0.0), x),
+    |x, y| after_last_of _mm256_shuffle_pd::<ODD_EVEN>(_mm256_permute2f128_pd::<HALVES>(x, y), y),
+    before_first_of _mm256_shuffle_pd::<ODD_EVEN>(x, _mm256_permute2f128_pd::<HALVES>(x, y)),
+    magnitude _mm256_andnot_pd(_mm256_set1_pd(-0.0), x),
     where_positive _mm256_and_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(y, _mm256_setzero_pd()), x),
     inverse _mm256_and_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(x, _mm256_setzero_pd()), _mm256_div_pd(_mm256_set1_pd(1.0), x))
 );

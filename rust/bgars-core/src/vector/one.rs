@@ -62,6 +62,16 @@ macro_rules! one {
             }
 
             #[inline(always)]
+            fn after_last_of(self, before: Self) -> Self {
+                before
+            }
+
+            #[inline(always)]
+            fn before_first_of(self, next: Self) -> Self {
+                next
+            }
+
+            #[inline(always)]
             fn magnitude(self) -> Self {
                 Self(self.0.abs())
             }

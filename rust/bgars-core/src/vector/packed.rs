@@ -43,6 +43,10 @@ pub trait Packed: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = 
     fn positive_part(self) -> Self;
     /// 0 where `other` is not above 0.
     fn where_positive(self, other: Self) -> Self;
+    /// The numbers one place further on: the last of `before`, then all but the last of `self`.
+    fn after_last_of(self, before: Self) -> Self;
+    /// The numbers one place back: all but the first of `self`, then the first of `next`.
+    fn before_first_of(self, next: Self) -> Self;
     /// `1 / self`, or 0 where that is not above 0.
     fn inverse(self) -> Self;
 }

@@ -48,6 +48,22 @@ macro_rules! portable {
             }
 
             #[inline(always)]
+            fn after_last_of(self, before: Self) -> Self {
+                let (before, numbers) = (before.0.to_array(), self.0.to_array());
+                let mut shifted = [before[$width - 1]; $width];
+                shifted[1..].copy_from_slice(&numbers[..$width - 1]);
+                Self($raw::new(shifted))
+            }
+
+            #[inline(always)]
+            fn before_first_of(self, next: Self) -> Self {
+                let (numbers, next) = (self.0.to_array(), next.0.to_array());
+                let mut shifted = [next[0]; $width];
+                shifted[..$width - 1].copy_from_slice(&numbers[1..]);
+                Self($raw::new(shifted))
+            }
+
+            #[inline(always)]
             fn magnitude(self) -> Self {
                 Self(self.0.abs())
             }

@@ -78,6 +78,14 @@ where
         assert_eq!(*out, number([0.0, 0.0, 4.0, 0.125][lane % 4]), "{lane}");
     }
 
+    // Shifted by one place, between two vectors.
+    for (shifted, place) in [(x.after_last_of(y), V::WIDTH - 1), (y.before_first_of(x), 1)] {
+        let numbers = [&b[..V::WIDTH], &a[..V::WIDTH]].concat();
+        let mut out = [number(f32::MAX); VALUES];
+        shifted.write(&mut out);
+        assert_eq!(out[..V::WIDTH], numbers[place..][..V::WIDTH]);
+    }
+
     // The second of two vectors of a row.
     let row: Vec<f32> = (0..=2 * V::WIDTH).map(|place| place as f32).collect();
     let numbers: Vec<V::Number> = row.iter().map(|&value| number(value)).collect();

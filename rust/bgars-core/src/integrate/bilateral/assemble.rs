@@ -12,6 +12,8 @@ pub(super) fn assemble(pixels: &Pixels, shares: &Shares, least: f64) -> (Weights
         let mut weight = vec![0.0; grid.width];
         move |axis: Axis, row: usize, edges: &mut EdgeRow| {
             let axis = usize::from(axis == Axis::Below);
+            weight.fill(0.0);
+            edges.push.fill(0.0);
             Edges { pixels, share: &shares[axis], least, axis }.of_row(row, &mut weight, &mut edges.push);
             for (rounded, weight) in edges.weight.iter_mut().zip(&weight) {
                 *rounded = *weight as f32;

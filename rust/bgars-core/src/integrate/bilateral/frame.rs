@@ -1,33 +1,50 @@
 //! Rows of the box in a frame of zeros, and the part of each row that the mask reaches.
 
+use rayon::prelude::*;
+
 use super::number::Number;
 use crate::memory::Aligned;
 
 /// Numbers that a loop takes at a time.
 pub(super) const LANES: usize = 16;
 
+/// Columns without a pixel that are worth another loop over the rest of the row.
+const MIN_GAP: usize = 4 * LANES;
+
 /// The layout of a *framed* array: each row is followed by numbers of no pixel, and a row of such lies before the first and
 /// after the last. They stay zero, so a neighbour can be read without asking whether there is one.
 ///
-/// Rows are widened to whole [`LANES`], and so are the spans of the mask in them: loops over them have no remainder.
+/// Rows are widened to whole [`LANES`], and so are the parts of the mask in them: loops over them have no remainder.
 #[derive(Clone, Debug)]
 pub(super) struct Frame {
-    pub height: usize,
     pub width: usize,
-    /// First and last (exclusive) column of the mask in each row, outward to whole lanes; both 0 in an empty row.
+    /// Columns of the mask from left to right, outward to whole lanes, row by row; smaller gaps than [`MIN_GAP`] count in.
     spans: Vec<(usize, usize)>,
+    /// Where the spans of each row begin, and where the last ones end.
+    rows: Vec<usize>,
 }
 
 impl Frame {
-    /// `used` tells the pixels of the mask by row and column.
-    pub fn new(height: usize, width: usize, used: impl Fn(usize, usize) -> bool) -> Self {
-        let span = |row: usize| {
-            let first = (0..width).find(|&col| used(row, col))?;
-            Some((first, 1 + (0..width).rfind(|&col| used(row, col))?))
-        };
-        let widened = |(lo, hi): (usize, usize)| (lo / LANES * LANES, hi.next_multiple_of(LANES));
-        let spans = (0..height).map(|row| span(row).map_or((0, 0), widened)).collect();
-        Self { height, width: width.next_multiple_of(LANES), spans }
+    /// Of a mask with rows of `width`.
+    pub fn new(mask: &[bool], width: usize) -> Self {
+        let mut spans: Vec<(usize, usize)> = Vec::new();
+        let mut rows = vec![0];
+        for row in mask.chunks(width) {
+            let first = spans.len();
+            for (lanes, _) in row.chunks(LANES).enumerate().filter(|(_, pixels)| pixels.contains(&true)) {
+                let (lo, hi) = (lanes * LANES, (lanes + 1) * LANES);
+                match spans[first..].last_mut() {
+                    Some(last) if lo - last.1 < MIN_GAP => last.1 = hi,
+                    _ => spans.push((lo, hi)),
+                }
+            }
+            rows.push(spans.len());
+        }
+        Self { width: width.next_multiple_of(LANES), spans, rows }
+    }
+
+    pub fn height(&self) -> usize {
+        self.rows.len() - 1
     }
 
     /// Numbers from a pixel to the one below.
@@ -37,7 +54,7 @@ impl Frame {
 
     /// Numbers of a framed array.
     pub fn len(&self) -> usize {
-        LANES + (self.height + 2) * self.stride()
+        LANES + (self.height() + 2) * self.stride()
     }
 
     /// Where a row starts in a framed array.
@@ -45,13 +62,32 @@ impl Frame {
         LANES + (row + 1) * self.stride()
     }
 
+    /// The part of each row of a framed array from the first column of the mask to the last.
+    pub fn parts_mut<'a, T: Send>(&'a self, framed: &'a mut [T]) -> impl IndexedParallelIterator<Item = &'a mut [T]> {
+        let rows = framed[self.start(0)..].par_chunks_mut(self.stride()).take(self.height());
+        rows.enumerate().map(|(row, numbers)| {
+            let (lo, hi) = self.reach(row);
+            &mut numbers[lo..hi]
+        })
+    }
+
     /// A framed array of zeros.
     pub fn zeros<T: Number>(&self) -> Aligned<T> {
         Aligned::zeros(self.len())
     }
 
-    /// The columns of a row that the mask reaches; none in rows outside the box.
-    pub fn span(&self, row: isize) -> (usize, usize) {
-        usize::try_from(row).ok().and_then(|row| self.spans.get(row)).copied().unwrap_or((0, 0))
+    /// The first and last (exclusive) column of the mask in a row; both 0 without one.
+    pub fn reach(&self, row: usize) -> (usize, usize) {
+        let spans = self.spans(row as isize);
+        (spans.first().map_or(0, |first| first.0), spans.last().map_or(0, |last| last.1))
+    }
+
+    /// The columns of the mask in a row, in parts from left to right; none in rows outside the box.
+    #[inline(always)]
+    pub fn spans(&self, row: isize) -> &[(usize, usize)] {
+        match usize::try_from(row) {
+            Ok(row) if row < self.height() => &self.spans[self.rows[row]..self.rows[row + 1]],
+            _ => &[],
+        }
     }
 }

@@ -7,13 +7,14 @@ use super::frame::Frame;
 use super::normal_equations::NormalEquations;
 use super::number::Number;
 use super::sweep::{Products, Scaled, Steps, Vectors, sweep};
+use crate::memory::Aligned;
 
 /// The memory of a solver in numbers of type `T`, used again from system to system.
 pub(super) struct Jacobi<'a, T: Number> {
     scaled: Scaled<'a, T>,
     vectors: Vectors<T>,
     /// `D^-1/2`, framed.
-    roots: Vec<f64>,
+    roots: Aligned<f64>,
 }
 
 impl<'a, T: Number> Jacobi<'a, T> {
@@ -21,7 +22,7 @@ impl<'a, T: Number> Jacobi<'a, T> {
     pub fn new(frame: &'a Frame) -> Self {
         let [right, below, diagonal] = std::array::from_fn(|_| frame.zeros());
         let scaled = Scaled { frame, right, below, diagonal };
-        Self { scaled, vectors: Vectors::new(frame), roots: vec![0.0; frame.len()] }
+        Self { scaled, vectors: Vectors::new(frame), roots: frame.zeros() }
     }
 
     /// Brings `z` (framed) closer to the solution of a system.
@@ -57,32 +58,36 @@ impl<'a, T: Number> Jacobi<'a, T> {
                 break norm_between;
             }
         };
-        z.par_iter_mut()
-            .zip(vectors.x.par_iter())
-            .zip(roots.par_iter())
-            .for_each(|((z, x), root)| *z += x.to_f64() * root);
+        let frame = scaled.frame;
+        frame.parts_mut(z).enumerate().for_each(|(row, z)| {
+            let at = frame.start(row) + frame.reach(row).0;
+            for ((z, x), root) in z.iter_mut().zip(&vectors.x[at..]).zip(&roots[at..]) {
+                *z += x.to_f64() * root;
+            }
+        });
         (iterations, norm)
     }
 
     /// Scales the system to a diagonal of ones, `D^-1/2 A D^-1/2`, and starts at the residual of `z`.
     fn begin(&mut self, system: &NormalEquations, z: &[f64]) {
         let Self { scaled: Scaled { frame, right, below, diagonal }, vectors, roots } = self;
-        let roots_of = |(roots, diagonal): (&mut [f64], &[f64])| inverse_roots(diagonal, roots);
         let stride = frame.stride();
-        roots.par_chunks_mut(stride).zip(system.diagonal.par_chunks(stride)).for_each(roots_of);
-        vectors.clear();
-        let first = frame.start(0);
-        let [right, below, diagonal, r] =
-            [right, below, diagonal, &mut vectors.r].map(|array| array[first..].par_chunks_mut(stride));
-        (right, below, diagonal, r).into_par_iter().take(frame.height).enumerate().for_each(
-            |(row, (right, below, diagonal, r))| {
-                let (lo, hi) = frame.span(row as isize);
-                let at = frame.start(row) + lo;
-                let outs = [&mut right[lo..hi], &mut below[lo..hi], &mut diagonal[lo..hi], &mut r[lo..hi]];
-                scale_row(system, roots, z, at, stride, outs);
+        let first_of = |row: usize| frame.start(row) + frame.reach(row).0;
+        frame
+            .parts_mut(roots)
+            .enumerate()
+            .for_each(|(row, roots)| inverse_roots(&system.diagonal[first_of(row)..], roots));
+        let [right, below, diagonal] = [right, below, diagonal].map(|array| frame.parts_mut(array));
+        (right, below, diagonal, vectors.rows_mut(frame)).into_par_iter().enumerate().for_each(
+            |(row, (right, below, diagonal, [x, p, r, v, u, w]))| {
+                scale_row(system, roots, z, first_of(row), stride, [right, below, diagonal, r]);
+                p.copy_from_slice(r);
+                for zeros in [x, v, u, w] {
+                    zeros.fill(T::default());
+                }
             },
         );
-        vectors.p.copy_from_slice(&vectors.r);
+        vectors.keep_edges(frame);
     }
 }
 
@@ -156,8 +161,9 @@ mod tests {
     fn system(height: usize, width: usize) -> (Frame, NormalEquations) {
         let number = |seed: usize| ((seed * 2_654_435_761) >> 7) % 1000;
         let used = |row: usize, col: usize| number(row * width + col) >= 150;
-        let frame = Frame::new(height, width, used);
-        let [mut right, mut below, mut diagonal, mut source] = std::array::from_fn(|_| vec![0.0; frame.len()]);
+        let mask: Vec<bool> = (0..height * width).map(|at| used(at / width, at % width)).collect();
+        let frame = Frame::new(&mask, width);
+        let [mut right, mut below, mut diagonal, mut source] = std::array::from_fn(|_| frame.zeros());
         let mut join = |a: usize, b: usize, weights: &mut [f64]| {
             weights[a] = number(a * b) as f64 / 1000.0;
             diagonal[a] += weights[a];
@@ -200,7 +206,7 @@ mod tests {
     /// Preconditioned conjugate gradient as in the textbook.
     fn textbook(frame: &Frame, system: &NormalEquations, x: &mut [f64], target: f64, max_iters: usize) -> usize {
         let precondition = |r: &[f64]| -> Vec<f64> {
-            r.iter().zip(&system.diagonal).map(|(r, &d)| if d > 0.0 { r / d } else { 0.0 }).collect()
+            r.iter().zip(&system.diagonal[..]).map(|(r, &d)| if d > 0.0 { r / d } else { 0.0 }).collect()
         };
         let mut r: Vec<f64> = system.source.iter().zip(multiply(frame, system, x)).map(|(b, ax)| b - ax).collect();
         let mut p = precondition(&r);
@@ -253,7 +259,7 @@ mod tests {
         let (frame, system) = system(40, 50);
         let mut z = vec![0.0; frame.len()];
         Jacobi::<f32>::new(&frame).improve(&system, &mut z, 1e-6, 100, || true);
-        assert!(z.iter().zip(&system.diagonal).all(|(z, &d)| d > 0.0 || *z == 0.0));
+        assert!(z.iter().zip(&system.diagonal[..]).all(|(z, &d)| d > 0.0 || *z == 0.0));
         assert!(z.iter().any(|z| *z != 0.0));
     }
 }

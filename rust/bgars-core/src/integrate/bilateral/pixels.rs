@@ -1,5 +1,8 @@
 //! What stays the same from one re-weighting to the next: normals and trust, cropped to the mask.
 
+use std::ops::Range;
+
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::super::checkerboard::Grid;
@@ -7,7 +10,7 @@ use super::super::operator::Field;
 use super::Setting;
 use super::camera::Pinhole;
 use super::frame::Frame;
-use crate::memory::zeros;
+use crate::memory::{Aligned, zeros};
 
 /// The bounding box of the mask, its first row and column in the image.
 #[derive(Clone, Copy, Debug)]
@@ -38,14 +41,16 @@ impl Crop {
 pub(super) struct Pixels {
     pub crop: Crop,
     /// Components of the normals along x and y.
-    pub n: [Vec<f64>; 2],
+    pub n: [Aligned<f64>; 2],
     /// Factors of the differences along x and y.
-    pub g: [Vec<f64>; 2],
+    pub g: [Aligned<f64>; 2],
     /// How much each pixel is trusted.
-    pub trust: Vec<f64>,
+    pub trust: Aligned<f64>,
     /// 1 where a pixel is joined to its right neighbour, or to the one below, else 0.
-    pub ties: [Vec<f64>; 2],
+    pub ties: [Aligned<f64>; 2],
     mask: Vec<bool>,
+    /// The columns of each row from the first to the last pixel of the mask.
+    spans: Vec<Range<usize>>,
 }
 
 impl Pixels {
@@ -53,8 +58,8 @@ impl Pixels {
         let crop = Crop::around(field.mask, field.width);
         let Grid { height, width } = crop.grid;
         let pixels = height * width;
-        let [mut n_x, mut n_y, mut g_x, mut g_y, mut trust] = std::array::from_fn(|_| vec![0.0; pixels]);
-        let [mut tied_right, mut tied_below] = std::array::from_fn(|_| vec![0.0; pixels]);
+        let [mut n_x, mut n_y, mut g_x, mut g_y, mut trust] = std::array::from_fn(|_| Aligned::zeros(pixels));
+        let [mut tied_right, mut tied_below] = std::array::from_fn(|_| Aligned::zeros(pixels));
         let mut mask = vec![false; pixels];
         let number = |at: usize| field.regions.map_or(0, |regions| regions[at]);
         let rows = (
@@ -87,7 +92,8 @@ impl Pixels {
                 mask[k] = true;
             }
         });
-        Self { crop, n: [n_x, n_y], g: [g_x, g_y], trust, ties: [tied_right, tied_below], mask }
+        let spans = mask.chunks(width).map(span_of).collect();
+        Self { crop, n: [n_x, n_y], g: [g_x, g_y], trust, ties: [tied_right, tied_below], mask, spans }
     }
 
     /// Pixels of the box.
@@ -97,8 +103,12 @@ impl Pixels {
 
     /// The frame of the box.
     pub fn frame(&self) -> Frame {
-        let Grid { height, width } = self.crop.grid;
-        Frame::new(height, width, |row, col| self.used(row * width + col))
+        Frame::new(&self.mask, self.crop.grid.width)
+    }
+
+    /// The columns of a row that the mask reaches, from the first to the last.
+    pub fn span(&self, row: usize) -> Range<usize> {
+        self.spans[row].clone()
     }
 
     /// True for a pixel of the mask.
@@ -124,6 +134,13 @@ impl Pixels {
     }
 }
 
+/// The columns of a row from its first pixel to its last; none without one.
+fn span_of(row: &[bool]) -> Range<usize> {
+    row.iter()
+        .position(|&used| used)
+        .map_or(0..0, |first| first..1 + row.iter().rposition(|&used| used).unwrap_or(first))
+}
+
 /// The edges along an axis: to the right (0), or to the pixel below (1).
 #[derive(Debug)]
 pub(super) struct Edges<'a> {
@@ -136,33 +153,34 @@ pub(super) struct Edges<'a> {
 }
 
 impl Edges<'_> {
-    /// Weights of a row's edges, and how much of the right side each pushes from its first pixel to its second.
+    /// Weights of a row's edges, and how much of the right side each pushes from its first pixel to its second; columns
+    /// outside the row's span, which have none, are left alone.
     pub fn of_row(&self, row: usize, weight: &mut [f64], push: &mut [f64]) {
-        let Pixels { crop: Crop { grid, .. }, n, g, trust, ties, .. } = self.pixels;
-        let first = row * grid.width;
+        let Pixels { crop: Crop { grid, .. }, .. } = self.pixels;
+        // Nothing ties a pixel to one that is not there: not the last row, nor the last column.
+        let span = if self.axis == 1 && row + 1 == grid.height { 0..0 } else { self.pixels.span(row) };
+        let span = span.start..span.end.min(if self.axis == 0 { grid.width - 1 } else { grid.width }).max(span.start);
         let stride = if self.axis == 0 { 1 } else { grid.width };
-        // Without a row below, or right of the last pixel, nothing is tied.
-        let edges =
-            if first + stride < self.pixels.len() { grid.width.min(self.pixels.len() - first - stride) } else { 0 };
-        weight[edges..].fill(0.0);
-        push[edges..].fill(0.0);
-        let (weight, push) = (&mut weight[..edges], &mut push[..edges]);
-        let near = [&trust[first..], &self.share[first..], &n[self.axis][first..], &g[self.axis][first..]]
-            .map(|row| &row[..edges]);
-        let first_far = first + stride;
-        let far =
-            [&trust[first_far..], &self.share[first_far..], &n[self.axis][first_far..], &g[self.axis][first_far..]]
-                .map(|row| &row[..edges]);
-        let tied = &ties[self.axis][first..][..edges];
-        // Ahead is to the right and up: the edge is ahead of its left pixel, and of its lower one.
-        let (flip, sign) = if self.axis == 0 { (0.0, -1.0) } else { (1.0, 1.0) };
-        let turn = 1.0 - 2.0 * flip;
-        for k in 0..edges {
-            let share = |side: [&[f64]; 4]| side[1][k].max(self.least).min(1.0 - self.least);
-            let pull_a = tied[k] * near[0][k] * (flip + turn * share(near)) * near[3][k];
-            let pull_b = tied[k] * far[0][k] * ((1.0 - flip) - turn * share(far)) * far[3][k];
-            weight[k] = pull_a * near[3][k] + pull_b * far[3][k];
-            push[k] = sign * (pull_a * near[2][k] + pull_b * far[2][k]);
-        }
+        edges_of(self, row * grid.width + span.start, stride, &mut weight[span.clone()], &mut push[span]);
+    }
+}
+
+/// Weights and pushes of the edges from the pixels from `first` on, to those `stride` further.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn edges_of(edges: &Edges<'_>, first: usize, stride: usize, weight: &mut [f64], push: &mut [f64]) {
+    let Edges { pixels: Pixels { n, g, trust, ties, .. }, share, least, axis } = edges;
+    let (count, least, most) = (weight.len(), *least, 1.0 - least);
+    let push = &mut push[..count];
+    let [[trust_a, share_a, n_a, g_a], [trust_b, share_b, n_b, g_b]] = [first, first + stride]
+        .map(|first| [&trust[..], share, &n[*axis], &g[*axis]].map(|numbers| &numbers[first..][..count]));
+    let tied = &ties[*axis][first..][..count];
+    // Ahead is to the right and up: the edge is ahead of its left pixel, and of its lower one.
+    let (flip, turn, sign) = if *axis == 0 { (0.0, 1.0, -1.0) } else { (1.0, -1.0, 1.0) };
+    for k in 0..count {
+        let (ahead_a, ahead_b) = (share_a[k].max(least).min(most), share_b[k].max(least).min(most));
+        let pull_a = tied[k] * trust_a[k] * (flip + turn * ahead_a) * g_a[k];
+        let pull_b = tied[k] * trust_b[k] * ((1.0 - flip) - turn * ahead_b) * g_b[k];
+        weight[k] = pull_a * g_a[k] + pull_b * g_b[k];
+        push[k] = sign * (pull_a * n_a[k] + pull_b * n_b[k]);
     }
 }

@@ -11,6 +11,7 @@ use super::normal_equations::NormalEquations;
 use super::pixels::Pixels;
 use super::reweigh::Shares;
 use super::solve::{OnReweigh, Progressed};
+use crate::memory::Aligned;
 use crate::{Error, Result};
 
 /// Largest relative residual of an inner solve.
@@ -26,7 +27,7 @@ pub(super) struct Published<'a> {
     system: NormalEquations,
     solver: Solver<'a>,
     /// The surface, framed.
-    z: Vec<f64>,
+    z: Aligned<f64>,
 }
 
 enum Solver<'a> {
@@ -40,7 +41,7 @@ impl<'a> Published<'a> {
             Precision::Double => Solver::Double(Jacobi::new(frame)),
             Precision::Single => Solver::Single(Jacobi::new(frame)),
         };
-        Self { frame, system: NormalEquations::new(frame), solver, z: vec![0.0; frame.len()] }
+        Self { frame, system: NormalEquations::new(frame), solver, z: frame.zeros() }
     }
 
     /// Brings `z` (row-major in the box) closer to the solution of the system for some shares.
@@ -61,7 +62,10 @@ impl<'a> Published<'a> {
         }
         let (first, stride, width) = (frame.start(0), frame.stride(), pixels.crop.grid.width);
         let rows = framed[first..].par_chunks_mut(stride).zip(z.par_chunks(width));
-        rows.for_each(|(framed, z)| framed[..width].copy_from_slice(z));
+        rows.enumerate().for_each(|(row, (framed, z))| {
+            let span = pixels.span(row);
+            framed[span.clone()].copy_from_slice(&z[span]);
+        });
         let mut stopped = false;
         let mut done = 0;
         let state = Progress { iteration: fit.rounds, residual: fit.change };
@@ -78,7 +82,10 @@ impl<'a> Published<'a> {
             return Err(Error::Cancelled);
         }
         let rows = z.par_chunks_mut(width).zip(framed[first..].par_chunks(stride));
-        rows.for_each(|(z, framed)| z.copy_from_slice(&framed[..width]));
+        rows.enumerate().for_each(|(row, (z, framed))| {
+            let span = pixels.span(row);
+            z[span.clone()].copy_from_slice(&framed[span]);
+        });
         fit.inner_iterations += iterations;
         fit.residual = fit.residual.max(left / scale);
         Ok(())

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::super::checkerboard::BAND_ROWS;
 use super::pixels::Pixels;
+use crate::memory::Aligned;
 
 /// Largest argument of the sigmoid, either way: beyond, one side has all but `e^-70`, which is still a normal number in `f32`.
 const MAX_ARGUMENT: f64 = 70.0;
@@ -12,11 +13,16 @@ const MAX_ARGUMENT: f64 = 70.0;
 const LANES: usize = 8;
 
 /// Weights of the differences to the right and upward; the opposite ones have the rest.
-pub(super) type Shares = [Vec<f64>; 2];
+pub(super) type Shares = [Aligned<f64>; 2];
 
 /// Both sides of every pixel alike: where the iteration starts.
 pub(super) fn even(pixels: &Pixels) -> Shares {
-    [vec![0.5; pixels.len()], vec![0.5; pixels.len()]]
+    let halves = || {
+        let mut halves = Aligned::any(pixels.len());
+        halves.fill(0.5);
+        halves
+    };
+    [halves(), halves()]
 }
 
 /// Sets the shares by the surface `z` (row-major in the box) and returns the energy with them (Cao et al. 2022, eqs. 11 and 16).
@@ -34,11 +40,9 @@ pub(super) fn reweigh(pixels: &Pixels, z: &[f64], k: f64, shares: &mut Shares) -
             let mut steps = Steps { right: vec![0.0; width + 1], up: vec![0.0; width], down: vec![0.0; width] };
             let rows = rightward.chunks_mut(width).zip(upward.chunks_mut(width)).enumerate();
             rows.map(|(row, (rightward, upward))| {
-                let first = (band * BAND_ROWS + row) * width;
-                steps.load(pixels, z, first);
-                let right = Side { ahead: &steps.right[1..], behind: &steps.right[..width], axis: 0 };
-                let up = Side { ahead: &steps.up, behind: &steps.down, axis: 1 };
-                row_of(pixels, first, &right, k, rightward) + row_of(pixels, first, &up, k, upward)
+                let row = band * BAND_ROWS + row;
+                let span = pixels.span(row);
+                reweigh_row(pixels, z, row, k, &mut steps, [&mut rightward[span.clone()], &mut upward[span]])
             })
             .sum()
         })
@@ -46,7 +50,22 @@ pub(super) fn reweigh(pixels: &Pixels, z: &[f64], k: f64, shares: &mut Shares) -
     energies.iter().sum()
 }
 
-/// Height differences of a row, zero where nothing is joined.
+/// Sets the shares of a row's span and returns their energy.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn reweigh_row(pixels: &Pixels, z: &[f64], row: usize, k: f64, steps: &mut Steps, shares: [&mut [f64]; 2]) -> f64 {
+    let span = pixels.span(row);
+    let (first, count) = (row * pixels.crop.grid.width + span.start, span.len());
+    if count == 0 {
+        return 0.0;
+    }
+    steps.load(pixels, z, first, count);
+    let [rightward, upward] = shares;
+    let right = Side { ahead: &steps.right[1..], behind: &steps.right, axis: 0 };
+    let up = Side { ahead: &steps.up, behind: &steps.down, axis: 1 };
+    row_of(pixels, first, &right, k, rightward) + row_of(pixels, first, &up, k, upward)
+}
+
+/// Height differences along the span of a row, zero where nothing is joined.
 struct Steps {
     /// To the right of each pixel, after one zero for what is left of the first.
     right: Vec<f64>,
@@ -57,23 +76,33 @@ struct Steps {
 }
 
 impl Steps {
-    /// The row whose first pixel is `first`.
-    fn load(&mut self, pixels: &Pixels, z: &[f64], first: usize) {
+    /// `count` pixels of a row from `first` on.
+    #[inline(always)]
+    fn load(&mut self, pixels: &Pixels, z: &[f64], first: usize, count: usize) {
         let width = pixels.crop.grid.width;
         let [right, below] = &pixels.ties;
-        let z_row = &z[first..first + width];
-        for (k, pair) in z_row.windows(2).enumerate() {
-            self.right[k + 1] = right[first + k] * (pair[1] - pair[0]);
+        let here = &z[first..first + count];
+        let (steps, ties) = (&mut self.right[1..=count], &right[first..first + count]);
+        for k in 0..count - 1 {
+            steps[k] = ties[k] * (here[k + 1] - here[k]);
         }
-        if first >= width {
-            let (above, ties) = (&z[first - width..first], &below[first - width..first]);
-            for k in 0..width {
-                self.up[k] = ties[k] * (above[k] - z_row[k]);
+        steps[count - 1] = 0.0;
+        let (up, down) = (&mut self.up[..count], &mut self.down[..count]);
+        if let Some(above) = first.checked_sub(width) {
+            let (above, ties) = (&z[above..above + count], &below[above..above + count]);
+            for k in 0..count {
+                up[k] = ties[k] * (above[k] - here[k]);
             }
+        } else {
+            up.fill(0.0);
         }
-        self.down.fill(0.0);
-        for (k, z_below) in z[first + width..].iter().take(width).enumerate() {
-            self.down[k] = below[first + k] * (z_row[k] - z_below);
+        if let Some(under) = z.get(first + width..first + width + count) {
+            let ties = &below[first..first + count];
+            for k in 0..count {
+                down[k] = ties[k] * (here[k] - under[k]);
+            }
+        } else {
+            down.fill(0.0);
         }
     }
 }
@@ -86,7 +115,7 @@ struct Side<'a> {
 }
 
 /// Sets the shares of a row along an axis and returns their energy.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+#[inline(always)]
 fn row_of(pixels: &Pixels, first: usize, side: &Side<'_>, k: f64, share: &mut [f64]) -> f64 {
     let width = share.len();
     let (n, g) = (&pixels.n[side.axis][first..][..width], &pixels.g[side.axis][first..][..width]);

@@ -12,6 +12,7 @@ use crate::vector::Packed;
 pub(super) const SUMS: usize = 13;
 
 /// The rows on their way through a band.
+#[derive(Debug)]
 pub(super) struct Rings<T: Number> {
     /// The new r.
     pub r: Ring<T>,
@@ -25,53 +26,48 @@ impl<T: Number> Rings<T> {
     pub fn new(width: usize) -> Self {
         Self { r: Ring::new(width), between: Ring::new(width), v: Ring::new(width) }
     }
+
+    /// Sets all numbers to zero.
+    pub fn clear(&mut self) {
+        for ring in [&mut self.r, &mut self.between, &mut self.v] {
+            ring.rows.iter_mut().for_each(|row| row.fill(T::default()));
+        }
+    }
 }
 
-/// The last three rows of a vector, with zeros at either end.
+/// The last three rows of a vector. Where a row has no pixel, numbers of earlier ones are left: no tie reaches them.
+#[derive(Debug)]
 pub(super) struct Ring<T: Number> {
     rows: [Aligned<T>; 3],
-    spans: [(usize, usize); 3],
 }
 
 impl<T: Number> Ring<T> {
     fn new(width: usize) -> Self {
-        Self { rows: std::array::from_fn(|_| Aligned::zeros(width + 2 * LANES)), spans: [(0, 0); 3] }
+        Self { rows: std::array::from_fn(|_| Aligned::zeros(width + LANES)) }
     }
 
-    /// Makes room for a row in place of the oldest: its columns `lo..hi` to be written, the others zero.
+    /// Room for some columns of a row, in place of the oldest.
     #[inline(always)]
-    pub fn begin(&mut self, row: isize, (lo, hi): (usize, usize)) -> &mut [T] {
-        let slot = row.rem_euclid(3) as usize;
-        let (old_lo, old_hi) = self.spans[slot];
-        self.spans[slot] = (lo, hi);
-        let row = &mut self.rows[slot];
-        if old_lo < lo || hi < old_hi {
-            row[LANES + old_lo..LANES + old_hi].fill(T::default());
-        }
-        &mut row[LANES + lo..LANES + hi]
+    pub fn row_mut(&mut self, row: isize, (lo, hi): (usize, usize)) -> &mut [T] {
+        &mut self.rows[row.rem_euclid(3) as usize][lo..hi]
     }
 
     #[inline(always)]
-    pub fn row(&self, row: isize, span: (usize, usize)) -> &[T] {
-        self.after(LANES, row, span)
-    }
-
-    /// The pixels of a row for `before` of [`LANES`]; one less gives their neighbours to the left, one more to the right.
-    #[inline(always)]
-    fn after(&self, before: usize, row: isize, (lo, hi): (usize, usize)) -> &[T] {
-        &self.rows[row.rem_euclid(3) as usize][before + lo..before + hi]
+    pub fn row(&self, row: isize, (lo, hi): (usize, usize)) -> &[T] {
+        &self.rows[row.rem_euclid(3) as usize][lo..hi]
     }
 }
 
-/// What ties a row's pixels to their neighbours on a side, and the vector there.
-type Side<'a, V> = (&'a [<V as Packed>::Chunk], &'a [<V as Packed>::Chunk]);
-
-/// A row of the system times a vector whose last rows are in a ring.
+/// A row of the system times a vector whose last rows are in a ring, from left to right.
 pub(super) struct Stencil<'a, V: Packed> {
-    /// The vector at each pixel.
-    here: &'a [V::Chunk],
-    /// To the left, right, above and below.
-    sides: [Side<'a, V>; 4],
+    /// The vector at each pixel, above and below.
+    values: [&'a [V::Chunk]; 3],
+    /// What ties each pixel to the one on its right, above and below.
+    ties: [&'a [V::Chunk]; 3],
+    /// The vector and the tie to the right, of the pixels before.
+    before: [V; 2],
+    /// The vector at the pixels to come.
+    here: V,
 }
 
 impl<'a, T: Number, V: Packed<Number = T>> Stencil<'a, V> {
@@ -79,31 +75,34 @@ impl<'a, T: Number, V: Packed<Number = T>> Stencil<'a, V> {
     pub fn new(system: &'a Scaled<'_, T>, x: &'a Ring<T>, row: isize, span: (usize, usize)) -> Self {
         let Scaled { frame, right, below, .. } = system;
         let (at, stride, n) = (frame.start(row as usize) + span.0, frame.stride(), (span.1 - span.0) / V::WIDTH);
-        let side = |ties, neighbours| (V::chunks(ties, n), V::chunks(neighbours, n));
+        let zero = V::splat(T::default());
+        let here = V::chunks(x.row(row, (span.0, span.1 + LANES)), n + 1);
         Self {
-            here: V::chunks(x.row(row, span), n),
-            sides: [
-                side(&right[at - 1..], x.after(LANES - 1, row, span)),
-                side(&right[at..], x.after(LANES + 1, row, span)),
-                side(&below[at - stride..], x.row(row - 1, span)),
-                side(&below[at..], x.row(row + 1, span)),
-            ],
+            values: [here, V::chunks(x.row(row - 1, span), n), V::chunks(x.row(row + 1, span), n)],
+            ties: [V::chunks(&right[at..], n), V::chunks(&below[at - stride..], n), V::chunks(&below[at..], n)],
+            before: [zero, zero],
+            here: V::read(&here[0]),
         }
     }
 
     /// How many vectors there are.
     #[inline(always)]
     fn len(&self) -> usize {
-        self.here.len()
+        self.ties[0].len()
     }
 
+    /// The vector here, and the product.
     #[inline(always)]
-    fn at(&self, k: usize) -> V {
-        let mut product = V::read(&self.here[k]);
-        for (ties, values) in &self.sides {
-            product = V::read(&ties[k]).times_plus(V::read(&values[k]), product);
-        }
-        product
+    fn next(&mut self, k: usize) -> [V; 2] {
+        let (here, next) = (self.here, V::read(&self.values[0][k + 1]));
+        let tie = V::read(&self.ties[0][k]);
+        let mut product = tie.after_last_of(self.before[1]).times_plus(here.after_last_of(self.before[0]), here);
+        product = tie.times_plus(here.before_first_of(next), product);
+        product = V::read(&self.ties[1][k]).times_plus(V::read(&self.values[1][k]), product);
+        product = V::read(&self.ties[2][k]).times_plus(V::read(&self.values[2][k]), product);
+        self.before = [here, tie];
+        self.here = next;
+        [here, product]
     }
 }
 
@@ -136,7 +135,14 @@ impl<T: Number, V: Packed<Number = T>> Factors<V> {
     }
 }
 
-/// The new residual of a row, and `A p1` between the two iterations.
+/// The new residual, and `A p1` between the two iterations.
+#[inline(always)]
+fn stepped<V: Packed>(by: &Factors<V>, r: V, v: V, u: V, w: V) -> [V; 2] {
+    let new_r = by.minus_a1.times_plus(u, by.of_w.times_plus(w, by.of_v.times_plus(v, r)));
+    [new_r, by.minus_a0.times_plus(w, by.b0.times_plus(v, u))]
+}
+
+/// Takes a row's residual over both iterations: what a band needs of its neighbours.
 #[inline(always)]
 pub(super) fn step<T: Number, V: Packed<Number = T>>(
     by: &Factors<V>,
@@ -147,32 +153,33 @@ pub(super) fn step<T: Number, V: Packed<Number = T>>(
     let (r, v, u, w) = (V::chunks(r, n), V::chunks(v, n), V::chunks(u, n), V::chunks(w, n));
     let (new_r, between) = (V::chunks_mut(new_r, n), V::chunks_mut(between, n));
     for k in 0..n {
-        let (v, u) = (V::read(&v[k]), V::read(&u[k]));
-        let w = V::read(&w[k]);
-        let r = by.of_w.times_plus(w, by.of_v.times_plus(v, V::read(&r[k])));
-        by.minus_a1.times_plus(u, r).put(&mut new_r[k]);
-        by.minus_a0.times_plus(w, by.b0.times_plus(v, u)).put(&mut between[k]);
+        let [r, a_p1] = stepped(by, V::read(&r[k]), V::read(&v[k]), V::read(&u[k]), V::read(&w[k]));
+        r.put(&mut new_r[k]);
+        a_p1.put(&mut between[k]);
     }
 }
 
-/// Takes x, p and r of a row over both iterations.
+/// The same of a row of the band, with x and p.
 #[inline(always)]
 pub(super) fn advance<T: Number, V: Packed<Number = T>>(
     by: &Factors<V>,
-    new_r: &[T],
-    v: &[T],
     [x, p, r]: [&mut [T]; 3],
+    [v, u, w]: [&[T]; 3],
+    [new_r, between]: [&mut [T]; 2],
 ) {
     let n = new_r.len() / V::WIDTH;
-    let (new_r, v) = (V::chunks(new_r, n), V::chunks(v, n));
     let (x, p, r) = (V::chunks_mut(x, n), V::chunks_mut(p, n), V::chunks_mut(r, n));
+    let (v, u, w) = (V::chunks(v, n), V::chunks(u, n), V::chunks(w, n));
+    let (new_r, between) = (V::chunks_mut(new_r, n), V::chunks_mut(between, n));
     for k in 0..n {
-        let p0 = V::read(&p[k]);
-        let p1 = by.minus_a0.times_plus(V::read(&v[k]), by.b0.times_plus(p0, V::read(&r[k])));
-        let r2 = V::read(&new_r[k]);
+        let (p0, r0, v) = (V::read(&p[k]), V::read(&r[k]), V::read(&v[k]));
+        let [r2, a_p1] = stepped(by, r0, v, V::read(&u[k]), V::read(&w[k]));
+        let p1 = by.minus_a0.times_plus(v, by.b0.times_plus(p0, r0));
         by.a1.times_plus(p1, by.a0.times_plus(p0, V::read(&x[k]))).put(&mut x[k]);
         by.b1.times_plus(p1, r2).put(&mut p[k]);
         r2.put(&mut r[k]);
+        r2.put(&mut new_r[k]);
+        a_p1.put(&mut between[k]);
     }
 }
 
@@ -180,7 +187,7 @@ pub(super) fn advance<T: Number, V: Packed<Number = T>>(
 #[inline(always)]
 pub(super) fn multiply<T: Number, V: Packed<Number = T>>(
     by: &Factors<V>,
-    product: &Stencil<'_, V>,
+    mut product: Stencil<'_, V>,
     between: &[T],
     new_v: &mut [T],
     own: Option<[&mut [T]; 2]>,
@@ -188,16 +195,16 @@ pub(super) fn multiply<T: Number, V: Packed<Number = T>>(
     let (between, new_v) = (V::chunks(between, product.len()), V::chunks_mut(new_v, product.len()));
     let Some([u, v]) = own else {
         for k in 0..product.len() {
-            let v = by.b1.times_plus(V::read(&between[k]), product.at(k));
+            let v = by.b1.times_plus(V::read(&between[k]), product.next(k)[1]);
             v.put(&mut new_v[k]);
         }
         return;
     };
     let (u, v) = (V::chunks_mut(u, product.len()), V::chunks_mut(v, product.len()));
     for k in 0..product.len() {
-        let product: V = product.at(k);
-        product.put(&mut u[k]);
-        let sum = by.b1.times_plus(V::read(&between[k]), product);
+        let [_, a_r] = product.next(k);
+        a_r.put(&mut u[k]);
+        let sum = by.b1.times_plus(V::read(&between[k]), a_r);
         sum.put(&mut v[k]);
         sum.put(&mut new_v[k]);
     }
@@ -206,7 +213,7 @@ pub(super) fn multiply<T: Number, V: Packed<Number = T>>(
 /// A A p of a row, and its share of the products.
 #[inline(always)]
 pub(super) fn add_products<T: Number, V: Packed<Number = T>>(
-    product: &Stencil<'_, V>,
+    mut product: Stencil<'_, V>,
     [r, p, u, d]: [&[T]; 4],
     w: &mut [T],
     sums: &mut [V; SUMS],
@@ -216,10 +223,10 @@ pub(super) fn add_products<T: Number, V: Packed<Number = T>>(
     let [mut r_r, mut p_v, mut r_v, mut v_v, mut r_d_r, mut r_d_v, mut v_d_v, ..] = *sums;
     let [.., mut r_u, mut u_v, mut u_u, mut v_w, mut w_w, mut u_w] = *sums;
     for k in 0..n {
-        let w: V = product.at(k);
+        let [v, w] = product.next(k);
         w.put(&mut out[k]);
         let (r, p) = (V::read(&r[k]), V::read(&p[k]));
-        let (v, u) = (V::read(&product.here[k]), V::read(&u[k]));
+        let u = V::read(&u[k]);
         let d = V::read(&d[k]);
         let (d_r, d_v) = (d * r, d * v);
         r_r = r.times_plus(r, r_r);
@@ -239,13 +246,15 @@ pub(super) fn add_products<T: Number, V: Packed<Number = T>>(
     *sums = [r_r, p_v, r_v, v_v, r_d_r, r_d_v, v_d_v, r_u, u_v, u_u, v_w, w_w, u_w];
 }
 
-/// Adds up what the lanes hold, and empties them.
+/// Adds what the lanes hold to their sums, and empties them.
 #[inline(always)]
-pub(super) fn flush<T: Number, V: Packed<Number = T>>(lanes: &mut [V; SUMS], sums: &mut [f64; SUMS]) {
-    for (lanes, sum) in lanes.iter_mut().zip(sums) {
+pub(super) fn flush<T: Number, V: Packed<Number = T>>(lanes: &mut [V; SUMS], sums: &mut [[f64; LANES]; SUMS]) {
+    for (lanes, sums) in lanes.iter_mut().zip(sums) {
         let mut numbers = [T::default(); LANES];
         lanes.write(&mut numbers);
-        *sum += numbers[..V::WIDTH].iter().map(|number| number.to_f64()).sum::<f64>();
+        for (sum, number) in sums.iter_mut().zip(numbers) {
+            *sum += number.to_f64();
+        }
         *lanes = V::splat(T::default());
     }
 }

@@ -18,6 +18,7 @@ use super::pixels::Pixels;
 use super::published::Published;
 use super::reweigh::{even, reweigh};
 use super::{BilateralParams, BilateralSurface, Pinhole, Setting};
+use crate::memory::Aligned;
 use crate::{Error, Result};
 
 /// Largest relative residual of an inner solve.
@@ -72,7 +73,7 @@ pub fn integrate_bilateral(
     let pixels = Pixels::new(field, camera, params.setting);
     let frame = (params.setting == Setting::Compatible).then(|| pixels.frame());
     let mut published = frame.as_ref().map(|frame| Published::new(frame, params.precision));
-    let mut z = vec![0.0; pixels.len()];
+    let mut z = Aligned::zeros(pixels.len());
     let mut shares = even(&pixels);
     let mut fit = Progressed::default();
     let mut energies: Vec<f64> = Vec::new();

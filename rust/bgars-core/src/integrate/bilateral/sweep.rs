@@ -10,15 +10,15 @@ use multiversion::{multiversion, target::target_cfg_f};
 use rayon::prelude::*;
 
 use super::super::real::{Real, on_vectors};
-use super::frame::Frame;
+use super::frame::{Frame, LANES};
 use super::number::Number;
 use super::rows::{Factors, Rings, SUMS, Stencil, add_products, advance, flush, multiply, step};
 use crate::memory::Aligned;
 use crate::vector::Packed;
 
-/// Rows that one task sweeps; of two more on either side it updates the residual for itself.
-const BAND: usize = 64;
-/// Rows that are kept at the border of two bands: two on either side.
+/// Most rows that one task sweeps; of two more on either side it updates the residual for itself.
+const MAX_BAND: usize = 64;
+/// Rows of a band that its neighbours need: the first two and the last two.
 const EDGE: usize = 4;
 /// Vectors that a band needs of the rows beside it: r, A p, A r and A A p.
 const KEPT: usize = 4;
@@ -76,62 +76,80 @@ pub(super) struct Vectors<T: Number> {
     u: Aligned<T>,
     /// A A p.
     w: Aligned<T>,
-    /// At each border of two bands, row by row: r, v, u and w as they were before the sweep.
-    edges: Aligned<T>,
+    /// The edge of each band, row by row: r, v, u and w as they were before a sweep, and as they are after it.
+    edges: [Aligned<T>; 2],
+    /// Of each band.
+    rings: Vec<Rings<T>>,
 }
 
 impl<T: Number> Vectors<T> {
-    /// All zero.
+    /// All zero. A sweep of no steps, p and r given, makes the products.
     pub fn new(frame: &Frame) -> Self {
         let [x, p, r, v, u, w] = std::array::from_fn(|_| frame.zeros());
-        let edges = Aligned::zeros((bands(frame) - 1) * EDGE * KEPT * frame.stride());
-        Self { x, p, r, v, u, w, edges }
+        let edges = std::array::from_fn(|_| Aligned::zeros(bands(frame) * EDGE * KEPT * frame.stride()));
+        let rings = (0..bands(frame)).map(|_| Rings::new(frame.width)).collect();
+        Self { x, p, r, v, u, w, edges, rings }
     }
 
-    /// Sets x and the products to zero. A sweep of no steps, p and r given, makes the products.
-    pub fn clear(&mut self) {
-        for vector in [&mut self.x, &mut self.v, &mut self.u, &mut self.w] {
-            vector.fill(T::default());
-        }
+    /// Rows of x, p, r and the three products, to start anew: p = r, all others zero. [`Self::keep_edges`] must follow.
+    pub fn rows_mut<'a>(&'a mut self, frame: &'a Frame) -> impl IndexedParallelIterator<Item = [&'a mut [T]; 6]> {
+        let Self { x, p, r, v, u, w, .. } = self;
+        let [x, p, r, v, u, w] = [x, p, r, v, u, w].map(|vector| frame.parts_mut(vector));
+        (x, p, r, v, u, w).into_par_iter().map(|(x, p, r, v, u, w)| [x, p, r, v, u, w])
     }
 
-    /// Keeps the rows on which two bands depend.
-    fn keep_edges(&mut self, frame: &Frame) {
-        let Self { r, v, u, w, edges, .. } = self;
-        let (stride, kept) = (frame.stride(), [&*r, &*v, &*u, &*w]);
-        edges.par_chunks_mut(EDGE * KEPT * stride).enumerate().for_each(|(band, edges)| {
-            let first = (band + 1) * BAND - EDGE / 2;
-            for (row, edges) in (first..frame.height).zip(edges.chunks_mut(KEPT * stride)) {
-                for (vector, edge) in kept.iter().zip(edges.chunks_mut(stride)) {
-                    edge.copy_from_slice(&vector[frame.start(row)..][..stride]);
-                }
-            }
-        });
+    /// Keeps what a first sweep needs of the rows, and forgets the last one.
+    pub fn keep_edges(&mut self, frame: &Frame) {
+        let Self { r, v, u, w, edges: [edges, _], rings, .. } = self;
+        rings.iter_mut().for_each(Rings::clear);
+        let [r, v, u, w] =
+            [r, v, u, w].map(|vector| vector[frame.start(0)..].par_chunks(band_rows(frame) * frame.stride()));
+        let edges = edges.par_chunks_mut(EDGE * KEPT * frame.stride()).enumerate();
+        edges.zip((r, v, u, w)).for_each(|((band, edge), (r, v, u, w))| keep_edge(frame, band, [r, v, u, w], edge));
     }
 }
 
+/// Copies the edge of a band from its rows of r, v, u and w.
+fn keep_edge<T: Copy>(frame: &Frame, band: usize, vectors: [&[T]; KEPT], edge: &mut [T]) {
+    let (most, stride) = (band_rows(frame), frame.stride());
+    let start = band * most;
+    let rows = most.min(frame.height() - start);
+    for (row, kept) in [0, 1, most - 2, most - 1].into_iter().zip(edge.chunks_mut(KEPT * stride)) {
+        if row < rows {
+            let (lo, hi) = frame.reach(start + row);
+            for (vector, kept) in vectors.iter().zip(kept.chunks_mut(stride)) {
+                kept[lo..hi].copy_from_slice(&vector[row * stride..][lo..hi]);
+            }
+        }
+    }
+}
+
+/// Rows of a band, so that their number is even: two threads then have as many each. The neighbours of a band need two.
+fn band_rows(frame: &Frame) -> usize {
+    frame.height().div_ceil(2 * frame.height().div_ceil(2 * MAX_BAND)).max(EDGE / 2)
+}
+
 fn bands(frame: &Frame) -> usize {
-    frame.height.div_ceil(BAND)
+    frame.height().div_ceil(band_rows(frame))
 }
 
 /// Takes two iterations and returns the products of the vectors after them, summed in an order without threads.
 pub(super) fn sweep<T: Number>(system: &Scaled<'_, T>, steps: Steps, vectors: &mut Vectors<T>) -> Products {
     let frame = system.frame;
-    vectors.keep_edges(frame);
-    let (chunk, first) = (BAND * frame.stride(), frame.start(0));
-    let Vectors { x, p, r, v, u, w, edges } = vectors;
+    let (chunk, first) = (band_rows(frame) * frame.stride(), frame.start(0));
+    let Vectors { x, p, r, v, u, w, edges: [before, after], rings } = vectors;
     let [x, p, r, v, u, w] = [x, p, r, v, u, w].map(|vector| vector[first..].par_chunks_mut(chunk));
-    let sums: Vec<[f64; SUMS]> = (x, p, r, v, u, w)
+    let edges = after.par_chunks_mut(EDGE * KEPT * frame.stride());
+    let sums: Vec<[f64; SUMS]> = (x, p, r, v, u, w, edges, rings)
         .into_par_iter()
-        .take(bands(frame))
         .enumerate()
-        .map_init(
-            || Rings::new(frame.width),
-            |rings, (band, (x, p, r, v, u, w))| {
-                sweep_band(system, steps, edges, band, &mut Own { x, p, r, v, u, w }, rings)
-            },
-        )
+        .map(|(band, (x, p, r, v, u, w, edge, rings))| {
+            let sums = sweep_band(system, steps, before, band, &mut Own { x, p, r, v, u, w }, rings);
+            keep_edge(frame, band, [r, v, u, w], edge);
+            sums
+        })
         .collect();
+    vectors.edges.swap(0, 1);
     let mut total = [0.0; SUMS];
     for sums in sums {
         for (total, sum) in total.iter_mut().zip(sums) {
@@ -176,55 +194,59 @@ fn sweep_band_with<T: Number, V: Packed<Number = T>>(
 ) -> [f64; SUMS] {
     let frame = system.frame;
     let stride = frame.stride();
-    let (start, end) = ((band * BAND) as isize, ((band + 1) * BAND).min(frame.height) as isize);
+    let rows = band_rows(frame);
+    let (start, end) = ((band * rows) as isize, ((band + 1) * rows).min(frame.height()) as isize);
     let factors = Factors::<V>::new(steps);
     let Rings { r: new_r, between, v: new_v } = rings;
     let mut lanes = [V::splat(T::default()); SUMS];
-    let mut sums = [0.0; SUMS];
-    let place = |row: isize, span: (usize, usize)| {
-        (start..end).contains(&row).then(|| (row - start) as usize * stride + span.0)
-    };
+    let mut sums = [[0.0; LANES]; SUMS];
+    let is_own = |row: isize| (start..end).contains(&row);
+    let place = |row: isize, span: (usize, usize)| (row - start) as usize * stride + span.0;
     for row in start - 2..end + 2 {
-        let span = frame.span(row);
-        let outs = [new_r.begin(row, span), between.begin(row, span)];
-        if let Some(at) = place(row, span) {
-            step(&factors, [&own.r[at..], &own.v[at..], &own.u[at..], &own.w[at..]], outs);
-            let vectors = [&mut own.x[at..], &mut own.p[at..], &mut own.r[at..]];
-            advance(&factors, new_r.row(row, span), &own.v[at..], vectors);
-        } else if span.0 < span.1 {
-            // Two rows above the band are the first of its edge, two below it the last of the next one's.
-            let before = if row < start { (band - 1) * EDGE + 2 } else { band * EDGE + 2 };
-            let first = before.wrapping_add_signed(if row < start { row - start } else { row - end }) * KEPT;
-            let kept = |vector: usize| &edges[(first + vector) * stride..][span.0..span.1];
-            step(&factors, [kept(0), kept(1), kept(2), kept(3)], outs);
+        for &span in frame.spans(row) {
+            let outs = [new_r.row_mut(row, span), between.row_mut(row, span)];
+            if is_own(row) {
+                let at = place(row, span);
+                let vectors = [&mut own.x[at..], &mut own.p[at..], &mut own.r[at..]];
+                advance(&factors, vectors, [&own.v[at..], &own.u[at..], &own.w[at..]], outs);
+            } else {
+                // Above are the last rows of the band before, below the first of the next one.
+                let edge = if row < start { row - start } else { EDGE as isize + row - end };
+                let first = (band * EDGE).wrapping_add_signed(edge) * KEPT;
+                let kept = |vector: usize| &edges[(first + vector) * stride..][span.0..span.1];
+                step(&factors, [kept(0), kept(1), kept(2), kept(3)], outs);
+            }
         }
 
         let row = row - 1;
         if row < start - 1 {
             continue;
         }
-        let span = frame.span(row);
-        let out = new_v.begin(row, span);
-        if span.0 < span.1 {
+        for &span in frame.spans(row) {
             let product = Stencil::new(system, new_r, row, span);
-            let own = place(row, span).map(|at| [&mut own.u[at..], &mut own.v[at..]]);
-            multiply(&factors, &product, between.row(row, span), out, own);
+            let own = is_own(row).then(|| {
+                let at = place(row, span);
+                [&mut own.u[at..], &mut own.v[at..]]
+            });
+            multiply(&factors, product, between.row(row, span), new_v.row_mut(row, span), own);
         }
 
         let row = row - 1;
-        let span = frame.span(row);
-        let Some(at) = place(row, span) else { continue };
-        if span.0 < span.1 {
+        if !is_own(row) {
+            continue;
+        }
+        for &span in frame.spans(row) {
+            let at = place(row, span);
             let product = Stencil::new(system, new_v, row, span);
             let diagonal = &system.diagonal[frame.start(row as usize) + span.0..];
             let vectors = [new_r.row(row, span), &own.p[at..], &own.u[at..], diagonal];
-            add_products(&product, vectors, &mut own.w[at..], &mut lanes);
+            add_products(product, vectors, &mut own.w[at..], &mut lanes);
         }
         if (row - start) as usize % FLUSH == FLUSH - 1 || row == end - 1 {
             flush(&mut lanes, &mut sums);
         }
     }
-    sums
+    sums.map(|lanes| lanes.iter().sum())
 }
 
 #[cfg(test)]
@@ -236,18 +258,16 @@ mod tests {
         ((seed * 2_654_435_761) >> 7) as f64 % 1000.0 / 1000.0
     }
 
-    /// Ties below a fifth on all edges between pixels of a disc, so that rows differ in length.
-    fn disc<T: Number>(frame: &Frame) -> (Scaled<'_, T>, Vectors<T>) {
+    /// Ties below a fifth on all edges between pixels of a frame.
+    fn tied<T: Number>(frame: &Frame) -> (Scaled<'_, T>, Vectors<T>) {
+        let used = |row: isize, col: usize| frame.spans(row).iter().any(|span| (span.0..span.1).contains(&col));
         let mut system = Scaled { frame, right: frame.zeros(), below: frame.zeros(), diagonal: frame.zeros() };
         let mut vectors = Vectors::new(frame);
-        for row in 0..frame.height {
-            let (lo, hi) = frame.span(row as isize);
-            for col in lo..hi {
+        for row in 0..frame.height() {
+            for col in (0..frame.width).filter(|&col| used(row as isize, col)) {
                 let at = frame.start(row) + col;
-                let ends_below = frame.span(row as isize + 1);
-                system.right[at] = T::of(if col + 1 < hi { -0.2 * number(at) } else { 0.0 });
-                system.below[at] =
-                    T::of(if (ends_below.0..ends_below.1).contains(&col) { -0.2 * number(at + 7) } else { 0.0 });
+                system.right[at] = T::of(if used(row as isize, col + 1) { -0.2 * number(at) } else { 0.0 });
+                system.below[at] = T::of(if used(row as isize + 1, col) { -0.2 * number(at + 7) } else { 0.0 });
                 system.diagonal[at] = T::of(1.0 + number(at + 3));
                 for (shift, vector) in
                     [&mut vectors.x, &mut vectors.p, &mut vectors.r, &mut vectors.v, &mut vectors.u, &mut vectors.w]
@@ -267,10 +287,10 @@ mod tests {
         steps: Steps,
         band: impl Fn(&Scaled<'_, T>, Steps, &[T], usize, &mut Own<'_, T>, &mut Rings<T>) -> [f64; SUMS],
     ) -> (Vec<f64>, Vec<f64>) {
-        let (system, mut vectors) = disc::<T>(frame);
+        let (system, mut vectors) = tied::<T>(frame);
         vectors.keep_edges(frame);
-        let Vectors { x, p, r, v, u, w, edges } = &mut vectors;
-        let chunk = BAND * frame.stride();
+        let Vectors { x, p, r, v, u, w, edges: [edges, _], rings } = &mut vectors;
+        let chunk = band_rows(frame) * frame.stride();
         let mut sums = Vec::new();
         for index in 0..bands(frame) {
             let from = frame.start(0) + index * chunk;
@@ -279,7 +299,7 @@ mod tests {
                 &mut vector[from..end]
             });
             let mut own = Own { x, p, r, v, u, w };
-            sums.extend(band(&system, steps, edges, index, &mut own, &mut Rings::new(frame.width)));
+            sums.extend(band(&system, steps, edges, index, &mut own, &mut rings[index]));
         }
         let all = [&*x, p, r, v, u, w].into_iter().flat_map(|vector| vector.iter().map(|number| number.to_f64()));
         (all.collect(), sums)
@@ -294,7 +314,11 @@ mod tests {
 
     #[test]
     fn every_instruction_set_takes_the_same_steps() {
-        let frame = Frame::new(150, 90, |row, col| (row as f64 - 75.0).hypot(col as f64 - 45.0) < 44.5);
+        // A ring: rows differ in length, and some are in two parts.
+        let distance = |at: usize| ((at / 200) as f64 - 75.0).hypot((at % 200) as f64 - 99.0);
+        let mask: Vec<bool> = (0..150 * 200).map(|at| (45.0..75.0).contains(&distance(at))).collect();
+        let frame = Frame::new(&mask, 200);
+        assert!((0..150).any(|row| frame.spans(row).len() == 2));
         let steps = Steps { a0: 0.7, b0: 0.3, a1: 0.9, b1: 0.2 };
         let (fast, plain) =
             (swept::<f64>(&frame, steps, sweep_band), swept(&frame, steps, sweep_band_with::<f64, PortableDouble>));
