@@ -30,10 +30,11 @@ NORMAL_OPERATIONS = {
     "Gram matrix, 6 sums of 3 look-ups": 36,
     "its inverse": 35,
     "four sums over 8 lights": 64,
-    "solution, its length in the inverse, residual": 38,
-    "length, normal, albedo, confidence": 40,
+    "solution, residual": 21,
+    "products of its components, three quadratic forms of them": 27,
+    "length, normal, albedo, confidence": 32,
 }
-"""Of a pixel that loses a light; where a block keeps all of them, the Gram matrix falls away."""
+"""Of a pixel that loses a light; where a vector keeps all of them, Gram matrix and inverse fall away."""
 ITERATION_BYTES = {
     "direction: z and p read, p written": 2 + 2 + 2,
     "product: weights and p read, q written": 8 + 2 + 4,

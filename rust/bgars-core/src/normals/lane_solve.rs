@@ -9,7 +9,7 @@ use super::cutoff::{LANES, Lanes, cutoffs};
 use super::finish::{Facets, Finished, Place, all_bits};
 use super::kept::Kept;
 use super::robust_lanes::{self, RobustLanes};
-use super::symmetric::{ENTRIES, Inverse, Monomials, dot, outer, product, splat, upper};
+use super::symmetric::{ENTRIES, Inverse, Monomials, dot, outer, splat, upper};
 use crate::lights::conditioning;
 use crate::vector::Vector;
 use crate::vector::subset_sums::SubsetSums;
@@ -182,7 +182,7 @@ fn solve_kept<K: Pixel, V: Vector>(
         sums.add(value, direction);
     }
     let inverse = Inverse::of(gram);
-    let mut scaled = product(inverse.entries, sums.vector);
+    let mut scaled = inverse.product(sums.vector);
     let explained = dot(scaled, sums.vector);
     let rough = (inverse.largest * V::splat(MIN_ROUGH_CONDITIONING)).is_over(inverse.determinant);
     if V::bits(rough) != 0 {
@@ -196,7 +196,7 @@ fn solve_kept<K: Pixel, V: Vector>(
             let residual = value - dot(scaled, splat3(direction));
             residuals.add(residual.where_bit(&kept.bits[light / BYTE_LIGHTS][at..], light % BYTE_LIGHTS), direction);
         }
-        let correction = product(inverse.entries, residuals.vector);
+        let correction = inverse.product(residuals.vector);
         for axis in 0..3 {
             scaled[axis] = V::pick(rough, scaled[axis] + correction[axis], scaled[axis]);
         }
@@ -205,13 +205,13 @@ fn solve_kept<K: Pixel, V: Vector>(
     let usable = V::bits(inverse.determinant.is_over(inverse.largest * V::splat(MIN_LANE_CONDITIONING as f32)));
     let monomials = Monomials::of(scaled);
     let square = monomials.square();
-    let trace = inverse.entries[0] + inverse.entries[3] + inverse.entries[5];
+    let trace = inverse.cofactors[0] + inverse.cofactors[3] + inverse.cofactors[5];
     let facets = Facets {
         scaled,
         monomials,
         squared_residuals: square
             .times_plus(V::splat((PRIOR_RESIDUAL * PRIOR_RESIDUAL) as f32), sums.squares - explained),
-        turning: trace * square - monomials.form(inverse.entries),
+        turning: (trace * square - monomials.form(inverse.cofactors)) * inverse.scale,
         kept: count,
     };
     (facets, all_bits::<V>() & !usable)

@@ -15,7 +15,7 @@ pub(super) fn dot<V: Vector>([a, b, c]: [V; 3], [x, y, z]: [V; 3]) -> V {
 
 /// A matrix times a vector.
 #[inline(always)]
-pub(super) fn product<V: Vector>([xx, xy, xz, yy, yz, zz]: [V; ENTRIES], vector: [V; 3]) -> [V; 3] {
+fn product<V: Vector>([xx, xy, xz, yy, yz, zz]: [V; ENTRIES], vector: [V; 3]) -> [V; 3] {
     [dot([xx, xy, xz], vector), dot([xy, yy, yz], vector), dot([xz, yz, zz], vector)]
 }
 
@@ -51,9 +51,10 @@ impl<V: Vector> Monomials<V> {
     }
 }
 
-/// The inverse of a Gram matrix; `determinant / largest` is its conditioning.
+/// The inverse of a Gram matrix: `scale` times its cofactors. `determinant / largest` is its conditioning.
 pub(super) struct Inverse<V> {
-    pub entries: [V; ENTRIES],
+    pub cofactors: [V; ENTRIES],
+    pub scale: V,
     pub determinant: V,
     /// The largest determinant at this trace.
     pub largest: V,
@@ -73,11 +74,15 @@ impl<V: Vector> Inverse<V> {
         let determinant = dot([xx, xy, xz], [cofactors[0], cofactors[1], cofactors[2]]);
         let third = (xx + yy + zz) * V::splat(1.0 / 3.0);
         let scale = V::splat(1.0) / determinant;
-        let mut entries = cofactors;
-        for entry in &mut entries {
-            *entry = *entry * scale;
-        }
-        Self { entries, determinant, largest: third * third * third }
+        Self { cofactors, scale, determinant, largest: third * third * third }
+    }
+
+    /// The inverse times a vector.
+    #[inline(always)]
+    pub fn product(&self, vector: [V; 3]) -> [V; 3] {
+        // The division meanwhile goes on.
+        let [x, y, z] = product(self.cofactors, vector);
+        [x * self.scale, y * self.scale, z * self.scale]
     }
 }
 
