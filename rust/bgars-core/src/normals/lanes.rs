@@ -138,7 +138,8 @@ fn run_blocks_with<K: Pixel, V: Vector>(
 ) {
     let mut kept = Kept::new(solver.lights());
     let mut copies = vec![[K::ZERO; LANES]; solver.lights()];
-    let mut in_place = Vec::with_capacity(solver.lights());
+    let nothing = [K::ZERO; LANES];
+    let mut in_place = vec![&nothing; solver.lights()];
     let mut offset = [0.0; LANES];
     let mut clipped = [0; LANES];
     let mut finished = Finished::new();
@@ -157,13 +158,12 @@ fn run_blocks_with<K: Pixel, V: Vector>(
         let copied: Vec<&Lanes<K>>;
         let keys = match source {
             Source::Images(planes) if block.len() == LANES => {
-                in_place.clear();
-                in_place.extend(planes.iter().filter_map(|plane| {
+                for (key, plane) in in_place.iter_mut().zip(*planes) {
                     for line in 0..size_of::<Lanes<K>>() / LINE_BYTES {
                         stream::prefetch(plane, first + AHEAD_PIXELS + line * (LINE_BYTES / size_of::<K>()));
                     }
-                    plane[block.clone()].first_chunk()
-                }));
+                    *key = plane[block.clone()].first_chunk().unwrap_or(&nothing);
+                }
                 &in_place
             }
             Source::Images(planes) => {
