@@ -82,6 +82,11 @@ impl Frame {
         (spans.first().map_or(0, |first| first.0), spans.last().map_or(0, |last| last.1))
     }
 
+    /// Where the mask's part of a row starts in a framed array.
+    pub fn first(&self, row: usize) -> usize {
+        self.start(row) + self.reach(row).0
+    }
+
     /// The columns of the mask in a row, in parts from left to right; none in rows outside the box.
     #[inline(always)]
     pub fn spans(&self, row: isize) -> &[(usize, usize)] {

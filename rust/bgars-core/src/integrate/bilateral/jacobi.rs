@@ -60,7 +60,7 @@ impl<'a, T: Number> Jacobi<'a, T> {
         };
         let frame = scaled.frame;
         frame.parts_mut(z).enumerate().for_each(|(row, z)| {
-            let at = frame.start(row) + frame.reach(row).0;
+            let at = frame.first(row);
             for ((z, x), root) in z.iter_mut().zip(&vectors.x[at..]).zip(&roots[at..]) {
                 *z += x.to_f64() * root;
             }
@@ -72,15 +72,14 @@ impl<'a, T: Number> Jacobi<'a, T> {
     fn begin(&mut self, system: &NormalEquations, z: &[f64]) {
         let Self { scaled: Scaled { frame, right, below, diagonal }, vectors, roots } = self;
         let stride = frame.stride();
-        let first_of = |row: usize| frame.start(row) + frame.reach(row).0;
         frame
             .parts_mut(roots)
             .enumerate()
-            .for_each(|(row, roots)| inverse_roots(&system.diagonal[first_of(row)..], roots));
+            .for_each(|(row, roots)| inverse_roots(&system.diagonal[frame.first(row)..], roots));
         let [right, below, diagonal] = [right, below, diagonal].map(|array| frame.parts_mut(array));
         (right, below, diagonal, vectors.rows_mut(frame)).into_par_iter().enumerate().for_each(
             |(row, (right, below, diagonal, [x, p, r, v, u, w]))| {
-                scale_row(system, roots, z, first_of(row), stride, [right, below, diagonal, r]);
+                scale_row(system, roots, z, frame.first(row), stride, [right, below, diagonal, r]);
                 p.copy_from_slice(r);
                 for zeros in [x, v, u, w] {
                     zeros.fill(T::default());

@@ -44,7 +44,7 @@ impl NormalEquations {
         }
         let rows = (frame.parts_mut(diagonal), frame.parts_mut(source)).into_par_iter().enumerate();
         rows.for_each(|(row, (diagonal, source))| {
-            let at = frame.start(row) + frame.reach(row).0;
+            let at = frame.first(row);
             add_up([right, below, push_right, push_below], at, stride, diagonal, source);
         });
     }
