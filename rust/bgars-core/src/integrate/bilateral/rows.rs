@@ -11,9 +11,9 @@ use crate::vector::Packed;
 /// Sums of [`super::sweep::Products`], in its order.
 pub(super) const SUMS: usize = 13;
 
-/// The rows on their way through a band.
+/// Rows beside a band, as the band needs them.
 #[derive(Debug)]
-pub(super) struct Rings<T: Number> {
+pub(super) struct Beside<T: Number> {
     /// The new r.
     pub r: Ring<T>,
     /// `A p1`, between the two iterations.
@@ -22,7 +22,7 @@ pub(super) struct Rings<T: Number> {
     pub v: Ring<T>,
 }
 
-impl<T: Number> Rings<T> {
+impl<T: Number> Beside<T> {
     pub fn new(width: usize) -> Self {
         Self { r: Ring::new(width), between: Ring::new(width), v: Ring::new(width) }
     }
@@ -35,7 +35,7 @@ impl<T: Number> Rings<T> {
     }
 }
 
-/// The last three rows of a vector. Where a row has no pixel, numbers of earlier ones are left: no tie reaches them.
+/// Three rows of a vector. Where a row has no pixel, numbers of earlier ones are left: no tie reaches them.
 #[derive(Debug)]
 pub(super) struct Ring<T: Number> {
     rows: [Aligned<T>; 3],
@@ -58,7 +58,7 @@ impl<T: Number> Ring<T> {
     }
 }
 
-/// A row of the system times a vector whose last rows are in a ring, from left to right.
+/// A row of the system times a vector, from left to right.
 pub(super) struct Stencil<'a, V: Packed> {
     /// The vector at each pixel, above and below.
     values: [&'a [V::Chunk]; 3],
@@ -71,14 +71,16 @@ pub(super) struct Stencil<'a, V: Packed> {
 }
 
 impl<'a, T: Number, V: Packed<Number = T>> Stencil<'a, V> {
+    /// `rows` are the vector's above, at and below `row`, from the first pixel of the span; the one at `row` is [`LANES`] longer.
     #[inline(always)]
-    pub fn new(system: &'a Scaled<'_, T>, x: &'a Ring<T>, row: isize, span: (usize, usize)) -> Self {
+    pub fn new(system: &'a Scaled<'_, T>, rows: [&'a [T]; 3], row: isize, span: (usize, usize)) -> Self {
         let Scaled { frame, right, below, .. } = system;
         let (at, stride, n) = (frame.start(row as usize) + span.0, frame.stride(), (span.1 - span.0) / V::WIDTH);
         let zero = V::splat(T::default());
-        let here = V::chunks(x.row(row, (span.0, span.1 + LANES)), n + 1);
+        let [above, here, beneath] = rows;
+        let here = V::chunks(here, n + 1);
         Self {
-            values: [here, V::chunks(x.row(row - 1, span), n), V::chunks(x.row(row + 1, span), n)],
+            values: [here, V::chunks(above, n), V::chunks(beneath, n)],
             ties: [V::chunks(&right[at..], n), V::chunks(&below[at - stride..], n), V::chunks(&below[at..], n)],
             before: [zero, zero],
             here: V::read(&here[0]),
@@ -159,54 +161,54 @@ pub(super) fn step<T: Number, V: Packed<Number = T>>(
     }
 }
 
-/// The same of a row of the band, with x and p.
+/// The same of the first `n` vectors of a row of the band, with x and p; v becomes `A p1`.
 #[inline(always)]
 pub(super) fn advance<T: Number, V: Packed<Number = T>>(
     by: &Factors<V>,
-    [x, p, r]: [&mut [T]; 3],
-    [v, u, w]: [&[T]; 3],
-    [new_r, between]: [&mut [T]; 2],
+    [x, p, r, v]: [&mut [T]; 4],
+    [u, w]: [&[T]; 2],
+    n: usize,
 ) {
-    let n = new_r.len() / V::WIDTH;
-    let (x, p, r) = (V::chunks_mut(x, n), V::chunks_mut(p, n), V::chunks_mut(r, n));
-    let (v, u, w) = (V::chunks(v, n), V::chunks(u, n), V::chunks(w, n));
-    let (new_r, between) = (V::chunks_mut(new_r, n), V::chunks_mut(between, n));
+    let [x, p, r, v] = [x, p, r, v].map(|vector| V::chunks_mut(vector, n));
+    let (u, w) = (V::chunks(u, n), V::chunks(w, n));
     for k in 0..n {
-        let (p0, r0, v) = (V::read(&p[k]), V::read(&r[k]), V::read(&v[k]));
-        let [r2, a_p1] = stepped(by, r0, v, V::read(&u[k]), V::read(&w[k]));
-        let p1 = by.minus_a0.times_plus(v, by.b0.times_plus(p0, r0));
+        let (p0, r0, v0) = (V::read(&p[k]), V::read(&r[k]), V::read(&v[k]));
+        let [r2, a_p1] = stepped(by, r0, v0, V::read(&u[k]), V::read(&w[k]));
+        let p1 = by.minus_a0.times_plus(v0, by.b0.times_plus(p0, r0));
         by.a1.times_plus(p1, by.a0.times_plus(p0, V::read(&x[k]))).put(&mut x[k]);
         by.b1.times_plus(p1, r2).put(&mut p[k]);
         r2.put(&mut r[k]);
-        r2.put(&mut new_r[k]);
-        a_p1.put(&mut between[k]);
+        a_p1.put(&mut v[k]);
     }
 }
 
-/// A r of the new r, and with it A p of the new p: `A p2 = A r2 + b1 A p1`. A row of the band's own keeps both.
+/// A r of the new r, and with it A p of the new p: `A p2 = A r2 + b1 A p1`, the last from v and to it.
 #[inline(always)]
 pub(super) fn multiply<T: Number, V: Packed<Number = T>>(
     by: &Factors<V>,
     mut product: Stencil<'_, V>,
-    between: &[T],
-    new_v: &mut [T],
-    own: Option<[&mut [T]; 2]>,
+    [u, v]: [&mut [T]; 2],
 ) {
-    let (between, new_v) = (V::chunks(between, product.len()), V::chunks_mut(new_v, product.len()));
-    let Some([u, v]) = own else {
-        for k in 0..product.len() {
-            let v = by.b1.times_plus(V::read(&between[k]), product.next(k)[1]);
-            v.put(&mut new_v[k]);
-        }
-        return;
-    };
     let (u, v) = (V::chunks_mut(u, product.len()), V::chunks_mut(v, product.len()));
     for k in 0..product.len() {
         let [_, a_r] = product.next(k);
         a_r.put(&mut u[k]);
-        let sum = by.b1.times_plus(V::read(&between[k]), a_r);
-        sum.put(&mut v[k]);
-        sum.put(&mut new_v[k]);
+        by.b1.times_plus(V::read(&v[k]), a_r).put(&mut v[k]);
+    }
+}
+
+/// A p of a row beside the band.
+#[inline(always)]
+pub(super) fn multiply_beside<T: Number, V: Packed<Number = T>>(
+    by: &Factors<V>,
+    mut product: Stencil<'_, V>,
+    between: &[T],
+    v: &mut [T],
+) {
+    let (between, v) = (V::chunks(between, product.len()), V::chunks_mut(v, product.len()));
+    for k in 0..product.len() {
+        let [_, a_r] = product.next(k);
+        by.b1.times_plus(V::read(&between[k]), a_r).put(&mut v[k]);
     }
 }
 

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::super::real::{Real, on_vectors};
 use super::frame::{Frame, LANES};
 use super::number::Number;
-use super::rows::{Factors, Rings, SUMS, Stencil, add_products, advance, flush, multiply, step};
+use super::rows::{Beside, Factors, SUMS, Stencil, add_products, advance, flush, multiply, multiply_beside, step};
 use crate::memory::Aligned;
 use crate::vector::Packed;
 
@@ -79,7 +79,7 @@ pub(super) struct Vectors<T: Number> {
     /// The edge of each band, row by row: r, v, u and w as they were before a sweep, and as they are after it.
     edges: [Aligned<T>; 2],
     /// Of each band.
-    rings: Vec<Rings<T>>,
+    beside: Vec<Beside<T>>,
 }
 
 impl<T: Number> Vectors<T> {
@@ -87,8 +87,8 @@ impl<T: Number> Vectors<T> {
     pub fn new(frame: &Frame) -> Self {
         let [x, p, r, v, u, w] = std::array::from_fn(|_| frame.zeros());
         let edges = std::array::from_fn(|_| Aligned::zeros(bands(frame) * EDGE * KEPT * frame.stride()));
-        let rings = (0..bands(frame)).map(|_| Rings::new(frame.width)).collect();
-        Self { x, p, r, v, u, w, edges, rings }
+        let beside = (0..bands(frame)).map(|_| Beside::new(frame.width)).collect();
+        Self { x, p, r, v, u, w, edges, beside }
     }
 
     /// Rows of x, p, r and the three products, to start anew: p = r, all others zero. [`Self::keep_edges`] must follow.
@@ -100,8 +100,8 @@ impl<T: Number> Vectors<T> {
 
     /// Keeps what a first sweep needs of the rows, and forgets the last one.
     pub fn keep_edges(&mut self, frame: &Frame) {
-        let Self { r, v, u, w, edges: [edges, _], rings, .. } = self;
-        rings.iter_mut().for_each(Rings::clear);
+        let Self { r, v, u, w, edges: [edges, _], beside, .. } = self;
+        beside.iter_mut().for_each(Beside::clear);
         let [r, v, u, w] =
             [r, v, u, w].map(|vector| vector[frame.start(0)..].par_chunks(band_rows(frame) * frame.stride()));
         let edges = edges.par_chunks_mut(EDGE * KEPT * frame.stride()).enumerate();
@@ -137,14 +137,14 @@ fn bands(frame: &Frame) -> usize {
 pub(super) fn sweep<T: Number>(system: &Scaled<'_, T>, steps: Steps, vectors: &mut Vectors<T>) -> Products {
     let frame = system.frame;
     let (chunk, first) = (band_rows(frame) * frame.stride(), frame.start(0));
-    let Vectors { x, p, r, v, u, w, edges: [before, after], rings } = vectors;
+    let Vectors { x, p, r, v, u, w, edges: [before, after], beside } = vectors;
     let [x, p, r, v, u, w] = [x, p, r, v, u, w].map(|vector| vector[first..].par_chunks_mut(chunk));
     let edges = after.par_chunks_mut(EDGE * KEPT * frame.stride());
-    let sums: Vec<[f64; SUMS]> = (x, p, r, v, u, w, edges, rings)
+    let sums: Vec<[f64; SUMS]> = (x, p, r, v, u, w, edges, beside)
         .into_par_iter()
         .enumerate()
-        .map(|(band, (x, p, r, v, u, w, edge, rings))| {
-            let sums = sweep_band(system, steps, before, band, &mut Own { x, p, r, v, u, w }, rings);
+        .map(|(band, (x, p, r, v, u, w, edge, beside))| {
+            let sums = sweep_band(system, steps, before, band, &mut Own { x, p, r, v, u, w }, beside);
             keep_edge(frame, band, [r, v, u, w], edge);
             sums
         })
@@ -177,12 +177,14 @@ fn sweep_band<T: Number>(
     edges: &[T],
     band: usize,
     own: &mut Own<'_, T>,
-    rings: &mut Rings<T>,
+    beside: &mut Beside<T>,
 ) -> [f64; SUMS] {
-    on_vectors!(T, sweep_band_with::<T>(system, steps, edges, band, own, rings))
+    on_vectors!(T, sweep_band_with::<T>(system, steps, edges, band, own, beside))
 }
 
-/// A row goes through three stages, each a row behind the one before, whose neighbours it needs.
+/// A row goes through three stages, each a row behind the one before, whose neighbours it needs: r after both iterations (and
+/// `A p1`, which waits in the row of v), then `A r` and `A p`, then `A A p`. Rows beside the band go through the first two in
+/// memory of their own.
 #[inline(always)]
 fn sweep_band_with<T: Number, V: Packed<Number = T>>(
     system: &Scaled<'_, T>,
@@ -190,30 +192,29 @@ fn sweep_band_with<T: Number, V: Packed<Number = T>>(
     edges: &[T],
     band: usize,
     own: &mut Own<'_, T>,
-    rings: &mut Rings<T>,
+    beside: &mut Beside<T>,
 ) -> [f64; SUMS] {
     let frame = system.frame;
     let stride = frame.stride();
     let rows = band_rows(frame);
     let (start, end) = ((band * rows) as isize, ((band + 1) * rows).min(frame.height()) as isize);
     let factors = Factors::<V>::new(steps);
-    let Rings { r: new_r, between, v: new_v } = rings;
     let mut lanes = [V::splat(T::default()); SUMS];
     let mut sums = [[0.0; LANES]; SUMS];
     let is_own = |row: isize| (start..end).contains(&row);
     let place = |row: isize, span: (usize, usize)| (row - start) as usize * stride + span.0;
     for row in start - 2..end + 2 {
         for &span in frame.spans(row) {
-            let outs = [new_r.row_mut(row, span), between.row_mut(row, span)];
             if is_own(row) {
                 let at = place(row, span);
-                let vectors = [&mut own.x[at..], &mut own.p[at..], &mut own.r[at..]];
-                advance(&factors, vectors, [&own.v[at..], &own.u[at..], &own.w[at..]], outs);
+                let vectors = [&mut own.x[at..], &mut own.p[at..], &mut own.r[at..], &mut own.v[at..]];
+                advance(&factors, vectors, [&own.u[at..], &own.w[at..]], (span.1 - span.0) / V::WIDTH);
             } else {
                 // Above are the last rows of the band before, below the first of the next one.
                 let edge = if row < start { row - start } else { EDGE as isize + row - end };
                 let first = (band * EDGE).wrapping_add_signed(edge) * KEPT;
                 let kept = |vector: usize| &edges[(first + vector) * stride..][span.0..span.1];
+                let outs = [beside.r.row_mut(row, span), beside.between.row_mut(row, span)];
                 step(&factors, [kept(0), kept(1), kept(2), kept(3)], outs);
             }
         }
@@ -223,12 +224,15 @@ fn sweep_band_with<T: Number, V: Packed<Number = T>>(
             continue;
         }
         for &span in frame.spans(row) {
-            let product = Stencil::new(system, new_r, row, span);
-            let own = is_own(row).then(|| {
+            let wide = (span.0, span.1 + LANES);
+            let of_r = |row| if is_own(row) { &own.r[place(row, span)..] } else { beside.r.row(row, wide) };
+            let product = Stencil::new(system, [of_r(row - 1), of_r(row), of_r(row + 1)], row, span);
+            if is_own(row) {
                 let at = place(row, span);
-                [&mut own.u[at..], &mut own.v[at..]]
-            });
-            multiply(&factors, product, between.row(row, span), new_v.row_mut(row, span), own);
+                multiply(&factors, product, [&mut own.u[at..], &mut own.v[at..]]);
+            } else {
+                multiply_beside(&factors, product, beside.between.row(row, span), beside.v.row_mut(row, span));
+            }
         }
 
         let row = row - 1;
@@ -237,9 +241,11 @@ fn sweep_band_with<T: Number, V: Packed<Number = T>>(
         }
         for &span in frame.spans(row) {
             let at = place(row, span);
-            let product = Stencil::new(system, new_v, row, span);
+            let wide = (span.0, span.1 + LANES);
+            let of_v = |row| if is_own(row) { &own.v[place(row, span)..] } else { beside.v.row(row, wide) };
+            let product = Stencil::new(system, [of_v(row - 1), of_v(row), of_v(row + 1)], row, span);
             let diagonal = &system.diagonal[frame.start(row as usize) + span.0..];
-            let vectors = [new_r.row(row, span), &own.p[at..], &own.u[at..], diagonal];
+            let vectors = [&own.r[at..], &own.p[at..], &own.u[at..], diagonal];
             add_products(product, vectors, &mut own.w[at..], &mut lanes);
         }
         if (row - start) as usize % FLUSH == FLUSH - 1 || row == end - 1 {
@@ -285,11 +291,11 @@ mod tests {
     fn swept<T: Number>(
         frame: &Frame,
         steps: Steps,
-        band: impl Fn(&Scaled<'_, T>, Steps, &[T], usize, &mut Own<'_, T>, &mut Rings<T>) -> [f64; SUMS],
+        band: impl Fn(&Scaled<'_, T>, Steps, &[T], usize, &mut Own<'_, T>, &mut Beside<T>) -> [f64; SUMS],
     ) -> (Vec<f64>, Vec<f64>) {
         let (system, mut vectors) = tied::<T>(frame);
         vectors.keep_edges(frame);
-        let Vectors { x, p, r, v, u, w, edges: [edges, _], rings } = &mut vectors;
+        let Vectors { x, p, r, v, u, w, edges: [edges, _], beside } = &mut vectors;
         let chunk = band_rows(frame) * frame.stride();
         let mut sums = Vec::new();
         for index in 0..bands(frame) {
@@ -299,7 +305,7 @@ mod tests {
                 &mut vector[from..end]
             });
             let mut own = Own { x, p, r, v, u, w };
-            sums.extend(band(&system, steps, edges, index, &mut own, &mut rings[index]));
+            sums.extend(band(&system, steps, edges, index, &mut own, &mut beside[index]));
         }
         let all = [&*x, p, r, v, u, w].into_iter().flat_map(|vector| vector.iter().map(|number| number.to_f64()));
         (all.collect(), sums)
