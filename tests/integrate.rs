@@ -135,6 +135,30 @@ fn two_islands_and_a_lonely_pixel_have_zero_mean_each() {
 }
 
 #[test]
+fn parts_far_apart_come_out_as_each_would_alone() {
+    // Rows without a pixel, and parts at other columns of other rows: no kernel walks along all of them.
+    let dish = |radius: f64, x: f64, y: f64| {
+        (x.hypot(y) < radius).then(|| (0.004 * (x * x - 2.0 * y * y), 0.008 * x, -0.016 * y))
+    };
+    let parts = [(40.0, -300.0, 180.0), (12.0, 250.0, 130.0), (60.0, 10.0, -150.0)];
+    let place = |x: f64, y: f64| parts.iter().find_map(|&(radius, right, up)| dish(radius, x - right, y - up));
+    let (rows, cols) = (500, 800);
+    let all = solve(&sample(rows, cols, place), &Params::default());
+    assert_eq!(all.components.len(), parts.len());
+    for (radius, right, up) in parts {
+        let side = 2 * radius as usize;
+        let alone = sample(side, side, |x, y| dish(radius, x, y));
+        let surface = solve(&alone, &Params::default());
+        let (first_row, first_col) = (rows as f64 / 2.0 - up - radius, cols as f64 / 2.0 + right - radius);
+        for pixel in (0..side * side).filter(|&pixel| alone.mask[pixel]) {
+            let (row, col) = (first_row as usize + pixel / side, first_col as usize + pixel % side);
+            let difference = surface.height_px[pixel] - all.height_px[row * cols + col];
+            assert!(difference.abs() < 1e-4, "{difference} px at ({row}, {col})");
+        }
+    }
+}
+
+#[test]
 fn the_residual_is_the_true_one_and_the_iterations_are_bounded() {
     let sample = sample(100, 100, |x, y| hemisphere(45.0, x, y));
     let surface = solve(&sample, &Params::default());

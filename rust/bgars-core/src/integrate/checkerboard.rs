@@ -8,6 +8,7 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
+use super::spans::{Span, Spans};
 use super::stencil::{Sides, Stencil};
 use crate::memory::Aligned;
 use crate::vector::Packed;
@@ -69,6 +70,8 @@ pub(super) struct Weights {
     pub grid: Grid,
     /// To the left, right, upper and lower neighbour. Zeros pad each row, a row of zeros each end.
     sides: [Aligned<f32>; 4],
+    /// The part of each band that kernels work on. What is left beside it may be any finite number: no edge leads there.
+    pub spans: Spans,
 }
 
 /// A row of one side's weights with a zero on either end: red k is at `k + 1`.
@@ -83,7 +86,12 @@ impl Weights {
     /// No edges.
     pub fn zeros(grid: Grid) -> Self {
         let length = grid.pad() + (grid.height + 2) * (grid.half() + grid.pad());
-        Self { grid, sides: std::array::from_fn(|_| Aligned::zeros(length)) }
+        Self { grid, sides: std::array::from_fn(|_| Aligned::zeros(length)), spans: Spans::whole(grid) }
+    }
+
+    /// Narrows the work on each band of rows to its pixels with edges; to be called once the last edge is set.
+    pub fn find_spans(&mut self) {
+        self.spans = Spans::of_edges(self);
     }
 
     /// Weights from one red to the one below.
@@ -144,37 +152,47 @@ impl Weights {
         }
     }
 
-    /// The weights of the edges of the reds of `row`.
+    /// The weights of the edges of the reds of `row` along a span.
     #[inline(always)]
-    pub fn reds<V: Packed>(&self, row: isize) -> Sides<'_, V> {
-        let n = self.grid.half() / V::WIDTH;
-        Sides([LEFT, RIGHT, UP, DOWN].map(|side| V::floats(&self.side(side, row)[1..], n)))
+    pub fn reds<V: Packed>(&self, row: isize, span: Span) -> Sides<'_, V> {
+        let n = span.vectors::<V>();
+        Sides([LEFT, RIGHT, UP, DOWN].map(|side| V::floats(&self.side(side, row)[1 + span.start..], n)))
     }
 
     /// The weights of the edges of the blacks of `row`, kept at their four reds.
     #[inline(always)]
-    pub fn blacks<V: Packed>(&self, row: isize) -> Sides<'_, V> {
-        let n = self.grid.half() / V::WIDTH;
+    pub fn blacks<V: Packed>(&self, row: isize, span: Span) -> Sides<'_, V> {
+        let n = span.vectors::<V>();
         let odd = is_odd(row);
         // Left and right red of black k: k and k + 1 in even rows, k - 1 and k in odd ones.
         Sides([
-            V::floats(&self.right(row)[1 - odd..], n),
-            V::floats(&self.left(row)[2 - odd..], n),
-            V::floats(&self.down(row - 1)[1..], n),
-            V::floats(&self.up(row + 1)[1..], n),
+            V::floats(&self.right(row)[1 - odd + span.start..], n),
+            V::floats(&self.left(row)[2 - odd + span.start..], n),
+            V::floats(&self.down(row - 1)[1 + span.start..], n),
+            V::floats(&self.up(row + 1)[1 + span.start..], n),
         ])
     }
 
-    /// The reds of `row` among the blacks: of the rows above, at and below.
+    /// The reds of `row` along a span among the blacks: of the rows above, at and below.
     #[inline(always)]
-    pub fn red_stencil<'a, V: Packed>(&'a self, row: isize, blacks: [PaddedRow<'a, V::Number>; 3]) -> Stencil<'a, V> {
-        Stencil::new(self.reds(row), blacks, is_odd(row))
+    pub fn red_stencil<'a, V: Packed>(
+        &'a self,
+        row: isize,
+        span: Span,
+        blacks: [PaddedRow<'a, V::Number>; 3],
+    ) -> Stencil<'a, V> {
+        Stencil::new(self.reds(row, span), blacks.map(|blacks| &blacks[span.start..]), is_odd(row))
     }
 
     /// The blacks of `row` among the reds.
     #[inline(always)]
-    pub fn black_stencil<'a, V: Packed>(&'a self, row: isize, reds: [PaddedRow<'a, V::Number>; 3]) -> Stencil<'a, V> {
-        Stencil::new(self.blacks(row), reds, 1 - is_odd(row))
+    pub fn black_stencil<'a, V: Packed>(
+        &'a self,
+        row: isize,
+        span: Span,
+        reds: [PaddedRow<'a, V::Number>; 3],
+    ) -> Stencil<'a, V> {
+        Stencil::new(self.blacks(row, span), reds.map(|reds| &reds[span.start..]), 1 - is_odd(row))
     }
 }
 

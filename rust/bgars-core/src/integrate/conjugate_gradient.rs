@@ -3,16 +3,19 @@
 //! Written out here for its memory traffic: the sums ride along with the passes that make their vectors, and every pass runs on
 //! all threads. faer's solver, with which the tests compare it, does its vector work on one thread and in passes of its own.
 
+use std::ops::Range;
+
+use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::checkerboard::Weights;
+use super::checkerboard::{BAND_ROWS, Weights};
 use super::multigrid::Multigrid;
 use super::reduction::{dot, multiply, residual_norm};
 use super::{OnProgress, Params, Progress};
 use crate::memory::Aligned;
 use crate::{Error, Result};
 
-/// Elements of a vector that one task updates.
+/// Elements of a vector that one task copies or adds up.
 const BLOCK: usize = 1 << 14;
 
 /// What [`conjugate_gradients`] found.
@@ -23,7 +26,7 @@ pub(super) struct Solution {
     pub residual: f64,
 }
 
-/// Solves `S x = b` from zero, until the norm of `b - S x` is at most the tolerance times `scale`.
+/// Solves `S x = b` from zero, until the norm of `b - S x` is at most the tolerance times `scale`; `b` is zero beside the spans.
 ///
 /// The residual that the iteration carries along drifts from the true one by rounding: when it says done, the true one is
 /// computed, and if it does not agree the iteration starts again from there.
@@ -41,6 +44,8 @@ pub(super) fn conjugate_gradients(
     }
     let target = (params.relative_tolerance * scale).max(params.absolute_tolerance * (2.0 * size as f64).sqrt());
     let preconditioner = Multigrid::new(weights);
+    let half = weights.grid.half();
+    let chunk = BAND_ROWS * half;
     let Solution { x, iterations, residual } = &mut solution;
     // A direction may be any; what x and r take along it agrees in `f64`.
     let [mut p, mut z] = [Aligned::<f32>::any(size), Aligned::any(size)];
@@ -64,9 +69,11 @@ pub(super) fn conjugate_gradients(
             let r_z = preconditioner.cycle(&r, &mut z);
             if let Some(before) = r_z_before.replace(r_z) {
                 let beta = (r_z / before) as f32;
-                p.par_chunks_mut(BLOCK).zip(z.par_chunks(BLOCK)).for_each(|(p, z)| {
-                    for (p, &z) in p.iter_mut().zip(z) {
-                        *p = z + beta * *p;
+                p.par_chunks_mut(chunk).zip(z.par_chunks(chunk)).enumerate().for_each(|(band, (p, z))| {
+                    for part in weights.spans.parts(band, p.len() / half) {
+                        for (p, &z) in p[part.clone()].iter_mut().zip(&z[part]) {
+                            *p = z + beta * *p;
+                        }
                     }
                 });
             } else {
@@ -77,7 +84,7 @@ pub(super) fn conjugate_gradients(
             if !(r_z > 0.0 && p_q > 0.0) {
                 return Err(stuck(*iterations, norm));
             }
-            norm = step(x, &mut r, &p, &q, r_z / p_q).sqrt();
+            norm = step(weights, r_z / p_q, [x, &mut r], &p, &q).sqrt();
             *iterations += 1;
             if on_progress(Progress { iteration: *iterations, residual: norm / scale }).is_break() {
                 return Err(Error::Cancelled);
@@ -86,31 +93,47 @@ pub(super) fn conjugate_gradients(
         norm = residual_norm(weights, x, b);
         if norm > target {
             multiply(weights, x, &mut q);
-            r.par_chunks_mut(BLOCK).zip(b.par_chunks(BLOCK)).zip(q.par_chunks(BLOCK)).for_each(|((r, b), q)| {
-                for ((r, b), q) in r.iter_mut().zip(b).zip(q) {
-                    *r = b - q;
-                }
-            });
+            (r.par_chunks_mut(chunk), b.par_chunks(chunk), q.par_chunks(chunk)).into_par_iter().enumerate().for_each(
+                |(band, (r, b, q))| {
+                    for part in weights.spans.parts(band, r.len() / half) {
+                        for ((r, b), q) in r[part.clone()].iter_mut().zip(&b[part.clone()]).zip(&q[part]) {
+                            *r = b - q;
+                        }
+                    }
+                },
+            );
         }
     }
 }
 
-/// `x += alpha p`, `r -= alpha q`; returns `<r, r>`.
-fn step(x: &mut [f64], r: &mut [f64], p: &[f32], q: &[f64], alpha: f64) -> f64 {
+/// `x += alpha p`, `r -= alpha q` along the spans of the grid; returns `<r, r>`.
+fn step(weights: &Weights, alpha: f64, [x, r]: [&mut [f64]; 2], p: &[f32], q: &[f64]) -> f64 {
+    let half = weights.grid.half();
+    let chunk = BAND_ROWS * half;
     let squares: Vec<f64> =
-        (x.par_chunks_mut(BLOCK), r.par_chunks_mut(BLOCK), p.par_chunks(BLOCK), q.par_chunks(BLOCK))
+        (x.par_chunks_mut(chunk), r.par_chunks_mut(chunk), p.par_chunks(chunk), q.par_chunks(chunk))
             .into_par_iter()
-            .map(|(x, r, p, q)| {
-                for (x, &p) in x.iter_mut().zip(p) {
-                    *x += alpha * f64::from(p);
-                }
-                for (r, q) in r.iter_mut().zip(q) {
-                    *r -= alpha * q;
-                }
-                dot(r, r)
+            .enumerate()
+            .map(|(band, (x, r, p, q))| {
+                let step = |part: Range<usize>| {
+                    step_part(alpha, &mut x[part.clone()], &mut r[part.clone()], &p[part.clone()], &q[part])
+                };
+                weights.spans.parts(band, p.len() / half).map(step).sum::<f64>()
             })
             .collect();
     squares.iter().sum()
+}
+
+/// [`step`] of a part of a row.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn step_part(alpha: f64, x: &mut [f64], r: &mut [f64], p: &[f32], q: &[f64]) -> f64 {
+    for (x, &p) in x.iter_mut().zip(p) {
+        *x += alpha * f64::from(p);
+    }
+    for (r, q) in r.iter_mut().zip(q) {
+        *r -= alpha * q;
+    }
+    dot(r, r)
 }
 
 /// Sum of squares, by blocks in parallel and then in order: the same bits for any number of threads.

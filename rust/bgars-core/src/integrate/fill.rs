@@ -5,12 +5,13 @@
 //! values between grids but has no part in the system. It may not join what the mask keeps apart: its neighbours must be
 //! connected around it, through the centres; of several groups it takes the one that conducts best.
 
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::checkerboard::{PaddedRow, Weights};
 use super::coarsen::series;
 
-/// Ties every corner without edges to the neighbours around it.
+/// Ties every corner without edges to the neighbours around it. These are a grid's last edges: its spans follow.
 pub(super) fn fill_corners(weights: &mut Weights) {
     let n = weights.grid.half();
     let found: Vec<(usize, usize, [f32; 4])> = (0..weights.grid.height.div_ceil(2))
@@ -18,12 +19,16 @@ pub(super) fn fill_corners(weights: &mut Weights) {
         .flat_map_iter(|coarse_row| {
             let row = 2 * coarse_row;
             let around = Around::new(weights, row as isize);
-            (0..n).filter_map(move |k| around.virtual_ties(k).map(|ties| (row, k, ties)))
+            let mut free = vec![0.0; n];
+            find_free(&around, &mut free);
+            let free = free.into_iter().enumerate().filter(|corner| corner.1 > 0.0);
+            free.filter_map(move |(k, _)| around.virtual_ties(k).map(|ties| (row, k, ties)))
         })
         .collect();
     for (row, k, ties) in found {
         weights.set_red(row, k, ties.map(|tie| -tie));
     }
+    weights.find_spans();
 }
 
 /// The weights in and beside a row of corners: left, right, up, down.
@@ -31,6 +36,32 @@ struct Around<'a> {
     above: [PaddedRow<'a, f32>; 4],
     here: [PaddedRow<'a, f32>; 4],
     below: [PaddedRow<'a, f32>; 4],
+}
+
+/// Of each corner without edges the strongest way around, by its weaker edge; 0 for the others. Corners are seldom of this
+/// kind: one fast pass finds them.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn find_free(around: &Around<'_>, free: &mut [f32]) {
+    let n = free.len();
+    let ([left_above, right_above, _, down_above], [left_below, right_below, up_below, _]) =
+        (around.above, around.below);
+    let arcs = [
+        [&down_above[..n], &right_above[..n]],
+        [&left_above[1..=n], &down_above[1..=n]],
+        [&up_below[1..=n], &left_below[1..=n]],
+        [&right_below[..n], &up_below[..n]],
+    ];
+    let own = around.here.map(|side| &side[1..=n]);
+    for k in 0..n {
+        let (mut tied, mut way) = (0.0f32, 0.0f32);
+        for side in own {
+            tied = tied.max(side[k].abs());
+        }
+        for [a, b] in arcs {
+            way = way.max(a[k].abs().min(b[k].abs()));
+        }
+        free[k] = if tied == 0.0 { way } else { 0.0 };
+    }
 }
 
 impl<'a> Around<'a> {

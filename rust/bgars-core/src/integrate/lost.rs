@@ -1,5 +1,6 @@
 //! What the next coarser grid cannot hold.
 
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::checkerboard::Weights;
@@ -64,16 +65,30 @@ fn tied_centres(weights: &Weights, row: isize, k: usize) -> impl Iterator<Item =
 
 /// The centres of odd `row` that tie together what has no coarse edge along the rim of their cell.
 fn doubtful_in_row(weights: &Weights, row: isize) -> Vec<usize> {
-    let n = weights.grid.half();
     let rows = CellRow::new(weights, row);
-    // All edges there is the common case: one fast pass finds the cells that are worth a look.
-    let mut weakest = vec![f32::INFINITY; n];
-    for side in rows.spokes.iter().chain(rows.rims.as_flattened()) {
-        for (weakest, weight) in weakest.iter_mut().zip(*side) {
-            *weakest = weakest.min(weight.abs());
-        }
+    // All edges there, or none, is the common case: one fast pass finds the cells that are worth a look.
+    let mut suspects = vec![0.0; weights.grid.half()];
+    suspect(&rows, &mut suspects);
+    let suspects = suspects.iter().enumerate().filter(|suspect| *suspect.1 > 0.0);
+    suspects.map(|suspect| suspect.0).filter(|&k| rows.rim(k).is_doubtful()).collect()
+}
+
+/// The strongest spoke of each cell that lacks an edge; 0 for the others.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn suspect(rows: &CellRow<'_>, suspects: &mut [f32]) {
+    let n = suspects.len();
+    let [up, right, down, left] = rows.spokes.map(|side| &side[..n]);
+    for k in 0..n {
+        suspects[k] = up[k].max(right[k]).max(down[k].max(left[k])).max(0.0);
     }
-    (0..n).filter(|&k| weakest[k] == 0.0 && rows.rim(k).is_doubtful()).collect()
+    let weakest_of = |a: &[f32], b: &[f32], k: usize| a[k].abs().min(b[k].abs());
+    let [[a, b], [c, d], [e, f], [g, h]] = rows.rims.map(|rim| rim.map(|side| &side[..n]));
+    for k in 0..n {
+        let spokes = weakest_of(up, right, k).min(weakest_of(down, left, k));
+        let first = weakest_of(a, b, k).min(weakest_of(c, d, k));
+        let weakest = spokes.min(first).min(weakest_of(e, f, k).min(weakest_of(g, h, k)));
+        suspects[k] = if weakest == 0.0 { suspects[k] } else { 0.0 };
+    }
 }
 
 /// Whether the coarser grid joins all that centre `k` of odd `row` ties together by a short way around.

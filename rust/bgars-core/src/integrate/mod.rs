@@ -25,6 +25,7 @@ mod real;
 mod reduction;
 mod ring;
 mod solve;
+mod spans;
 mod stencil;
 mod strays;
 mod system;

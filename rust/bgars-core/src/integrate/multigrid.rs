@@ -64,7 +64,7 @@ impl LevelVectors {
             half: grid.half(),
             reds: Aligned::zeros(grid.half_pixels()),
             blacks: Aligned::zeros(grid.half_pixels()),
-            red_solution: Aligned::any(grid.half_pixels()),
+            red_solution: Aligned::zeros(grid.half_pixels()),
             solution: Aligned::any(grid.height * grid.width),
         }
     }

@@ -3,12 +3,13 @@
 use multiversion::{multiversion, target::target_cfg_f};
 use rayon::prelude::*;
 
-use super::checkerboard::{BAND_ROWS, Weights};
+use super::checkerboard::{BAND_ROWS, Grid, Weights};
 use super::real::{Real, on_vectors};
 use super::ring::Ring;
+use super::spans::Span;
 use crate::vector::Packed;
 
-/// `out = S x`; returns `<x, S x>`, summed in an order that does not depend on the threads.
+/// `out = S x` along the spans of the grid; returns `<x, S x>`, summed in an order that does not depend on the threads.
 pub(super) fn multiply<T: Real>(weights: &Weights, x: &[T], out: &mut [f64]) -> f64 {
     let chunk = BAND_ROWS * weights.grid.half();
     let bands = out.par_chunks_mut(chunk).enumerate();
@@ -28,57 +29,59 @@ pub(super) fn residual_norm(weights: &Weights, x: &[f64], b: &[f64]) -> f64 {
         .map_init(memory, |(rows, product), (band, b)| {
             let product = &mut product[..b.len()];
             multiply_band(weights, x, band, rows, product);
-            for (product, b) in product.iter_mut().zip(b) {
-                *product = b - *product;
-            }
-            dot(product, product)
+            let rows = b.len() / weights.grid.half();
+            let squares = weights.spans.parts(band, rows).map(|part| {
+                let product = &mut product[part.clone()];
+                for (product, b) in product.iter_mut().zip(&b[part]) {
+                    *product = b - *product;
+                }
+                dot(product, product)
+            });
+            squares.sum::<f64>()
         })
         .collect();
     squares.iter().sum::<f64>().sqrt()
 }
 
-/// `reds += W D_black^-1 blacks`: the right side of the reduced system.
+/// `reds += W D_black^-1 blacks`: the right side of the reduced system, along its spans.
 pub(super) fn eliminate_blacks<T: Real>(weights: &Weights, reds: &mut [T], blacks: &[T]) {
     let chunk = BAND_ROWS * weights.grid.half();
     reds.par_chunks_mut(chunk).enumerate().for_each(|(band, reds)| eliminate_band(weights, blacks, band, reds));
 }
 
-/// `blacks = D_black^-1 (blacks + W^T reds)`: from right side to solution.
+/// `blacks = D_black^-1 (blacks + W^T reds)`: from right side to solution, along the spans.
 pub(super) fn fill_blacks<T: Real>(weights: &Weights, reds: &[T], blacks: &mut [T]) {
     let chunk = BAND_ROWS * weights.grid.half();
     blacks.par_chunks_mut(chunk).enumerate().for_each(|(band, blacks)| fill_band(weights, reds, band, blacks));
 }
 
-/// `D_black^-1 W^T reds` of a row; zeros outside the grid.
+/// `D_black^-1 W^T reds` of a row, along a span.
 #[inline(always)]
 pub(super) fn solve_blacks<V: Packed<Number: Real>>(
     weights: &Weights,
     row: isize,
+    span: Span,
     reds: &Ring<V::Number>,
     blacks: &mut Ring<V::Number>,
 ) {
-    let out = blacks.row_mut(row);
     if !weights.grid.contains(row) {
-        out.fill(V::Number::default());
         return;
     }
-    let stencil = weights.black_stencil::<V>(row, reds.around(row));
-    let out = V::chunks_mut(out, stencil.len());
+    let stencil = weights.black_stencil::<V>(row, span, reds.around(row));
+    let out = V::chunks_mut(&mut blacks.row_mut(row)[span.start..], stencil.len());
     for k in 0..stencil.len() {
         (stencil.sum(k) * stencil.diagonal(k).inverse()).put(&mut out[k]);
     }
 }
 
-/// Copies a row of `values` into a padded row, converted; zeros outside the grid.
+/// Copies the part of a row of `values` that a span covers, converted.
 #[inline(always)]
-fn load<T: Real, U: Real>(weights: &Weights, values: &[T], row: isize, out: &mut [U], convert: impl Fn(T) -> U) {
-    let n = weights.grid.half();
-    if weights.grid.contains(row) {
-        for (out, value) in out.iter_mut().zip(&values[row as usize * n..][..n]) {
+fn load<T: Real, U: Real>(grid: Grid, values: &[T], row: isize, span: Span, out: &mut [U], convert: impl Fn(T) -> U) {
+    if grid.contains(row) {
+        let values = &values[row as usize * grid.half()..][span.range()];
+        for (out, value) in out[span.range()].iter_mut().zip(values) {
             *out = convert(*value);
         }
-    } else {
-        out.fill(U::default());
     }
 }
 
@@ -98,21 +101,22 @@ fn multiply_band_with<T: Real, V: Packed<Number = f64>>(
     let n = weights.grid.half();
     let first = (band * BAND_ROWS) as isize;
     let end = first + (out.len() / n) as isize;
+    let span = weights.spans.band(band);
     let mut product = 0.0;
     for row in first - 2..=end + 1 {
-        load(weights, x, row, reds.row_mut(row), T::to_f64);
+        load(weights.grid, x, row, span, reds.row_mut(row), T::to_f64);
         let row = row - 1;
         if row < first - 1 {
             continue;
         }
-        solve_blacks::<V>(weights, row, reds, blacks);
+        solve_blacks::<V>(weights, row, span, reds, blacks);
         let row = row - 1;
         if row < first {
             continue;
         }
-        let here = &reds.row(row)[1..=n];
-        let out = &mut out[(row - first) as usize * n..][..n];
-        let stencil = weights.red_stencil::<V>(row, blacks.around(row));
+        let here = &reds.row(row)[1..][span.range()];
+        let out = &mut out[(row - first) as usize * n..][span.range()];
+        let stencil = weights.red_stencil::<V>(row, span, blacks.around(row));
         let (x, products) = (V::chunks(here, stencil.len()), V::chunks_mut(out, stencil.len()));
         for k in 0..stencil.len() {
             (stencil.diagonal(k) * V::read(&x[k]) - stencil.sum(k)).put(&mut products[k]);
@@ -164,25 +168,23 @@ fn eliminate_band_with<V: Packed<Number: Real>>(
     let n = weights.grid.half();
     let first = (band * BAND_ROWS) as isize;
     let end = first + (reds.len() / n) as isize;
+    let span = weights.spans.band(band);
     let mut scaled = Ring::<V::Number>::new(n);
     for row in first - 1..=end {
-        let out = scaled.row_mut(row);
         if weights.grid.contains(row) {
-            let sides = weights.blacks::<V>(row);
-            let out = V::chunks_mut(out, sides.len());
-            let blacks = V::chunks(&blacks[row as usize * n..], sides.len());
+            let sides = weights.blacks::<V>(row, span);
+            let out = V::chunks_mut(&mut scaled.row_mut(row)[span.start..], sides.len());
+            let blacks = V::chunks(&blacks[row as usize * n + span.start..], sides.len());
             for k in 0..sides.len() {
                 (V::read(&blacks[k]) * sides.diagonal(k).inverse()).put(&mut out[k]);
             }
-        } else {
-            out.fill(V::Number::default());
         }
         let row = row - 1;
         if row < first {
             continue;
         }
-        let stencil = weights.red_stencil::<V>(row, scaled.around(row));
-        let reds = V::chunks_mut(&mut reds[(row - first) as usize * n..], stencil.len());
+        let stencil = weights.red_stencil::<V>(row, span, scaled.around(row));
+        let reds = V::chunks_mut(&mut reds[(row - first) as usize * n + span.start..], stencil.len());
         for k in 0..stencil.len() {
             (V::read(&reds[k]) + stencil.sum(k)).put(&mut reds[k]);
         }
@@ -204,15 +206,16 @@ fn fill_band_with<V: Packed<Number: Real>>(
     let n = weights.grid.half();
     let first = (band * BAND_ROWS) as isize;
     let end = first + (blacks.len() / n) as isize;
+    let span = weights.spans.band(band);
     let mut here = Ring::<V::Number>::new(n);
     for row in first - 1..=end {
-        load(weights, reds, row, here.row_mut(row), |value| value);
+        load(weights.grid, reds, row, span, here.row_mut(row), |value| value);
         let row = row - 1;
         if row < first {
             continue;
         }
-        let stencil = weights.black_stencil::<V>(row, here.around(row));
-        let blacks = V::chunks_mut(&mut blacks[(row - first) as usize * n..], stencil.len());
+        let stencil = weights.black_stencil::<V>(row, span, here.around(row));
+        let blacks = V::chunks_mut(&mut blacks[(row - first) as usize * n + span.start..], stencil.len());
         for k in 0..stencil.len() {
             ((V::read(&blacks[k]) + stencil.sum(k)) * stencil.diagonal(k).inverse()).put(&mut blacks[k]);
         }

@@ -46,7 +46,8 @@ const CHECK_PIXELS: usize = 1 << 14;
 /// ```
 ///
 /// # Cost
-/// An iteration is linear in the pixels of the image; the same bits for any number of threads.
+/// An iteration is linear in the pixels between the first and the last of the mask, 32 rows at a time; the same bits for any
+/// number of threads.
 pub fn integrate(
     normals: &[f32],
     mask: &[bool],

@@ -117,7 +117,9 @@ impl LinOp<f64> for Operator<'_> {
     }
 
     fn apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, _par: Par, _stack: &mut MemStack) {
-        multiply(self.weights, slice(rhs), slice_mut(out));
+        let out = slice_mut(out);
+        out.fill(0.0);
+        multiply(self.weights, slice(rhs), out);
     }
 
     fn conj_apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, par: Par, stack: &mut MemStack) {

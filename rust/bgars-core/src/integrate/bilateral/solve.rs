@@ -191,6 +191,7 @@ fn improve(
     // The residual of the reds, the blacks solved for: b - S x.
     eliminate_blacks(&weights, &mut right.reds, &right.blacks);
     let mut residual = before;
+    residual.par_chunks_mut(half).for_each(|row| row.fill(0.0));
     multiply(&weights, &reds, &mut residual);
     residual.par_iter_mut().zip(right.reds.par_iter()).for_each(|(residual, b)| *residual = b - *residual);
     let inner = Params { relative_tolerance: CONVERGED_TOLERANCE, max_iters: CONVERGED_ITERS, ..Params::default() };

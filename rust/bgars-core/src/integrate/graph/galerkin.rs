@@ -2,49 +2,66 @@
 
 use rayon::prelude::*;
 
-use super::CHUNK;
+use super::SETUP_CHUNK;
 use super::matrix::{Part, Rows};
+
+/// A sparse row that is added up entry by entry.
+struct SparseSum {
+    entries: Vec<(u32, f64)>,
+    /// Where each column is among the entries.
+    place: Vec<u32>,
+}
+
+impl SparseSum {
+    fn new(width: usize) -> Self {
+        Self { entries: Vec::new(), place: vec![u32::MAX; width] }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, column: usize, value: f64) {
+        if self.place[column] == u32::MAX {
+            self.place[column] = self.entries.len() as u32;
+            self.entries.push((column as u32, value));
+        } else {
+            self.entries[self.place[column] as usize].1 += value;
+        }
+    }
+
+    /// Takes the entries out, one after the other.
+    fn drain(&mut self) -> impl Iterator<Item = (usize, f64)> {
+        self.entries.drain(..).map(|(column, value)| {
+            self.place[column as usize] = u32::MAX;
+            (column as usize, value)
+        })
+    }
+}
 
 /// The coarser graph. Its Laplacian's rows add up to zero as those of `L` do, so the diagonal need not be kept.
 pub(super) fn coarser_graph(graph: &Rows, prolongation: &Rows, restriction: &Rows) -> Rows {
     let n = restriction.len();
-    let parts = (0..n.div_ceil(CHUNK))
+    let parts = (0..n.div_ceil(SETUP_CHUNK))
         .into_par_iter()
         .map_init(
-            || vec![u32::MAX; n],
-            |place, chunk| {
+            || (SparseSum::new(graph.len()), SparseSum::new(n)),
+            |(fine_row, coarse_row), chunk| {
                 let mut part = Part::default();
-                let mut row: Vec<(u32, f64)> = Vec::new();
-                for coarse in chunk * CHUNK..((chunk + 1) * CHUNK).min(n) {
-                    let mut add = |other: usize, value: f64| {
-                        if place[other] == u32::MAX {
-                            place[other] = row.len() as u32;
-                            row.push((other as u32, value));
-                        } else {
-                            row[place[other] as usize].1 += value;
-                        }
-                    };
+                for coarse in chunk * SETUP_CHUNK..((chunk + 1) * SETUP_CHUNK).min(n) {
+                    // -P^T L first: its columns are fewer than its terms.
                     for (fine, share) in restriction.pairs(coarse) {
                         let share = f64::from(share);
-                        for (other, weight) in graph.pairs(fine) {
-                            for (to, part) in prolongation.pairs(other) {
-                                add(to, share * f64::from(weight) * f64::from(part));
-                            }
-                        }
-                        let diagonal = graph.sum(fine);
-                        for (to, part) in prolongation.pairs(fine) {
-                            add(to, -share * diagonal * f64::from(part));
-                        }
+                        graph.pairs(fine).for_each(|(other, weight)| fine_row.add(other, share * f64::from(weight)));
+                        fine_row.add(fine, -share * graph.sum(fine));
+                    }
+                    for (fine, value) in fine_row.drain() {
+                        prolongation.pairs(fine).for_each(|(to, share)| coarse_row.add(to, value * f64::from(share)));
                     }
                     let before = part.columns.len();
-                    for &(other, weight) in &row {
-                        place[other as usize] = u32::MAX;
-                        if other as usize != coarse && weight != 0.0 {
-                            part.push(other, weight as f32);
-                        }
+                    for (other, weight) in
+                        coarse_row.drain().filter(|&(other, weight)| other != coarse && weight != 0.0)
+                    {
+                        part.push(other as u32, weight as f32);
                     }
                     part.end_row(before);
-                    row.clear();
                 }
                 part
             },

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::CHUNK;
 use super::matrix::{Part, Rows};
+use super::{CHUNK, SETUP_CHUNK};
 use crate::integrate::checkerboard::Weights;
 use crate::integrate::places::ties;
 use crate::integrate::real::Real;
@@ -62,7 +62,7 @@ pub(super) fn reduced_graph(weights: &Weights) -> (Nodes, Rows) {
         node_of[place as usize] = node as u32;
     }
     let parts = nodes
-        .par_chunks(CHUNK)
+        .par_chunks(SETUP_CHUNK)
         .map(|nodes| {
             let mut part = Part::default();
             let mut found = Vec::new();

@@ -18,39 +18,44 @@ pub(super) use restrict::restrict;
 use super::checkerboard::{PaddedRow, Weights};
 use super::real::Real;
 use super::ring::Ring;
+use super::spans::Span;
 use crate::vector::Packed;
 
-/// Sums of the weights that tie a row's blacks to corners: left and right in even rows, up and down in odd ones; zeros
-/// outside the grid.
+/// Sums of the weights that tie a row's blacks to corners: left and right in even rows, up and down in odd ones.
 #[inline(always)]
-fn black_ties<V: Packed<Number = f32>>(weights: &Weights, row: isize, out: &mut [f32]) {
+fn black_ties<V: Packed<Number = f32>>(weights: &Weights, row: isize, span: Span, out: &mut [f32]) {
     if !weights.grid.contains(row) {
-        out.fill(0.0);
         return;
     }
-    let n = out.len() / V::WIDTH;
-    let out = V::chunks_mut(out, n);
-    let (first, second) = corner_ties::<V>(weights, row, n);
-    for k in 0..n {
+    let (first, second) = corner_ties::<V>(weights, row, span);
+    let out = V::chunks_mut(&mut out[span.start..], first.len());
+    for k in 0..first.len() {
         (V::read(&first[k]).magnitude() + V::read(&second[k]).magnitude()).put(&mut out[k]);
     }
 }
 
 /// The weights between a row's blacks and their corners: left and right in even rows, above and below in odd ones.
 #[inline(always)]
-fn corner_ties<V: Packed<Number = f32>>(weights: &Weights, row: isize, n: usize) -> (&[V::Chunk], &[V::Chunk]) {
+fn corner_ties<V: Packed<Number = f32>>(weights: &Weights, row: isize, span: Span) -> (&[V::Chunk], &[V::Chunk]) {
     let (first, second) = if row.rem_euclid(2) == 0 {
         (&weights.right(row)[1..], &weights.left(row)[2..])
     } else {
         (&weights.down(row - 1)[1..], &weights.up(row + 1)[1..])
     };
-    (V::chunks(first, n), V::chunks(second, n))
+    let n = span.vectors::<V>();
+    (V::chunks(&first[span.start..], n), V::chunks(&second[span.start..], n))
 }
 
 /// Divides by the weights that tie the centres of odd `row` to blacks that have a corner themselves.
 #[inline(always)]
-fn divide_by_centre_ties<V: Packed<Number = f32>>(weights: &Weights, row: isize, ties: &Ring<f32>, values: &mut [f32]) {
-    let n = values.len() / V::WIDTH;
+fn divide_by_centre_ties<V: Packed<Number = f32>>(
+    weights: &Weights,
+    row: isize,
+    span: Span,
+    ties: &Ring<f32>,
+    values: &mut [f32],
+) {
+    let n = span.vectors::<V>();
     let [above, here, below] = ties.around(row);
     let sides: [(PaddedRow<'_, f32>, PaddedRow<'_, f32>); 4] = [
         (&weights.left(row)[1..], &here[1..]),
@@ -58,8 +63,9 @@ fn divide_by_centre_ties<V: Packed<Number = f32>>(weights: &Weights, row: isize,
         (&weights.up(row)[1..], &above[1..]),
         (&weights.down(row)[1..], &below[1..]),
     ];
-    let [left, right, up, down] = sides.map(|(weight, tie)| (V::chunks(weight, n), V::chunks(tie, n)));
-    let values = V::chunks_mut(values, n);
+    let [left, right, up, down] =
+        sides.map(|(weight, tie)| (V::chunks(&weight[span.start..], n), V::chunks(&tie[span.start..], n)));
+    let values = V::chunks_mut(&mut values[span.start..], n);
     for k in 0..n {
         let mut sum = V::read(&left.0[k]).where_positive(V::read(&left.1[k]));
         for (weight, tie) in [right, up, down] {
@@ -69,31 +75,31 @@ fn divide_by_centre_ties<V: Packed<Number = f32>>(weights: &Weights, row: isize,
     }
 }
 
-/// `D^-1 b` of a row; zeros outside the grid. `rounded` takes b.
+/// `D^-1 b` of a row. `rounded` takes b.
 #[inline(always)]
 fn smoothed_row<T: Real, V: Packed<Number = f32>>(
     weights: &Weights,
     b: &[T],
     row: isize,
+    span: Span,
     rounded: &mut [f32],
     out: &mut [f32],
 ) {
     if !weights.grid.contains(row) {
-        out.fill(0.0);
         return;
     }
-    round(&b[row as usize * out.len()..], rounded);
-    let sides = weights.reds::<V>(row);
-    let (b, out) = (V::chunks(rounded, sides.len()), V::chunks_mut(out, sides.len()));
+    round(&b[row as usize * out.len()..][span.range()], rounded);
+    let sides = weights.reds::<V>(row, span);
+    let (b, out) = (V::chunks(rounded, sides.len()), V::chunks_mut(&mut out[span.start..], sides.len()));
     for k in 0..sides.len() {
         (V::read(&b[k]) * sides.diagonal(k).inverse()).put(&mut out[k]);
     }
 }
 
-/// The first numbers of a row as floats.
+/// A part of a row as the first floats of `out`.
 #[inline(always)]
-fn round<T: Real>(row: &[T], out: &mut [f32]) {
-    for (out, value) in out.iter_mut().zip(row) {
+fn round<T: Real>(part: &[T], out: &mut [f32]) {
+    for (out, value) in out.iter_mut().zip(part) {
         *out = value.to_f32();
     }
 }

@@ -8,9 +8,11 @@ use crate::integrate::checkerboard::{BAND_ROWS, PaddedRow, Weights, split_row};
 use crate::integrate::real::{Real, on_vectors};
 use crate::integrate::reduction::solve_blacks;
 use crate::integrate::ring::Ring;
+use crate::integrate::spans::Span;
 use crate::vector::Packed;
 
-/// `coarse = P^T (b - S D^-1 b)`: smooths `b` from zero and restricts what is left to the coarser grid, as reds and blacks.
+/// `coarse = P^T (b - S D^-1 b)`: smooths `b` from zero and restricts what is left to the coarser grid, as reds and blacks,
+/// below the spans of this grid.
 pub(in crate::integrate) fn restrict<T: Real>(
     weights: &Weights,
     b: &[T],
@@ -67,66 +69,64 @@ pub(super) fn restrict_band_with<T: Real, V: Packed<Number = f32>>(
     [coarse_reds, coarse_blacks]: [&mut [f32]; 2],
 ) {
     let grid = weights.grid;
-    let coarse_half = grid.coarser().half();
+    let (coarse_half, span) = (grid.coarser().half(), weights.spans.band(band));
     let first = (band * BAND_ROWS) as isize;
     let coarse_rows = coarse_reds.len() / coarse_half;
     let end = first + 2 * coarse_rows as isize;
     for row in first - 3..=end + 1 {
-        smoothed_row::<T, V>(weights, b, row, &mut rows.rounded, rows.smooth.row_mut(row));
+        smoothed_row::<T, V>(weights, b, row, span, &mut rows.rounded, rows.smooth.row_mut(row));
 
         let row = row - 1;
         if row < first - 2 {
             continue;
         }
-        solve_blacks::<V>(weights, row, &rows.smooth, &mut rows.blacks);
-        black_ties::<V>(weights, row, rows.ties.row_mut(row));
+        solve_blacks::<V>(weights, row, span, &rows.smooth, &mut rows.blacks);
+        black_ties::<V>(weights, row, span, rows.ties.row_mut(row));
 
         // The residual: D - N applied to D^-1 b leaves N D^-1 b.
         let row = row - 1;
         if row < first - 1 {
             continue;
         }
-        let out = rows.residual.row_mut(row);
         if grid.contains(row) {
-            let stencil = weights.red_stencil::<V>(row, rows.blacks.around(row));
-            let out = V::chunks_mut(out, stencil.len());
+            let stencil = weights.red_stencil::<V>(row, span, rows.blacks.around(row));
+            let out = V::chunks_mut(&mut rows.residual.row_mut(row)[span.start..], stencil.len());
             for k in 0..stencil.len() {
                 stencil.sum(k).put(&mut out[k]);
             }
-        } else {
-            out.fill(0.0);
         }
         if row.rem_euclid(2) == 0 {
             continue;
         }
-        centres_to_blacks::<V>(weights, row, rows);
+        centres_to_blacks::<V>(weights, row, span, rows);
         if row <= first {
             continue;
         }
         let row = row - 1;
-        blacks_to_corners::<V>(weights, row, rows);
-        let coarse_row = (row - first) as usize / 2;
-        let span = coarse_row * coarse_half..(coarse_row + 1) * coarse_half;
-        split_row((row / 2) as usize, &rows.coarse, &mut coarse_reds[span.clone()], &mut coarse_blacks[span]);
+        blacks_to_corners::<V>(weights, row, span, rows);
+        let coarse_start = (row - first) as usize / 2 * coarse_half;
+        // A corner is one pixel of the coarser grid, where each colour has every other.
+        let [start, end] = [span.start / 2, span.end.div_ceil(2)];
+        let halves = coarse_start + start..coarse_start + end;
+        let corners = &rows.coarse[2 * start..span.end];
+        split_row((row / 2) as usize, corners, &mut coarse_reds[halves.clone()], &mut coarse_blacks[halves]);
     }
 }
 
 /// The centres of an odd row to the blacks beside them.
 #[inline(always)]
-fn centres_to_blacks<V: Packed<Number = f32>>(weights: &Weights, row: isize, rows: &mut Restricting) {
-    let (values, out) = (rows.centres.row_mut(row), rows.vertical.row_mut(row));
+fn centres_to_blacks<V: Packed<Number = f32>>(weights: &Weights, row: isize, span: Span, rows: &mut Restricting) {
     if !weights.grid.contains(row) {
-        values.fill(0.0);
-        out.fill(0.0);
         return;
     }
-    values.copy_from_slice(&rows.residual.row(row)[1..=values.len()]);
-    divide_by_centre_ties::<V>(weights, row, &rows.ties, values);
-    let n = out.len() / V::WIDTH;
-    let here = rows.centres.row(row);
+    let (start, n) = (span.start, span.vectors::<V>());
+    rows.centres.row_mut(row)[span.range()].copy_from_slice(&rows.residual.row(row)[1..][span.range()]);
+    divide_by_centre_ties::<V>(weights, row, span, &rows.ties, rows.centres.row_mut(row));
+    let here = &rows.centres.row(row)[start..];
     let (before, after) = (V::chunks(here, n), V::chunks(&here[1..], n));
-    let (right, left) = (V::chunks(weights.right(row), n), V::chunks(&weights.left(row)[1..], n));
-    let (tie, out) = (V::chunks(&rows.ties.row(row)[1..], n), V::chunks_mut(out, n));
+    let (right, left) = (V::chunks(&weights.right(row)[start..], n), V::chunks(&weights.left(row)[1 + start..], n));
+    let tie = V::chunks(&rows.ties.row(row)[1 + start..], n);
+    let out = V::chunks_mut(&mut rows.vertical.row_mut(row)[start..], n);
     for k in 0..n {
         let sum = V::read(&right[k]).times_plus(V::read(&before[k]), V::read(&left[k]) * V::read(&after[k]));
         (sum * V::read(&tie[k]).inverse()).put(&mut out[k]);
@@ -135,12 +135,13 @@ fn centres_to_blacks<V: Packed<Number = f32>>(weights: &Weights, row: isize, row
 
 /// The blacks around the corners of an even row to these; the blacks of the row itself take from the centres first.
 #[inline(always)]
-fn blacks_to_corners<V: Packed<Number = f32>>(weights: &Weights, row: isize, rows: &mut Restricting) {
-    let n = rows.coarse.len() / V::WIDTH;
-    let (down, up) = (V::chunks(&weights.down(row - 1)[1..], n), V::chunks(&weights.up(row + 1)[1..], n));
+fn blacks_to_corners<V: Packed<Number = f32>>(weights: &Weights, row: isize, span: Span, rows: &mut Restricting) {
+    let (first, n) = (1 + span.start, span.vectors::<V>());
+    let (down, up) = (V::chunks(&weights.down(row - 1)[first..], n), V::chunks(&weights.up(row + 1)[first..], n));
     let [above, _, below] = rows.centres.around(row);
-    let (above, below) = (V::chunks(&above[1..], n), V::chunks(&below[1..], n));
-    let (tie, out) = (V::chunks(&rows.ties.row(row)[1..], n), V::chunks_mut(rows.horizontal.row_mut(row), n));
+    let (above, below) = (V::chunks(&above[first..], n), V::chunks(&below[first..], n));
+    let tie = V::chunks(&rows.ties.row(row)[first..], n);
+    let out = V::chunks_mut(&mut rows.horizontal.row_mut(row)[span.start..], n);
     for k in 0..n {
         let sum = V::read(&down[k]).times_plus(V::read(&above[k]), V::read(&up[k]) * V::read(&below[k]));
         (sum * V::read(&tie[k]).inverse()).put(&mut out[k]);
@@ -152,8 +153,9 @@ fn blacks_to_corners<V: Packed<Number = f32>>(weights: &Weights, row: isize, row
         (&weights.up(row)[1..], &above[1..]),
         (&weights.down(row)[1..], &below[1..]),
     ];
-    let sides = sides.map(|(weight, value)| (V::chunks(weight, n), V::chunks(value, n)));
-    let (corner, coarse) = (V::chunks(&rows.residual.row(row)[1..], n), V::chunks_mut(&mut rows.coarse, n));
+    let sides = sides.map(|(weight, value)| (V::chunks(&weight[span.start..], n), V::chunks(&value[span.start..], n)));
+    let corner = V::chunks(&rows.residual.row(row)[first..], n);
+    let coarse = V::chunks_mut(&mut rows.coarse[span.start..], n);
     for k in 0..n {
         let mut sum = V::read(&corner[k]);
         for (weight, value) in sides {

@@ -1,0 +1,127 @@
+//! The part of each band of rows that has edges: kernels work on it alone, so a mask costs its own pixels, not the image's.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::checkerboard::{BAND_ROWS, Grid, LANES, Weights};
+use crate::vector::Packed;
+
+/// Rows above and below a band that its kernels compute for themselves.
+const HALO_ROWS: usize = 3;
+
+/// Pixels of a colour, the same in each row of a band; whole vectors where the grid has any.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Span {
+    pub start: usize,
+    pub end: usize,
+}
+
+impl Span {
+    pub fn range(self) -> Range<usize> {
+        self.start..self.end
+    }
+
+    /// How many vectors it is long.
+    #[inline(always)]
+    pub fn vectors<V: Packed>(self) -> usize {
+        (self.end - self.start) / V::WIDTH
+    }
+}
+
+/// The spans of all bands.
+#[derive(Debug)]
+pub(super) struct Spans {
+    bands: Vec<Span>,
+    half: usize,
+}
+
+impl Spans {
+    /// Every row from end to end.
+    pub fn whole(grid: Grid) -> Self {
+        let half = grid.half();
+        Self { bands: vec![Span { start: 0, end: half }; grid.height.div_ceil(BAND_ROWS)], half }
+    }
+
+    /// All pixels with edges, virtual ones included.
+    pub fn of_edges(weights: &Weights) -> Self {
+        let Grid { height, .. } = weights.grid;
+        let (half, lanes) = (weights.grid.half(), if weights.grid.has_lanes() { LANES } else { 1 });
+        let reds: Vec<_> = (0..height).into_par_iter().map(|row| reds_with_edges(weights, row)).collect();
+        let span = |band: usize| {
+            // The black at the far end of an edge lies in a row of its own, or one further left or right.
+            let first = (band * BAND_ROWS).saturating_sub(HALO_ROWS + 1);
+            let rows = &reds[first..((band + 1) * BAND_ROWS + HALO_ROWS + 1).min(height)];
+            let hull = rows.iter().flatten().cloned().reduce(|a, b| a.start.min(b.start)..a.end.max(b.end));
+            let Range { start, end } = hull.map_or(0..0, |reds| reds.start.saturating_sub(1)..(reds.end + 1).min(half));
+            Span { start: start / lanes * lanes, end: end.next_multiple_of(lanes) }
+        };
+        Self { bands: (0..height.div_ceil(BAND_ROWS)).map(span).collect(), half }
+    }
+
+    /// The span of a band.
+    #[inline]
+    pub fn band(&self, band: usize) -> Span {
+        self.bands[band]
+    }
+
+    /// The parts of a band's `rows` that its span covers, counted from the band's first pixel of a colour.
+    pub fn parts(&self, band: usize, rows: usize) -> impl Iterator<Item = Range<usize>> {
+        let (half, Span { start, end }) = (self.half, self.bands[band]);
+        // Rows without a gap between them are one part.
+        let (parts, end) = if end - start == half { (1, rows * half) } else { (rows, end) };
+        (0..parts).map(move |row| row * half + start..row * half + end)
+    }
+}
+
+/// From the first to the last red with an edge; `None` in a row without any.
+fn reds_with_edges(weights: &Weights, row: usize) -> Option<Range<usize>> {
+    let (row, half) = (row as isize, weights.grid.half());
+    let sides = [weights.left(row), weights.right(row), weights.up(row), weights.down(row)];
+    // All bits but the signs, which zeros may have.
+    let bits = |side: &[f32]| side.iter().fold(0, |bits, weight| bits | weight.to_bits()) << 1;
+    let has_edges = |reds: &Range<usize>| sides.iter().any(|side| bits(&side[1 + reds.start..=reds.end]) != 0);
+    // Blocks first, which are compared at once, then the reds of the first and the last.
+    let block = |index: usize| index * LANES..((index + 1) * LANES).min(half);
+    let mut blocks = (0..half.div_ceil(LANES)).map(block).filter(has_edges);
+    let mut first = blocks.next()?;
+    let mut last = blocks.next_back().unwrap_or(first.clone());
+    let is_used = |red: &usize| has_edges(&(*red..red + 1));
+    Some(first.find(is_used)?..last.rfind(is_used)? + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// No edges but those of some reds to the right.
+    fn spans(grid: Grid, reds: &[(usize, usize)]) -> Vec<(usize, usize)> {
+        let mut weights = Weights::zeros(grid);
+        for &(row, k) in reds {
+            weights.set_red(row, k, [0.0, 1.0, 0.0, 0.0]);
+        }
+        Spans::of_edges(&weights).bands.iter().map(|span| (span.start, span.end)).collect()
+    }
+
+    #[test]
+    fn spans_hold_both_ends_of_every_edge_of_a_band_and_of_the_rows_around_it() {
+        let grid = Grid { height: 3 * BAND_ROWS, width: 128 };
+        assert_eq!(spans(grid, &[(2, 17), (2, 30)]), [(16, 32), (0, 0), (0, 0)]);
+        // Black 32 may be tied to red 31.
+        assert_eq!(spans(grid, &[(2, 31)]), [(16, 48), (0, 0), (0, 0)]);
+        assert_eq!(spans(grid, &[(2, 5), (BAND_ROWS + 3, 40)]), [(0, 48), (32, 48), (0, 0)]);
+        assert_eq!(spans(grid, &[(BAND_ROWS + 4, 40)]), [(0, 0), (32, 48), (0, 0)]);
+    }
+
+    #[test]
+    fn short_rows_are_counted_one_by_one() {
+        assert_eq!(spans(Grid { height: 3, width: 20 }, &[(0, 4)]), [(3, 6)]);
+    }
+
+    #[test]
+    fn rows_without_a_gap_are_one_part() {
+        let spans = Spans { bands: vec![Span { start: 2, end: 5 }, Span { start: 0, end: 8 }], half: 8 };
+        assert_eq!(spans.parts(0, 3).collect::<Vec<_>>(), [2..5, 10..13, 18..21]);
+        assert!(spans.parts(1, 2).eq(std::iter::once(0..16)));
+    }
+}
