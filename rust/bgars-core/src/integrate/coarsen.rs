@@ -9,7 +9,7 @@ use crate::memory::Aligned;
 /// Halves both sides of a grid.
 ///
 /// Weights are conductances. Between two corners lies one edge pixel: two edges in series, `a b / (a + b)`. The paths beside,
-/// through the centres, count for each of the corners they run between as far as the blacks at both their ends hang on it.
+/// through the centres, count for the corners on either side of them as far as the blacks at both their ends hang on these.
 pub(super) fn coarsen(weights: &Weights) -> Weights {
     let grid = weights.grid;
     let n = grid.half();
@@ -61,7 +61,7 @@ fn conduct(weights: &Weights, coarse_row: usize, rightward: &mut [f32], downward
         let (down, up) = (&weights.down(beside - 1)[1..n + 2], &weights.up(beside + 1)[1..n + 2]);
         let (own, other) = if beside < row { (up, down) } else { (down, up) };
         for k in 0..n {
-            rightward[k] += series(left[k], right[k]) * share(own, other, k).min(share(own, other, k + 1));
+            rightward[k] += series(left[k], right[k]) * common(share(own, other, k), share(own, other, k + 1));
         }
     }
     // Down the column of the corners: red k, black k of the row between, red k.
@@ -77,10 +77,10 @@ fn conduct(weights: &Weights, coarse_row: usize, rightward: &mut [f32], downward
     let (top_own, top_next) = (&weights.right(row)[1..=n], &weights.left(row)[2..n + 2]);
     let (low_own, low_next) = (&weights.right(row + 2)[1..=n], &weights.left(row + 2)[2..n + 2]);
     for (k, next) in downward[1..].iter_mut().enumerate() {
-        *next += series(up[k], down[k]) * share(top_next, top_own, k).min(share(low_next, low_own, k));
+        *next += series(up[k], down[k]) * common(share(top_next, top_own, k), share(low_next, low_own, k));
     }
     for k in 0..n {
-        downward[k] += series(up[k], down[k]) * share(top_own, top_next, k).min(share(low_own, low_next, k));
+        downward[k] += series(up[k], down[k]) * common(share(top_own, top_next, k), share(low_own, low_next, k));
     }
 }
 
@@ -98,4 +98,14 @@ fn share(own: &[f32], other: &[f32], k: usize) -> f32 {
     let (own, other) = (own[k].abs(), other[k].abs());
     let sum = own + other;
     if sum > 0.0 { own / sum } else { 0.0 }
+}
+
+/// What a path counts for two corners, by the shares that they have in its ends.
+///
+/// With `a` and `b` the path ties the corners by `a b`, and each of them to the corner diagonally across by `a (1 - b)` and
+/// `b (1 - a)`. A grid has no diagonals: half of these goes to either side, which leaves planes as they are. Corners that
+/// have no share in one of the ends stay apart.
+#[inline(always)]
+fn common(a: f32, b: f32) -> f32 {
+    if a > 0.0 && b > 0.0 { 0.5 * (a + b) } else { 0.0 }
 }
