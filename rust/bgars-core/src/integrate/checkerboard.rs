@@ -196,6 +196,21 @@ impl Weights {
     }
 }
 
+#[cfg(test)]
+impl Weights {
+    /// Edges of any of some weights, at random, on a grid of 40 x 90 pixels.
+    pub fn ragged(choices: [f32; 6]) -> Self {
+        let mut weights = Self::zeros(Grid { height: 40, width: 90 });
+        for row in 1..39 {
+            for k in 1..44 {
+                let choice = |side: usize| choices[(((row * 991 + k * 4 + side) * 2_654_435_761) >> 9) % choices.len()];
+                weights.set_red(row, k, std::array::from_fn(choice));
+            }
+        }
+        weights
+    }
+}
+
 /// 1 for an odd row, also for the row above the first.
 #[inline(always)]
 fn is_odd(row: isize) -> usize {

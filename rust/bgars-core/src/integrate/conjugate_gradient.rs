@@ -44,8 +44,7 @@ pub(super) fn conjugate_gradients(
     }
     let target = (params.relative_tolerance * scale).max(params.absolute_tolerance * (2.0 * size as f64).sqrt());
     let preconditioner = Multigrid::new(weights);
-    let half = weights.grid.half();
-    let chunk = BAND_ROWS * half;
+    let chunk = BAND_ROWS * weights.grid.half();
     let Solution { x, iterations, residual } = &mut solution;
     // A direction may be any; what x and r take along it agrees in `f64`.
     let [mut p, mut z] = [Aligned::<f32>::any(size), Aligned::any(size)];
@@ -70,7 +69,7 @@ pub(super) fn conjugate_gradients(
             if let Some(before) = r_z_before.replace(r_z) {
                 let beta = (r_z / before) as f32;
                 p.par_chunks_mut(chunk).zip(z.par_chunks(chunk)).enumerate().for_each(|(band, (p, z))| {
-                    for part in weights.spans.parts(band, p.len() / half) {
+                    for part in weights.spans.parts(band) {
                         for (p, &z) in p[part.clone()].iter_mut().zip(&z[part]) {
                             *p = z + beta * *p;
                         }
@@ -95,7 +94,7 @@ pub(super) fn conjugate_gradients(
             multiply(weights, x, &mut q);
             (r.par_chunks_mut(chunk), b.par_chunks(chunk), q.par_chunks(chunk)).into_par_iter().enumerate().for_each(
                 |(band, (r, b, q))| {
-                    for part in weights.spans.parts(band, r.len() / half) {
+                    for part in weights.spans.parts(band) {
                         for ((r, b), q) in r[part.clone()].iter_mut().zip(&b[part.clone()]).zip(&q[part]) {
                             *r = b - q;
                         }
@@ -108,8 +107,7 @@ pub(super) fn conjugate_gradients(
 
 /// `x += alpha p`, `r -= alpha q` along the spans of the grid; returns `<r, r>`.
 fn step(weights: &Weights, alpha: f64, [x, r]: [&mut [f64]; 2], p: &[f32], q: &[f64]) -> f64 {
-    let half = weights.grid.half();
-    let chunk = BAND_ROWS * half;
+    let chunk = BAND_ROWS * weights.grid.half();
     let squares: Vec<f64> =
         (x.par_chunks_mut(chunk), r.par_chunks_mut(chunk), p.par_chunks(chunk), q.par_chunks(chunk))
             .into_par_iter()
@@ -118,13 +116,13 @@ fn step(weights: &Weights, alpha: f64, [x, r]: [&mut [f64]; 2], p: &[f32], q: &[
                 let step = |part: Range<usize>| {
                     step_part(alpha, &mut x[part.clone()], &mut r[part.clone()], &p[part.clone()], &q[part])
                 };
-                weights.spans.parts(band, p.len() / half).map(step).sum::<f64>()
+                weights.spans.parts(band).map(step).sum::<f64>()
             })
             .collect();
     squares.iter().sum()
 }
 
-/// [`step`] of a part of a row.
+/// [`step`] of a part of a band.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 fn step_part(alpha: f64, x: &mut [f64], r: &mut [f64], p: &[f32], q: &[f64]) -> f64 {
     for (x, &p) in x.iter_mut().zip(p) {

@@ -108,3 +108,23 @@ impl<'a> Around<'a> {
         Some([left, right, up, down])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_pass_finds_all_corners_to_be_tied() {
+        let (weights, mut found) = (Weights::ragged([0.0, 0.0, 0.0, 0.0, 0.7, -0.5]), 0);
+        let n = weights.grid.half();
+        for row in (0..40).step_by(2) {
+            let (around, mut free) = (Around::new(&weights, row), vec![0.0; n]);
+            find_free(&around, &mut free);
+            for k in (0..n).filter(|&k| around.virtual_ties(k).is_some()) {
+                assert!(free[k] > 0.0, "corner {k} of row {row}");
+                found += 1;
+            }
+        }
+        assert!(found > 5, "{found}");
+    }
+}

@@ -211,3 +211,25 @@ impl Rim {
         corners == 0 || linked + 1 < corners
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_pass_finds_all_doubtful_centres() {
+        let (weights, mut found) = (Weights::ragged([0.0, 0.0, 0.3, 0.7, 1.0, -0.5]), 0);
+        for row in (1..40).step_by(2) {
+            let cells = CellRow::new(&weights, row);
+            let slow = |&k: &usize| {
+                let Rim { spokes, rims, .. } = cells.rim(k);
+                let lacks_an_edge = spokes.iter().chain(rims.as_flattened()).any(|&weight| weight == 0.0);
+                lacks_an_edge && cells.rim(k).is_doubtful()
+            };
+            let doubtful: Vec<usize> = (0..weights.grid.half()).filter(slow).collect();
+            assert_eq!(doubtful_in_row(&weights, row), doubtful);
+            found += doubtful.len();
+        }
+        assert!(found > 50, "{found}");
+    }
+}

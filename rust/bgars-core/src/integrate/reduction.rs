@@ -29,8 +29,7 @@ pub(super) fn residual_norm(weights: &Weights, x: &[f64], b: &[f64]) -> f64 {
         .map_init(memory, |(rows, product), (band, b)| {
             let product = &mut product[..b.len()];
             multiply_band(weights, x, band, rows, product);
-            let rows = b.len() / weights.grid.half();
-            let squares = weights.spans.parts(band, rows).map(|part| {
+            let squares = weights.spans.parts(band).map(|part| {
                 let product = &mut product[part.clone()];
                 for (product, b) in product.iter_mut().zip(&b[part]) {
                     *product = b - *product;

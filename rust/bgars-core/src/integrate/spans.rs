@@ -33,14 +33,13 @@ impl Span {
 #[derive(Debug)]
 pub(super) struct Spans {
     bands: Vec<Span>,
-    half: usize,
+    grid: Grid,
 }
 
 impl Spans {
     /// Every row from end to end.
     pub fn whole(grid: Grid) -> Self {
-        let half = grid.half();
-        Self { bands: vec![Span { start: 0, end: half }; grid.height.div_ceil(BAND_ROWS)], half }
+        Self { bands: vec![Span { start: 0, end: grid.half() }; grid.height.div_ceil(BAND_ROWS)], grid }
     }
 
     /// All pixels with edges, virtual ones included.
@@ -56,7 +55,7 @@ impl Spans {
             let Range { start, end } = hull.map_or(0..0, |reds| reds.start.saturating_sub(1)..(reds.end + 1).min(half));
             Span { start: start / lanes * lanes, end: end.next_multiple_of(lanes) }
         };
-        Self { bands: (0..height.div_ceil(BAND_ROWS)).map(span).collect(), half }
+        Self { bands: (0..height.div_ceil(BAND_ROWS)).map(span).collect(), grid: weights.grid }
     }
 
     /// The span of a band.
@@ -65,9 +64,10 @@ impl Spans {
         self.bands[band]
     }
 
-    /// The parts of a band's `rows` that its span covers, counted from the band's first pixel of a colour.
-    pub fn parts(&self, band: usize, rows: usize) -> impl Iterator<Item = Range<usize>> {
-        let (half, Span { start, end }) = (self.half, self.bands[band]);
+    /// The parts of a band's rows that its span covers, counted from the band's first pixel of a colour.
+    pub fn parts(&self, band: usize) -> impl Iterator<Item = Range<usize>> {
+        let (half, Span { start, end }) = (self.grid.half(), self.bands[band]);
+        let rows = BAND_ROWS.min(self.grid.height - band * BAND_ROWS);
         // Rows without a gap between them are one part.
         let (parts, end) = if end - start == half { (1, rows * half) } else { (rows, end) };
         (0..parts).map(move |row| row * half + start..row * half + end)
@@ -120,8 +120,9 @@ mod tests {
 
     #[test]
     fn rows_without_a_gap_are_one_part() {
-        let spans = Spans { bands: vec![Span { start: 2, end: 5 }, Span { start: 0, end: 8 }], half: 8 };
-        assert_eq!(spans.parts(0, 3).collect::<Vec<_>>(), [2..5, 10..13, 18..21]);
-        assert!(spans.parts(1, 2).eq(std::iter::once(0..16)));
+        let grid = Grid { height: BAND_ROWS + 2, width: 16 };
+        let spans = Spans { bands: vec![Span { start: 0, end: 8 }, Span { start: 2, end: 5 }], grid };
+        assert!(spans.parts(0).eq(std::iter::once(0..8 * BAND_ROWS)));
+        assert_eq!(spans.parts(1).collect::<Vec<_>>(), [2..5, 10..13]);
     }
 }

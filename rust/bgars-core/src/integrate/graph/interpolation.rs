@@ -22,14 +22,7 @@ pub(super) fn interpolation(graph: &Rows, coarse_of: &[u32]) -> Rows {
     let parts = (0..graph.len().div_ceil(SETUP_CHUNK))
         .into_par_iter()
         .map_init(
-            || Sources {
-                graph,
-                coarse_of,
-                limits: &limits,
-                shares: Vec::new(),
-                place: vec![NONE; graph.len()],
-                passed: Vec::new(),
-            },
+            || Sources { graph, coarse_of, limits: &limits, shares: Vec::new(), place: vec![NONE; graph.len()] },
             |sources, chunk| {
                 let mut part = Part::default();
                 for node in chunk * SETUP_CHUNK..((chunk + 1) * SETUP_CHUNK).min(graph.len()) {
@@ -62,14 +55,12 @@ struct Sources<'a> {
     shares: Vec<(u32, f64)>,
     /// Where each node is in `shares`.
     place: Vec<u32>,
-    /// What a neighbour passes on: where to in `shares`, and the weight.
-    passed: Vec<(u32, f64)>,
 }
 
 impl Sources<'_> {
     /// The sources of fine `node` and their weights.
     fn of(&mut self, node: usize) -> &[(u32, f64)] {
-        let Self { graph, coarse_of, limits, shares, place, passed } = self;
+        let Self { graph, coarse_of, limits, shares, place } = self;
         let is_coarse = |node: usize| coarse_of[node] != FINE;
         shares.clear();
         let mut add = |source: usize| {
@@ -91,19 +82,11 @@ impl Sources<'_> {
                 shares[place[other] as usize].1 += f64::from(weight);
             } else if !is_coarse(other) && weight >= limits[node] {
                 // What the fine neighbour passes on, to each source and back to this node.
-                passed.clear();
-                let mut sum = 0.0;
-                for (farther, tie) in graph.pairs(other).filter(|&(_, weight)| weight > 0.0) {
-                    if place[farther] != NONE {
-                        passed.push((place[farther], f64::from(tie)));
-                        sum += f64::from(tie);
-                    } else if farther == node {
-                        sum += f64::from(tie);
-                    }
-                }
-                let factor = f64::from(weight) / sum;
-                for &(place, tie) in &*passed {
-                    shares[place as usize].1 += factor * tie;
+                let ties = || graph.pairs(other).filter(|&(_, weight)| weight > 0.0);
+                let passes = ties().filter(|&(farther, _)| farther == node || place[farther] != NONE);
+                let factor = f64::from(weight) / passes.map(|(_, tie)| f64::from(tie)).sum::<f64>();
+                for (farther, tie) in ties().filter(|&(farther, _)| place[farther] != NONE) {
+                    shares[place[farther] as usize].1 += factor * f64::from(tie);
                 }
             }
         }
