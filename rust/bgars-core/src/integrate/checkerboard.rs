@@ -5,6 +5,8 @@
 //! other way round (missing pixels at the end are ones without edges). Then the neighbours of red k above and below are black
 //! k, and left and right are two blacks that follow each other, so every stencil runs over contiguous memory.
 
+use std::ops::Range;
+
 use multiversion::multiversion;
 use rayon::prelude::*;
 
@@ -84,9 +86,24 @@ pub(super) const DOWN: usize = 3;
 
 impl Weights {
     /// No edges.
+    #[cfg(test)]
     pub fn zeros(grid: Grid) -> Self {
+        let mut weights = Self::unset(grid);
+        weights.sides.iter_mut().for_each(|side| side.fill(0.0));
+        weights
+    }
+
+    /// Edges of any weight: every row is to be set by its band.
+    pub fn unset(grid: Grid) -> Self {
         let length = grid.pad() + (grid.height + 2) * (grid.half() + grid.pad());
-        Self { grid, sides: std::array::from_fn(|_| Aligned::zeros(length)), spans: Spans::whole(grid) }
+        let mut weights = Self { grid, sides: std::array::from_fn(|_| Aligned::any(length)), spans: Spans::whole(grid) };
+        let (first, end, stride) = (weights.start(0), weights.start(grid.height as isize), weights.stride());
+        for side in &mut weights.sides {
+            side[..first].fill(0.0);
+            side[first..end].chunks_mut(stride).for_each(|row| row[grid.half()..].fill(0.0));
+            side[end..].fill(0.0);
+        }
+        weights
     }
 
     /// Narrows the work on each band of rows to its pixels with edges; to be called once the last edge is set.
@@ -135,13 +152,18 @@ impl Weights {
         self.side(DOWN, row)
     }
 
-    /// The weights of each band of rows, to write, left, right, up, down: rows of `half` weights, `stride` apart.
-    pub fn bands_mut(&mut self) -> impl IndexedParallelIterator<Item = [&mut [f32]; 4]> {
-        let stride = self.stride();
+    /// The bands of rows, to set.
+    pub fn bands_mut(&mut self) -> impl IndexedParallelIterator<Item = Band<'_>> {
+        let (half, stride) = (self.grid.half(), self.stride());
         let inner = self.start(0)..self.start(self.grid.height as isize);
         let chunk = BAND_ROWS * stride;
         let [left, right, up, down] = self.sides.each_mut().map(|side| side[inner.clone()].par_chunks_mut(chunk));
-        (left, right, up, down).into_par_iter().map(|(left, right, up, down)| [left, right, up, down])
+        (left, right, up, down).into_par_iter().enumerate().map(move |(band, (left, right, up, down))| Band {
+            rows: band * BAND_ROWS..band * BAND_ROWS + left.len() / stride,
+            sides: [left, right, up, down],
+            half,
+            stride,
+        })
     }
 
     /// Sets the weights of red `k` of `row`: left, right, up, down.
@@ -196,6 +218,43 @@ impl Weights {
     }
 }
 
+/// The weights of a band of rows.
+pub(super) struct Band<'a> {
+    /// The rows of the grid.
+    pub rows: Range<usize>,
+    /// To the left, right, upper and lower neighbour: rows of `half`, `stride` apart.
+    sides: [&'a mut [f32]; 4],
+    half: usize,
+    stride: usize,
+}
+
+impl Band<'_> {
+    /// Sets the edges from the row above the band down to its first; one weight a pixel.
+    pub fn set_above(&mut self, below: &[f32]) {
+        let mut elsewhere = vec![0.0; self.half];
+        split_whole_row(self.rows.start + 1, below, &mut elsewhere, &mut self.sides[UP][..self.half]);
+    }
+
+    /// Sets the edges of a row's pixels to the right, and to the row below; one weight a pixel, the last to the right 0.
+    pub fn set_row(&mut self, row: usize, right: &[f32], below: &[f32]) {
+        let (at, next) = ((row - self.rows.start) * self.stride, (row + 1 - self.rows.start) * self.stride);
+        let half = self.half;
+        let [reds_left, reds_right, reds_up, reds_down] = &mut self.sides;
+        // The black to the left of red k is black k in odd rows, and k - 1 in even ones.
+        let first = 1 - row % 2;
+        reds_left[at] = 0.0;
+        split_whole_row(row, right, &mut reds_right[at..][..half], &mut reds_left[at + first..][..half]);
+        let mut elsewhere = Vec::new();
+        let up_to_blacks = if row + 1 < self.rows.end {
+            &mut reds_up[next..][..half]
+        } else {
+            elsewhere.resize(half, 0.0);
+            &mut elsewhere[..]
+        };
+        split_whole_row(row, below, &mut reds_down[at..][..half], up_to_blacks);
+    }
+}
+
 #[cfg(test)]
 impl Weights {
     /// Edges of any of some weights, at random, on a grid of 40 x 90 pixels.
@@ -228,6 +287,14 @@ pub(super) fn split_row<T: Copy>(row: usize, pixels: &[T], reds: &mut [T], black
     if pixels.len() % 2 == 1 {
         first[pixels.len() / 2] = pixels[pixels.len() - 1];
     }
+}
+
+/// The same, and zeros for the pixels that are missing at the end.
+pub(super) fn split_whole_row<T: Copy + Default>(row: usize, pixels: &[T], reds: &mut [T], blacks: &mut [T]) {
+    split_row(row, pixels, reds, blacks);
+    let (longer, shorter) = if row.is_multiple_of(2) { (reds, blacks) } else { (blacks, reds) };
+    longer[pixels.len().div_ceil(2)..].fill(T::default());
+    shorter[pixels.len() / 2..].fill(T::default());
 }
 
 /// Joins reds and blacks to a row of pixels.

@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::checkerboard::{BAND_ROWS, Weights, split_row};
+use super::checkerboard::Weights;
 use crate::memory::Aligned;
 
 /// Halves both sides of a grid.
@@ -21,21 +21,12 @@ pub(super) fn coarsen(weights: &Weights) -> Weights {
         .zip(downward.par_chunks_mut(n))
         .enumerate()
         .for_each(|(coarse_row, (rightward, downward))| conduct(weights, coarse_row, rightward, downward));
-    let mut out = Weights::zeros(coarse);
-    let (half, stride) = (coarse.half(), out.stride());
-    out.bands_mut().enumerate().for_each(|(band, mut sides)| {
-        let mut unused = vec![0.0; half];
-        let mut leftward = vec![0.0; coarse.width];
-        let none = vec![0.0; coarse.width];
-        for offset in 0..sides[0].len() / stride {
-            let row = band * BAND_ROWS + offset;
-            let here = &rightward[row * coarse.width..][..coarse.width];
-            leftward[1..].copy_from_slice(&here[..coarse.width - 1]);
-            let upward = if row > 0 { &downward[(row - 1) * coarse.width..][..coarse.width] } else { &none };
-            let below = &downward[row * coarse.width..][..coarse.width];
-            for (side, pixels) in sides.iter_mut().zip([&leftward, here, upward, below]) {
-                split_row(row, pixels, &mut side[offset * stride..][..half], &mut unused);
-            }
+    let mut out = Weights::unset(coarse);
+    out.bands_mut().for_each(|mut band| {
+        let above = band.rows.start.checked_sub(1);
+        band.set_above(above.map_or(&vec![0.0; n], |above| &downward[above * n..][..n]));
+        for row in band.rows.clone() {
+            band.set_row(row, &rightward[row * n..][..n], &downward[row * n..][..n]);
         }
     });
     out

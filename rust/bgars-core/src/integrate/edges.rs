@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::checkerboard::{BAND_ROWS, Grid, Weights, split_row};
+use super::checkerboard::{BAND_ROWS, Grid, Weights, split_whole_row};
 use crate::memory::Aligned;
 
 /// A right side, or a solution, by colour.
@@ -47,41 +47,32 @@ where
     Join: FnMut(Axis, usize, &mut EdgeRow),
 {
     let (width, half) = (grid.width, grid.half());
-    let mut weights = Weights::zeros(grid);
-    let stride = weights.stride();
-    let mut right = Colours { reds: Aligned::zeros(grid.half_pixels()), blacks: Aligned::zeros(grid.half_pixels()) };
+    let mut weights = Weights::unset(grid);
+    let mut right = Colours { reds: Aligned::any(grid.half_pixels()), blacks: Aligned::any(grid.half_pixels()) };
     let bands = weights
         .bands_mut()
         .zip(right.reds.par_chunks_mut(BAND_ROWS * half))
-        .zip(right.blacks.par_chunks_mut(BAND_ROWS * half))
-        .enumerate();
-    bands.for_each(|(band, ((mut sides, reds), blacks))| {
+        .zip(right.blacks.par_chunks_mut(BAND_ROWS * half));
+    bands.for_each(|((mut weights, reds), blacks)| {
         let mut join = joiner();
-        let first = band * BAND_ROWS;
         let [mut above, mut along, mut below] = [EdgeRow::default(), EdgeRow::default(), EdgeRow::default()];
         above.clear(width);
-        if first > 0 {
-            join(Axis::Below, first - 1, &mut above);
+        if let Some(row) = weights.rows.start.checked_sub(1) {
+            join(Axis::Below, row, &mut above);
         }
-        let mut left = vec![0.0f32; width];
-        let mut unused = vec![0.0f32; half];
+        weights.set_above(&above.weight);
         let mut divergence = vec![0.0f64; width];
-        for offset in 0..reds.len() / half {
-            let row = first + offset;
+        let colours = reds.chunks_mut(half).zip(blacks.chunks_mut(half));
+        for (row, (reds, blacks)) in weights.rows.clone().zip(colours) {
             along.clear(width);
             join(Axis::Right, row, &mut along);
             below.clear(width);
             if row + 1 < grid.height {
                 join(Axis::Below, row, &mut below);
             }
-            left[1..].copy_from_slice(&along.weight[..width - 1]);
-            let sources = [&left, &along.weight, &above.weight, &below.weight];
-            for (side, source) in sides.iter_mut().zip(sources) {
-                split_row(row, source, &mut side[offset * stride..][..half], &mut unused);
-            }
+            weights.set_row(row, &along.weight, &below.weight);
             diverge([&above.push, &along.push, &below.push], &mut divergence);
-            let span = offset * half..(offset + 1) * half;
-            split_row(row, &divergence, &mut reds[span.clone()], &mut blacks[span]);
+            split_whole_row(row, &divergence, reds, blacks);
             std::mem::swap(&mut above, &mut below);
         }
     });
