@@ -95,10 +95,9 @@ impl<'a> Multigrid<'a> {
             }
             let mut coarser = coarsen(weights);
             let mut lost = Lost::centres(weights, &coarser);
-            stray_count += lost.reds.len();
             // Where detours are the rule, they are no longer short and wide.
             let hopeless = lost.doubtful > pixels / HOPELESS;
-            if hopeless || is_too_coarse(stray_count, levels.len(), finest.grid) {
+            if hopeless || is_too_coarse([stray_count, lost.reds.len()], levels.len(), finest.grid) {
                 // A grid that is nearly all lanes is no good neighbour for the strays of the one before.
                 if hopeless && strays.last().is_some_and(|strays: &Strays| strays.len() > 0) {
                     levels.pop();
@@ -106,6 +105,7 @@ impl<'a> Multigrid<'a> {
                 }
                 break;
             }
+            stray_count += lost.reds.len();
             if !lost.reds.is_empty() {
                 lost.add_corners(weights, &coarser);
             }
@@ -170,16 +170,20 @@ impl<'a> Multigrid<'a> {
     }
 }
 
-/// True where a graph must take over from the grid of `level`, which with all finer ones leaves `strays`.
+/// True where a graph must take over from the grid of `level`, which leaves `new` strays after the `earlier` ones of finer grids.
 ///
-/// Every grid between a stray and the graph costs iterations, for its smoothing does not know of the stray; a graph of many
+/// Every grid between a stray and the graph costs iterations, for its smoothing does not know of the stray: the more so along a
+/// slit, which leaves as many strays on every grid. Spots that a lane narrows to leave theirs on one grid, and a graph of many
 /// nodes costs time and memory. The bounds are chosen by measurement; `tests/multigrid.rs` holds their effect.
-fn is_too_coarse(strays: usize, level: usize, finest: Grid) -> bool {
+fn is_too_coarse([earlier, new]: [usize; 2], level: usize, finest: Grid) -> bool {
     let pixels = finest.height * finest.width;
+    let is_fading = earlier == 0 || 2 * new <= earlier;
     let at_least = match level {
         0 => pixels / HOPELESS,
-        1 | 2 => (pixels / 65_536).max(16),
+        1 | 2 if is_fading => (pixels / 1_024).max(64),
+        1 => (pixels / 65_536).max(16),
+        2 => 8,
         _ => 0,
     };
-    strays > at_least
+    earlier + new > at_least
 }
