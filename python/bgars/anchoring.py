@@ -47,6 +47,7 @@ def anchored(
     if not trust.any():
         msg = "anchors: none lies on a pixel that was integrated (and has a weight above 0)"
         raise InputError(msg)
+    trust = trust / trust.max()  # sums of any weights are then finite
     parts, count = labels[known], len(components)
     lack_px = anchors.height_um[known].astype(np.float64) / pixel_pitch_um - height_px[known]
     total = np.bincount(parts, trust, count)

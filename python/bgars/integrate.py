@@ -9,9 +9,21 @@ import numpy as np
 from bgars import _bgars
 from bgars.anchoring import anchored
 from bgars.errors import InputError
+from bgars.integration_inputs import (
+    anchor_regions,
+    bool_mask,
+    check_camera,
+    check_others,
+    check_pitch,
+    count,
+    edge_trust,
+    normal_array,
+    number,
+    plain,
+)
 from bgars.large_arrays import any_content
 from bgars.records import Component, DepthMap, HeightMap, NormalField
-from bgars.surface_records import BilateralFit, Pinhole
+from bgars.surface_records import BilateralFit
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -19,8 +31,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
     from typing_extensions import Unpack
 
-    from bgars.records import BoolArray, FloatArray
-    from bgars.surface_records import Anchors
+    from bgars.surface_records import Anchors, Pinhole
 
 __all__ = ["DIFFERENCES", "Difference", "IntegrationMethod", "Solver", "integrate_normals"]
 
@@ -29,7 +40,6 @@ DIFFERENCES: tuple[Difference, ...] = get_args(Difference)
 IntegrationMethod = Literal["least-squares", "bilateral"]
 Solver = Literal["converged", "compatible"]
 Precision = Literal["double", "single"]
-NORMALS_NDIM = 3
 LEAST_SQUARES_ITERS, BILATERAL_ITERS = 2_000, 150
 
 if TYPE_CHECKING:
@@ -99,8 +109,8 @@ def integrate_normals(
     Parameters
     ----------
     normals : NormalField or (H, W, 3) array_like
-        Unit normals, x right, y up, z toward the camera. A C-contiguous float32 array is used where it lies; others are
-        copied once.
+        Unit normals (a length of 0.5 to 2 is let through), x right, y up, z toward the camera. An aligned, C-contiguous
+        float32 array is used where it lies; others are copied once.
     mask : (H, W) array_like of bool, optional
         True = use; combined with the field's own mask. For plain arrays: by default every finite normal with n_z > 0.
     method : {"least-squares", "bilateral"}
@@ -109,8 +119,8 @@ def integrate_normals(
         Least squares: slope between two pixels, the mean of their normals, or the first pixel's alone as the paper
         prints it (this shifts the surface by half a pixel).
     weights : "confidence" or (H, W) array_like, optional
-        Trust in each pixel, at least 0; an edge of least squares takes the geometric mean of its two. n_z^2 is always a
-        weight.
+        Trust in each pixel, at least 0, of which only the ratios count; an edge of least squares takes the geometric
+        mean of its two, and pixels of weight 0 are left out of its mask. n_z^2 is always a weight.
     relative_tolerance, absolute_tolerance : float
         Least squares: stop at a residual of this times the right side, or of this a pixel (root mean square, pixels).
     max_iters : int, optional
@@ -149,10 +159,11 @@ def integrate_normals(
     Raises
     ------
     InputError
-        Shapes that do not fit, an empty mask, normals inside the mask that are not finite or face away, arguments that
-        the method does not have.
+        Shapes that do not fit, an empty mask, normals inside the mask that are not finite, face away or are no unit
+        vectors, arguments that the method does not have.
     ConvergenceError
-        A system was not solved within its iterations; carries iterations and residual.
+        Least squares: not solved within its iterations; carries iterations and residual. A bilateral system that is not
+        leaves ``converged = False`` and its `residual`.
 
     References
     ----------
@@ -178,22 +189,27 @@ def integrate_normals(
         if value not in allowed:
             msg = f"{name}: must be one of {', '.join(allowed)}; got {value!r}"
             raise InputError(msg)
-    _check_camera(camera, method, anchors)
+    least_squares = {
+        "difference": difference,
+        "relative_tolerance": number("relative_tolerance", relative_tolerance),
+        "absolute_tolerance": number("absolute_tolerance", absolute_tolerance),
+    }
+    bilateral = {"k": number("k", k), "tol": number("tol", tol), "solver": solver, "precision": precision}
+    own, others = (bilateral, least_squares) if method == "bilateral" else (least_squares, bilateral)
+    check_others(method, others, own)
+    iters = count("max_iters", max_iters, BILATERAL_ITERS if method == "bilateral" else LEAST_SQUARES_ITERS)
+    check_camera(camera, method, anchors)
     if isinstance(normals, NormalField):
         vectors, valid = normals.normals, normals.mask
         pixel_pitch_um = normals.pixel_pitch_um if pixel_pitch_um is None else pixel_pitch_um
     else:
-        vectors, valid = _normal_array(normals, mask)
-    if pixel_pitch_um is not None and not (np.isfinite(pixel_pitch_um) and pixel_pitch_um > 0):
-        msg = f"pixel_pitch_um: must be finite and above 0, got {pixel_pitch_um:g}"
-        raise InputError(msg)
-    use = np.ascontiguousarray(valid if mask is None else valid & _bool_mask(mask, valid.shape))
-    regions = None
-    if anchors is not None:
-        anchors.check(use.shape)
-        regions = None if anchors.regions is None else np.ascontiguousarray(anchors.regions, dtype=np.int32)
-    arrays = (np.ascontiguousarray(vectors), use, _edge_trust(normals, weights, use), regions)
-    common: dict[str, Any] = {"threads": threads, "progress": progress}
+        vectors, valid = normal_array(normals, mask)
+    check_pitch(pixel_pitch_um)
+    use = np.ascontiguousarray(valid if mask is None else valid & bool_mask(mask, valid.shape))
+    trust = edge_trust(normals, weights, use)
+    regions = anchor_regions(anchors, use.shape)
+    arrays = (plain(vectors, np.float32), use, trust, regions)
+    common: dict[str, Any] = {"max_iters": iters, "threads": threads, "progress": progress}
     if method == "least-squares":
         height_px, labels = any_content(use.shape, np.float32), any_content(use.shape, np.int32)
         parts, iterations, residual = _bgars.integrate_normals(
@@ -203,17 +219,16 @@ def integrate_normals(
             difference=difference,
             relative_tolerance=relative_tolerance,
             absolute_tolerance=absolute_tolerance,
-            max_iters=LEAST_SQUARES_ITERS if max_iters is None else max_iters,
             **common,
         )
         components = tuple(Component(*part) for part in parts)
+        use = use if trust is None else labels >= 0
         found: dict[str, Any] = {"mask": use, "iterations": iterations, "residual": residual, "labels": labels}
     else:
         surface = _bgars.integrate_bilateral(
             *arrays,
             camera=None if camera is None else camera.numbers_px,
             k=k,
-            max_iters=BILATERAL_ITERS if max_iters is None else max_iters,
             tolerance=tol,
             setting=solver,
             precision=precision,
@@ -240,53 +255,3 @@ def integrate_normals(
     if anchors is not None:
         height_px, components = anchored(height_px, labels, components, anchors, pixel_pitch_um)
     return HeightMap(height_px=height_px, pixel_pitch_um=pixel_pitch_um, components=components, **found)
-
-
-def _check_camera(camera: object, method: IntegrationMethod, anchors: Anchors | None) -> None:
-    if camera is None:
-        return
-    if not isinstance(camera, Pinhole):
-        msg = f"camera: must be a bgars.Pinhole, got {type(camera).__name__}"
-        raise InputError(msg)
-    if method != "bilateral":
-        msg = f"camera: only method 'bilateral' integrates under a camera, got {method!r}"
-        raise InputError(msg)
-    if anchors is not None:
-        msg = "anchors: heights in micrometres do not fix a depth under a camera; leave one of the two out"
-        raise InputError(msg)
-
-
-def _normal_array(normals: ArrayLike, mask: ArrayLike | None) -> tuple[FloatArray, BoolArray]:
-    vectors = np.asarray(normals, dtype=np.float32)
-    if vectors.ndim != NORMALS_NDIM or vectors.shape[2] != NORMALS_NDIM:
-        msg = f"normals: must have shape (H, W, 3), got {vectors.shape}"
-        raise InputError(msg)
-    if mask is not None:
-        return vectors, np.ones(vectors.shape[:2], dtype=np.bool_)
-    vectors = np.ascontiguousarray(vectors)
-    return vectors, _bgars.usable_normals(vectors)
-
-
-def _bool_mask(mask: ArrayLike, shape: tuple[int, ...]) -> BoolArray:
-    given = np.asarray(mask)
-    if given.dtype != np.bool_ or given.shape != shape:
-        msg = f"mask: must be bool of shape {shape}, got {given.dtype} of shape {given.shape}"
-        raise InputError(msg)
-    return given
-
-
-def _edge_trust(
-    normals: NormalField | ArrayLike, weights: Literal["confidence"] | ArrayLike | None, use: BoolArray
-) -> FloatArray | None:
-    if weights is None:
-        return None
-    if isinstance(weights, str):
-        if weights != "confidence" or not isinstance(normals, NormalField):
-            msg = f"weights: must be an array of shape (H, W), or 'confidence' with a NormalField; got {weights!r}"
-            raise InputError(msg)
-        return np.ascontiguousarray(normals.confidence)
-    trust = np.ascontiguousarray(weights, dtype=np.float32)
-    if trust.shape != use.shape:
-        msg = f"weights: must have shape {use.shape}, got {trust.shape}"
-        raise InputError(msg)
-    return trust

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["Anchors", "BilateralFit", "Pinhole"]
 
 MATRIX_SHAPE = (3, 3)
+MAX_REGION = 2**31 - 1
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -43,7 +44,11 @@ class Pinhole:
     matrix_px: NDArray[np.float64]
 
     def __init__(self, matrix_px: ArrayLike) -> None:
-        matrix = np.array(matrix_px, dtype=np.float64)
+        try:
+            matrix = np.array(matrix_px, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            msg = f"camera: must be a (3, 3) matrix of numbers ({error})"
+            raise InputError(msg) from error
         if matrix.shape != MATRIX_SHAPE or not np.isfinite(matrix).all():
             msg = f"camera: must be a finite (3, 3) matrix, got shape {matrix.shape}"
             raise InputError(msg)
@@ -122,19 +127,33 @@ class Anchors:
     reach_px: Mapping[int, float] = field(default_factory=dict)
 
     def check(self, shape: tuple[int, ...]) -> None:
-        """Raise InputError unless everything has this shape, something is known, and weights are at least 0."""
-        for name, values in (("height_um", self.height_um), ("weights", self.weights), ("regions", self.regions)):
-            if values is not None and values.shape != shape:
+        """Raise InputError unless all are arrays of this shape, something is known, and weights are at least 0."""
+        given: dict[str, object] = {"height_um": self.height_um, "weights": self.weights, "regions": self.regions}
+        for name, values in given.items():
+            if values is not None and not isinstance(values, np.ndarray):
+                msg = f"anchors.{name}: must be an array, got {type(values).__name__}"
+                raise InputError(msg)
+            if isinstance(values, np.ndarray) and values.shape != shape:
                 msg = f"anchors.{name}: must have the shape of the normals {shape}, got {values.shape}"
                 raise InputError(msg)
         if self.regions is not None and not np.issubdtype(self.regions.dtype, np.integer):
             msg = f"anchors.regions: must be integers, got {self.regions.dtype}"
+            raise InputError(msg)
+        if self.regions is not None and abs(self.regions.astype(np.float64)).max(initial=0) > MAX_REGION:
+            msg = f"anchors.regions: must be from -{MAX_REGION} to {MAX_REGION}"
+            raise InputError(msg)
+        if np.isinf(self.height_um).any():
+            msg = "anchors.height_um: must be finite, or NaN where no height is known; got infinity"
             raise InputError(msg)
         if not np.isfinite(self.height_um).any():
             msg = "anchors.height_um: no height is known (all NaN)"
             raise InputError(msg)
         if self.weights is not None and not (np.isfinite(self.weights).all() and (self.weights >= 0).all()):
             msg = "anchors.weights: must be finite and at least 0"
+            raise InputError(msg)
+        reach: object = self.reach_px
+        if not isinstance(reach, Mapping):
+            msg = f"anchors.reach_px: must be a mapping of region to distance, got {type(reach).__name__}"
             raise InputError(msg)
         for region, reach_px in self.reach_px.items():
             if not (np.isfinite(reach_px) and reach_px > 0):

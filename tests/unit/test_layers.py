@@ -22,6 +22,7 @@ RECORDS = {
     "part_result": 3,
     "kernel_capture": 3.5,
     "anchoring": 3.5,
+    "integration_inputs": 3.5,
 }
 BASE = {"errors": 0, "large_arrays": 0, "light_files": 1, "rig": 2, **RECORDS}
 STAGES = dict.fromkeys(("io", "pixelwise", "reflectance", "integrate", "mesh", "balls", "inspection"), 4)

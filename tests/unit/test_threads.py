@@ -31,7 +31,7 @@ SIZE = 1200
 def noisy_normals(size: int = SIZE) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
     normals = np.random.default_rng(0).normal([0, 0, 2], 0.3, (size, size, 3)).astype(np.float32)
     normals[..., 2] = np.abs(normals[..., 2])
-    return normals
+    return normals / np.linalg.norm(normals, axis=-1, keepdims=True)
 
 
 def noisy_stack(size: int = SIZE) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:

@@ -99,15 +99,18 @@ pub enum Error {
     },
     /// A normal inside the mask that is NaN or faces away from the camera.
     #[error(
-        "normals: at row {row}, column {col} inside the mask: n_z must be finite and >= 0, got {n_z}; mask such pixels out"
+        "normals: at row {row}, column {col} inside the mask: must be {rule}, got ({}, {}, {}); mask such pixels out",
+        normal[0], normal[1], normal[2]
     )]
     BadNormal {
         /// Row of the first such pixel.
         row: usize,
         /// Column of the first such pixel.
         col: usize,
-        /// The z component found.
-        n_z: f64,
+        /// What it must be.
+        rule: &'static str,
+        /// The normal found.
+        normal: [f32; 3],
     },
     /// Most normals are seen from behind.
     #[error(

@@ -4,6 +4,7 @@
 //! (2 MiB), Linux faults 512 times less often; elsewhere, and where they are turned off, nothing changes.
 
 use std::ops::{Deref, DerefMut};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
@@ -24,6 +25,19 @@ pub(crate) struct Aligned<T: Reused> {
     memory: Vec<T>,
     start: usize,
     len: usize,
+    /// [`ERA`] at its beginning.
+    era: usize,
+}
+
+/// How often everything was forgotten.
+static ERA: AtomicUsize = AtomicUsize::new(0);
+
+/// Uses none of the arrays again that there are now, for some may hold NaN or infinity: memory of any content is read beside
+/// what was written, times zero, and must be finite.
+pub(crate) fn forget() {
+    ERA.fetch_add(1, Ordering::SeqCst);
+    f32::waiting().lock().unwrap_or_else(PoisonError::into_inner).clear();
+    f64::waiting().lock().unwrap_or_else(PoisonError::into_inner).clear();
 }
 
 impl<T: Reused> Aligned<T> {
@@ -51,13 +65,15 @@ impl<T: Reused> Aligned<T> {
         let is_fresh = kept.is_none();
         let memory = kept.unwrap_or_else(|| zeros(room));
         let start = memory.as_ptr().align_offset(CACHE_LINE).min(room - len);
-        (Self { memory, start, len }, is_fresh)
+        (Self { memory, start, len, era: ERA.load(Ordering::SeqCst) }, is_fresh)
     }
 }
 
 impl<T: Reused> Drop for Aligned<T> {
     fn drop(&mut self) {
-        give_back(std::mem::take(&mut self.memory));
+        if self.era == ERA.load(Ordering::SeqCst) {
+            give_back(std::mem::take(&mut self.memory));
+        }
     }
 }
 
@@ -175,6 +191,19 @@ fn advise<T>(memory: &mut [T], advice: libc::c_int) -> bool {
 #[allow(clippy::float_cmp)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn nothing_that_was_there_is_used_again_after_forgetting() {
+        // A length that no other test has.
+        const LEN: usize = 1_234_569;
+        let [mut dropped, mut held] = [Aligned::<f32>::zeros(LEN), Aligned::<f32>::zeros(LEN)];
+        dropped.fill(f32::NAN);
+        held.fill(f32::NAN);
+        drop(dropped);
+        forget();
+        drop(held);
+        assert!(Aligned::<f32>::any(LEN).iter().all(|number| *number == 0.0));
+    }
 
     #[test]
     fn zeros_are_zeros_on_used_memory() {

@@ -96,7 +96,8 @@ impl Weights {
     /// Edges of any weight: every row is to be set by its band.
     pub fn unset(grid: Grid) -> Self {
         let length = grid.pad() + (grid.height + 2) * (grid.half() + grid.pad());
-        let mut weights = Self { grid, sides: std::array::from_fn(|_| Aligned::any(length)), spans: Spans::whole(grid) };
+        let mut weights =
+            Self { grid, sides: std::array::from_fn(|_| Aligned::any(length)), spans: Spans::whole(grid) };
         let (first, end, stride) = (weights.start(0), weights.start(grid.height as isize), weights.stride());
         for side in &mut weights.sides {
             side[..first].fill(0.0);

@@ -12,7 +12,7 @@ use super::checkerboard::{BAND_ROWS, Weights};
 use super::multigrid::Multigrid;
 use super::reduction::{dot, multiply, residual_norm};
 use super::{OnProgress, Params, Progress};
-use crate::memory::Aligned;
+use crate::memory::{self, Aligned};
 use crate::{Error, Result};
 
 /// Elements of a vector that one task copies or adds up.
@@ -24,6 +24,8 @@ pub(super) struct Solution {
     pub iterations: usize,
     /// Norm of the true residual, relative to `scale`.
     pub residual: f64,
+    /// False where the iterations did not suffice, or rounding left nothing of one; x is then what they came to.
+    pub solved: bool,
 }
 
 /// Solves `S x = b` from zero, until the norm of `b - S x` is at most the tolerance times `scale`; `b` is zero beside the spans.
@@ -38,14 +40,14 @@ pub(super) fn conjugate_gradients(
     on_progress: OnProgress<'_>,
 ) -> Result<Solution> {
     let size = b.len();
-    let mut solution = Solution { x: Aligned::zeros(size), iterations: 0, residual: 0.0 };
+    let mut solution = Solution { x: Aligned::zeros(size), iterations: 0, residual: 0.0, solved: true };
     if scale == 0.0 {
         return Ok(solution);
     }
     let target = (params.relative_tolerance * scale).max(params.absolute_tolerance * (2.0 * size as f64).sqrt());
     let preconditioner = Multigrid::new(weights);
     let chunk = BAND_ROWS * weights.grid.half();
-    let Solution { x, iterations, residual } = &mut solution;
+    let Solution { x, iterations, residual, solved } = &mut solution;
     // A direction may be any; what x and r take along it agrees in `f64`.
     let [mut p, mut z] = [Aligned::<f32>::any(size), Aligned::any(size)];
     let [mut q, mut r] = [Aligned::<f64>::any(size), Aligned::any(size)];
@@ -57,13 +59,11 @@ pub(super) fn conjugate_gradients(
             return Ok(solution);
         }
         let mut r_z_before = None;
-        while norm > target {
-            let stuck = |iterations, norm: f64| {
-                let tolerance = params.relative_tolerance;
-                Error::NoConvergence { iterations, residual: norm / scale, tolerance }
-            };
+        // Written so that NaN goes on, to be found below.
+        while !(norm <= target) {
             if *iterations == params.max_iters {
-                return Err(stuck(*iterations, norm));
+                (*residual, *solved) = (norm / scale, false);
+                return Ok(solution);
             }
             let r_z = preconditioner.cycle(&r, &mut z);
             if let Some(before) = r_z_before.replace(r_z) {
@@ -81,7 +81,9 @@ pub(super) fn conjugate_gradients(
             let p_q = multiply(weights, &p, &mut q);
             // Both are positive but for rounding; what is lost in it cannot be found again.
             if !(r_z > 0.0 && p_q > 0.0) {
-                return Err(stuck(*iterations, norm));
+                memory::forget();
+                (*residual, *solved) = (norm / scale, false);
+                return Ok(solution);
             }
             norm = step(weights, r_z / p_q, [x, &mut r], &p, &q).sqrt();
             *iterations += 1;

@@ -1,6 +1,7 @@
 //! The normal equations: a weighted graph Laplacian on the pixels of the mask, its blacks eliminated.
 
 use multiversion::multiversion;
+use rayon::prelude::*;
 
 use super::Difference;
 use super::checkerboard::{Grid, Weights};
@@ -16,7 +17,7 @@ pub struct Field<'a> {
     pub normals: &'a [f32],
     /// True = use.
     pub mask: &'a [bool],
-    /// Trust in each pixel, at least 0; `None`: all alike.
+    /// Trust in each pixel, at least 0, of which the ratios count; `None`: all alike.
     pub weights: Option<&'a [f32]>,
     /// A number for each pixel: where it differs between neighbours, nothing joins them. `None`: all one.
     pub regions: Option<&'a [i32]>,
@@ -34,13 +35,14 @@ struct FieldRow {
 }
 
 impl FieldRow {
-    fn load(&mut self, field: Field<'_>, row: usize) {
+    /// `unit` brings the weights to the size of 1.
+    fn load(&mut self, field: Field<'_>, unit: f64, row: usize) {
         let span = row * field.width..(row + 1) * field.width;
         let mask = &field.mask[span.clone()];
         self.trust.clear();
         match field.weights {
             Some(weights) => {
-                let roots = weights[span.clone()].iter().map(|&weight| f64::from(weight).sqrt());
+                let roots = weights[span.clone()].iter().map(|&weight| (f64::from(weight) * unit).sqrt());
                 self.trust.extend(roots.zip(mask).map(|(root, &used)| if used { root } else { 0.0 }));
             }
             None => self.trust.extend(mask.iter().map(|&used| f64::from(u8::from(used)))),
@@ -118,22 +120,35 @@ struct FieldRows {
 }
 
 impl FieldRows {
-    fn load(&mut self, field: Field<'_>, row: usize) {
+    fn load(&mut self, field: Field<'_>, unit: f64, row: usize) {
         if self.loaded[row % 2] != Some(row) {
-            self.rows[row % 2].load(field, row);
+            self.rows[row % 2].load(field, unit, row);
             self.loaded[row % 2] = Some(row);
         }
     }
+}
+
+/// The largest weight in the mask.
+fn largest(weights: &[f32], mask: &[bool]) -> f64 {
+    let inside = weights.par_iter().zip(mask).map(|(&weight, &used)| if used { weight } else { 0.0 });
+    f64::from(inside.reduce(|| 0.0, f32::max))
+}
+
+/// The power of four that brings a weight near 1. Tolerances and the range of `f32` then mean the same for weights of any size,
+/// and no digit of them or of their roots changes.
+pub(super) fn to_unit(weight: f64) -> f64 {
+    if weight > 0.0 { 4f64.powf(-(weight.log2() / 2.0).floor()) } else { 1.0 }
 }
 
 /// Weights and right side `M^T v` of a field; both zero outside the mask.
 pub(super) fn assemble(field: Field<'_>, difference: Difference) -> (Weights, Colours) {
     let width = field.width;
     let grid = Grid { height: field.mask.len() / width, width };
+    let unit = field.weights.map_or(1.0, |weights| to_unit(largest(weights, field.mask)));
     from_edges(grid, || {
         let mut rows = FieldRows::default();
         move |axis: Axis, row: usize, edges: &mut EdgeRow| {
-            rows.load(field, row);
+            rows.load(field, unit, row);
             let FieldRow { along, n_z, trust } = &rows.rows[row % 2];
             match axis {
                 Axis::Right => {
@@ -142,7 +157,7 @@ pub(super) fn assemble(field: Field<'_>, difference: Difference) -> (Weights, Co
                     edges.cut(field, row * width, 1);
                 }
                 Axis::Below => {
-                    rows.load(field, row + 1);
+                    rows.load(field, unit, row + 1);
                     let [upper, lower] = [&rows.rows[row % 2], &rows.rows[(row + 1) % 2]];
                     let a = (&upper.along[1][..], &upper.n_z[..], &upper.trust[..]);
                     // y grows upward: the forward difference starts at the lower pixel.

@@ -14,6 +14,9 @@ use super::{Fit, OnProgress, Params, Surface};
 use crate::memory::zeros;
 use crate::{Error, Result};
 
+/// Shortest and longest normal that is taken for one of length 1: interpolation and 8 bits shorten them, garbage is far off.
+const LENGTHS: [f32; 2] = [0.5, 2.0];
+
 /// Pixels that are checked at a time.
 const CHECK_PIXELS: usize = 1 << 14;
 
@@ -21,7 +24,8 @@ const CHECK_PIXELS: usize = 1 << 14;
 ///
 /// # Inputs
 /// `normals` 3 values a pixel (x right, y up, z to the camera), row-major `mask.len()` pixels in rows of `width`;
-/// `weights` one value a pixel (an edge takes the geometric mean of its two). The weight `n_z^2` is always in.
+/// `weights` one value a pixel (an edge takes the geometric mean of its two; only their ratios count, and pixels of weight 0
+/// are left out). The weight `n_z^2` is always in.
 ///
 /// # Method
 /// Minimises the sum over edges of `w (n_z dz + n_x)^2` (and the like in y; Horn and Brooks 1986; Quéau, Durou, Aujol 2018,
@@ -29,7 +33,8 @@ const CHECK_PIXELS: usize = 1 << 14;
 /// Oosterlee, Schüller 2001). The constant of each component is free: its mean is set to zero at the end.
 ///
 /// # Errors
-/// Mismatched lengths, an empty mask, normals inside the mask that are not finite or look away, settings out of range,
+/// Mismatched lengths, an empty mask, normals inside the mask that are not finite, look away or are far from length 1, settings
+/// out of range,
 /// [`Error::NoConvergence`] with iterations and residual, [`Error::Cancelled`].
 ///
 /// # Examples
@@ -93,7 +98,10 @@ pub fn integrate_into(
     labels: &mut [i32],
 ) -> Result<Fit> {
     check(field, params)?;
-    let Field { mask, width, .. } = field;
+    let weighted = without_weightless(field);
+    let mask = weighted.as_deref().unwrap_or(field.mask);
+    let (field, width) = (Field { mask, ..field }, field.width);
+    check_lengths(field)?;
     check_length("height_px", mask.len(), height_px.len())?;
     check_length("labels", mask.len(), labels.len())?;
     let runs = Runs::new(mask, field.regions, width);
@@ -101,8 +109,11 @@ pub fn integrate_into(
     fill_corners(&mut weights);
     let scale = (square_sum(&right.reds) + square_sum(&right.blacks)).sqrt();
     eliminate_blacks(&weights, &mut right.reds, &right.blacks);
-    let Solution { x: reds, iterations, residual } =
+    let Solution { x: reds, iterations, residual, solved } =
         conjugate_gradients(&weights, &right.reds, scale, params, on_progress)?;
+    if !solved {
+        return Err(Error::NoConvergence { iterations, residual, tolerance: params.relative_tolerance });
+    }
     fill_blacks(&weights, &reds, &mut right.blacks);
     let half = weights.grid.half();
     let fill = |row: usize, values: &mut [f64]| {
@@ -125,6 +136,14 @@ pub fn integrate_into(
     );
     runs.write_labels(labels);
     Ok(Fit { components: runs.components, iterations, residual })
+}
+
+/// The mask without the pixels of weight zero, of which nothing is known; `None` where there are none.
+fn without_weightless(field: Field<'_>) -> Option<Vec<bool>> {
+    let Field { mask, weights, .. } = field;
+    let weights =
+        weights.filter(|weights| weights.par_iter().zip(mask).any(|(&weight, &used)| used && weight == 0.0))?;
+    Some(mask.iter().zip(weights).map(|(&used, &weight)| used && weight > 0.0).collect())
 }
 
 /// The pixels whose normal can be integrated: finite, and toward the camera (`n_z > 0`). 3 values a pixel.
@@ -210,12 +229,15 @@ pub(super) fn check_pixels(field: Field<'_>, facing: Facing) -> Result<()> {
 fn are_sound(field: Field<'_>, facing: Facing, pixels: Range<usize>) -> bool {
     // NaN and infinity spread into products with zero.
     let is_finite = |value: f32| value * 0.0 == 0.0;
+    let [least, most] = LENGTHS.map(|length| length * length);
     let mask = &field.mask[pixels.clone()];
     let normals = field.normals[3 * pixels.start..3 * pixels.end].as_chunks::<3>().0;
     let away = facing == Facing::Anywhere;
     let mut sound = true;
     for (&[x, y, z], &used) in normals.iter().zip(mask) {
-        sound &= !used | (is_finite(x) & is_finite(y) & is_finite(z) & (away | (z >= 0.0)));
+        // False for NaN.
+        let square = x * x + y * y + z * z;
+        sound &= !used | ((square >= least) & (square <= most) & (away | (z >= 0.0)));
     }
     for (&weight, &used) in field.weights.map_or(&[][..], |weights| &weights[pixels]).iter().zip(mask) {
         sound &= !used | (is_finite(weight) & (weight >= 0.0));
@@ -230,10 +252,19 @@ fn check_pixel(field: Field<'_>, facing: Facing, pixel: usize) -> Result<()> {
         return Ok(());
     }
     let (row, col) = (pixel / width, pixel % width);
-    let normal = &normals[pixel * 3..pixel * 3 + 3];
-    let is_finite = normal.iter().all(|component| component.is_finite());
-    if !is_finite || facing == Facing::Camera && normal[2] < 0.0 {
-        return Err(Error::BadNormal { row, col, n_z: f64::from(normal[2]) });
+    let normal: [f32; 3] = std::array::from_fn(|axis| normals[3 * pixel + axis]);
+    let length = normal.iter().map(|component| component * component).sum::<f32>().sqrt();
+    let rule = if !normal.iter().all(|component| component.is_finite()) {
+        Some("finite")
+    } else if facing == Facing::Camera && normal[2] < 0.0 {
+        Some("toward the camera, n_z >= 0")
+    } else if !(LENGTHS[0]..=LENGTHS[1]).contains(&length) {
+        Some("of length 1 (0.5 to 2 is let through)")
+    } else {
+        None
+    };
+    if let Some(rule) = rule {
+        return Err(Error::BadNormal { row, col, rule, normal });
     }
     if let Some(weights) = weights
         && !(weights[pixel].is_finite() && weights[pixel] >= 0.0)

@@ -17,6 +17,15 @@ pub(super) struct Jacobi<'a, T: Number> {
     roots: Aligned<f64>,
 }
 
+/// Why an iteration ended.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum End {
+    /// As far as it was to go.
+    Asked,
+    /// Products that are positive were not, by rounding.
+    Rounding,
+}
+
 impl<'a, T: Number> Jacobi<'a, T> {
     /// For systems in a frame.
     pub fn new(frame: &'a Frame) -> Self {
@@ -37,25 +46,50 @@ impl<'a, T: Number> Jacobi<'a, T> {
         max_iters: usize,
         mut each: impl FnMut() -> bool,
     ) -> (usize, f64) {
+        let (mut iterations, mut before) = (0, f64::INFINITY);
+        loop {
+            let (taken, norm, end) = self.run(system, z, target, max_iters - iterations, &mut each);
+            iterations += taken;
+            // The true residual goes on where rounding has left nothing of the products, as long as it helps.
+            if end == End::Asked || iterations == max_iters || !(norm < before) {
+                return (iterations, norm);
+            }
+            before = norm;
+        }
+    }
+
+    /// [`Self::improve`] as far as the products carry.
+    fn run(
+        &mut self,
+        system: &NormalEquations,
+        z: &mut [f64],
+        target: f64,
+        max_iters: usize,
+        each: &mut impl FnMut() -> bool,
+    ) -> (usize, f64, End) {
         self.begin(system, z);
         let Self { scaled, vectors, roots } = self;
         let mut steps = Steps::default();
         let mut iterations = 0;
-        let norm = loop {
+        let (norm, end) = loop {
             let now = sweep(scaled, steps, vectors);
             let norm = now.r_d_r.max(0.0).sqrt();
-            if norm <= target || iterations >= max_iters || !(now.p_v > 0.0) || !each() {
-                break norm;
+            if norm <= target || iterations >= max_iters || !each() {
+                break (norm, End::Asked);
+            }
+            if !(now.p_v > 0.0) {
+                break (norm, End::Rounding);
             }
             let (a0, norm_between) = first_step(&now);
             iterations += 1;
-            if let Some(next) = both_steps(&now, a0).filter(|_| norm_between > target && iterations < max_iters) {
+            let is_asked = norm_between <= target || iterations == max_iters;
+            if let Some(next) = both_steps(&now, a0).filter(|_| !is_asked) {
                 iterations += 1;
                 steps = next;
             } else {
                 let a0 = T::of(a0);
                 vectors.x.par_iter_mut().zip(vectors.p.par_iter()).for_each(|(x, p)| *x += a0 * *p);
-                break norm_between;
+                break (norm_between, if is_asked { End::Asked } else { End::Rounding });
             }
         };
         let frame = scaled.frame;
@@ -65,7 +99,7 @@ impl<'a, T: Number> Jacobi<'a, T> {
                 *z += x.to_f64() * root;
             }
         });
-        (iterations, norm)
+        (iterations, norm, end)
     }
 
     /// Scales the system to a diagonal of ones, `D^-1/2 A D^-1/2`, and starts at the residual of `z`.

@@ -87,7 +87,7 @@ pub struct BilateralSurface {
     pub components: Vec<Component>,
     /// Energy after each re-weighting.
     pub energies: Vec<f64>,
-    /// Whether the energy came to rest before the last allowed re-weighting.
+    /// Whether the energy came to rest before the last allowed re-weighting, and the last system was solved.
     pub converged: bool,
     /// Iterations of all inner solves.
     pub inner_iterations: usize,

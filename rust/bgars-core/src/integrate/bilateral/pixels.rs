@@ -6,7 +6,7 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::super::checkerboard::Grid;
-use super::super::operator::Field;
+use super::super::operator::{Field, to_unit};
 use super::Setting;
 use super::camera::Pinhole;
 use super::frame::Frame;
@@ -44,8 +44,10 @@ pub(super) struct Pixels {
     pub n: [Aligned<f64>; 2],
     /// Factors of the differences along x and y.
     pub g: [Aligned<f64>; 2],
-    /// How much each pixel is trusted.
+    /// How much each pixel is trusted, times `unit`.
     pub trust: Aligned<f64>,
+    /// Brings the weights of edges, trust times factor squared, to the size of 1.
+    pub unit: f64,
     /// 1 where a pixel is joined to its right neighbour, or to the one below, else 0.
     pub ties: [Aligned<f64>; 2],
     mask: Vec<bool>,
@@ -93,7 +95,11 @@ impl Pixels {
             }
         });
         let spans = mask.chunks(width).map(span_of).collect();
-        Self { crop, n: [n_x, n_y], g: [g_x, g_y], trust, ties: [tied_right, tied_below], mask, spans }
+        let weights =
+            (&*trust, &*g_x, &*g_y).into_par_iter().map(|(trust, g_x, g_y)| trust * (g_x * g_x).max(g_y * g_y));
+        let unit = to_unit(weights.reduce(|| 0.0, f64::max));
+        trust.par_iter_mut().for_each(|trust| *trust *= unit);
+        Self { crop, n: [n_x, n_y], g: [g_x, g_y], trust, unit, ties: [tied_right, tied_below], mask, spans }
     }
 
     /// Pixels of the box.

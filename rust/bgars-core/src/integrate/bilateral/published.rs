@@ -11,7 +11,7 @@ use super::normal_equations::NormalEquations;
 use super::pixels::Pixels;
 use super::reweigh::Shares;
 use super::solve::{OnReweigh, Progressed};
-use crate::memory::Aligned;
+use crate::memory::{self, Aligned};
 use crate::{Error, Result};
 
 /// Largest relative residual of an inner solve.
@@ -80,6 +80,10 @@ impl<'a> Published<'a> {
         };
         if stopped {
             return Err(Error::Cancelled);
+        }
+        if !left.is_finite() {
+            memory::forget();
+            return Err(Error::NoConvergence { iterations, residual: left / scale, tolerance: TOLERANCE });
         }
         let rows = z.par_chunks_mut(width).zip(framed[first..].par_chunks(stride));
         rows.enumerate().for_each(|(row, (z, framed))| {

@@ -47,7 +47,7 @@ pub(super) fn reweigh(pixels: &Pixels, z: &[f64], k: f64, shares: &mut Shares) -
             .sum()
         })
         .collect();
-    energies.iter().sum()
+    energies.iter().sum::<f64>() / pixels.unit
 }
 
 /// Sets the shares of a row's span and returns their energy.

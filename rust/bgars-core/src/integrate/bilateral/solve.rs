@@ -77,8 +77,8 @@ pub fn integrate_bilateral(
     let mut shares = even(&pixels);
     let mut fit = Progressed::default();
     let mut energies: Vec<f64> = Vec::new();
-    let mut converged = false;
-    while energies.len() < params.max_iters && !converged {
+    let mut at_rest = false;
+    while energies.len() < params.max_iters && !at_rest {
         if let Some(published) = &mut published {
             published.improve(&pixels, &shares, &mut z, &mut fit, on_progress)?;
         } else {
@@ -89,7 +89,7 @@ pub fn integrate_bilateral(
         let before = energies.last().copied().unwrap_or(f64::INFINITY);
         energies.push(energy);
         fit.change = (energy - before).abs() / before;
-        converged = energy == 0.0 || (before.is_finite() && fit.change < params.tolerance);
+        at_rest = energy == 0.0 || (before.is_finite() && fit.change < params.tolerance);
         fit.rounds = energies.len();
         if on_progress(Progress { iteration: fit.rounds, residual: fit.change }).is_break() {
             return Err(Error::Cancelled);
@@ -113,7 +113,7 @@ pub fn integrate_bilateral(
         labels,
         components: runs.components,
         energies,
-        converged,
+        converged: at_rest && !fit.unsolved,
         inner_iterations: fit.inner_iterations,
         residual: fit.residual,
     })
@@ -130,7 +130,7 @@ fn check(field: Field<'_>, camera: Option<Pinhole>, params: &BilateralParams) ->
             check_facing(field, camera)?;
         }
     }
-    for (argument, value, least) in [("k", params.k, 0.0), ("tol", params.tolerance, f64::MIN_POSITIVE)] {
+    for (argument, value, least) in [("k", params.k, 0.0), ("tol", params.tolerance, f64::from_bits(1))] {
         if !(value.is_finite() && value >= least) {
             let rule = if least == 0.0 { "finite and at least 0" } else { "finite and above 0" };
             return Err(Error::OutOfRange { argument, rule, value });
@@ -164,6 +164,8 @@ pub(super) struct Progressed {
     pub change: f64,
     pub inner_iterations: usize,
     pub residual: f64,
+    /// Whether the last of them needed more iterations than it was given.
+    pub unsolved: bool,
 }
 
 /// Brings `z` (row-major in the box) to the solution of a system by multigrid.
@@ -197,8 +199,13 @@ fn improve(
     let inner = Params { relative_tolerance: CONVERGED_TOLERANCE, max_iters: CONVERGED_ITERS, ..Params::default() };
     let state = Progress { iteration: fit.rounds, residual: fit.change };
     let solution = conjugate_gradients(&weights, &residual, scale, &inner, &mut |_: Progress| on_progress(state))?;
+    if !solution.residual.is_finite() {
+        let (iterations, tolerance) = (fit.inner_iterations, CONVERGED_TOLERANCE);
+        return Err(Error::NoConvergence { iterations, residual: solution.residual, tolerance });
+    }
     reds.par_iter_mut().zip(solution.x.par_iter()).for_each(|(red, change)| *red += change);
     fit.inner_iterations += solution.iterations;
+    fit.unsolved = !solution.solved;
     fit.residual = fit.residual.max(solution.residual);
     fill_blacks(&weights, &reds, &mut right.blacks);
     z.par_chunks_mut(width)

@@ -1,0 +1,171 @@
+"""What `integrate_normals` is given, checked and brought into the form of the solver."""
+
+from __future__ import annotations
+
+import operator
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from bgars import _bgars
+from bgars.errors import InputError
+from bgars.records import NormalField
+from bgars.surface_records import Anchors, Pinhole
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+    from bgars.records import BoolArray, FloatArray
+
+__all__ = [
+    "anchor_regions",
+    "bool_mask",
+    "check_camera",
+    "check_others",
+    "check_pitch",
+    "count",
+    "edge_trust",
+    "normal_array",
+    "number",
+    "plain",
+]
+
+NORMALS_NDIM = 3
+MAX_COUNT = 2**31 - 1
+DEFAULTS = {
+    "difference": "trapezoid",
+    "relative_tolerance": 1e-8,
+    "absolute_tolerance": 1e-12,
+    "k": 2.0,
+    "tol": 1e-4,
+    "solver": "converged",
+    "precision": "double",
+}
+"""Of the arguments that only one method has."""
+
+
+def number(name: str, value: object) -> float:
+    """Return the value, or raise InputError unless it is a number."""
+    if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
+        return float(value)
+    msg = f"{name}: must be a number, got {value!r}"
+    raise InputError(msg)
+
+
+def count(name: str, value: object, default: int) -> int:
+    """Return the value, the default for None, or raise InputError unless it is a whole number of at least 1."""
+    if value is None:
+        return default
+    try:
+        whole = operator.index(value)  # type: ignore[arg-type]  # what has no index raises
+    except TypeError:
+        msg = f"{name}: must be a whole number, got {value!r}"
+        raise InputError(msg) from None
+    if not 1 <= whole <= MAX_COUNT:
+        rule = "at least 1" if whole < 1 else f"at most {MAX_COUNT}"
+        msg = f"{name}: must be {rule}, got {whole}"
+        raise InputError(msg)
+    return whole
+
+
+def check_pitch(pixel_pitch_um: object) -> None:
+    """Raise InputError unless the pixel pitch is finite and above 0, or None."""
+    if pixel_pitch_um is None:
+        return
+    pitch = number("pixel_pitch_um", pixel_pitch_um)
+    if not (np.isfinite(pitch) and pitch > 0):
+        msg = f"pixel_pitch_um: must be finite and above 0, got {pitch:g}"
+        raise InputError(msg)
+
+
+def check_others(method: str, others: Mapping[str, object], own: Mapping[str, object]) -> None:
+    """Raise InputError where an argument that only the other method has is not at its default."""
+    for name, value in others.items():
+        if value != DEFAULTS[name]:
+            msg = f"{name}: method {method!r} has no such argument (it has {', '.join(own)}); got {value!r}"
+            raise InputError(msg)
+    if own.get("precision") == "single" and own["solver"] != "compatible":
+        msg = f"precision: only solver 'compatible' has 'single', got solver {own['solver']!r}"
+        raise InputError(msg)
+
+
+def check_camera(camera: object, method: str, anchors: Anchors | None) -> None:
+    """Raise InputError where there is a camera that this integration cannot have."""
+    if camera is None:
+        return
+    if not isinstance(camera, Pinhole):
+        msg = f"camera: must be a bgars.Pinhole, got {type(camera).__name__}"
+        raise InputError(msg)
+    if method != "bilateral":
+        msg = f"camera: only method 'bilateral' integrates under a camera, got {method!r}"
+        raise InputError(msg)
+    if anchors is not None:
+        msg = "anchors: heights in micrometres do not fix a depth under a camera; leave one of the two out"
+        raise InputError(msg)
+
+
+def plain(values: ArrayLike, dtype: DTypeLike) -> NDArray[Any]:
+    """Return the array as the solver reads it, C-contiguous and aligned; copied only where it is not."""
+    return np.require(values, dtype, ["C", "A"])
+
+
+def normal_array(normals: ArrayLike, mask: ArrayLike | None) -> tuple[FloatArray, BoolArray]:
+    """Return plain normals and where they can be integrated: everywhere, where a mask says it already."""
+    vectors = _numbers("normals", normals)
+    if vectors.ndim != NORMALS_NDIM or vectors.shape[2] != NORMALS_NDIM:
+        msg = f"normals: must have shape (H, W, 3), got {vectors.shape}"
+        raise InputError(msg)
+    if mask is not None:
+        return vectors, np.ones(vectors.shape[:2], dtype=np.bool_)
+    return vectors, _bgars.usable_normals(vectors)
+
+
+def bool_mask(mask: ArrayLike, shape: tuple[int, ...]) -> BoolArray:
+    """Return the mask, or raise InputError unless it is one of this shape."""
+    given = np.asarray(mask)
+    if given.dtype != np.bool_ or given.shape != shape:
+        msg = f"mask: must be bool of shape {shape}, got {given.dtype} of shape {given.shape}"
+        raise InputError(msg)
+    return given
+
+
+def edge_trust(
+    normals: NormalField | ArrayLike, weights: Literal["confidence"] | ArrayLike | None, use: BoolArray
+) -> FloatArray | None:
+    """Return the weights of the pixels as an array; None for none."""
+    if weights is None:
+        return None
+    if isinstance(weights, str):
+        if weights != "confidence" or not isinstance(normals, NormalField):
+            msg = f"weights: must be an array of shape (H, W), or 'confidence' with a NormalField; got {weights!r}"
+            raise InputError(msg)
+        return plain(normals.confidence, np.float32)
+    trust = _numbers("weights", weights)
+    if trust.shape != use.shape:
+        msg = f"weights: must have shape {use.shape}, got {trust.shape}"
+        raise InputError(msg)
+    if use.any() and not trust[use].any():
+        msg = "weights: no pixel of the mask has one above 0"
+        raise InputError(msg)
+    return trust
+
+
+def anchor_regions(anchors: object, shape: tuple[int, ...]) -> NDArray[np.int32] | None:
+    """Return the regions of the anchors, checked; None for none."""
+    if anchors is None:
+        return None
+    if not isinstance(anchors, Anchors):
+        msg = f"anchors: must be bgars.Anchors, got {type(anchors).__name__}"
+        raise InputError(msg)
+    anchors.check(shape)
+    return None if anchors.regions is None else plain(anchors.regions, np.int32)
+
+
+def _numbers(name: str, values: ArrayLike) -> FloatArray:
+    try:
+        return plain(values, np.float32)
+    except (TypeError, ValueError) as error:
+        msg = f"{name}: must be an array of numbers ({error})"
+        raise InputError(msg) from error
