@@ -151,10 +151,14 @@ def reconstruct(
     """The main job: a folder of photographs becomes normals, a height map, a mesh and an overview picture.
 
     Writes overview.png, normals.png (16 bit), height.tif and height.npy (float32, um when the pixel pitch is known),
-    mesh.ply and summary.json. Heights between parts that do not touch, such as a ball above its board, are not
-    measured.
+    mesh.ply and summary.json. What an earlier run left of these in OUT is removed before FOLDER is read. Heights
+    between parts that do not touch, such as a ball above its board, are not measured.
     """
-    run = partial(bgars.reconstruct, method=method, threshold=threshold, material=_material_from(material))
+
+    def run(capture: bgars.Capture, **options: Any) -> bgars.Reconstruction:  # noqa: ANN401
+        surface = _material_from(material)
+        return bgars.reconstruct(capture, method=method, threshold=threshold, material=surface, **options)
+
     summary, files = _reconstruct_to(folder, output, run, channel=channel, mesh_format=mesh_format, directx=directx)
     if as_json:
         print_json(summary)
@@ -286,10 +290,12 @@ def _reconstruct_to(
     directx: bool,
     channel: ChannelOption | None = None,
 ) -> tuple[dict[str, Any], dict[str, str]]:
-    capture = bgars.read_capture(folder, channel=channel)
     with stage_progress() as report:
         return write_reconstruction(
-            lambda: run(capture, progress=report), output, mesh_format=mesh_format, directx=directx
+            lambda: run(bgars.read_capture(folder, channel=channel), progress=report),
+            output,
+            mesh_format=mesh_format,
+            directx=directx,
         )
 
 

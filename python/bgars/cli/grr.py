@@ -12,7 +12,7 @@ import bgars
 from bgars.cli.console import print_json, say, say_files, stage_progress
 from bgars.cli.inspect import EXIT_NOT_PASSED
 from bgars.errors import InputError
-from bgars.io.atomic import atomic_folder
+from bgars.io.atomic import FolderNames, atomic_folder
 from bgars.normals import DEFAULT_METHOD, Method
 from bgars.studies.pages import grr_page
 from bgars.studies.readings import readings_csv
@@ -28,6 +28,7 @@ FILES = {
     "grr.json": "every figure",
     "readings.csv": "every reading, one line each",
 }
+NAMES = FolderNames(frozenset(FILES), frozenset({"grr.json"}))
 RESULTS = "results"
 RESULTS_MEANING = "the result of every run: bgars report shows one, bgars grr repeats the study from them"
 
@@ -80,8 +81,8 @@ def grr(
     wrong use, a design that is not balanced, runs that do not belong together, or a capture that cannot be measured.
     """
     _check_results(folder, output)
-    known = None if references is None else bgars.read_references(references)
-    with stage_progress() as report, atomic_folder(output) as place:
+    with stage_progress() as report, atomic_folder(output, NAMES) as place:
+        known = None if references is None else bgars.read_references(references)
         study = bgars.read_study(folder, recipe, method=method, progress=lambda fraction: report("runs", fraction))
         found = bgars.gauge_rr(study, known)
         (place / "grr.html").write_text(grr_page(found), encoding="utf-8")

@@ -13,9 +13,11 @@ import typer
 import bgars
 from bgars.cli.console import print_json, say, say_files, stage_progress, utc_now
 from bgars.errors import InputError
-from bgars.io.atomic import atomic_folder
+from bgars.io.atomic import FolderNames, atomic_folder
 from bgars.io.parquet import need_pyarrow
 from bgars.normals import DEFAULT_METHOD, Method
+from bgars.report.page import REPORT_FILES
+from bgars.report.part import PICTURES
 
 if TYPE_CHECKING:
     from bgars.part_result import PartResult
@@ -28,6 +30,12 @@ FILES = {
     "result.json": "everything: readings, uncertainties, limits, verdicts, reasons, checksums of the input",
     "balls.csv": "one line a ball, for a spreadsheet",
 }
+PARQUET = "balls.parquet"
+CFX = "cfx.json"
+# balls.csv and the pictures mark no run: captures have files of these names, too.
+NAMES = FolderNames(
+    frozenset({*FILES, *PICTURES, *REPORT_FILES, PARQUET, CFX}), frozenset({"result.json", PARQUET, CFX})
+)
 
 
 def register(app: typer.Typer) -> None:
@@ -77,7 +85,8 @@ def inspect(
 ) -> None:
     """Find, measure and judge the solder balls of a part.
 
-    Writes report.html, which is the page to look at first, result.json, balls.csv and four pictures.
+    Writes report.html, which is the page to look at first, result.json, balls.csv and four pictures. Files that an
+    earlier inspection left in OUT are removed before FOLDER is read: a run that fails leaves no verdict.
 
     Exit code 0: the part passes. 1: it fails, or is undecided because something is too near its limit, was not
     measured, or has no limit; the output says which. 2: wrong use, a bad recipe, or a capture that cannot be measured.
@@ -87,9 +96,9 @@ def inspect(
         raise InputError(msg)
     if parquet:
         need_pyarrow()
-    part = None if recipe is None else bgars.read_part_recipe(recipe)
-    capture = bgars.read_capture(folder)
-    with stage_progress() as report, atomic_folder(output) as place:
+    with stage_progress() as report, atomic_folder(output, NAMES) as place:
+        part = None if recipe is None else bgars.read_part_recipe(recipe)
+        capture = bgars.read_capture(folder)
         result = bgars.inspect(capture, part, method=method, surface=True, progress=report)
         result = replace(result, serial=serial, inspected_utc=utc_now())
         files = FILES | bgars.write_part_pictures(result, capture, place)
@@ -98,11 +107,11 @@ def inspect(
         pages = bgars.write_report(result, place / "report.html", capture=capture)
         files = {"report.html": pages.pop("report.html"), **files, **pages}
         if parquet:
-            bgars.write_parquet(result, place / "balls.parquet")
-            files["balls.parquet"] = "the same in full digits, units in the columns' metadata"
+            bgars.write_parquet(result, place / PARQUET)
+            files[PARQUET] = "the same in full digits, units in the columns' metadata"
         if cfx:
-            (place / "cfx.json").write_text(json.dumps(bgars.to_cfx(result), indent=2) + "\n", encoding="utf-8")
-            files["cfx.json"] = "IPC-CFX message UnitsInspected"
+            (place / CFX).write_text(json.dumps(bgars.to_cfx(result), indent=2) + "\n", encoding="utf-8")
+            files[CFX] = "IPC-CFX message UnitsInspected"
     if as_json:
         print_json({**result.to_dict(), "output": list(files)})
     elif log_line:

@@ -10,7 +10,8 @@ import numpy as np
 import tifffile
 
 import bgars
-from bgars.io.atomic import atomic_folder
+from bgars.io.atomic import FolderNames, atomic_folder
+from bgars.io.mesh_files import MESH_SUFFIXES
 from bgars.pipeline import summarise_field
 
 if TYPE_CHECKING:
@@ -22,15 +23,23 @@ if TYPE_CHECKING:
 
 __all__ = ["write_normals", "write_reconstruction"]
 
+MARK = "summary.json"
+RECONSTRUCTION = FolderNames(
+    frozenset({"overview.png", "normals.png", "height.tif", "height.npy", MARK})
+    | {f"mesh{suffix}" for suffix in MESH_SUFFIXES},
+    frozenset({MARK}),
+)
+
 
 def write_reconstruction(
     run: Callable[[], Reconstruction], output: Path, *, mesh_format: str, directx: bool
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Run a reconstruction and write its results; return its summary and what each file is.
 
-    The output folder is tried first, so that no work is lost to an unwritable one.
+    The output folder is tried first, so that no work is lost to an unwritable one, and what an earlier reconstruction
+    left there is removed.
     """
-    with atomic_folder(output) as folder:
+    with atomic_folder(output, RECONSTRUCTION) as folder:
         result = run()
         unit = result.height.unit
         files = {
@@ -39,7 +48,7 @@ def write_reconstruction(
             "normals.png": _normals_meaning(directx),
             "height.tif": f"heights, float32, in {unit}",
             "height.npy": "the same for numpy",
-            "summary.json": "the numbers of this run",
+            MARK: "the numbers of this run",
         }
         bgars.write_overview(result, folder / "overview.png")
         bgars.write_mesh(result.mesh, folder / f"mesh.{mesh_format}")
@@ -47,7 +56,7 @@ def write_reconstruction(
         bgars.write_height(result.height, folder / "height.tif")
         bgars.write_height(result.height, folder / "height.npy")
         summary = {"bgars": bgars.__version__, **result.summary(), "files": list(files)}
-        (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        (folder / MARK).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     return summary, files
 
 

@@ -7,14 +7,29 @@ import shutil
 import tempfile
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from bgars.errors import FileFormatError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-__all__ = ["atomic_file", "atomic_folder"]
+__all__ = ["FolderNames", "atomic_file", "atomic_folder"]
+
+
+class FolderNames(NamedTuple):
+    """Files that a command leaves in its folder of results.
+
+    Attributes
+    ----------
+    written : frozenset of str
+        Every name that some run of the command may write.
+    marks : frozenset of str
+        Those that nothing else writes: where one lies, an earlier run was there.
+    """
+
+    written: frozenset[str]
+    marks: frozenset[str]
 
 
 @contextmanager
@@ -53,12 +68,13 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 @contextmanager
-def atomic_folder(folder: str | os.PathLike[str]) -> Iterator[Path]:
+def atomic_folder(folder: str | os.PathLike[str], names: FolderNames | None = None) -> Iterator[Path]:
     """Yield a temporary folder; when the block succeeds, move its files into `folder`.
 
     Files of the same name are replaced.
 
     Other files of an existing `folder` stay. The folder is tried before the block runs, so that long work is not lost.
+    With `names`, what an earlier run left is removed before the block runs, too: a folder holds one run or none.
 
     Raises
     ------
@@ -75,6 +91,8 @@ def atomic_folder(folder: str | os.PathLike[str]) -> Iterator[Path]:
         parent.mkdir(parents=True, exist_ok=True)
         temporary = Path(tempfile.mkdtemp(prefix=".bgars-partial-", dir=parent))
         try:
+            if names is not None:
+                _remove_earlier(folder, names)
             yield temporary
             folder.mkdir(exist_ok=True)
             for path in sorted(temporary.iterdir()):
@@ -86,3 +104,13 @@ def atomic_folder(folder: str | os.PathLike[str]) -> Iterator[Path]:
                     place.rmdir()
             raise
         temporary.rmdir()
+
+
+def _remove_earlier(folder: Path, names: FolderNames) -> None:
+    """Remove the files of an earlier run; without a mark of one, files of these names are somebody else's."""
+    if not any((folder / name).is_file() for name in names.marks):
+        return
+    # Marks go last: what an interrupted removal leaves is still known as a run's.
+    for name in sorted(names.written, key=lambda name: (name in names.marks, name)):
+        if (folder / name).is_file():
+            (folder / name).unlink()
