@@ -68,6 +68,7 @@ clean:
 
 # The compiled module is rebuilt when a Rust source changes; Python sources are used in place.
 $(VENV)/.installed: $(RUST_SOURCES)
+	@echo "Building bgars in $(VENV): fetches packages, compiles Rust; minutes the first time, without a word"
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
 	$(BIN)/python -m pip install --quiet --editable '.[test,lint]'

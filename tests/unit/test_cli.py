@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import tifffile
 import trimesh
+from bgars.cli.console import activation
 
 
 def bgars_command(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
@@ -30,6 +31,21 @@ def test_demo_writes_everything_and_says_what_to_open(tmp_path: Path) -> None:
         assert (tmp_path / "bgars-demo" / name).stat().st_size > 0
         assert f"bgars-demo/{name}" in run.stdout
     assert [path.name for path in tmp_path.iterdir()] == ["bgars-demo"], "no temporary folder is left"
+    assert run.stdout.splitlines()[-1].startswith("Next: ")
+
+
+@pytest.mark.parametrize("on_path", [False, True])
+def test_what_to_type_after_the_demo_is_found_by_the_shell(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, on_path: bool
+) -> None:
+    scripts = tmp_path / ".venv" / "bin"
+    scripts.mkdir(parents=True)
+    for name in ("activate", "bgars"):
+        (scripts / name).touch(mode=0o755)
+    monkeypatch.setattr(sys, "prefix", str(tmp_path / ".venv"))
+    monkeypatch.setenv("PATH", str(scripts) if on_path else "")
+    monkeypatch.chdir(tmp_path)
+    assert activation() == ("" if on_path else ". .venv/bin/activate && ")
 
 
 @pytest.mark.parametrize("mesh_format", ["ply", "obj", "stl", "glb"])

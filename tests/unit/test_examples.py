@@ -22,6 +22,11 @@ def test_the_readme_shows_the_examples() -> None:
     assert blocks == [example.read_text(encoding="utf-8") for example in examples]
 
 
+def test_after_the_demo_the_shell_is_told_where_bgars_is() -> None:
+    block = re.findall(r"```sh\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)[0]
+    assert [line.split("  ")[0] for line in block.splitlines()[:2]] == ["make demo", ". .venv/bin/activate"]
+
+
 def test_the_quick_start_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     runpy.run_path(str(ROOT / "examples" / "quickstart.py"))

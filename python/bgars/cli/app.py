@@ -13,7 +13,7 @@ import typer
 
 import bgars
 from bgars.cli.calibrate import register as register_calibrate
-from bgars.cli.console import EXIT_BAD_INPUT, fail, print_json, say, stage_progress
+from bgars.cli.console import EXIT_BAD_INPUT, activation, fail, print_json, say, shown_path, stage_progress
 from bgars.cli.describe import describe, describe_in_words
 from bgars.cli.evaluation import choice_in_words, evaluation_table
 from bgars.cli.experiment import register as register_experiment
@@ -133,7 +133,8 @@ def demo(
     say("Open these:")
     _list_files(output, files)
     say()
-    say(f"Next: bgars evaluate {_shown(folder)}    or, on your own images: bgars reconstruct FOLDER -o OUT")
+    own = "bgars reconstruct FOLDER -o OUT"
+    say(f"Next: {activation()}bgars evaluate {shown_path(folder)}    or, on your own images: {own}")
 
 
 @app.command()
@@ -304,14 +305,6 @@ def _material_from(path: Path | None) -> bgars.SurfaceMaterial | None:
 
 
 def _list_files(folder: Path, files: dict[str, str]) -> None:
-    width = max(len(_shown(folder / name)) for name in files)
+    width = max(len(shown_path(folder / name)) for name in files)
     for name, meaning in files.items():
-        say(f"  {_shown(folder / name):<{width}}  {meaning}")
-
-
-def _shown(path: Path) -> str:
-    """A path as short as it can be typed from here."""
-    try:
-        return str(path.resolve().relative_to(Path.cwd()))
-    except ValueError:
-        return str(path)
+        say(f"  {shown_path(folder / name):<{width}}  {meaning}")

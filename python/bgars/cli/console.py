@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
 import time
 from contextlib import contextmanager
 from datetime import datetime, timezone
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
@@ -15,9 +17,19 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
-    from pathlib import Path
 
-__all__ = ["EXIT_BAD_INPUT", "error_console", "fail", "print_json", "say", "say_files", "stage_progress", "utc_now"]
+__all__ = [
+    "EXIT_BAD_INPUT",
+    "activation",
+    "error_console",
+    "fail",
+    "print_json",
+    "say",
+    "say_files",
+    "shown_path",
+    "stage_progress",
+    "utc_now",
+]
 
 EXIT_BAD_INPUT = 2
 
@@ -35,6 +47,22 @@ def say_files(output: Path, files: Mapping[str, str]) -> None:
     width = max(len(str(output / name)) for name in files)
     for name, meaning in files.items():
         say(f"  {output / name!s:<{width}}  {meaning}")
+
+
+def shown_path(path: Path) -> str:
+    """A path as short as it can be typed from here."""
+    try:
+        return str(path.resolve().relative_to(Path.cwd()))
+    except ValueError:
+        return str(path)
+
+
+def activation() -> str:
+    """What to type before ``bgars ...``: the activation of this environment where the shell does not find its bgars."""
+    script, found = Path(sys.prefix) / "bin" / "activate", shutil.which("bgars")
+    if not script.is_file() or (found and Path(found).resolve().is_relative_to(Path(sys.prefix).resolve())):
+        return ""
+    return f". {shown_path(script)} && "
 
 
 def print_json(values: dict[str, Any]) -> None:
