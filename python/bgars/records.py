@@ -239,7 +239,15 @@ class HeightMap:
             Heights in micrometres when a pixel pitch is given, else in pixels; NaN = invalid.
         pixel_pitch_um : float, optional
             Size of a pixel.
+
+        Raises
+        ------
+        InputError
+            A pitch that is not finite and above 0.
         """
+        if pixel_pitch_um is not None and not (np.isfinite(pixel_pitch_um) and pixel_pitch_um > 0):
+            msg = f"pixel_pitch_um: must be finite and above 0, got {pixel_pitch_um:g}"
+            raise InputError(msg)
         height_px = (height / (1.0 if pixel_pitch_um is None else pixel_pitch_um)).astype(np.float32)
         mask: BoolArray = np.isfinite(height_px)
         rows, cols = np.nonzero(mask)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
@@ -9,8 +10,9 @@ import typer
 
 import bgars
 from bgars.cli.console import print_json, say, stage_progress
-from bgars.errors import InputError
+from bgars.errors import FileFormatError, InputError
 from bgars.integrate import IntegrationMethod, Solver
+from bgars.io.height import HEIGHT_SUFFIXES, read_stored_height
 from bgars.io.mesh_files import MESH_SUFFIXES
 from bgars.pipeline import solver_fraction
 
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 NORMAL_MAP_SUFFIX = ".png"
+TAKEN = f"mesh takes a normal map ({NORMAL_MAP_SUFFIX}) or a height map ({', '.join(HEIGHT_SUFFIXES)})"
 
 
 def register(app: typer.Typer) -> None:
@@ -41,7 +44,8 @@ def mesh(
     pixel_pitch_um: Annotated[
         float | None,
         typer.Option(
-            help="Pixel pitch; a height map is then taken as um. A .tif of bgars brings its own.", show_default=False
+            help="Pixel pitch. A .tif of bgars brings its own; any other height map needs one, its heights are um.",
+            show_default=False,
         ),
     ] = None,
     directx: Annotated[bool, typer.Option("--directx", help="The normal map has green = y down.")] = False,
@@ -70,6 +74,10 @@ def mesh(
 ) -> None:
     """Turn a normal map or a height map into a mesh."""
     options = _integration(source, method, k, solver)
+    _check_source(source)
+    if pixel_pitch_um is not None and not (math.isfinite(pixel_pitch_um) and pixel_pitch_um > 0):
+        msg = f"--pixel-pitch-um: must be finite and above 0, got {pixel_pitch_um:g}"
+        raise InputError(msg)
     with stage_progress() as report:
         height = _height_from(source, pixel_pitch_um, directx, options, report)
     surface = bgars.mesh_from_height(height)
@@ -105,6 +113,15 @@ def _integration(
     return {name: value for name, value in named.items() if value is not None}
 
 
+def _check_source(source: Path) -> None:
+    """Raise unless there is a file that could be a map."""
+    if source.is_file() and source.suffix.lower() in {NORMAL_MAP_SUFFIX, *HEIGHT_SUFFIXES}:
+        return
+    what = "is a folder" if source.is_dir() else f"ends in {source.suffix!r}" if source.is_file() else "no such file"
+    msg = f"{source}: {what}; {TAKEN}"
+    raise FileFormatError(msg)
+
+
 def _height_from(
     source: Path,
     pixel_pitch_um: float | None,
@@ -121,5 +138,18 @@ def _height_from(
             **options,
         )
         return height
-    values, stored_pitch_um = bgars.read_height(source)
-    return bgars.HeightMap.from_array(values, pixel_pitch_um=pixel_pitch_um or stored_pitch_um)
+    return _stored_height(source, pixel_pitch_um)
+
+
+def _stored_height(source: Path, pixel_pitch_um: float | None) -> bgars.HeightMap:
+    """A height map in the unit that its file names, or in um where only the command names a pitch."""
+    values, unit, stored_um = read_stored_height(source)
+    if stored_um is not None and pixel_pitch_um not in {None, stored_um}:
+        msg = f"--pixel-pitch-um: {source} says {stored_um}, got {pixel_pitch_um}; leave it out"
+        raise InputError(msg)
+    if unit is None and pixel_pitch_um is None:
+        msg = f"--pixel-pitch-um: must be given, {source} names no unit: its heights are then taken as um"
+        raise InputError(msg)
+    if unit == "px" and pixel_pitch_um is not None:
+        values = values * pixel_pitch_um
+    return bgars.HeightMap.from_array(values, pixel_pitch_um=pixel_pitch_um or stored_um)

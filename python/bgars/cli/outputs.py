@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import imageio.v3 as iio
 import numpy as np
-import tifffile
 
 import bgars
 from bgars.io.atomic import FolderNames, atomic_folder
+from bgars.io.described_tiff import write_described
 from bgars.io.mesh_files import MESH_SUFFIXES
 from bgars.pipeline import summarise_field
 
@@ -75,8 +75,8 @@ def write_normals(field: NormalField, output: Path, *, directx: bool) -> tuple[d
     }
     with atomic_folder(output) as folder:
         bgars.write_normal_map(field, folder / "normals.png", directx=directx)
-        tifffile.imwrite(folder / "albedo.tif", field.albedo)
-        tifffile.imwrite(folder / "confidence.tif", field.confidence)
+        write_described(folder / "albedo.tif", field.albedo, "albedo")
+        write_described(folder / "confidence.tif", field.confidence, "confidence")
         iio.imwrite(folder / "measured.png", np.where(field.measured, 255, 0).astype(np.uint8))
         iio.imwrite(folder / "lights_kept.png", np.minimum(field.lights_kept, 255).astype(np.uint8))
     return {**summarise_field(field), "files": list(files)}, files

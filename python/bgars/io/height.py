@@ -2,25 +2,45 @@
 
 from __future__ import annotations
 
-import json
+import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 import tifffile
 
 from bgars.errors import FileFormatError, InputError
 from bgars.io.atomic import atomic_file
+from bgars.io.described_tiff import OWN, description_of, write_described
 
 if TYPE_CHECKING:
     from os import PathLike
 
     from bgars.records import FloatArray, HeightMap
 
-__all__ = ["HEIGHT_SUFFIXES", "read_height", "write_height"]
+__all__ = ["HEIGHT_SUFFIXES", "StoredHeight", "read_height", "read_stored_height", "write_height"]
 
 HEIGHT_SUFFIXES = (".tif", ".tiff", ".npy")
 HEIGHT_NDIM = 2
+CONTENT = "height map"
+
+
+class StoredHeight(NamedTuple):
+    """A height map as its file holds it.
+
+    Attributes
+    ----------
+    values : (H, W) float32
+        NaN = invalid.
+    unit : {"um", "px"} or None
+        Of the values; None: the file does not say.
+    pixel_pitch_um : float or None
+        None: the file does not say.
+    """
+
+    values: FloatArray
+    unit: Literal["um", "px"] | None
+    pixel_pitch_um: float | None
 
 
 def write_height(height: HeightMap, path: str | PathLike[str]) -> None:
@@ -37,13 +57,13 @@ def write_height(height: HeightMap, path: str | PathLike[str]) -> None:
     """
     path = Path(path)
     _check_suffix(path)
-    values = np.ascontiguousarray(height.height, dtype=np.float32)
+    values = np.asarray(height.height, dtype=np.float32)
     with atomic_file(path) as temporary:
         if path.suffix.lower() == ".npy":
-            np.save(temporary, values, allow_pickle=False)
+            np.save(temporary, np.ascontiguousarray(values), allow_pickle=False)
         else:
-            description = {"content": "bgars height map", "unit": height.unit, "pixel_pitch_um": height.pixel_pitch_um}
-            tifffile.imwrite(temporary, values, description=json.dumps(description), metadata=None)
+            pitch_um = height.pixel_pitch_um
+            write_described(temporary, values, CONTENT, unit=height.unit, pixel_pitch_um=pitch_um)
 
 
 def read_height(path: str | PathLike[str]) -> tuple[FloatArray, float | None]:
@@ -61,7 +81,7 @@ def read_height(path: str | PathLike[str]) -> tuple[FloatArray, float | None]:
     InputError
         An unknown suffix.
     FileFormatError
-        The file is missing, truncated, or not a single grey float image.
+        The file is missing, truncated, not a single grey float image, or a TIFF of bgars that holds something else.
 
     Examples
     --------
@@ -73,16 +93,22 @@ def read_height(path: str | PathLike[str]) -> tuple[FloatArray, float | None]:
     >>> values.tolist(), pitch_um
     ([[1.0, 1.0]], 5.0)
     """
+    stored = read_stored_height(path)
+    return stored.values, stored.pixel_pitch_um
+
+
+def read_stored_height(path: str | PathLike[str]) -> StoredHeight:
+    """Read a height map and the unit that its file names; errors as of :func:`read_height`."""
     path = Path(path)
     _check_suffix(path)
-    pixel_pitch_um: float | None = None
+    fields: dict[str, Any] = {}
     try:
         if path.suffix.lower() == ".npy":
             values = np.load(path, allow_pickle=False)
         else:
             with tifffile.TiffFile(path) as tiff:
                 values = tiff.asarray()
-                pixel_pitch_um = _described_pitch(tiff.pages.first.description)
+                fields = description_of(tiff)
     except OSError as error:
         msg = f"{path}: cannot be read ({error.strerror or error})"
         raise FileFormatError(msg) from error
@@ -92,16 +118,18 @@ def read_height(path: str | PathLike[str]) -> tuple[FloatArray, float | None]:
     if values.ndim != HEIGHT_NDIM or values.dtype.kind not in "fui":
         msg = f"{path}: must hold one grey image of numbers, got {values.dtype} of shape {values.shape}"
         raise FileFormatError(msg)
-    return values.astype(np.float32), pixel_pitch_um
-
-
-def _described_pitch(description: str) -> float | None:
-    try:
-        fields = json.loads(description)
-    except json.JSONDecodeError:
-        return None
-    pitch = fields.get("pixel_pitch_um") if isinstance(fields, dict) else None
-    return float(pitch) if isinstance(pitch, (int, float)) else None
+    content = str(fields.get("content", ""))
+    if content.startswith(OWN) and content != OWN + CONTENT:
+        msg = f"{path}: must hold a height map, but its description says {content!r}"
+        raise FileFormatError(msg)
+    pitch_um = fields.get("pixel_pitch_um")
+    if not isinstance(pitch_um, (int, float)):
+        # Ours without a pitch is in pixels; of another's nothing is known.
+        return StoredHeight(values.astype(np.float32), "px" if content else None, None)
+    if not (math.isfinite(pitch_um) and pitch_um > 0):
+        msg = f"{path}: pixel_pitch_um of its description: must be finite and above 0, got {pitch_um:g}"
+        raise FileFormatError(msg)
+    return StoredHeight(values.astype(np.float32), "um", float(pitch_um))
 
 
 def _check_suffix(path: Path) -> None:

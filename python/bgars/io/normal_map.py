@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bgars import _bgars
-from bgars.errors import InputError
+from bgars.errors import FileFormatError, InputError
 from bgars.io.atomic import atomic_file
 from bgars.io.images import MAX_MEGAPIXELS
 
@@ -21,6 +21,9 @@ __all__ = ["read_normal_map", "write_normal_map"]
 
 FULL = 65535.0
 NORMALS_NDIM = 3
+UNIT_WITHIN = 0.1
+"""How far a vector of 8 bits that was filtered or resized may be from length 1."""
+MOST_OTHERS = 0.5
 
 
 def write_normal_map(normals: NormalField | FloatArray, path: str | PathLike[str], *, directx: bool = False) -> None:
@@ -77,7 +80,7 @@ def read_normal_map(path: str | PathLike[str], *, directx: bool = False) -> Floa
     Raises
     ------
     FileFormatError
-        The file is not an RGB image.
+        The file is not an RGB image, or most of its pixels that are not black hold no unit vectors.
 
     Examples
     --------
@@ -89,10 +92,29 @@ def read_normal_map(path: str | PathLike[str], *, directx: bool = False) -> Floa
     >>> back.round(3).tolist()
     [[[0.6000000238418579, 0.0, 0.800000011920929], [nan, nan, nan]]]
     """
-    rgb = _bgars.read_rgb16(Path(path), MAX_MEGAPIXELS)
+    path = Path(path)
+    try:
+        rgb = _bgars.read_rgb16(path, MAX_MEGAPIXELS)
+    except FileFormatError as error:
+        msg = f"{error}; a normal map is an RGB image, R = x, G = y, B = z"
+        raise FileFormatError(msg) from None
     vectors = rgb.astype(np.float32) / np.float32(FULL) * 2.0 - 1.0
     if directx:
         vectors[..., 1] *= -1.0
-    vectors /= np.maximum(np.linalg.norm(vectors, axis=2, keepdims=True), 1e-6)
-    vectors[(rgb == 0).all(axis=2)] = np.nan
+    lengths = np.linalg.norm(vectors, axis=2, keepdims=True)
+    black = (rgb == 0).all(axis=2)
+    _check_lengths(path, lengths[~black])
+    vectors /= np.maximum(lengths, 1e-6)
+    vectors[black] = np.nan
     return vectors
+
+
+def _check_lengths(path: Path, lengths: FloatArray) -> None:
+    """Refuse a picture of something else: its colours are no unit vectors."""
+    others = float(np.mean(np.abs(lengths - 1.0) > UNIT_WITHIN)) if lengths.size else 0.0
+    if others > MOST_OTHERS:
+        msg = (
+            f"{path}: is not a normal map: at least {1 - MOST_OTHERS:.0%} of its pixels must be unit vectors (length 1 "
+            f"within {UNIT_WITHIN:g}), but {others:.1%} are not"
+        )
+        raise FileFormatError(msg)
