@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import bgars
@@ -14,7 +15,10 @@ import numpy as np
 import pytest
 import tifffile
 import trimesh
+import typer
+from bgars.cli.app import app
 from bgars.cli.console import activation
+from rich.text import Text
 
 
 def bgars_command(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
@@ -137,6 +141,20 @@ def test_every_command_has_help(command: str) -> None:
     assert run.returncode == 0
     assert "Usage" in run.stdout
     assert len(run.stdout) > 300
+
+
+def help_texts(command: object) -> Iterator[str]:
+    for each in (command, *getattr(command, "params", ())):
+        yield getattr(each, "help", None) or ""
+    for other in getattr(command, "commands", {}).values():
+        yield from help_texts(other)
+
+
+def test_no_help_is_taken_for_markup() -> None:
+    texts = list(help_texts(typer.main.get_command(app)))
+    assert any("bgars\\[parquet]" in text for text in texts)
+    for text in texts:
+        assert Text.from_markup(text).plain == text.replace("\\[", "["), "brackets are escaped"
 
 
 @pytest.mark.parametrize(

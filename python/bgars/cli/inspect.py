@@ -71,7 +71,9 @@ def inspect(
         str, typer.Option(metavar="SERIAL", help="Serial number of the part, kept in the result.", show_default=False)
     ] = "",
     parquet: Annotated[
-        bool, typer.Option("--parquet", help="Write balls.parquet, too (needs pip install 'bgars[parquet]').")
+        # The help is markup: a bracket that is no style is escaped.
+        bool,
+        typer.Option("--parquet", help=r"Write balls.parquet, too (needs pip install 'bgars\[parquet]')."),
     ] = False,
     cfx: Annotated[
         bool, typer.Option("--cfx", help="Write cfx.json, too: the IPC-CFX message UnitsInspected.")
