@@ -17,10 +17,7 @@ if TYPE_CHECKING:
     from bgars.material_records import ReflectanceFit
     from bgars.records import Capture
 
-__all__ = ["calibrate_material", "loss_in_words"]
-
-VERY_WELL = 0.1
-WELL = 0.5
+__all__ = ["calibrate_material"]
 
 
 def calibrate_material(
@@ -76,15 +73,3 @@ def calibrate_material(
         msg = f"{capture.name}: no material explains the balls (loss {fit.loss:.2f}, at most 2 is accepted)"
         raise CalibrationError(msg)
     return fit
-
-
-def loss_in_words(fit: ReflectanceFit) -> str:
-    """How well a material explains the balls it was fitted on.
-
-    `ReflectanceFit.loss` 0.1 is a residual of 1 grey level, 0.5 of 2.4 levels, 2 of 7.6 levels, as if all were alike.
-    """
-    if not fit.accepted:
-        return "badly: not usable"
-    if fit.loss < VERY_WELL:
-        return "very well"
-    return "well" if fit.loss < WELL else "roughly: expect larger errors, and read each normal's standard error"

@@ -8,9 +8,12 @@ from typing import Literal
 
 from bgars.errors import InputError
 
-__all__ = ["ReflectanceFit", "SurfaceLobe", "SurfaceMaterial"]
+__all__ = ["ReflectanceFit", "SurfaceLobe", "SurfaceMaterial", "loss_in_words"]
 
 MAX_LOBES = 2
+VERY_WELL = 0.1
+WELL = 0.5
+"""Losses below which a material explains its balls very well, and well."""
 
 
 @dataclass(frozen=True)
@@ -129,3 +132,15 @@ class ReflectanceFit:
     residuals_learnt: bool
     deviation_deg: tuple[float, ...]
     flat_radius: tuple[float | None, ...]
+
+
+def loss_in_words(loss: float, *, accepted: bool) -> str:
+    """How well a material explains the balls it was fitted on, for every place that tells it.
+
+    `ReflectanceFit.loss` 0.1 is a residual of 1 grey level, 0.5 of 2.4 levels, 2 of 7.6 levels, as if all were alike.
+    """
+    if not accepted:
+        return "badly: not usable"
+    if loss < VERY_WELL:
+        return "very well"
+    return "well" if loss < WELL else "roughly: expect larger errors, and read each normal's standard error"

@@ -13,8 +13,8 @@ import bgars
 import imageio.v3 as iio
 import numpy as np
 import pytest
-from bgars.calibrate import loss_in_words
 from bgars.cli import main
+from bgars.material_records import loss_in_words
 
 RING = bgars.LightRig.ring(8)
 SOLDER = bgars.Material(i_d=0.3, i_s=1.0, hardness=40)
@@ -162,4 +162,6 @@ def test_a_material_needs_six_lights() -> None:
 def test_the_loss_is_put_into_words() -> None:
     capture, _ = bgars.simulate(bgars.Scene.hemisphere(200.0), RING, SOLDER, bgars.Camera())
     fit = bgars.calibrate_material(capture, anchors=[[0.0, 0.0, 20.0]])
-    assert loss_in_words(fit) == "very well"
+    assert loss_in_words(fit.loss, accepted=fit.accepted) == "very well"
+    judged = [loss_in_words(loss, accepted=loss <= 2.0).partition(":")[0] for loss in (0.102, 0.6, 2.5)]
+    assert judged == ["well", "roughly", "badly"]

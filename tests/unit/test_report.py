@@ -15,7 +15,9 @@ import numpy as np
 import plotly.graph_objects
 import pytest
 from bgars.cli.app import app
+from bgars.material_records import loss_in_words
 from bgars.report.page import page_text
+from bgars.report.page_material import material_facts
 from bgars.report.page_mesh import unpacked
 from bgars.report.page_photograph import photograph_of
 from bgars.report.page_source import PageSource, read_page_source
@@ -135,6 +137,10 @@ def test_the_material_is_told_parameter_by_parameter() -> None:
     assert told["strength_1_level"] == ["255.0", "1.9", "grey levels of 255"]
     assert told["gain_0"] == ["1.000", "not fitted", "ratio"]
     assert rows[-1][0].startswith("brightness of light 3")
+    for loss, accepted in ((0.102, True), (0.6, True), (2.5, False)):
+        other = replace(result, material=replace(result.material, loss=loss, accepted=accepted)).to_dict()
+        words = f"{loss:.3f}: one material explains the balls {loss_in_words(loss, accepted=accepted)}"
+        assert ("loss", words) in material_facts(other), "as bgars calibrate material says"
     without = page_text(PageSource(replace(result, material=None).to_dict()))
     assert "No material was fitted" in without
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import bgars
-from bgars.calibrate import loss_in_words
 from bgars.cli.console import print_json, say, stage_progress
 from bgars.io.images import read_mask
 from bgars.io.material_file import material_path
+from bgars.material_records import loss_in_words
 from bgars.pipeline import summarise_fit
 
 if TYPE_CHECKING:
@@ -74,15 +74,16 @@ def material(
     with stage_progress() as report:
         fit = bgars.calibrate_material(capture, anchors=anchors, progress=lambda fraction: report("material", fraction))
     balls = len(fit.circles_px)
+    words = loss_in_words(fit.loss, accepted=fit.accepted)
     bgars.write_material(fit.material, output, capture=capture.name, balls=balls, loss=fit.loss)
     if as_json:
         summary = {"bgars": bgars.__version__, "capture": capture.name, **summarise_fit(fit)}
-        print_json({**summary, "explains": loss_in_words(fit), "file": str(output)})
+        print_json({**summary, "explains": words, "file": str(output)})
         return
     say(f"{capture.name}: material fitted on {balls} ball{'s' if balls != 1 else ''} under {len(capture.rig)} lights.")
     for line in _table(fit.material):
         say(f"  {line}")
-    say(f"It explains the balls {loss_in_words(fit)} (loss {fit.loss:.3f}).")
+    say(f"It explains the balls {words} (loss {fit.loss:.3f}).")
     for line in _remarks(fit):
         say(line)
     say(f"Written: {output}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
+from bgars.material_records import loss_in_words
 from bgars.report.page_words import NOT_MEASURED, is_known
 
 __all__ = ["material_facts", "material_rows"]
@@ -19,8 +20,6 @@ MEANINGS = {
     "gain": ("brightness of light {}", "against what the rig says, 1 = as it says"),
 }
 NUMBERED = re.compile(r"(strength|roughness|tail|gain)_(\d+)((?:_level)?)")
-VERY_WELL, NOT_AT_ALL = 0.1, 2.0
-"""Losses, as docs/reflectance.md judges them."""
 SIGNIFICANT = 2
 
 
@@ -61,9 +60,10 @@ def material_facts(result: dict[str, Any]) -> list[tuple[str, str]]:
     if material is None:
         return []
     loss = material["loss"]
+    words = loss_in_words(loss, accepted=material["accepted"]) if is_known(loss) else ""
     facts = [
         ("material", "from the recipe's file, not fitted here" if material["from_file"] else "fitted to all balls"),
-        ("loss", "not known" if not is_known(loss) else f"{loss:.3f}: {_loss_words(loss)}"),
+        ("loss", f"{loss:.3f}: one material explains the balls {words}" if is_known(loss) else "not known"),
         ("used for the normals", "yes" if material["accepted"] else "no: it explains the balls too badly"),
         ("attenuation of the lobes", f"{material['masking']}: what fits better"),
         ("balls with a material of their own", str(material["own_material_balls"])),
@@ -75,11 +75,3 @@ def material_facts(result: dict[str, Any]) -> list[tuple[str, str]]:
     if material["from_file"]:
         facts[3] = ("attenuation of the lobes", material["masking"])
     return facts
-
-
-def _loss_words(loss: float) -> str:
-    if loss < VERY_WELL:
-        return "one material explains the balls very well"
-    if loss < 1.0:
-        return "one material explains the balls in part"
-    return "it explains little of them" if loss <= NOT_AT_ALL else "it does not explain them"
