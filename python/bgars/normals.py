@@ -67,14 +67,14 @@ def estimate_normals(
         Fortran-ordered ones (a crop, a transposed stack) and float64 are copied once.
     light_directions : (L, 3) array_like
         Unit vectors from the surface to the light; only with plain arrays.
-    method : {"reflectance", "robust-filter", "specular-filter", "lambertian"}
+    method : {"reflectance", "robust-filter", "specular-filter", "lambertian", "blind"}
         ``reflectance``: on balls, the normal whose brightness under all lights, highlights included, fits the material
         best; the material is fitted on the balls themselves; other pixels are left to ``robust-filter``. Captures
         with fewer than 6 lights, or with neither balls nor a material, are left to ``blind``: one material is fitted
         to the whole capture together with normals and albedo of every pixel, and taken where it predicts left-out
         lights better than least squares does (some 20 us a pixel; at least 5 lights). `NormalField.choice` says what
-        was done. The others solve ``I_k = rho l_k . n`` by least squares (Woodham 1980) over the lights they keep at a
-        pixel: ``lambertian`` all; ``specular-filter``, as published: sort the values, cut at the first gap over
+        was done. The other three solve ``I_k = rho l_k . n`` by least squares (Woodham 1980) over the lights they keep
+        at a pixel: ``lambertian`` all; ``specular-filter``, as published: sort the values, cut at the first gap over
         `threshold` with at least 3 values kept; ``robust-filter`` the window of sorted values that a Lambertian facet
         explains best (docs/method.md).
     mask : (H, W) array_like of bool, optional

@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import get_args
 
 import bgars
 import numpy as np
@@ -18,6 +19,7 @@ import trimesh
 import typer
 from bgars.cli.app import app
 from bgars.cli.console import activation
+from bgars.normals import METHODS, Method
 from rich.text import Text
 
 
@@ -141,6 +143,20 @@ def test_every_command_has_help(command: str) -> None:
     assert run.returncode == 0
     assert "Usage" in run.stdout
     assert len(run.stdout) > 300
+
+
+def test_the_help_of_every_estimator_explains_each_method() -> None:
+    commands = typer.main.get_command(app).commands
+    for name in ("reconstruct", "normals", "inspect", "grr"):
+        (told,) = [option.help for option in commands[name].params if option.name == "method"]
+        for method in get_args(Method):
+            assert f"{method}: " in told, (name, method)
+        assert "without balls and a material, under fewer than 6 lights" in told
+        assert ": blind. robust-filter: " in told
+    (told,) = [option.help for option in commands["evaluate"].params if option.name == "method"]
+    for method in METHODS:
+        assert method in told
+    assert "blind is what reflectance uses without balls" in told
 
 
 def help_texts(command: object) -> Iterator[str]:

@@ -20,6 +20,7 @@ from bgars.cli.experiment import register as register_experiment
 from bgars.cli.grr import register as register_grr
 from bgars.cli.inspect import register as register_inspect
 from bgars.cli.mesh import register as register_mesh
+from bgars.cli.options import MethodOption
 from bgars.cli.outputs import write_normals, write_reconstruction
 from bgars.cli.report import register as register_report
 from bgars.cli.simulate import register as register_simulate
@@ -54,16 +55,6 @@ FolderArgument = Annotated[
 OutOption = Annotated[
     Path,
     typer.Option("--output", "-o", metavar="OUT", help="Folder for the results; made if missing.", show_default=False),
-]
-MethodOption = Annotated[
-    Method,
-    typer.Option(
-        "--method",
-        "-m",
-        help="reflectance: on balls, highlights included, by the material that is fitted on them; elsewhere, and "
-        "without balls, robust-filter. robust-filter: the window of sorted values that a matt facet explains best, "
-        "shadows and highlights left out. specular-filter: the published sorted-gap filter. lambertian: all lights.",
-    ),
 ]
 ThresholdOption = Annotated[
     float | None,
@@ -228,7 +219,13 @@ def info(folder: FolderArgument, channel: ChannelChoice = None, as_json: JsonOpt
 def evaluate(
     folder: FolderArgument,
     method: Annotated[
-        Method | None, typer.Option("--method", "-m", help="Estimator; every one by default.", show_default=False)
+        Method | None,
+        typer.Option(
+            "--method",
+            "-m",
+            help=f"Estimator; by default each of {', '.join(METHODS)}. blind is what reflectance uses without balls.",
+            show_default=False,
+        ),
     ] = None,
     images: Annotated[
         Path | None,
@@ -243,8 +240,9 @@ def evaluate(
     """Compare with truth (gt.npz of a rendered scene, Normal_gt.npy of a photograph).
 
     Scenes are judged over ball pixels with true n_z > 0.3, photographs over their mask. A pixel without a solution
-    counts as (0, 0, 1). Measured pixels are those whose own light fixes the normal; the errors of about 68 % of them
-    should be within the standard error that the method states.
+    counts as (0, 0, 1). Measured pixels are those whose own light fixes the normal; on balls, the errors of about 68 %
+    of them should be within the standard error that the method states, on photographs far fewer are
+    (docs/accuracy.md).
     """
     surface = _material_from(material)
     names = None if images is None else read_filenames(images)

@@ -11,9 +11,10 @@ import typer
 import bgars
 from bgars.cli.console import print_json, say, say_files, stage_progress
 from bgars.cli.inspect import EXIT_NOT_PASSED
+from bgars.cli.options import MethodOption
 from bgars.errors import InputError
 from bgars.io.atomic import FolderNames, atomic_folder
-from bgars.normals import DEFAULT_METHOD, Method
+from bgars.normals import DEFAULT_METHOD
 from bgars.studies.pages import grr_page
 from bgars.studies.readings import readings_csv
 from bgars.studies.study_folder import write_single_results
@@ -68,7 +69,7 @@ def grr(
             show_default=False,
         ),
     ] = None,
-    method: Annotated[Method, typer.Option("--method", "-m", help="Estimator of the normals.")] = DEFAULT_METHOD,
+    method: MethodOption = DEFAULT_METHOD,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
     ] = False,

@@ -12,10 +12,11 @@ import typer
 
 import bgars
 from bgars.cli.console import print_json, say, say_files, stage_progress, utc_now
+from bgars.cli.options import MethodOption
 from bgars.errors import InputError
 from bgars.io.atomic import FolderNames, atomic_folder
 from bgars.io.parquet import need_pyarrow
-from bgars.normals import DEFAULT_METHOD, Method
+from bgars.normals import DEFAULT_METHOD
 from bgars.report.page import REPORT_FILES
 from bgars.report.part import PICTURES
 
@@ -66,7 +67,7 @@ def inspect(
             show_default=False,
         ),
     ] = None,
-    method: Annotated[Method, typer.Option("--method", "-m", help="Estimator of the normals.")] = DEFAULT_METHOD,
+    method: MethodOption = DEFAULT_METHOD,
     serial: Annotated[
         str, typer.Option(metavar="SERIAL", help="Serial number of the part, kept in the result.", show_default=False)
     ] = "",

@@ -1,0 +1,22 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from bgars.normals import Method
+
+__all__ = ["MethodOption"]
+
+METHOD_HELP = (
+    "reflectance: on balls, highlights included, by the material that is fitted on them, elsewhere robust-filter; "
+    "without balls and a material, under fewer than 6 lights, or where no material explains the balls: blind. "
+    "robust-filter: the window of sorted values that a matt facet explains best, shadows and highlights left out. "
+    "specular-filter: the published sorted-gap filter. lambertian: all lights. "
+    "blind: one material is fitted to the whole capture together with every normal, and taken where it predicts "
+    "lights left out about as well as least squares and robust-filter, else the better of these; slow; under fewer "
+    "than 5 lights robust-filter."
+)
+MethodOption = Annotated[Method, typer.Option("--method", "-m", help=METHOD_HELP)]
