@@ -233,7 +233,8 @@ def test_the_guide_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.chdir(tmp_path)
     (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     exec(code, {})
-    assert len(bgars.read_capture(tmp_path / "part").images) == 8
+    assert len(bgars.read_capture(tmp_path / "own_part").images) == 8
+    assert not (tmp_path / "part").exists(), "the part that every page inspects is not replaced"
     (recipe,) = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
     (tmp_path / "recipe.toml").write_text(recipe, encoding="utf-8")
     assert len(bgars.read_scene(tmp_path / "recipe.toml").scene.balls) == 25
