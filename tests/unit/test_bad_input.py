@@ -108,6 +108,15 @@ def test_another_image_size_and_depth(capture_folder: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".png", ".tif", ".jpg", ".bmp", ".pgm"])
+def test_an_image_without_a_byte_is_called_empty(capture_folder: Path, suffix: str) -> None:
+    for index in range(4):
+        (capture_folder / f"img{index}.png").unlink()
+        iio.imwrite(capture_folder / f"img{index}{suffix}", np.full((5, 6), 99, np.uint8))
+    (capture_folder / f"img1{suffix}").write_bytes(b"")
+    refused(capture_folder, bgars.FileFormatError, f"img1{suffix}: is empty (0 bytes), not an image")
+
+
+@pytest.mark.parametrize("suffix", [".png", ".tif", ".jpg", ".bmp", ".pgm"])
 def test_truncated_images(capture_folder: Path, suffix: str) -> None:
     for index in range(4):
         (capture_folder / f"img{index}.png").unlink()

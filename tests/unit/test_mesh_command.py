@@ -94,9 +94,11 @@ def test_a_picture_is_no_normal_map() -> None:
 def test_what_is_no_map_is_told_what_is() -> None:
     taken = "mesh takes a normal map (.png) or a height map (.tif, .tiff, .npy)"
     Path("notes.txt").touch()
+    Path("empty.npy").touch()
     Path("folder").mkdir()
     iio.imwrite("grey.png", np.zeros((3, 3), np.uint8))
     assert mesh("folder") == f"folder: is a folder; {taken}"
     assert mesh("none.png") == f"none.png: no such file; {taken}"
     assert mesh("notes.txt") == f"notes.txt: ends in '.txt'; {taken}"
+    assert mesh("empty.npy") == f"empty.npy: is empty (0 bytes); {taken}"
     assert mesh("grey.png").endswith("; a normal map is an RGB image, R = x, G = y, B = z")

@@ -115,9 +115,16 @@ def _integration(
 
 def _check_source(source: Path) -> None:
     """Raise unless there is a file that could be a map."""
-    if source.is_file() and source.suffix.lower() in {NORMAL_MAP_SUFFIX, *HEIGHT_SUFFIXES}:
+    if source.is_dir():
+        what = "is a folder"
+    elif not source.is_file():
+        what = "no such file"
+    elif source.suffix.lower() not in {NORMAL_MAP_SUFFIX, *HEIGHT_SUFFIXES}:
+        what = f"ends in {source.suffix!r}"
+    elif not source.stat().st_size:
+        what = "is empty (0 bytes)"
+    else:
         return
-    what = "is a folder" if source.is_dir() else f"ends in {source.suffix!r}" if source.is_file() else "no such file"
     msg = f"{source}: {what}; {TAKEN}"
     raise FileFormatError(msg)
 

@@ -164,6 +164,9 @@ def _read_one(path: Path, max_megapixels: float) -> PixelArray:
     try:
         # From memory: some plug-ins leave a file open when they fail.
         content, suffix = path.read_bytes(), path.suffix
+        if not content:
+            msg = f"{path}: is empty (0 bytes), not an image"
+            raise FileFormatError(msg)
         _check_shape(path, iio.improps(content, extension=suffix).shape, max_megapixels)
         image = np.asarray(iio.imread(content, extension=suffix))
     except FileFormatError:
