@@ -151,7 +151,7 @@ def fit_profile() -> None:
         axes.plot(
             x, np.minimum(predicted[:, light], GREY_LEVELS), color=OKABE_ITO[0], linewidth=1.4, label="fitted material"
         )
-        axes.set_title(f"light {light + 1}, azimuth {part.capture.rig.azimuths_deg[light] % 360:.0f}°")
+        axes.set_title(f"light {light}, azimuth {part.capture.rig.azimuths_deg[light] % 360:.0f}°")
         axes.axhline(GREY_LEVELS, color="0.6", linewidth=0.8, linestyle=":")
         tidy(axes)
         if light % 4 == 0:
@@ -215,7 +215,7 @@ def residual_table() -> None:
     ):
         picture = axes.imshow(table, cmap="RdBu_r", vmin=-15, vmax=15, origin="lower", extent=(-1, 1, -1, 1))
         axes.set(xlabel="n_x", ylabel="n_y", title=f"{title}\nRMS {np.sqrt(np.nanmean(table**2)):.1f}")
-    figure.colorbar(picture, ax=figure.axes, label="grey levels, bent (light 1)", shrink=0.85)
+    figure.colorbar(picture, ax=figure.axes, label="grey levels, bent (light 0)", shrink=0.85)
     save(figure, FOLDER / "residual_table.png")
     error = part.error_deg()
     judged = truth.mask & (truth.normals[..., 2] > 0.3)  # noqa: PLR2004

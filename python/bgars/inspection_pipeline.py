@@ -107,6 +107,7 @@ def inspect(
         pixel_pitch_um=float(capture.pixel_pitch_um or 0.0),
         files=checksums(files),
         version=version("bgars"),
+        light_files=[path.name for path in capture.files],
         warnings=warnings,
     )
     report("judge", 1.0)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bgars.errors import InputError
 from bgars.light_files import read_lp
+from bgars.light_names import light_name
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -229,7 +230,7 @@ def directions_from_angles(angles_deg: ArrayLike) -> NDArray[np.float64]:
     wrong = np.flatnonzero(~((angles[:, 1] > 0) & (angles[:, 1] <= 90)))  # noqa: PLR2004 - the zenith
     if wrong.size:
         index = int(wrong[0])
-        msg = f"elevation_deg: light {index} must lie in (0, 90], got {angles[index, 1]:g}"
+        msg = f"elevation_deg: {light_name(index)} must lie in (0, 90], got {angles[index, 1]:g}"
         raise InputError(msg)
     azimuth, elevation = np.radians(angles).T
     return np.column_stack(

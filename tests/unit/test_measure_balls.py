@@ -308,10 +308,14 @@ def shifted(images: NDArray[np.uint8]) -> NDArray[np.uint8]:
 @pytest.mark.parametrize(
     ("change", "error", "text"),
     [
-        (swapped, bgars.CalibrationError, "images 2 and 5 are swapped"),
+        (swapped, bgars.CalibrationError, r"images 2 \(counted from 0\) and 5 \(counted from 0\) are swapped"),
         (doubled, bgars.InputError, "same picture"),
-        (noisily_doubled, bgars.CalibrationError, "image 3 has the shadows of light 2"),
-        (far_shifted, bgars.CalibrationError, "image 4 is shifted"),
+        (
+            noisily_doubled,
+            bgars.CalibrationError,
+            r"image 3 \(counted from 0\) has the shadows of light 2 \(counted from 0\)",
+        ),
+        (far_shifted, bgars.CalibrationError, r"image 4 \(counted from 0\) is shifted"),
     ],
 )
 def test_images_that_do_not_belong_are_refused(
@@ -330,7 +334,7 @@ def test_images_that_do_not_belong_are_refused(
 
 def test_a_shift_of_two_pixels_is_refused(part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]) -> None:
     capture, _, found = part
-    with pytest.raises(bgars.CalibrationError, match="image 4 is shifted by"):
+    with pytest.raises(bgars.CalibrationError, match=r"image 4 \(counted from 0\) is shifted by"):
         measure_balls(replace(capture, images=shifted(capture.images)), found)
 
 
@@ -341,7 +345,7 @@ def test_a_light_six_degrees_off_is_named_and_measured(
     angles = np.column_stack([capture.rig.azimuths_deg, capture.rig.elevations_deg])
     angles[1, 1] += 6.0
     measured = measure_balls(replace(capture, rig=bgars.LightRig.from_angles(angles)), found)
-    assert any("light 1" in warning for warning in measured.warnings)
+    assert any("light 1 (counted from 0)" in warning for warning in measured.warnings)
     assert measured.light_change_deg[1] == pytest.approx(6.0, abs=0.1)
     assert rms(errors(measured, truth, "top_um")) < 0.8
 
@@ -350,7 +354,7 @@ def test_a_light_twenty_degrees_off_is_refused(part: tuple[bgars.Capture, bgars.
     capture, _, found = part
     angles = np.column_stack([capture.rig.azimuths_deg, capture.rig.elevations_deg])
     angles[1, 0] += 25.0
-    with pytest.raises(bgars.CalibrationError, match="light 1 stands about"):
+    with pytest.raises(bgars.CalibrationError, match=r"light 1 \(counted from 0\) stands about"):
         check_shadows(replace(capture, rig=bgars.LightRig.from_angles(angles)), found)
 
 

@@ -32,11 +32,11 @@ def run(how: Run) -> Outcome:
     for index, (axes, image) in enumerate(zip(places, capture.images, strict=False)):
         azimuth_deg = float(capture.rig.azimuths_deg[index])
         picture = axes.imshow(image, cmap="gray", vmin=0, vmax=255, extent=extent, interpolation="nearest")
-        axes.set_title(f"light {index + 1}: azimuth {azimuth_deg:.0f}°")
+        axes.set_title(f"light {index}: azimuth {azimuth_deg:.0f}°")
         ball = image[truth.mask]
         rows.append(
             {
-                "light": index + 1,
+                "light": index,
                 "azimuth_deg": azimuth_deg,
                 "elevation_deg": setting.elevation_deg,
                 "mean_grey": float(ball.mean()),

@@ -214,7 +214,7 @@ def rows_of(pixel: Pixel) -> list[Row]:
             "row": pixel.row,
             "col": pixel.col,
             "rank": rank + 1,
-            "light": int(light) + 1,
+            "light": int(light),
             "azimuth_deg": float(azimuths_deg[light]),
             "grey": float(pixel.grey[rank]),
             "gap_to_next": gaps[rank],

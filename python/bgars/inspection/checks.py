@@ -11,8 +11,12 @@ from bgars.errors import CalibrationError, InputError
 from bgars.inspection.board import Board
 from bgars.inspection.shadow_model import Balls, Lights
 from bgars.inspection.start import edge_steps
+from bgars.light_names import light_name, numbered
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
     from bgars.inspection.outline import Outlines
     from bgars.inspection.problem import Problem
     from bgars.inspection.shadow_edges import Edges
@@ -54,7 +58,7 @@ def refuse_repeated(capture: Capture) -> None:
     stack = capture.images.reshape(len(capture.images), -1)
     step = max(1, stack.shape[1] // SAMPLE)
     sample = stack[:, ::step]
-    names = [path.name for path in capture.files] or [f"image {index}" for index in range(len(stack))]
+    names = [path.name for path in capture.files] or [light_name(index, what="image") for index in range(len(stack))]
     for second in range(1, len(stack)):
         if sample[second].min() == sample[second].max():
             continue
@@ -96,17 +100,20 @@ def explain_dark_steps(problem: Problem, table: Array, steps: Array) -> tuple[Co
     chosen = np.sort(np.argsort(np.hypot(table[:, 0], table[:, 1]))[:MOST_BALLS])
     complaints: list[Complaint] = []
     answers: dict[int, Array] = {}
+    files = problem.radiance.capture.files
     for light in (int(each) for each in doubtful):
         turned, direction = _best_direction(problem, table, chosen, light)
         moved, dx, dy = _best_shift(problem, table, chosen, light)
         needed = max(GOOD_STEP, mean[light] + MUCH_BETTER)
         if moved >= needed and moved > turned - MUCH_BETTER and _balls_moved(problem, chosen, light, dx, dy):
-            text = f"image {light} is shifted by about ({dx:+.0f}, {dy:+.0f}) pixels (x right, y up)"
+            name = light_name(light, files, what="image")
+            text = f"{name} is shifted by about ({dx:+.0f}, {dy:+.0f}) pixels (x right, y up)"
             complaints.append(Complaint(light, text, serious=True))
         elif turned >= needed:
             answers[light] = direction
         else:
-            text = f"image {light}: its shadows are not where light {light} of the rig casts them"
+            name = light_name(light, files, what="image")
+            text = f"{name}: its shadows are not where light {light} of the rig casts them"
             complaints.append(Complaint(light, text, serious=False))
     return tuple(complaints + _name_lights(problem, answers))
 
@@ -182,6 +189,7 @@ def _name_lights(problem: Problem, answers: dict[int, Array]) -> list[Complaint]
         if nearest != light and angles[nearest] < SAME_LIGHT_DEG:
             like[light] = nearest
     complaints = []
+    files = problem.radiance.capture.files
     for light, direction in answers.items():
         other = like.get(light)
         if other is None:
@@ -189,14 +197,16 @@ def _name_lights(problem: Problem, answers: dict[int, Array]) -> list[Complaint]
             elevation = np.degrees(np.arcsin(direction[2]))
             off = np.degrees(np.arccos(np.clip(unit[light] @ direction, -1.0, 1.0)))
             text = (
-                f"light {light} stands about {off:.0f} degrees from where the rig says: its shadows point to azimuth "
-                f"{azimuth:.0f}, elevation {elevation:.0f} degrees"
+                f"{light_name(light, files)} stands about {off:.0f} degrees from where the rig says: its shadows point "
+                f"to azimuth {azimuth:.0f}, elevation {elevation:.0f} degrees"
             )
             complaints.append(Complaint(light, text, serious=bool(off > NEAR_DEG)))
         elif like.get(other) != light:
-            complaints.append(Complaint(light, f"image {light} has the shadows of light {other}", serious=True))
+            text = f"{light_name(light, files, what='image')} has the shadows of light {numbered(other, files)}"
+            complaints.append(Complaint(light, text, serious=True))
         elif light < other:
-            complaints.append(Complaint(light, f"images {light} and {other} are swapped", serious=True))
+            text = f"images {numbered(light, files)} and {numbered(other, files)} are swapped"
+            complaints.append(Complaint(light, text, serious=True))
     return complaints
 
 
@@ -250,7 +260,7 @@ def _best_shift(problem: Problem, table: Array, chosen: NDArray[np.intp], light:
     return float(steps[best]), float(dx[best]), float(dy[best])
 
 
-def check_shifts(outlines: Outlines) -> tuple[str, ...]:
+def check_shifts(outlines: Outlines, files: Sequence[Path] = ()) -> tuple[str, ...]:
     """Find images that are shifted by little, from the outlines of the balls in each.
 
     Under one light an outline is seen on one side only, and how its shading moves the edge is the same under every
@@ -284,14 +294,15 @@ def check_shifts(outlines: Outlines) -> tuple[str, ...]:
         size = float(np.hypot(*move))
         if size < max(SHIFT_WARNING_PX, SHIFT_SIGMAS * u_move):
             continue
-        text = f"image {light} is shifted by ({move[0]:+.1f}, {move[1]:+.1f}) pixels (x right, y up) against the others"
+        name = light_name(light, files, what="image")
+        text = f"{name} is shifted by ({move[0]:+.1f}, {move[1]:+.1f}) pixels (x right, y up) against the others"
         if size >= SHIFT_ERROR_PX:
             raise CalibrationError(text)
         warnings.append(text)
     return tuple(warnings)
 
 
-def displaced_images(outlines: Outlines) -> tuple[str, ...]:
+def displaced_images(outlines: Outlines, files: Sequence[Path] = ()) -> tuple[str, ...]:
     """Name images whose balls have no outline where the others have one.
 
     A shift of some pixels along the light's azimuth is taken for another elevation by the fit, and is too far for
@@ -302,7 +313,7 @@ def displaced_images(outlines: Outlines) -> tuple[str, ...]:
     if usual < MIN_STRETCHES:
         return ()
     return tuple(
-        f"image {light} shows {known[light]} stretches of outline where other images show {usual:.0f}: it is "
-        "shifted, or shows something else"
-        for light in np.flatnonzero(known < FEW_OUTLINES * usual)
+        f"{light_name(light, files, what='image')} shows {known[light]} stretches of outline where other images show "
+        f"{usual:.0f}: it is shifted, or shows something else"
+        for light in map(int, np.flatnonzero(known < FEW_OUTLINES * usual))
     )

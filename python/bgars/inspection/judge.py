@@ -16,9 +16,12 @@ from bgars.inspection.odd_sizes import odd_sizes
 from bgars.inspection.places import Slot, match_balls
 from bgars.inspection.position import GridFit, fit_grid
 from bgars.inspection.warpage import board_height_um, board_terms, warpage
+from bgars.light_names import light_name
 from bgars.part_result import BallResult, PartResult, SeatingResult
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from bgars.ball_records import BallMeasurement, FoundBalls
@@ -43,6 +46,7 @@ def judge_part(
     pixel_pitch_um: float = math.nan,
     files: tuple[tuple[str, str], ...] = (),
     version: str = "",
+    light_files: Sequence[str] = (),
     warnings: tuple[str, ...] = (),
 ) -> PartResult:
     """Judge a measured part.
@@ -59,6 +63,8 @@ def judge_part(
         Of the part, where there is no recipe.
     pixel_pitch_um, files, version
         Copied into the result.
+    light_files : sequence of str
+        Image file of each light, for reasons.
     warnings : tuple of str
         Put before those of the measurement.
 
@@ -106,7 +112,7 @@ def judge_part(
     verdicts = [ball.verdict for ball in balls] + [check.verdict for check in checks if check.verdict is not None]
     if bridges or not any(ball.present for ball in balls):
         verdicts.append("fail")
-    doubts = (*_strayed_lights(measurement.light_change_deg), *measurement.doubts)
+    doubts = (*_strayed_lights(measurement.light_change_deg, light_files), *measurement.doubts)
     if doubts or not limits:
         verdicts.append("undecided")
     return PartResult(
@@ -168,10 +174,10 @@ def _rocks(coplanarity: Coplanarity) -> bool:
     return not float(np.ptp(deviations_um, axis=0).max()) <= COVERAGE_FACTOR * u_um
 
 
-def _strayed_lights(change_deg: Array) -> list[str]:
+def _strayed_lights(change_deg: Array, files: Sequence[str]) -> list[str]:
     """Lights that the shadows put elsewhere: a wrong rig, or an image under another light's name."""
     return [
-        f"light {index} (counted from 0) stands {change:.1f} degrees from where the rig says, by its shadows; over "
+        f"{light_name(index, files)} stands {change:.1f} degrees from where the rig says, by its shadows; over "
         f"{MAX_LIGHT_CHANGE_DEG:g} degrees the rig or the pairing of images and lights is wrong"
         for index, change in enumerate(change_deg)
         if change > MAX_LIGHT_CHANGE_DEG

@@ -15,6 +15,7 @@ from bgars.inspection.plateaus import edge_bias_px
 from bgars.inspection.radii import sharpen_radii
 from bgars.inspection.shape_or_lights import shape_or_lights, silhouettes_or_shadows
 from bgars.inspection.spread import SHARP_PX
+from bgars.light_names import light_name
 
 if TYPE_CHECKING:
     from bgars.ball_records import FoundBall, FoundBalls
@@ -102,13 +103,14 @@ def measurement(
     moved = np.degrees(angles_rad(solution.vectors, problem.vectors))
     refined = solution.vectors / np.linalg.norm(solution.vectors, axis=1, keepdims=True)
     warnings = fit.warnings if fit is not None else ()
+    files = problem.radiance.capture.files
     doubts = fit.doubts if fit is not None else ()
     doubts += shape_or_lights(solution.balls[:, 4], problem.vectors, solution.vectors)
     if fit is not None:
         doubts += silhouettes_or_shadows(problem.table[fit.index[fit.usability.usable], 3], solution.balls[:, 3])
     warnings += tuple(
-        f"light {light}: its shadows say that it stands {moved[light]:.1f} degrees from where the rig says"
-        for light in np.flatnonzero(moved > LIGHT_WARNING_DEG)
+        f"{light_name(light, files)}: its shadows say that it stands {moved[light]:.1f} degrees from where the rig says"
+        for light in map(int, np.flatnonzero(moved > LIGHT_WARNING_DEG))
     )
     contrast = float(np.nanmedian(fit.edges.contrast_levels)) if fit is not None else float("nan")
     noise = float(np.sqrt(np.nanmean(np.square(fit.edges.noise_levels)))) if fit is not None else float("nan")

@@ -159,9 +159,9 @@ def fit_shadows(
         turn += 1
         progress(0.1 + 0.8 * (1.0 if finished else min(turn / passes, 0.95)))
     assert wide is not None
-    moved_deg = np.degrees(angles_rad(vectors, problem.vectors))
-    warnings = refuse_misfits(complaints, used, solution.weight, moved_deg) + check_shifts(wide)
-    return Fit(problem, index, usability, solution, edges, spread, warnings, displaced_images(wide))
+    moved_deg, files = np.degrees(angles_rad(vectors, problem.vectors)), problem.radiance.capture.files
+    warnings = refuse_misfits(complaints, used, solution.weight, moved_deg) + check_shifts(wide, files)
+    return Fit(problem, index, usability, solution, edges, spread, warnings, displaced_images(wide, files))
 
 
 def _wide_outlines(problem: Problem, shadows: ShadowMap, table: Array, vectors: Array, spread: EdgeSpread) -> Outlines:

@@ -12,6 +12,7 @@ import numpy as np
 from bgars.errors import InputError
 from bgars.io.recipe import RECIPE_NAME, CaptureRecipe
 from bgars.light_files import read_filenames, read_intensities, read_numbers
+from bgars.light_names import light_name
 from bgars.rig import LightRig
 
 if TYPE_CHECKING:
@@ -126,7 +127,9 @@ def _intensity_rows(folder: Path, value: str | Sequence[object] | None, count: i
     wrong = np.argwhere(~(np.isfinite(intensities) & (intensities > 0)))
     if wrong.size:
         light, column = wrong[0]
-        msg = f"{where}: intensity of light {light} must be finite and above 0, got {intensities[light, column]:g}"
+        msg = (
+            f"{where}: intensity of {light_name(light)} must be finite and above 0, got {intensities[light, column]:g}"
+        )
         raise InputError(msg)
     return intensities
 

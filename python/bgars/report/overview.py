@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
 from bgars.io.atomic import atomic_file
+from bgars.light_names import light_name
 from bgars.report.prior import prior_label, prior_pixels, show_prior, stripes
 
 if TYPE_CHECKING:
@@ -137,7 +138,8 @@ def _show_input(figure: Figure, axes: Axes, result: Reconstruction) -> None:
     image = np.asarray(capture.images[0], dtype=np.float32)
     top = float(np.percentile(image[capture.mask], 99.8))
     rig = capture.rig
-    title = f"Input: light 1 of {len(rig)} (azimuth {rig.azimuths_deg[0]:.0f}°, elevation {rig.elevations_deg[0]:.0f}°)"
+    place = f"azimuth {rig.azimuths_deg[0]:.0f}°, elevation {rig.elevations_deg[0]:.0f}°"
+    title = f"Input: {light_name(0, capture.files)} of {len(rig)}\n{place}"
     picture = _picture(axes, image, result.height, title, cmap="gray", span=(0.0, top))
     figure.colorbar(picture, ax=axes, label="grey level", shrink=0.85)
 

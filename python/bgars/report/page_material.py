@@ -17,7 +17,7 @@ MEANINGS = {
     "strength_level": ("strength of lobe {}", "level at its peak, where the camera looks along the normal"),
     "roughness": ("roughness of lobe {}", "root mean square slope of the microfacets"),
     "tail": ("tail of lobe {}", "0 = Beckmann, 1 = GGX"),
-    "gain": ("brightness of light {}", "against what the rig says, 1 = as it says"),
+    "gain": ("brightness of light {}", "against what the rig says, 1 = as it says; lights count from 0"),
 }
 NUMBERED = re.compile(r"(strength|roughness|tail|gain)_(\d+)((?:_level)?)")
 SIGNIFICANT = 2

@@ -14,6 +14,7 @@ import numpy as np
 
 from bgars.errors import FileFormatError
 from bgars.io.surface_file import SURFACE_FILE, read_surface, surface_bytes
+from bgars.light_names import light_name
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -109,7 +110,8 @@ def _stretched(values: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 def lamps_of(capture: Capture) -> tuple[Lamp, ...]:
     """Return the lights of a capture, in the order of its images."""
-    names = [file.name for file in capture.files] or [f"image {index}" for index in range(len(capture.images))]
+    numbers = range(len(capture.images))
+    names = [file.name for file in capture.files] or [light_name(index, what="image") for index in numbers]
     angles = zip(capture.rig.azimuths_deg, capture.rig.elevations_deg, strict=True)
     return tuple(Lamp(name, float(a), float(e)) for name, (a, e) in zip(names, angles, strict=True))
 

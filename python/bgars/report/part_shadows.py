@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.patches import Circle
 
+from bgars.light_names import light_name
 from bgars.report.part_style import (
     ball_place_um,
     ball_radius_um,
@@ -63,7 +64,7 @@ def shadow_figure(result: PartResult, capture: Capture) -> Figure:
             half_um = REACH * ball_radius_um(middle, result)
             panel.set_xlim(place[0] - half_um, place[0] + half_um)
             panel.set_ylim(place[1] - half_um, place[1] + half_um)
-            panel.set_title(f"{middle.name}, light {light + 1}", fontsize=10)
+            panel.set_title(f"{middle.name}, {light_name(int(light), capture.files)}", fontsize=10)
     for panel in grid[len(lights) :]:
         panel.set_visible(False)
     return figure
@@ -75,7 +76,7 @@ def _show_light(axes: Axes, capture: Capture, result: PartResult, light: int) ->
     moved = result.light_change_deg[light] if light < len(result.light_change_deg) else math.nan
     changed = f", moved by {moved:.2f}°" if math.isfinite(moved) else ""
     azimuth = capture.rig.azimuths_deg[light]
-    axes.set_title(f"light {light + 1} (azimuth {azimuth:.0f}°{changed})", fontsize=10)
+    axes.set_title(f"{light_name(light, capture.files)}, azimuth {azimuth:.0f}°{changed}", fontsize=10)
     axes.set_xlabel("x (µm)")
     axes.set_ylabel("y (µm)")
 
