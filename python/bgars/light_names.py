@@ -6,13 +6,16 @@ or the words, say so.
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-__all__ = ["light_name", "numbered"]
+__all__ = ["light_name", "named_lights", "numbered"]
+
+NAMED = re.compile(r"\b(?:lights?|images?|and|,) (\d+) \(")
 
 FROM_ZERO = "counted from 0"
 
@@ -38,3 +41,14 @@ def light_name(index: int, files: Sequence[str | Path] = (), *, what: str = "lig
     ('light 3 (counted from 0)', 'image 0 (light_00.png)')
     """
     return f"{what} {numbered(index, files)}"
+
+
+def named_lights(text: str) -> tuple[int, ...]:
+    """Numbers of the lights that a message names, as :func:`light_name` and :func:`numbered` write them.
+
+    Examples
+    --------
+    >>> named_lights("images 2 (light_02.png) and 5 (light_05.png) are swapped"), named_lights("2 balls missing: A1")
+    ((2, 5), ())
+    """
+    return tuple(int(number) for number in NAMED.findall(text))

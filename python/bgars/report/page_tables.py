@@ -137,7 +137,8 @@ def _why(name: str, result: dict[str, Any]) -> str:
 def light_rows(source: PageSource) -> list[dict[str, str]]:
     """One row a light: where the rig has it, where its shadows put it, how far that is."""
     rows = []
-    changes = source.result["light_change_deg"]
+    is_fitted = is_known(source.result["shadow_residual_rms"])
+    changes = source.result["light_change_deg"] if is_fitted else []
     for index, (x, y, z) in enumerate(source.result["light_directions"]):
         known = is_known(x) and is_known(y) and is_known(z)
         elevation = math.degrees(math.atan2(z, math.hypot(x, y))) if known else None
@@ -149,7 +150,9 @@ def light_rows(source: PageSource) -> list[dict[str, str]]:
                 "image": lamp.image if lamp else "",
                 "azimuth": number(round(math.degrees(math.atan2(y, x)), 2) % 360.0 if known else None),
                 "elevation": number(elevation),
-                "raised": _signed(elevation - lamp.elevation_deg if lamp and elevation is not None else None),
+                "raised": _signed(
+                    elevation - lamp.elevation_deg if is_fitted and lamp and elevation is not None else None
+                ),
                 "moved": number(moved, 3),
                 "strayed": "yes" if is_known(moved) and moved > MAX_LIGHT_CHANGE_DEG else "",
             }
@@ -160,15 +163,16 @@ def light_rows(source: PageSource) -> list[dict[str, str]]:
 def raised_together(source: PageSource) -> str:
     """By how much all lights were raised on average: what balls that are all flattened alike look like."""
     rows = source.result["light_directions"]
+    if not is_known(source.result["shadow_residual_rms"]):
+        return "not fitted: no shadow was measured"
     if len(rows) != len(source.lamps) or not all(is_known(value) for row in rows for value in row) or not rows:
         return "not known: report.json does not lie beside the result"
     raised = [
         math.degrees(math.atan2(z, math.hypot(x, y))) - lamp.elevation_deg
         for (x, y, z), lamp in zip(rows, source.lamps, strict=True)
     ]
-    return (
-        f"by {sum(raised) / len(raised):+.2f}° on average; nothing passes where it is clearly over {MIN_RAISE_DEG:g}°"
-    )
+    mean = _signed(sum(raised) / len(raised))
+    return f"by {mean}° on average; nothing passes where it is clearly over {MIN_RAISE_DEG:g}°"
 
 
 def _signed(value: float | None) -> str:

@@ -10,6 +10,7 @@ from matplotlib.patches import Circle
 
 from bgars.light_names import light_name
 from bgars.report.part_style import (
+    VERDICT_COLORS,
     ball_place_um,
     ball_radius_um,
     image_extent_um,
@@ -17,6 +18,7 @@ from bgars.report.part_style import (
     part_frame,
     shown_image,
 )
+from bgars.report.shadow_lights import flagged_lights, is_fitted, panel_lights
 from bgars.report.shadow_outline import shadow_outline_um
 
 if TYPE_CHECKING:
@@ -31,6 +33,7 @@ __all__ = ["shadow_figure"]
 
 OUTLINE = "#00E5FF"
 SILHOUETTE = "#FF4FD8"
+FLAGGED = "; orange title: a reason or warning names this light"
 CLOSE_UPS = 4
 REACH = 3.4
 """Half width of a close-up in radii."""
@@ -39,32 +42,34 @@ REACH = 3.4
 def shadow_figure(result: PartResult, capture: Capture) -> Figure:
     """One light with the fitted outlines of all shadows, and one ball under four lights."""
     figure = new_figure(15.0, 8.2)
+    flagged = flagged_lights(result)
     figure.suptitle(
         f"{result.name}: fitted shadows (cyan) and silhouettes (pink) over the images; "
-        f"residual {_percent(result.shadow_residual_rms)} of the contrast",
+        f"{_residual(result.shadow_residual_rms)}{FLAGGED if flagged else ''}",
         fontsize=13,
     )
     whole, close = figure.subfigures(1, 2, width_ratios=[1.05, 1.0], squeeze=False)[0]
     axes = whole.subplots()
-    _show_light(axes, capture, result, 0)
+    first = flagged[0] if flagged else 0
+    _show_light(axes, capture, result, first)
     for ball in result.balls:
-        _draw(axes, ball, result, capture, 0, linewidth=0.9)
+        _draw(axes, ball, result, capture, first, linewidth=0.9)
     part_frame(axes, result, image_extent_um(capture), margin=2.0)
     middle = _typical_ball(result)
     grid = [panel for row in close.subplots(2, 2, squeeze=False) for panel in row]
-    lights = np.unique(np.linspace(0, len(capture.rig), CLOSE_UPS, endpoint=False).astype(int))
+    lights = panel_lights(result, len(capture.rig), CLOSE_UPS)
     for panel, light in zip(grid, lights, strict=False):
-        _show_light(panel, capture, result, int(light))
+        _show_light(panel, capture, result, light)
         if middle is None:
             continue
         for ball in result.balls:
-            _draw(panel, ball, result, capture, int(light), linewidth=1.6)
+            _draw(panel, ball, result, capture, light, linewidth=1.6)
         place = ball_place_um(middle)
         if place is not None:
             half_um = REACH * ball_radius_um(middle, result)
             panel.set_xlim(place[0] - half_um, place[0] + half_um)
             panel.set_ylim(place[1] - half_um, place[1] + half_um)
-            panel.set_title(f"{middle.name}, {light_name(int(light), capture.files)}", fontsize=10)
+            panel.set_title(f"{middle.name}, {panel.get_title()}", fontsize=10)
     for panel in grid[len(lights) :]:
         panel.set_visible(False)
     return figure
@@ -73,10 +78,12 @@ def shadow_figure(result: PartResult, capture: Capture) -> Figure:
 def _show_light(axes: Axes, capture: Capture, result: PartResult, light: int) -> None:
     shown = shown_image(capture, capture.images[light])
     axes.imshow(np.sqrt(shown), extent=image_extent_um(capture), cmap="gray", vmin=0.0, vmax=1.0)
-    moved = result.light_change_deg[light] if light < len(result.light_change_deg) else math.nan
-    changed = f", moved by {moved:.2f}°" if math.isfinite(moved) else ""
-    azimuth = capture.rig.azimuths_deg[light]
-    axes.set_title(f"{light_name(light, capture.files)}, azimuth {azimuth:.0f}°{changed}", fontsize=10)
+    is_flagged = light in flagged_lights(result)
+    axes.set_title(
+        f"{light_name(light, capture.files)}\nazimuth {capture.rig.azimuths_deg[light]:.0f}°, {_moved(result, light)}",
+        fontsize=10,
+        color=VERDICT_COLORS["fail"] if is_flagged else "black",
+    )
     axes.set_xlabel("x (µm)")
     axes.set_ylabel("y (µm)")
 
@@ -122,5 +129,13 @@ def _typical_ball(result: PartResult) -> BallResult | None:
     return min(known, key=lambda ball: math.dist((ball.x_um, ball.y_um), middle))
 
 
-def _percent(value: float) -> str:
-    return f"{value:.1%}" if math.isfinite(value) else "unknown:"
+def _moved(result: PartResult, light: int) -> str:
+    """How far the fit moved a light."""
+    moved = result.light_change_deg[light] if light < len(result.light_change_deg) else math.nan
+    if not is_fitted(result) or not math.isfinite(moved):
+        return "not fitted"
+    return f"moved by {moved:.2f}°"
+
+
+def _residual(value: float) -> str:
+    return f"residual {value:.1%} of the contrast" if math.isfinite(value) else "no shadow was fitted"
