@@ -12,11 +12,13 @@ from pathlib import Path
 import bgars
 import numpy as np
 import pytest
+from bgars.cli.app import app
 from bgars.io.surface_file import surface_bytes
 from bgars.report.page import page_text
 from bgars.report.page_mesh import unpacked
 from bgars.report.page_source import PageSource, read_page_source
 from bgars.report.page_surface import OUTERMOST
+from typer.testing import CliRunner
 
 CLIPPED_UM = 60.0
 
@@ -157,6 +159,20 @@ def test_the_surface_of_another_inspection_is_not_taken(tmp_path: Path) -> None:
     assert read_page_source(folder).surface is None
     (folder / "surface.npz").unlink()
     assert read_page_source(folder).surface is None
+    assert read_page_source(folder).warnings == (), "taken away on purpose"
+
+
+def test_the_command_says_that_it_draws_no_surface(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path)
+    file = folder / "surface.npz"
+    file.write_bytes(file.read_bytes()[:-9])
+    run = CliRunner().invoke(app, ["report", str(folder)])
+    assert run.exit_code == 0, run.output
+    words = f"warning: {file}: is not the file that report.json names: cut off, or of another inspection"
+    assert words in run.output
+    warned = json.loads(CliRunner().invoke(app, ["report", str(folder), "--json"]).output)["warnings"]
+    assert len(warned) == 1
+    assert warned[0].endswith("the 3-D view shows spheroids instead of the surface")
 
 
 SPOILT: dict[str, Callable[[bytes], bytes]] = {

@@ -7,9 +7,10 @@ from typing import Annotated
 
 import typer
 
-import bgars
 from bgars.cli.console import print_json, say
 from bgars.io.result_file import RESULT_NAME
+from bgars.report.page import write_page
+from bgars.report.page_source import read_page_source
 
 __all__ = ["register"]
 
@@ -49,8 +50,12 @@ def report(
     Exit code 0: the page was written, whatever the verdict. 2: there is no result, or it is not one.
     """
     page = output or (result if result.is_dir() else result.parent) / PAGE
-    bgars.write_report(result, page)
+    source = read_page_source(result)
+    write_page(source, page)
     if as_json:
-        print_json({"result": str(result / RESULT_NAME if result.is_dir() else result), "output": str(page)})
-    else:
-        say(f"{page}: open it in a browser")
+        place = result / RESULT_NAME if result.is_dir() else result
+        print_json({"result": str(place), "output": str(page), "warnings": list(source.warnings)})
+        return
+    say(f"{page}: open it in a browser")
+    for warning in source.warnings:
+        say(f"warning: {warning}")

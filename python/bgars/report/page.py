@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
     from bgars.records import Capture
 
-__all__ = ["REPORT_FILES", "write_report"]
+__all__ = ["REPORT_FILES", "write_page", "write_report"]
 
 REPORT_FILES = {
     "report.html": "open in a browser: verdict, balls, charts and a 3-D view on one page that needs no network",
@@ -100,9 +100,7 @@ def write_report(
     ['photograph.jpg', 'report.html', 'report.json']
     """
     path = Path(path)
-    if path.suffix.lower() not in {".html", ".htm"}:
-        msg = f"{path}: must end in .html"
-        raise InputError(msg)
+    _check_suffix(path)
     if isinstance(result, PartResult):
         source = _made_source(result, capture)
     elif capture is not None:
@@ -111,15 +109,27 @@ def write_report(
     else:
         source = read_page_source(Path(result))
     written = {path.name: REPORT_FILES["report.html"]}
-    text = page_text(source)
-    with atomic_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_page(source, path)
     if capture is not None and source.photograph is not None:
         for name, content in side_files(source.photograph, source.lamps, source.surface).items():
             with atomic_file(path.with_name(name)) as temporary:
                 temporary.write_bytes(content)
             written[name] = REPORT_FILES[name]
     return written
+
+
+def write_page(source: PageSource, path: Path) -> None:
+    """Write the page of a source, whole or not at all."""
+    _check_suffix(path)
+    text = page_text(source)
+    with atomic_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _check_suffix(path: Path) -> None:
+    if path.suffix.lower() not in {".html", ".htm"}:
+        msg = f"{path}: must end in .html"
+        raise InputError(msg)
 
 
 def _made_source(result: PartResult, capture: Capture | None) -> PageSource:

@@ -131,8 +131,8 @@ def side_files(photograph: Photograph, lamps: tuple[Lamp, ...], surface: PartSur
     return files if content is None else files | {SURFACE_FILE: content}
 
 
-def read_side_files(path: Path) -> tuple[Photograph | None, tuple[Lamp, ...], PartSurface | None]:
-    """Read what :func:`side_files` wrote; nothing where there is nothing.
+def read_side_files(path: Path) -> tuple[Photograph | None, tuple[Lamp, ...], PartSurface | None, tuple[str, ...]]:
+    """Read what :func:`side_files` wrote, nothing where there is nothing; and warnings of what cannot be used.
 
     Raises
     ------
@@ -140,7 +140,7 @@ def read_side_files(path: Path) -> tuple[Photograph | None, tuple[Lamp, ...], Pa
         The file is there, but is not what was written.
     """
     if not path.is_file():
-        return None, (), None
+        return None, (), None, ()
     try:
         values: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         place = values["photograph"]
@@ -157,19 +157,22 @@ def read_side_files(path: Path) -> tuple[Photograph | None, tuple[Lamp, ...], Pa
         msg = f"{path}: is not what `bgars inspect` writes beside its result ({error!r}); remove it to do without"
         raise FileFormatError(msg) from error
     photograph = _read_jpeg(path.with_name(PHOTOGRAPH_FILE), (left_um, right_um, bottom_um, top_um), meaning)
-    return photograph, lamps, _surface(path.with_name(SURFACE_FILE), digest)
+    return photograph, lamps, *_surface(path.with_name(SURFACE_FILE), digest)
 
 
-def _surface(path: Path, digest: str | None) -> PartSurface | None:
-    """The height map that belongs to the result; None where there is none, or only another one's."""
+def _surface(path: Path, digest: str | None) -> tuple[PartSurface | None, tuple[str, ...]]:
+    """The height map that belongs to the result; None where there is none, or, with a warning, only another one's."""
     if digest is None or not path.is_file():
-        return None
+        return None, ()
     try:
         found = sha256(path.read_bytes()).hexdigest()
     except OSError as error:
         msg = f"{path}: cannot be read ({error.strerror})"
         raise FileFormatError(msg) from error
-    return read_surface(path) if found == digest else None
+    if found != digest:
+        names = f"is not the file that {SIDE_FILE} names: cut off, or of another inspection"
+        return None, (f"{path}: {names}; the 3-D view shows spheroids instead of the surface",)
+    return read_surface(path), ()
 
 
 def _read_jpeg(path: Path, edges_um: tuple[float, float, float, float], meaning: str) -> Photograph | None:

@@ -32,12 +32,15 @@ class PageSource:
         The lights as the rig gives them; empty when unknown.
     surface : PartSurface or None
         Integrated heights; None: the 3-D view falls back to spheroids.
+    warnings : tuple of str
+        What lies beside the result but could not be used.
     """
 
     result: dict[str, Any]
     photograph: Photograph | None = None
     lamps: tuple[Lamp, ...] = ()
     surface: PartSurface | None = None
+    warnings: tuple[str, ...] = ()
 
 
 def source_of(result: PartResult, capture: Capture | None) -> PageSource:
