@@ -11,6 +11,7 @@ import numpy as np
 
 from bgars.balls import find_balls
 from bgars.circle_pixels import inside_circles
+from bgars.errors import InputError
 from bgars.inspection import measure_balls
 from bgars.inspection.exposure import check_capture
 from bgars.inspection.judge import judge_part
@@ -36,6 +37,8 @@ __all__ = ["inspect"]
 InspectionStage = Literal["find", "measure", "judge", "surface"]
 BOARD_STEP = 4
 """Every so many rows and columns of the board give it its first shape."""
+LAYOUT = "layout: "
+"""What a complaint of the finder about a recipe begins with; its keys have the same names in the file."""
 MATERIAL_UNUSED = "material.file of the recipe is not used by method {method}"
 
 
@@ -142,7 +145,13 @@ def _found(
     report: Callable[[InspectionStage, float], None],
 ) -> FoundBalls:
     layout = None if recipe is None else recipe.image_layout
-    return find_balls(capture, layout=layout, threads=threads, progress=lambda fraction: report("find", fraction))
+    try:
+        return find_balls(capture, layout=layout, threads=threads, progress=lambda fraction: report("find", fraction))
+    except InputError as error:
+        if recipe is None or recipe.file is None or not str(error).startswith(LAYOUT):
+            raise
+        msg = f"{recipe.file}: {str(error).removeprefix(LAYOUT)}"
+        raise InputError(msg) from None
 
 
 def _board_normals(capture: Capture, threads: int | None) -> NormalField | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bgars
 import pytest
 from bgars.ball_records import BallLayout
@@ -63,6 +65,16 @@ def test_each_defect_is_the_only_thing_that_fails() -> None:
         assert ball.name == true.name
         if true.present:
             assert ball.top_um == pytest.approx(true.top_um, abs=2.0)
+
+
+def test_a_recipe_of_another_pitch_is_refused_by_file_and_key(tmp_path: Path) -> None:
+    capture, _ = photographed(1, {})
+    path = tmp_path / "part.toml"
+    for pitch_um, words in ((880, "pitch_um: must be within 10%"), (700, "rows, cols, pitch_um: must fit the image")):
+        path.write_text(f'name = "p"\nrows = 3\ncols = 4\npitch_um = {pitch_um}\n', encoding="utf-8")
+        with pytest.raises(bgars.InputError) as caught:
+            bgars.inspect(capture, path)
+        assert str(caught.value).startswith(f"{path}: {words}")
 
 
 def test_a_bridge_fails_with_or_without_a_recipe() -> None:

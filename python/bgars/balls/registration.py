@@ -93,12 +93,23 @@ def register(
     ball = _nearest(points, placed, reach)
     matched = int((ball >= 0).sum())
     if matched < MIN_MATCHED * len(points):
-        msg = f"layout: does not fit, only {matched} of {len(points)} balls are on its {len(nominal)} places"
+        keys = "positions" if layout.positions else "rows, cols, pitch_um"
+        msg = (
+            f"layout: {keys}: must fit the image at its pixel_pitch_um of {pixel_pitch_um:g}, but only {matched} of "
+            f"{len(points)} balls are on the {len(nominal)} places"
+        )
         raise InputError(msg)
     if abs(abs(turn) - 1.0) > WRONG_SCALE:
-        msg = f"layout: its distances are {abs(turn):.3g} times those in the image (pixel_pitch_um {pixel_pitch_um:g})"
-        raise InputError(msg)
+        raise InputError(_wrong_scale(layout, abs(turn), pixel_pitch_um))
     return Registration(placed.real, placed.imag, ball, abs(turn) / pixel_pitch_um, float(np.angle(turn)))
+
+
+def _wrong_scale(layout: BallLayout, ratio: float, pixel_pitch_um: float) -> str:
+    """What to say where distances in the image are so many times those of the layout."""
+    at = f"within {WRONG_SCALE:.0%} of the image's at its pixel_pitch_um of {pixel_pitch_um:g}"
+    if layout.pitch_um is None:
+        return f"layout: positions: distances must be {at}, which are {ratio:.3g} times as long"
+    return f"layout: pitch_um: must be {at}, which is {ratio * layout.pitch_um:.4g}, got {layout.pitch_um:g}"
 
 
 def _vote(points: NDArray[np.complex128], nominal: NDArray[np.complex128], reach: float) -> tuple[complex, complex]:
