@@ -91,7 +91,7 @@ def inspect(
             progress(stage, fraction)
 
     check_capture(capture)
-    material, warnings = _material(recipe, method)
+    material, warnings = _material(recipe, method, len(capture.rig))
     report("find", 0.0)
     with ThreadPoolExecutor(1) as background:
         # The board's normals need no balls: they are made while the balls are looked for.
@@ -129,13 +129,13 @@ def inspect(
     return result
 
 
-def _material(recipe: PartRecipe | None, method: Method) -> tuple[SurfaceMaterial | None, tuple[str, ...]]:
+def _material(recipe: PartRecipe | None, method: Method, lights: int) -> tuple[SurfaceMaterial | None, tuple[str, ...]]:
     """The recipe's material, where the method uses one; a warning where it does not."""
     if recipe is None or recipe.material_file is None:
         return None, ()
     if method != "reflectance":
         return None, (MATERIAL_UNUSED.format(method=method),)
-    return read_material(recipe.material_file), ()
+    return read_material(recipe.material_file, lights=lights), ()
 
 
 def _found(

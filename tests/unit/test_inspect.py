@@ -244,6 +244,9 @@ def test_the_material_of_the_recipe_is_used_or_said_to_be_unused(quick: Path) ->
     assert not any("material.file" in warning for warning in bgars.inspect(capture, part).warnings)
     unused = bgars.inspect(capture, part, method="robust-filter")
     assert any("material.file" in warning for warning in unused.warnings)
+    bgars.write_material(replace(material, gains=(1.0,) * 5), quick.parent / "solder.toml")
+    with pytest.raises(bgars.InputError, match=r"solder\.toml: gains: .* 4 lights, got 5"):
+        bgars.inspect(capture, part)
     (quick.parent / "solder.toml").write_text("diffuse_level = -1\n", encoding="utf-8")
     with pytest.raises(bgars.BgarsError, match=r"solder\.toml"):
         bgars.inspect(capture, part)

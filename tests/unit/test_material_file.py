@@ -7,6 +7,8 @@ from pathlib import Path
 
 import bgars
 import pytest
+from bgars.cli.app import app
+from typer.testing import CliRunner
 
 ONE_LOBE = bgars.SurfaceMaterial(
     diffuse_level=127.3,
@@ -94,6 +96,29 @@ def test_a_third_lobe_and_a_missing_file_are_refused(tmp_path: Path) -> None:
         bgars.read_material(path)
     with pytest.raises(bgars.FileFormatError, match=r"none\.toml: cannot be read"):
         bgars.read_material(tmp_path / "none.toml")
+
+
+def test_a_material_of_other_lights_names_its_gains(tmp_path: Path) -> None:
+    path = tmp_path / "solder.toml"
+    bgars.write_material(ONE_LOBE, path)
+    assert bgars.read_material(path, lights=6) == ONE_LOBE
+    with pytest.raises(bgars.InputError) as caught:
+        bgars.read_material(path, lights=8)
+    assert str(caught.value) == f"{path}: gains: must have one number for each of the capture's 8 lights, got 6"
+    text = re.sub(r"gains = \[[\d.]+, ", "gains = [", path.read_text(encoding="utf-8"))
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(bgars.InputError) as caught:
+        bgars.read_material(path)
+    words = "standard_errors: 'gain_5' is no parameter of this material (gains: one a light, got 5; known: "
+    assert str(caught.value).startswith(f"{path}: {words}")
+
+
+@pytest.mark.parametrize("command", ["normals", "reconstruct"])
+def test_a_command_names_the_file_whose_gains_do_not_fit(tmp_path: Path, capture_folder: Path, command: str) -> None:
+    bgars.write_material(ONE_LOBE, tmp_path / "solder.toml")
+    options = ["-o", str(tmp_path / "out"), "--material", str(tmp_path / "solder.toml")]
+    said = str(CliRunner().invoke(app, [command, str(capture_folder), *options]).exception)
+    assert said.endswith("solder.toml: gains: must have one number for each of the capture's 4 lights, got 6")
 
 
 def test_a_material_is_written_as_toml_only_and_into_folders_that_exist(tmp_path: Path) -> None:

@@ -148,7 +148,7 @@ def reconstruct(
     """
 
     def run(capture: bgars.Capture, **options: Any) -> bgars.Reconstruction:  # noqa: ANN401
-        surface = _material_from(material)
+        surface = _material_from(material, capture)
         return bgars.reconstruct(capture, method=method, threshold=threshold, material=surface, **options)
 
     summary, files = _reconstruct_to(folder, output, run, channel=channel, mesh_format=mesh_format, directx=directx)
@@ -178,8 +178,8 @@ def normals(
     as_json: JsonOption = False,
 ) -> None:
     """Only the normals: normals.png (16 bit), albedo.tif, confidence.tif, measured.png, lights_kept.png."""
-    surface = _material_from(material)
     capture = bgars.read_capture(folder, channel=channel)
+    surface = _material_from(material, capture)
     with stage_progress() as report:
         field = bgars.estimate_normals(
             capture,
@@ -244,9 +244,9 @@ def evaluate(
     of them should be within the standard error that the method states, on photographs far fewer are
     (docs/accuracy.md).
     """
-    surface = _material_from(material)
     names = None if images is None else read_filenames(images)
     capture = bgars.read_capture(folder, channel=channel, images=names)
+    surface = _material_from(material, capture)
     truth = bgars.read_truth(folder)
     with stage_progress() as report:
         results = []
@@ -298,8 +298,8 @@ def _reconstruct_to(
         )
 
 
-def _material_from(path: Path | None) -> bgars.SurfaceMaterial | None:
-    return None if path is None else bgars.read_material(path)
+def _material_from(path: Path | None, capture: bgars.Capture) -> bgars.SurfaceMaterial | None:
+    return None if path is None else bgars.read_material(path, lights=len(capture.rig))
 
 
 def _list_files(folder: Path, files: dict[str, str]) -> None:

@@ -68,18 +68,21 @@ class MaterialFile(Strict):
         known |= {f"gain_{light}" for light in range(len(self.gains))}
         for name in self.standard_errors:
             if name not in known:
-                msg = f"standard_errors: '{name}' is no parameter of this material (known: {', '.join(sorted(known))})"
+                has = f"gains: one a light, got {len(self.gains)}; known: {', '.join(sorted(known))}"
+                msg = f"standard_errors: '{name}' is no parameter of this material ({has})"
                 raise ValueError(msg)
         return self
 
 
-def read_material(path: str | PathLike[str]) -> SurfaceMaterial:
+def read_material(path: str | PathLike[str], *, lights: int | None = None) -> SurfaceMaterial:
     """Read a material file.
 
     Parameters
     ----------
     path : path
         Written by :func:`write_material` or ``bgars calibrate material``.
+    lights : int, optional
+        Lights of the capture that it is meant for: it must have as many gains.
 
     Returns
     -------
@@ -91,10 +94,14 @@ def read_material(path: str | PathLike[str]) -> SurfaceMaterial:
     FileFormatError
         The file is missing or not TOML.
     InputError
-        An unknown key (the nearest known one is named), a missing one, a value out of range.
+        An unknown key (the nearest known one is named), a missing one, a value out of range, another number of gains
+        than `lights`.
     """
     path = Path(path)
     file = checked(MaterialFile, read_values(path), path)
+    if lights is not None and len(file.gains) != lights:
+        msg = f"{path}: gains: must have one number for each of the capture's {lights} lights, got {len(file.gains)}"
+        raise InputError(msg)
     return SurfaceMaterial(
         diffuse_level=file.diffuse_level,
         grazing=file.grazing,

@@ -83,7 +83,8 @@ def _explain(model: type[BaseModel], path: Path, error: ValidationError) -> str:
         return f"{path}: unknown key '{'.'.join([*keys, name])}'{hint} (known: {', '.join(known)})"
     reason = first["msg"].removeprefix("Value error, ")
     value = "" if isinstance(first["input"], dict) else f", got {first['input']!r}"
-    return f"{path}: {'.'.join(keys) or 'recipe'}: {reason}{value}"
+    # A rule over several keys names them itself.
+    return ": ".join([str(path), *([".".join(keys)] if keys else []), f"{reason}{value}"])
 
 
 def _walk(model: type[BaseModel], location: tuple[int | str, ...]) -> tuple[list[str], list[str]]:
