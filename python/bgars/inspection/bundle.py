@@ -199,7 +199,7 @@ def solve_bundle(
     covariance = inverse + lever @ border_covariance @ lever.transpose(0, 2, 1)
     mean_lever = lever.mean(axis=0)
     board_covariance: Array = border_covariance[2 * lights :, 2 * lights :].astype(np.float64)
-    u_light = np.sqrt(np.diag(border_covariance)[: 2 * lights].reshape(lights, 2).sum(axis=1))
+    u_light = _u_lights(border_covariance.astype(np.float64), lights)
     return Solution(
         table,
         vectors,
@@ -215,6 +215,13 @@ def solve_bundle(
         response(np.ones_like(residual)),
         response(_flanks(edges, table, vectors, near, board)),
     )
+
+
+def _u_lights(border_covariance: Array, lights: int) -> Array:
+    """(L,) standard uncertainties of both axes together; NaN where a fit that ran away has no variance."""
+    variance = np.diag(border_covariance)[: 2 * lights].reshape(lights, 2).sum(axis=1)
+    u_light: Array = np.sqrt(np.where(variance >= 0, variance, np.nan))
+    return u_light
 
 
 def _flanks(edges: Edges, table: Array, vectors: Array, near: bool, board: Board) -> Array:

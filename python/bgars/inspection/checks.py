@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from bgars.errors import CalibrationError, InputError
 from bgars.inspection.board import Board
+from bgars.inspection.in_view import fitting_stretches
 from bgars.inspection.shadow_model import Balls, Lights
 from bgars.inspection.start import edge_steps
 from bgars.light_names import light_name, numbered
@@ -30,7 +31,7 @@ SAMPLE = 50_000
 GOOD_STEP = 0.5
 """Mean step of brightness over predicted edges, relative to the board, that needs no explanation."""
 MUCH_BETTER = 0.2
-FITTING_WEIGHT, FITTING_SHARE, STRONG = 0.3, 0.7, 0.4
+FITTING_SHARE = 0.7
 """A light is fine when this share of its stretches of edge fit, where it stands at most `FAR_DEG` from the rig."""
 FAR_DEG = 5.0
 MIN_WITNESSES = 3
@@ -76,7 +77,9 @@ class Complaint(NamedTuple):
     serious: bool
 
 
-def explain_dark_steps(problem: Problem, table: Array, steps: Array) -> tuple[Complaint, ...]:
+def explain_dark_steps(
+    problem: Problem, table: Array, steps: Array, in_view: NDArray[np.bool_]
+) -> tuple[Complaint, ...]:
     """Explain images whose predicted shadow edges are no edges.
 
     Parameters
@@ -86,6 +89,8 @@ def explain_dark_steps(problem: Problem, table: Array, steps: Array) -> tuple[Co
         Balls with first heights.
     steps : (N, L) float64
         Step of brightness at each ball's predicted edge under each light.
+    in_view : (L,) bool
+        Lights whose shadows lie in the image: of others a first look can say nothing (`in_view.py`).
 
     Returns
     -------
@@ -94,7 +99,7 @@ def explain_dark_steps(problem: Problem, table: Array, steps: Array) -> tuple[Co
     """
     known = np.isfinite(steps)
     mean = np.where(known, steps, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    doubtful = np.flatnonzero(mean < GOOD_STEP)
+    doubtful = np.flatnonzero((mean < GOOD_STEP) & in_view)
     if not doubtful.size or not known.any():
         return ()
     chosen = np.sort(np.argsort(np.hypot(table[:, 0], table[:, 1]))[:MOST_BALLS])
@@ -144,9 +149,7 @@ def refuse_misfits(
         Complaints that are left and serious.
     """
     if weight is not None:
-        strong = edges.contrast_levels > STRONG * np.nanmedian(edges.contrast_levels)
-        looked_at = edges.looked_at.sum(axis=(0, 2))
-        fitting = ((weight > FITTING_WEIGHT) & strong).sum(axis=(0, 2))
+        looked_at, fitting = fitting_stretches(edges, weight)
         fine = (fitting >= FITTING_SHARE * looked_at) & (looked_at >= MIN_STRETCHES) & (moved_deg < FAR_DEG)
         complaints = tuple(complaint for complaint in complaints if not fine[complaint.light])
     serious = [complaint.text for complaint in complaints if complaint.serious]

@@ -98,7 +98,9 @@ def measurement(
         else:
             balls.append(_unmeasured(ball, index, problem, fit, looked_at, pitch))
     if solution is None:
-        return BallMeasurement(tuple(balls), np.zeros(6), unit, np.zeros(len(unit)), float("nan"))
+        warnings = () if fit is None else fit.warnings
+        unknown = np.full(6, np.nan)
+        return BallMeasurement(tuple(balls), unknown, unit, np.zeros(len(unit)), float("nan"), warnings)
     c1, c2, c3, c4, c5 = solution.board.coefficients
     moved = np.degrees(angles_rad(solution.vectors, problem.vectors))
     refined = solution.vectors / np.linalg.norm(solution.vectors, axis=1, keepdims=True)
@@ -281,4 +283,6 @@ def _why(problem: Problem, index: int, lights: int, contrast: float) -> list[str
     if level < MIN_CONTRAST_LEVELS or (np.isfinite(contrast) and contrast < MIN_CONTRAST_LEVELS):
         shown = min(level, contrast) if np.isfinite(contrast) else level
         return [f"too little contrast of shadow and board: {max(shown, 0.0):.1f} grey levels of 255, 2 are needed"]
+    if lights >= MIN_LIGHTS:
+        return ["too little of its shadows is in view to fit a ball to them"]
     return [f"fewer than 2 usable lights ({lights}): shadows hidden, outside the image or without an edge"]

@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 
 from bgars.inspection.board import SHAPE_TERMS, Board, board_from_normals, outside_balls
 from bgars.inspection.bundle import Priors, Solution, angles_rad, solve_bundle
-from bgars.inspection.checks import check_shifts, displaced_images, explain_dark_steps, refuse_misfits
+from bgars.inspection.checks import (
+    MIN_WITNESSES,
+    Complaint,
+    check_shifts,
+    displaced_images,
+    explain_dark_steps,
+    refuse_misfits,
+)
+from bgars.inspection.in_view import lights_in_view, unjudged_lights
 from bgars.inspection.outline import Outlines, outline_centres
 from bgars.inspection.population import q_spread
 from bgars.inspection.radii import MIN_POPULATION
@@ -108,7 +116,9 @@ def fit_shadows(
         threads,
     )
     table[:, 2] = heights
-    complaints = explain_dark_steps(problem, table, steps)
+    in_view, files = lights_in_view(problem, table), problem.radiance.capture.files
+    no_light = np.zeros_like(in_view)
+    complaints = explain_dark_steps(problem, table, steps, in_view)
     progress(0.1)
     priors = _priors(problem, table, field, refine_lights)
     spread = EdgeSpread(FIRST_SPREAD_PX, 0.0)
@@ -138,12 +148,12 @@ def fit_shadows(
         )
         usability = judge_balls(edges)
         chosen = index[usability.usable]
-        if not len(chosen):
-            warnings = refuse_misfits(complaints, edges, None, np.zeros(len(vectors)))
-            return Fit(problem, index, usability, None, edges, spread, warnings)
         used = edges.take(usability.usable)
         start = (table[chosen], vectors, board)
         solution, priors = _solve(used, start, problem.near, priors, chosen, turn, last, refine_lights)
+        if solution is None:
+            warnings = _warnings(problem, complaints, edges, None, in_view if len(table) >= MIN_WITNESSES else no_light)
+            return Fit(problem, index, usability, None, edges, spread, warnings)
         change = float(np.abs(solution.balls - table[chosen]).max())
         drift = abs(float((solution.balls - table[chosen])[:, 2].mean()))
         finished = last and (drift < DRIFT_PX or turn >= passes + LAST_PASSES - 2)
@@ -159,9 +169,26 @@ def fit_shadows(
         turn += 1
         progress(0.1 + 0.8 * (1.0 if finished else min(turn / passes, 0.95)))
     assert wide is not None
-    moved_deg, files = np.degrees(angles_rad(vectors, problem.vectors)), problem.radiance.capture.files
-    warnings = refuse_misfits(complaints, used, solution.weight, moved_deg) + check_shifts(wide, files)
+    # First heights may be wrong, and what lies in the image with them.
+    warnings = _warnings(problem, complaints, used, solution, in_view & lights_in_view(problem, table))
+    warnings += check_shifts(wide, files)
     return Fit(problem, index, usability, solution, edges, spread, warnings, displaced_images(wide, files))
+
+
+def _warnings(
+    problem: Problem,
+    complaints: tuple[Complaint, ...],
+    edges: Edges,
+    solution: Solution | None,
+    in_view: NDArray[np.bool_],
+) -> tuple[str, ...]:
+    """What is left of a first look's complaints after the fit; lights out of view are judged by the fit alone."""
+    weight = None if solution is None else solution.weight
+    vectors = problem.vectors if solution is None else solution.vectors
+    moved_deg = np.degrees(angles_rad(vectors, problem.vectors))
+    complaints = tuple(complaint for complaint in complaints if in_view[complaint.light])
+    left = refuse_misfits(complaints, edges, weight, moved_deg)
+    return left + unjudged_lights(in_view, edges, weight, problem.radiance.capture.files)
 
 
 def _wide_outlines(problem: Problem, shadows: ShadowMap, table: Array, vectors: Array, spread: EdgeSpread) -> Outlines:
@@ -278,8 +305,13 @@ def _solve(
     turn: int,
     last: bool,
     refine_lights: bool,
-) -> tuple[Solution, Priors]:
-    """Bundle; once edges are sharp, the scatter of lights and of q is taken from the result (empirical Bayes)."""
+) -> tuple[Solution | None, Priors]:
+    """Bundle; once edges are sharp, the scatter of lights and of q is taken from the result (empirical Bayes).
+
+    None where there is nothing to fit, or so little that the fit ran away.
+    """
+    if not len(chosen):
+        return None, priors
     sharp = turn >= len(COARSE)
     redescend = (REDESCEND if turn > len(COARSE) else REDESCEND_FIRST) if sharp else None
 
@@ -304,4 +336,4 @@ def _solve(
             before.u_balls[:, 4], priors.u_balls[:, 4], rtol=SETTLED
         ):
             break
-    return solution, priors
+    return (solution if np.isfinite(solution.balls).all() else None), priors

@@ -11,6 +11,8 @@ __all__ = ["board_height_um", "board_terms", "warpage"]
 
 Array = NDArray[np.float64]
 SAMPLES = 41
+MIN_BALLS = 3
+"""Under fewer there is no area that could be warped."""
 
 
 def board_terms(x_um: Array, y_um: Array) -> Array:
@@ -40,7 +42,8 @@ def warpage(coefficients_um: Array, covariance: Array | None, centres_um: Array)
     Returns
     -------
     (float, float)
-        Warpage and its standard uncertainty (to first order); NaN where unknown.
+        Warpage and its standard uncertainty (to first order); NaN where unknown,
+        and for fewer than three balls.
 
     References
     ----------
@@ -49,11 +52,11 @@ def warpage(coefficients_um: Array, covariance: Array | None, centres_um: Array)
 
     Examples
     --------
-    >>> corners = np.array([[-1000.0, -1000.0], [1000.0, 1000.0]])
+    >>> corners = np.array([[-1000.0, -1000.0], [1000.0, -1000.0], [1000.0, 1000.0]])
     >>> round(warpage(np.array([0.0, 0.02, 0.0, -5e-6, 0.0, -5e-6]), None, corners)[0], 6)
     10.0
     """
-    if not np.isfinite(coefficients_um[1:]).all() or len(centres_um) == 0:
+    if not np.isfinite(coefficients_um[1:]).all() or len(centres_um) < MIN_BALLS:
         return math.nan, math.nan
     low, high = centres_um.min(axis=0), centres_um.max(axis=0)
     x_um, y_um = np.meshgrid(np.linspace(low[0], high[0], SAMPLES), np.linspace(low[1], high[1], SAMPLES))

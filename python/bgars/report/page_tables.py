@@ -131,7 +131,9 @@ def _why(name: str, result: dict[str, Any]) -> str:
         return "it takes three measured tops that are not in one line, around the centre of gravity, and a known board"
     if name == "pitch_um":
         return "a list of positions, or too few balls, has no pitch"
-    return "the board's shape is not known" if result["board_coefficients_um"] else "not measured"
+    if all(is_known(value) for value in result["board_coefficients_um"][1:]):
+        return "it takes three measured balls"
+    return "the board's shape is not known"
 
 
 def light_rows(source: PageSource) -> list[dict[str, str]]:

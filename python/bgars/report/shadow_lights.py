@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 __all__ = ["flagged_lights", "is_fitted", "panel_lights"]
 
+FAR_DEG = 1.0
+
 
 def is_fitted(result: PartResult) -> bool:
     """Whether shadows were fitted at all: without a fit no light was looked for, and none moved."""
@@ -23,14 +25,10 @@ def is_fitted(result: PartResult) -> bool:
 def flagged_lights(result: PartResult) -> tuple[int, ...]:
     """Lights that a reason or a warning names, the farthest from the rig first."""
     moved = result.light_change_deg
-    named = {
-        light
-        for text in (*result.reasons, *result.warnings)
-        for light in named_lights(text)
-        if light < len(result.light_directions)
-    }
-    far = {light: float(moved[light]) if light < len(moved) and math.isfinite(moved[light]) else 0.0 for light in named}
-    return tuple(sorted(named, key=lambda light: (-far[light], light)))
+    texts = (*result.reasons, *result.warnings)
+    named = dict.fromkeys(light for text in texts for light in named_lights(text) if light < len(moved))
+    # Of lights that all but stayed, the first that is named is the worst.
+    return tuple(sorted(named, key=lambda light: -moved[light] if moved[light] > FAR_DEG else 0.0))
 
 
 def panel_lights(result: PartResult, lights: int, most: int) -> tuple[int, ...]:
