@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import bgars
 import numpy as np
 import pytest
 from bgars.studies.capability import capability
 from bgars.studies.control_chart import c4, control_chart
+from bgars.studies.spc_figures import trend_figure
 from bgars.studies.trend import Trend
 from judged_parts import RECIPE, judged, write_results
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 
 @pytest.mark.parametrize(
@@ -176,3 +180,20 @@ def test_what_is_no_process_is_refused() -> None:
     with pytest.raises(bgars.InputError, match="subgroups: must be finite"):
         control_chart(np.full((3, 5), np.nan))
     assert RECIPE.limits
+
+
+def test_labels_of_close_control_limits_do_not_overlap() -> None:
+    """Out of control, limits lie close together beside far means: their labels lay on top of each other."""
+    random = np.random.default_rng(3)
+    means = np.linspace(599.0, 603.0, 6)
+    chart = control_chart(means[:, None] + 0.1 * random.standard_normal((6, 5)))
+    assert chart.signals
+    figure = trend_figure(SimpleNamespace(chart=chart, unit="µm"))
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    for axes in figure.axes:
+        boxes = [text.get_window_extent(canvas.get_renderer()) for text in axes.texts]
+        assert len(boxes) == 3
+        boxes.sort(key=lambda box: box.y0)
+        for below, above in pairwise(boxes):
+            assert below.y1 <= above.y0

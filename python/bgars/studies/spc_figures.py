@@ -23,6 +23,10 @@ __all__ = ["trend_figure"]
 
 WIDTH_IN = 9.0
 LINE = PLACEMENT_COLORS[0]
+LABEL_IN = 0.15
+"""Height of a label of 8 points with the space above it."""
+LABEL_X = 1.025
+"""Where labels start, in widths of the axes."""
 
 
 def trend_figure(trend: Trend) -> Figure:
@@ -47,17 +51,60 @@ def _chart(axes: Axes, values: NDArray[np.float64], lines: tuple[float, float, f
     x = np.arange(1, len(values) + 1)
     digits = _digits([*values, *lines])
     axes.plot(x, values, "o-", color=LINE, markersize=4, linewidth=1.0)
-    for value, name, style in zip(lines, ("LCL", "centre", "UCL"), ("--", "-", "--"), strict=True):
-        if not math.isfinite(value):
-            continue
+    named = zip(lines, ("LCL", "centre", "UCL"), ("--", "-", "--"), strict=True)
+    known = [(value, name, style) for value, name, style in named if math.isfinite(value)]
+    for value, _, style in known:
         axes.axhline(value, color="0.35", linestyle=style, linewidth=1.0)
-        axes.annotate(
-            f" {name} {value:.{digits}f}", (1.0, value), xycoords=("axes fraction", "data"), va="center", fontsize=8
-        )
     axes.set_ylabel(title)
     axes.ticklabel_format(axis="y", useOffset=False)
     axes.margins(x=0.02, y=0.15)
     axes.spines[["top", "right"]].set_visible(False)
+    _label_lines(axes, [(value, f"{name} {value:.{digits}f}") for value, name, _ in known])
+
+
+def _label_lines(axes: Axes, labels: list[tuple[float, str]]) -> None:
+    """Name lines at the right edge; labels of lines that lie close together are spread, a thin stroke joins each."""
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high)
+    room = LABEL_IN / (axes.get_position().height * axes.get_figure().get_size_inches()[1])
+    heights = [(value - low) / (high - low) for value, _ in labels]
+    places = _spread(heights, room)
+    style = {"arrowstyle": "-", "color": "0.35", "linewidth": 0.6, "shrinkA": 0.0, "shrinkB": 0.0}
+    for (_, text), height, place in zip(labels, heights, places, strict=True):
+        axes.annotate(
+            text,
+            (1.0, height),
+            (LABEL_X, place),
+            xycoords="axes fraction",
+            textcoords="axes fraction",
+            va="center",
+            fontsize=8,
+            arrowprops=style,
+        )
+
+
+def _spread(heights: list[float], room: float) -> list[float]:
+    """Places near rising heights, at least `room` apart; heights that crowd share the middle of their labels.
+
+    Examples
+    --------
+    >>> [round(place, 3) for place in _spread([0.1, 0.5, 0.9], 0.1)]
+    [0.1, 0.5, 0.9]
+    >>> [round(place, 3) for place in _spread([0.49, 0.5, 0.51], 0.1)]
+    [0.4, 0.5, 0.6]
+    """
+    groups: list[list[float]] = []
+    for height in heights:
+        groups.append([height])
+        while len(groups) > 1 and _first(groups[-1], room) < _first(groups[-2], room) + room * len(groups[-2]):
+            last = groups.pop()
+            groups[-1] += last
+    return [_first(group, room) + room * at for group in groups for at in range(len(group))]
+
+
+def _first(group: list[float], room: float) -> float:
+    """Place of the lowest label of a group, the others `room` apart above it."""
+    return sum(group) / len(group) - room * (len(group) - 1) / 2
 
 
 def _digits(values: Sequence[float]) -> int:
