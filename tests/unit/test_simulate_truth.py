@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from itertools import combinations
+from pathlib import Path
 
 import bgars
 import numpy as np
 import pytest
+from bgars import ball_names
 from bgars.simulate import PlaneTruth, ball_name
 from bgars.simulate.coplanarity import regression_plane, seating_plane
 
@@ -238,3 +240,16 @@ def rests(apexes: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> list[flo
         if below.min() > -1e-7:
             found.append(float(below.max()))
     return found
+
+
+def test_tables_of_truth_and_result_join_on_the_name() -> None:
+    """The scene counts rows and columns from 1, a result from 0: names are one and the same."""
+    rig, camera = bgars.LightRig.ring(4), bgars.Camera(pixel_pitch_um=25.0)
+    _, truth = bgars.simulate(bgars.Scene.ball_array(22, 2), rig, bgars.Material(), camera)
+    for ball in truth.balls:
+        assert ball.name == ball_names.ball_name(ball.row - 1, ball.col - 1)
+    page = Path(__file__).parents[2] / "docs"
+    for name in ("result.md", "simulator.md"):
+        text = (page / name).read_text(encoding="utf-8")
+        assert "`name`" in text
+        assert "from 1, as names do" in text

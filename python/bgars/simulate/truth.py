@@ -49,7 +49,7 @@ class BallTruth:
     name : str
         JEDEC name.
     row, col : int
-        From 1, from the top left of the image.
+        From 1, from the top left of the image; results of an inspection count from 0, so tables are joined on `name`.
     present : bool
         False for a missing ball.
     x_um, y_um : float or None
