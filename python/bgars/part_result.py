@@ -281,7 +281,7 @@ class PartResult:
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(names)
         for ball in self.balls:
-            cells = [_plain(getattr(ball, name), CSV_DIGITS) for name in names]
+            cells = [_csv_cell(name, getattr(ball, name)) for name in names]
             writer.writerow(["; ".join(cell) if isinstance(cell, list) else cell for cell in cells])
         return text.getvalue()
 
@@ -327,6 +327,15 @@ class PartResult:
 
 def _material_dict(material: PartMaterial) -> dict[str, Any]:
     return vars(material) | {"parameters": [dict(vars(row)) for row in material.parameters]}
+
+
+def _csv_cell(name: str, value: Any) -> Any:  # noqa: ANN401 - a field of a record
+    """Lengths to a nanometre, ratios and small uncertainties to as many decimals as tell them from 0."""
+    return _plain(value, CSV_DIGITS if name.endswith("_um") and not _is_tiny(value) else DIGITS)
+
+
+def _is_tiny(value: Any) -> bool:  # noqa: ANN401 - a field of a record
+    return isinstance(value, float) and 0.0 < abs(value) < 10.0**-CSV_DIGITS
 
 
 def _log_value(value: float | str | None) -> str:
