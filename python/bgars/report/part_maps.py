@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
+from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
 from bgars.report.part_style import (
@@ -35,6 +36,20 @@ COLORS = "viridis"
 LONGEST_ARROW = 0.9
 """Length of the longest arrow, of the pitch."""
 ROUND = (1.0, 2.0, 5.0)
+FAIL, OFFSET = VERDICT_COLORS["fail"], "#0072B2"
+DISC: dict[str, object] = {"linestyle": "none", "marker": "o", "markersize": 9, "markeredgewidth": 1.2}
+DASHED: dict[str, object] = {"linestyle": (0, (3, 2)), "color": FAIL, "linewidth": 1.2}
+HEIGHT_MARKS: tuple[tuple[str, dict[str, object]], ...] = (
+    ("filled: see the colour bar", DISC | {"markerfacecolor": "#21918C", "markeredgecolor": "0.3"}),
+    ("orange outline: fails", DISC | {"markerfacecolor": "#21918C", "markeredgecolor": FAIL}),
+    ("white: no height measured", DISC | {"markerfacecolor": "white", "markeredgecolor": "0.3"}),
+    ("dashed: missing", DASHED),
+)
+OFFSET_MARKS: tuple[tuple[str, dict[str, object]], ...] = (
+    ("offset of a ball", {"color": OFFSET, "linewidth": 2.2}),
+    ("of a ball that fails", {"color": FAIL, "linewidth": 2.2}),
+    ("missing", DASHED),
+)
 
 
 def deviation_figure(result: PartResult) -> Figure:
@@ -70,6 +85,11 @@ def _heights(figure: Figure, axes: Axes, result: PartResult) -> None:
     axes.set_title(f"{name[0].upper()}{name[1:]} ({rests})\nseating coplanarity {reading}")
     part_frame(axes, result)
     label_balls(axes, result, SIDE_IN - 1.5)
+    has_height = [math.isfinite(value) for value in values]
+    _legend(
+        axes,
+        [entry for entry, is_drawn in zip(HEIGHT_MARKS, _height_marks(result, has_height), strict=True) if is_drawn],
+    )
     if any(math.isfinite(value) for value in values):
         figure.colorbar(ScalarMappable(norm, COLORS), ax=axes, label=f"{name} (µm)", shrink=0.8)
 
@@ -103,16 +123,48 @@ def _offsets(axes: Axes, result: PartResult) -> None:
             scale_units="xy",
             scale=1.0,
             width=0.004,
-            color=["#0072B2" if ball.verdict != "fail" else VERDICT_COLORS["fail"] for ball in known],
+            color=[OFFSET if ball.verdict != "fail" else FAIL for ball in known],
             zorder=5,
         )
         _key(axes, magnification, longest)
+        drawn = (
+            any(ball.verdict != "fail" for ball in known),
+            any(ball.verdict == "fail" for ball in known),
+            any(not ball.present for ball in result.balls),
+        )
+        _legend(axes, [entry for entry, is_drawn in zip(OFFSET_MARKS, drawn, strict=True) if is_drawn])
     limit_um = None if result.recipe is None else result.recipe.limits.true_position_um
     limit = "" if limit_um is None else f", limit {limit_um:g} µm"
     axes.set_title(
         f"Offsets from the ideal grid, {magnification:g} times magnified\nlargest true position {longest:.1f} µm{limit}"
         if known
         else "Offsets from the ideal grid: not measured"
+    )
+
+
+def _height_marks(result: PartResult, known: list[bool]) -> tuple[bool, bool, bool, bool]:
+    """Which of `HEIGHT_MARKS` the map of heights needs."""
+    balls = list(zip(result.balls, known, strict=True))
+    return (
+        any(ball.present and is_known and ball.verdict != "fail" for ball, is_known in balls),
+        any(ball.present and ball.verdict == "fail" for ball, _ in balls),
+        any(ball.present and not is_known for ball, is_known in balls),
+        any(not ball.present for ball, _ in balls),
+    )
+
+
+def _legend(axes: Axes, entries: list[tuple[str, dict[str, object]]]) -> None:
+    """What marks stand for, below the map on the right, beside the key of the arrows."""
+    handles = [Line2D([], [], label=words, **look) for words, look in entries]  # type: ignore[arg-type]
+    axes.legend(
+        handles=handles,
+        loc="upper right",
+        bbox_to_anchor=(1.0, -0.09),
+        ncols=2,
+        fontsize=8,
+        frameon=False,
+        handletextpad=0.4,
+        columnspacing=1.2,
     )
 
 
