@@ -113,7 +113,7 @@ def _json(found: GaugeStudy) -> str:
 
 def _tell(found: GaugeStudy, output: Path) -> None:
     study = found.study
-    say(f"{study.runs[0].result.name}: {found.verdict.upper()}")
+    say(f"{found.name}: {found.verdict.upper()}")
     for reason in found.reasons:
         say(f"  {reason}")
     for name, left_out in found.left_out:

@@ -6,6 +6,7 @@ import importlib.util
 import json
 from base64 import b64encode
 from collections import Counter
+from dataclasses import replace
 from functools import cache
 from hashlib import sha256
 from os import PathLike
@@ -33,6 +34,7 @@ from bgars.report.page_tables import (
     spreads,
     unmeasured,
 )
+from bgars.report.page_units import with_micro
 from bgars.report.page_vectors import VectorChart, vector_chart
 from bgars.report.page_words import QUANTITIES, VERDICT_MARKS, VERDICT_MEANINGS, listed, number
 
@@ -147,6 +149,8 @@ def _made_source(result: PartResult, capture: Capture | None) -> PageSource:
 
 def page_text(source: PageSource) -> str:
     """Return the page: the same source, the same text."""
+    plain_json = _json(source.result)
+    source = replace(source, result=with_micro(source.result))
     result = source.result
     figures, vectors = _figures(source)
     still = still_of(figures["scene"]) if "scene" in figures else None  # None, too, for a damaged result
@@ -188,7 +192,7 @@ def page_text(source: PageSource) -> str:
         plotly=plotly,
         js=js,
         script_hashes=_markup(" ".join(f"'sha256-{_hash(text)}'" for text in (plotly, js))),
-        result_json=_json(result),
+        result_json=plain_json,
         page_json=_json({"figures": figures, "places": places}),
         scene_json=None if scene is None else _json(scene),
         still=still,
@@ -211,7 +215,8 @@ def _figures(source: PageSource) -> tuple[dict[str, dict[str, Any]], VectorChart
 
 
 def _counts(result: dict[str, Any]) -> list[tuple[str, int]]:
-    count = Counter(ball["verdict"] for ball in result["balls"])
+    """Every ball once: those that are there by their verdict, the missing ones apart."""
+    count = Counter(ball["verdict"] for ball in result["balls"] if ball["present"])
     told = [(verdict, count[verdict]) for verdict in VERDICT_MARKS if count[verdict]]
     missing = sum(not ball["present"] for ball in result["balls"])
     return [*told, ("missing", missing)] if missing else told

@@ -25,6 +25,7 @@ HISTOGRAMS = ("true_position_um", "diameter_um", "top_um", "seating_deviation_um
 LEAST_SPAN_UM = 1.0
 LEAST_SPAN_RATIO = 0.002
 MAX_TICKS = 32
+TICKS = 5
 MAX_NAME = 6
 """Letters of a name that the margin holds, turned."""
 MAX_ERROR_BARS = 120
@@ -149,6 +150,19 @@ def _band(quantity: Quantity, balls: list[dict[str, Any]], result: dict[str, Any
     return 2.0 * float(np.median(known)) if known else 0.0
 
 
+def _whole_step(most: int) -> int:
+    """Step of ticks that count balls: whole, about five of them.
+
+    Examples
+    --------
+    >>> _whole_step(1), _whole_step(8), _whole_step(300)
+    (1, 2, 100)
+    """
+    step = max(1, math.ceil(most / TICKS))
+    power = int(10 ** (len(str(step)) - 1))
+    return next(round_ * power for round_ in (1, 2, 5, 10) if round_ * power >= step)
+
+
 def _histogram(
     quantity: Quantity,
     values: NDArray[np.float64],
@@ -185,7 +199,7 @@ def _histogram(
         "layout": {
             "title": {"text": f"limits: {limit_words(limits)}" if limits else "no limit given"},
             "xaxis": axis(title, range=[min(ends) - margin, max(ends) + margin], zeroline=False),
-            "yaxis": axis("balls", rangemode="tozero"),
+            "yaxis": axis("balls", rangemode="tozero", dtick=_whole_step(int(bars.max(initial=0)))),
             "shapes": shapes,
             "showlegend": False,
             "bargap": 0,

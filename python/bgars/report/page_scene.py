@@ -115,8 +115,9 @@ def view_words(source: PageSource) -> ViewWords:
     surface = source.surface
     solids = solids_of(source.result, lambda _x, _y: 0.0)
     grey = (GREY, "drawn, not measured: below the equator")
+    plane = ((BLUE, "seating plane"),) if source.result["seatings"] else ()
     if surface is None or not solids:
-        return ViewWords(False, "", ((BOARD, "board, fitted"), grey, (BLUE, "seating plane")))
+        return ViewWords(False, "", ((BOARD, "board, fitted"), grey, *plane))
     sides = mesh_sides(len(solids))
     ball_um, board_um = (step * surface.pixel_pitch_um for step in (surface.ball_step_px, surface.board_step_px))
     sampling = (
@@ -125,7 +126,7 @@ def view_words(source: PageSource) -> ViewWords:
     )
     grey = (GREY, "drawn, not measured: rim and below the equator")
     keys = (
-        (BOARD, "board, integrated"), (PRIOR, "from a prior, not measured"), grey, (BLUE, "seating plane"),
+        (BOARD, "board, integrated"), (PRIOR, "from a prior, not measured"), grey, *plane,
     )  # fmt: skip
     return ViewWords(True, sampling, keys)
 

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from bgars.part_recipe import PartRecipe
     from bgars.part_result import PartResult
 
-__all__ = ["CHARACTERISTICS", "Characteristic", "part_readings"]
+__all__ = ["CHARACTERISTICS", "TITLES", "Characteristic", "part_readings"]
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,7 @@ CHARACTERISTICS = (
     Characteristic("pitch_um", "pitch", "part", "pitch_um"),
     Characteristic("warpage_um", "warpage", "part", "warpage_um"),
 )
+TITLES = {each.name: each.title for each in CHARACTERISTICS}
 
 
 def part_readings(result: PartResult, characteristic: Characteristic) -> dict[str, float]:

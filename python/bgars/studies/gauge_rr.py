@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from bgars.errors import InputError
 from bgars.studies.accuracy import TYPICAL_RUNS, Accuracy, accuracy_figures
-from bgars.studies.characteristics import CHARACTERISTICS
+from bgars.studies.characteristics import CHARACTERISTICS, TITLES
 from bgars.studies.gauge import GaugeFigures, gauge_figures
 from bgars.studies.plain import plain
 from bgars.studies.readings import LeftOut, Readings, study_readings
@@ -57,13 +57,19 @@ class GaugeStudy:
     left_out: tuple[tuple[str, LeftOut], ...]
     warnings: tuple[str, ...]
 
+    @property
+    def name(self) -> str:
+        """Of the part, as the recipe says; without one a result is named after its run, so the study's folder."""
+        first = self.study.runs[0].result
+        return first.name if first.recipe is not None else self.study.folder.resolve().name
+
     def to_dict(self) -> dict[str, Any]:
         """Return everything but the single readings as plain Python values; None where something is not known."""
         first = self.study.runs[0].result
         return {
             "format": FORMAT,
             "format_version": FORMAT_VERSION,
-            "part": first.name,
+            "part": self.name,
             "verdict": self.verdict,
             "reasons": list(self.reasons),
             "parts": list(self.study.parts),
@@ -154,13 +160,13 @@ def _warnings(study: Study, figures: tuple[GaugeFigures, ...], accuracies: tuple
         warnings.append("one placement: GRR is repeatability only, without what placing the part adds")
     few = [each for each in figures if each.measurands < FEW_MEASURANDS]
     if few:
-        names = ", ".join(f"{each.characteristic} ({each.measurands})" for each in few)
+        names = ", ".join(f"{TITLES[each.characteristic]} ({each.measurands})" for each in few)
         warnings.append(
             f"fewer than {FEW_MEASURANDS} parts or balls: PV, percent of study and ndc are rough for {names}"
         )
     rough = [each for each in figures if each.anova.repeatability_df < FEW_DF]
     if rough:
-        names = ", ".join(f"{each.characteristic} ({each.anova.repeatability_df})" for each in rough)
+        names = ", ".join(f"{TITLES[each.characteristic]} ({each.anova.repeatability_df})" for each in rough)
         warnings.append(f"fewer than {FEW_DF} degrees of freedom: the repeatability is rough for {names}")
     if any(each.cg == each.cg for each in accuracies) and accuracies[0].runs < TYPICAL_RUNS:
         warnings.append(f"Cg and Cgk rest on {accuracies[0].runs} runs of a part; {TYPICAL_RUNS} or more are usual")

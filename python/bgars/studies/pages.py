@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from bgars.studies.characteristics import CHARACTERISTICS
+from bgars.report.page_units import with_micro
+from bgars.studies.characteristics import TITLES
 from bgars.studies.gauge import ACCEPTABLE_PERCENT, UNACCEPTABLE_PERCENT
 from bgars.studies.grr_figures import deviation_figure, linearity_figure, share_figure
 from bgars.studies.spc_figures import trend_figure
@@ -22,7 +23,6 @@ __all__ = ["grr_page", "spc_page"]
 
 UNKNOWN = "–"  # noqa: RUF001 - a dash of the width of a digit
 SMALL_CHANCE = 0.001
-TITLES = {each.name: each.title for each in CHARACTERISTICS}
 
 
 def grr_page(found: GaugeStudy) -> str:
@@ -41,7 +41,7 @@ def grr_page(found: GaugeStudy) -> str:
         .render(
             found=found,
             study=found.study,
-            part=first.name,
+            part=found.name,
             pixel_pitch_um=first.pixel_pitch_um,
             recipe="" if first.recipe is None else first.recipe.name,
             version=first.version,
@@ -82,6 +82,8 @@ def _environment() -> Environment:
     )
     environment.filters |= {
         "number": _number,
+        "micro": with_micro,
+        "title": lambda name: TITLES.get(name, name),
         "chance": _chance,
         "percent": lambda value: _told(value, ".1f", " %"),
         "fixed": lambda value: _told(value, ".2f"),

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["trend_figure"]
 
-WIDTH_IN = 9.0
+WIDTH_IN, HEIGHT_IN = 9.0, 4.2
 LINE = PLACEMENT_COLORS[0]
 LABEL_IN = 0.15
 """Height of a label of 8 points with the space above it."""
@@ -31,7 +31,7 @@ LABEL_X = 1.025
 
 def trend_figure(trend: Trend) -> Figure:
     """X-bar chart over S chart, signals marked."""
-    figure = new_figure(WIDTH_IN, 4.2)
+    figure = new_figure(WIDTH_IN, HEIGHT_IN)
     top, bottom = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [3, 2]})
     chart = trend.chart
     unit = f" ({trend.unit})" if trend.unit else ""
@@ -66,7 +66,7 @@ def _label_lines(axes: Axes, labels: list[tuple[float, str]]) -> None:
     """Name lines at the right edge; labels of lines that lie close together are spread, a thin stroke joins each."""
     low, high = axes.get_ylim()
     axes.set_ylim(low, high)
-    room = LABEL_IN / (axes.get_position().height * axes.get_figure().get_size_inches()[1])
+    room = LABEL_IN / (axes.get_position().height * HEIGHT_IN)
     heights = [(value - low) / (high - low) for value, _ in labels]
     places = _spread(heights, room)
     style = {"arrowstyle": "-", "color": "0.35", "linewidth": 0.6, "shrinkA": 0.0, "shrinkB": 0.0}
