@@ -13,6 +13,7 @@ import bgars
 import imageio.v3 as iio
 import numpy as np
 import pytest
+from bgars.report.page_units import with_micro
 from bgars.report.page_words import QUANTITIES, expanded, number
 from report_parts import RESULTS, failing, hostile, inspected, passing, simulated
 
@@ -57,8 +58,8 @@ def test_every_kind_of_result_opens_in_silence_and_alone(kind: str, tmp_path: Pa
     page = opened.page
     assert page.title() == f"{result.name}: {result.verdict}"
     assert result.verdict.upper() in page.inner_text("#verdict")
-    assert page.eval_on_selector_all("ul.reasons li", "all => all.map(each => each.textContent)") == list(
-        result.reasons
+    assert page.eval_on_selector_all("ul.reasons li", "all => all.map(each => each.textContent)") == with_micro(
+        list(result.reasons)
     )
     assert names(page) == [ball.name for ball in result.balls]
     assert json.loads(page.text_content("#result") or "") == result.to_dict()

@@ -21,6 +21,7 @@ from bgars.report.page_material import material_facts
 from bgars.report.page_mesh import unpacked
 from bgars.report.page_photograph import photograph_of
 from bgars.report.page_source import PageSource, read_page_source
+from bgars.report.page_units import with_micro
 from bgars.report.page_words import QUANTITIES, expanded, number
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -88,7 +89,7 @@ def test_every_kind_of_result_makes_a_page_with_its_own_numbers(result: bgars.Pa
             assert shown == number(value, quantity.digits)
             if u:
                 assert u == number(expanded(ball.to_dict()[quantity.u_name]), quantity.digits)
-        assert row[-1] == "; ".join(ball.reasons)
+        assert row[-1] == with_micro("; ".join(ball.reasons))
     assert f"</span> {result.verdict.upper()}</p>" in text
 
 
