@@ -66,7 +66,7 @@ def test_true_position_is_the_distance_with_its_uncertainty_along_the_offset() -
 
 
 def test_warpage_of_a_bow_is_its_height_and_a_tilt_has_none() -> None:
-    corners = np.array([[-2000.0, -1500.0], [2000.0, 1500.0]])
+    corners = np.array([[-2000.0, -1500.0], [2000.0, -1500.0], [2000.0, 1500.0]])
     tilt = np.array([7.0, 0.03, -0.02, 0.0, 0.0, 0.0])
     assert warpage(tilt, None, corners)[0] == pytest.approx(0.0, abs=1e-9)
     bow = tilt + np.array([0.0, 0.0, 0.0, -5e-6, 0.0, -5e-6])
@@ -75,7 +75,7 @@ def test_warpage_of_a_bow_is_its_height_and_a_tilt_has_none() -> None:
 
 def test_the_uncertainty_of_warpage_is_that_of_repeated_measurements() -> None:
     random = np.random.default_rng(2)
-    corners = np.array([[-2000.0, -2000.0], [2000.0, 2000.0]])
+    corners = np.array([[-2000.0, -2000.0], [2000.0, -2000.0], [2000.0, 2000.0]])
     coefficients = np.array([0.0, 0.0, 0.0, -5e-6, 1e-6, -4e-6])
     covariance = np.diag([0.1, 1e-8, 1e-8, 4e-15, 4e-15, 4e-15])
     _, stated = warpage(coefficients, covariance, corners)

@@ -51,9 +51,12 @@ where
             });
             while receiver.recv_timeout(INTERVAL) == Err::<(), _>(RecvTimeoutError::Timeout) {
                 let arguments = state.lock().unwrap_or_else(PoisonError::into_inner).take();
-                if let Err(error) = look_at_python(callback, arguments) {
+                // After an exception the work only has to end: nobody is told of its progress any more.
+                if raised.is_none()
+                    && let Err(error) = look_at_python(callback, arguments)
+                {
                     cancelled.store(true, Ordering::Relaxed);
-                    raised.get_or_insert(error);
+                    raised = Some(error);
                 }
             }
             worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
