@@ -14,15 +14,14 @@ from bgars.integration_inputs import (
     bool_mask,
     check_camera,
     check_others,
-    check_pitch,
     count,
     edge_trust,
     normal_array,
-    number,
     plain,
 )
 from bgars.large_arrays import any_content
 from bgars.records import Component, DepthMap, HeightMap, NormalField
+from bgars.scalar_checks import check_pitch, number
 from bgars.surface_records import BilateralFit
 
 if TYPE_CHECKING:

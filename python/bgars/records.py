@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.errors import InputError
+from bgars.scalar_checks import check_pitch
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -243,11 +244,9 @@ class HeightMap:
         Raises
         ------
         InputError
-            A pitch that is not finite and above 0.
+            A pitch that is not a number, finite and above 0.
         """
-        if pixel_pitch_um is not None and not (np.isfinite(pixel_pitch_um) and pixel_pitch_um > 0):
-            msg = f"pixel_pitch_um: must be finite and above 0, got {pixel_pitch_um:g}"
-            raise InputError(msg)
+        check_pitch(pixel_pitch_um)
         height_px = (height / (1.0 if pixel_pitch_um is None else pixel_pitch_um)).astype(np.float32)
         mask: BoolArray = np.isfinite(height_px)
         rows, cols = np.nonzero(mask)

@@ -188,7 +188,7 @@ def test_no_help_is_taken_for_markup() -> None:
         (["mesh", "n.png", "-o", "out.ply", "--solver", "best"], "best"),
         (["evaluate", "nowhere"], "nowhere"),
         (["inspect", "nowhere", "-o", "out"], "nowhere: no such folder"),
-        (["inspect", "nowhere", "-o", "out", "--recipe", "none.toml"], "none.toml: cannot be read"),
+        (["inspect", "nowhere", "-o", "out", "--recipe", "none.toml"], "none.toml: no such file"),
         (["report", "nowhere"], "nowhere: cannot be read"),
         (["grr", "nowhere", "-o", "out"], "nowhere: no such folder"),
         (["spc", "nowhere", "-o", "out"], "nowhere: no such file or folder"),

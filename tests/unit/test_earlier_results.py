@@ -7,11 +7,13 @@ from pathlib import Path
 
 import bgars
 import pytest
+from bgars.cli import grr, inspect, spc
 from bgars.cli.app import app
+from bgars.cli.outputs import RECONSTRUCTION
 from bgars.io.atomic import FolderNames, atomic_folder
 from typer.testing import CliRunner
 
-NAMES = FolderNames(frozenset({"verdict.json", "picture.png", "more.json"}), frozenset({"verdict.json"}))
+JUDGED = FolderNames(frozenset({"verdict.json", "picture.png", "more.json"}), frozenset({"verdict.json"}))
 
 
 def command(*arguments: object) -> str:
@@ -32,17 +34,17 @@ def names_in(folder: Path) -> set[str]:
 
 
 def test_what_this_run_does_not_write_is_removed(tmp_path: Path) -> None:
-    folder = filled(tmp_path / "out", *NAMES.written, "notes.txt")
-    with atomic_folder(folder, NAMES) as place:
+    folder = filled(tmp_path / "out", *JUDGED.written, "notes.txt")
+    with atomic_folder(folder, JUDGED) as place:
         (place / "verdict.json").write_text("new", encoding="utf-8")
     assert names_in(folder) == {"verdict.json", "notes.txt"}
     assert (folder / "verdict.json").read_text(encoding="utf-8") == "new"
     assert (folder / "notes.txt").read_text(encoding="utf-8") == "earlier"
 
 
-def test_a_run_that_fails_leaves_nothing_of_an_earlier_one(tmp_path: Path) -> None:
-    folder = filled(tmp_path / "out", *NAMES.written, "notes.txt")
-    with pytest.raises(bgars.CalibrationError), atomic_folder(folder, NAMES):
+def test_a_failing_run_that_judges_leaves_nothing_of_an_earlier_one(tmp_path: Path) -> None:
+    folder = filled(tmp_path / "out", *JUDGED.written, "notes.txt")
+    with pytest.raises(bgars.CalibrationError), atomic_folder(folder, JUDGED):
         raise bgars.CalibrationError("lights do not fit")
     assert names_in(folder) == {"notes.txt"}
 
@@ -50,7 +52,7 @@ def test_a_run_that_fails_leaves_nothing_of_an_earlier_one(tmp_path: Path) -> No
 def test_without_the_mark_of_a_run_files_of_its_names_are_foreign(tmp_path: Path) -> None:
     folder = filled(tmp_path / "out", "picture.png")
     (folder / "more.json").mkdir()
-    with pytest.raises(bgars.CalibrationError), atomic_folder(folder, NAMES):
+    with pytest.raises(bgars.CalibrationError), atomic_folder(folder, JUDGED):
         raise bgars.CalibrationError("lights do not fit")
     assert names_in(folder) == {"picture.png", "more.json"}
 
@@ -81,13 +83,51 @@ def test_a_reconstruction_removes_the_mesh_of_an_earlier_one(tmp_path: Path) -> 
     for mesh_format in ("ply", "stl"):
         said = command("reconstruct", bgars.sample_capture(), "-o", out, "--mesh-format", mesh_format, "--json")
         assert names_in(out) == set(json.loads(said)["files"])
-    assert (
-        "no such file" in command("reconstruct", bgars.sample_capture(), "-o", out, "--material", "none.toml").lower()
-    )
-    assert names_in(out) == set()
 
 
-def test_a_failing_study_leaves_no_verdict_of_an_earlier_one(tmp_path: Path) -> None:
-    out = filled(tmp_path / "out", "grr.html", "grr.json", "readings.csv", "notes.txt")
-    assert "no such folder" in command("grr", tmp_path / "nowhere", "-o", out)
+def test_a_reconstruction_that_fails_costs_nothing(capture_folder: Path, tmp_path: Path) -> None:
+    out = filled(tmp_path / "out", *RECONSTRUCTION.written)
+    (capture_folder / "img0.png").unlink()
+    assert "3 images" in command("reconstruct", capture_folder, "-o", out)
+    assert names_in(out) == RECONSTRUCTION.written
+
+
+@pytest.mark.parametrize(
+    ("arguments", "files", "message"),
+    [
+        (("grr", "empty"), grr.NAMES.written, "it is none of these"),
+        (("spc", "empty"), spc.NAMES.written, "holds no result.json"),
+    ],
+)
+def test_a_failing_study_leaves_no_verdict_of_an_earlier_one(
+    arguments: tuple[str, ...], files: frozenset[str], message: str, tmp_path: Path
+) -> None:
+    out = filled(tmp_path / "out", *files, "notes.txt")
+    name, folder = arguments
+    (tmp_path / folder).mkdir()
+    assert message in command(name, tmp_path / folder, "-o", out)
     assert names_in(out) == {"notes.txt"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("inspect", "nowhere"), "nowhere: no such folder"),
+        (("inspect", "here/picture.png"), "picture.png: is not a folder"),
+        (("inspect", "here", "--recipe", "none.toml"), "none.toml: no such file"),
+        (("inspect", "here", "--recipe", "here"), "here: is a folder, not a file"),
+        (("grr", "nowhere"), "nowhere: no such folder"),
+        (("grr", "here", "--recipe", "none.toml"), "none.toml: no such file"),
+        (("grr", "here", "--references", "none.csv"), "none.csv: no such file"),
+        (("spc", "here", "nowhere"), "nowhere: no such file or folder"),
+    ],
+)
+def test_a_mistyped_path_costs_nothing(
+    arguments: tuple[str, ...], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    filled(tmp_path / "here", "picture.png")
+    files = {"inspect": inspect.NAMES, "grr": grr.NAMES, "spc": spc.NAMES}[arguments[0]].written
+    out = filled(tmp_path / "out", *files)
+    assert message in command(*arguments, "-o", out)
+    assert names_in(out) == files

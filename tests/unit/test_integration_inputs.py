@@ -66,7 +66,7 @@ def test_a_normal_that_is_none_is_named(method: IntegrationMethod, normal: list[
         ({"max_iters": 2.5}, "max_iters: must be a whole number"),
         ({"max_iters": 10**30}, "max_iters: must be at most"),
         ({"weights": [["a"] * 12] * 12}, "weights: must be an array of numbers"),
-        ({"weights": np.zeros((12, 12))}, "weights: no pixel of the mask has one above 0"),
+        ({"weights": np.zeros((12, 12))}, "weights: must be above 0 in at least one pixel of the mask, got 0"),
         ({"anchors": PLANE}, "anchors: must be bgars.Anchors, got ndarray"),
         ({"anchors": bgars.Anchors([[1.0] * 12] * 12)}, "anchors.height_um: must be an array, got list"),  # type: ignore[arg-type]
         ({"anchors": bgars.Anchors(np.full((12, 12), np.inf))}, "anchors.height_um: must be finite, or NaN"),

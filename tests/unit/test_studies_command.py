@@ -189,7 +189,7 @@ def test_grr_refuses_what_is_no_study_by_name_and_leaves_nothing(name: str, tmp_
         (["grr", "empty"], "empty: must be a result, a capture, or hold folders of them"),
         (["grr", "study/part1/place1/1"], "is a single run"),
         (["grr", "study", "--recipe", "p.toml"], "holds a finished result, which brings its own recipe"),
-        (["grr", "study", "--references", "none.csv"], "none.csv: cannot be read"),
+        (["grr", "study", "--references", "none.csv"], "none.csv: no such file"),
         (["grr", "study", "--references", "heading.csv"], "heading.csv: line 1: must be part,ball,characteristic"),
         (["grr", "study", "--references", "name.csv"], "name.csv: line 2: characteristic must be one of diameter_um"),
         (
@@ -212,6 +212,7 @@ def test_wrong_use_is_told_by_name_and_leaves_nothing(
     monkeypatch.chdir(tmp_path)
     write_study(tmp_path / "study", placements=1)
     (tmp_path / "empty").mkdir()
+    (tmp_path / "p.toml").write_text("", encoding="utf-8")
     heading = "part,ball,characteristic,reference\n"
     for name, text in {
         "heading": "part;ball\n",

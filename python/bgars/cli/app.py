@@ -143,8 +143,8 @@ def reconstruct(
     """The main job: a folder of photographs becomes normals, a height map, a mesh and an overview picture.
 
     Writes overview.png, normals.png (16 bit), height.tif and height.npy (float32, um when the pixel pitch is known),
-    mesh.ply and summary.json. What an earlier run left of these in OUT is removed before FOLDER is read. Heights
-    between parts that do not touch, such as a ball above its board, are not measured.
+    mesh.ply and summary.json; they replace all that an earlier run left of these in OUT. Heights between parts that do
+    not touch, such as a ball above its board, are not measured.
     """
 
     def run(capture: bgars.Capture, **options: Any) -> bgars.Reconstruction:  # noqa: ANN401

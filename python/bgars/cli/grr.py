@@ -14,6 +14,7 @@ from bgars.cli.inspect import EXIT_NOT_PASSED
 from bgars.cli.options import MethodOption
 from bgars.errors import InputError
 from bgars.io.atomic import FolderNames, atomic_folder
+from bgars.io.given_paths import need_file, need_folder
 from bgars.normals import DEFAULT_METHOD
 from bgars.studies.pages import grr_page
 from bgars.studies.readings import readings_csv
@@ -81,6 +82,9 @@ def grr(
     Exit code 0: GRR is at most 10 % of every tolerance. 1: it is not, or it cannot be said; the output says why. 2:
     wrong use, a design that is not balanced, runs that do not belong together, or a capture that cannot be measured.
     """
+    need_folder(folder)
+    for file in (recipe, references):
+        need_file(file)
     _check_results(folder, output)
     with stage_progress() as report, atomic_folder(output, NAMES) as place:
         known = None if references is None else bgars.read_references(references)

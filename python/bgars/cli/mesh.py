@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
@@ -15,6 +14,7 @@ from bgars.integrate import IntegrationMethod, Solver
 from bgars.io.height import HEIGHT_SUFFIXES, read_stored_height
 from bgars.io.mesh_files import MESH_SUFFIXES
 from bgars.pipeline import solver_fraction
+from bgars.scalar_checks import check_pitch
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -75,9 +75,7 @@ def mesh(
     """Turn a normal map or a height map into a mesh."""
     options = _integration(source, method, k, solver)
     _check_source(source)
-    if pixel_pitch_um is not None and not (math.isfinite(pixel_pitch_um) and pixel_pitch_um > 0):
-        msg = f"--pixel-pitch-um: must be finite and above 0, got {pixel_pitch_um:g}"
-        raise InputError(msg)
+    check_pitch(pixel_pitch_um, "--pixel-pitch-um")
     with stage_progress() as report:
         height = _height_from(source, pixel_pitch_um, directx, options, report)
     surface = bgars.mesh_from_height(height)

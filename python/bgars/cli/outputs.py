@@ -28,6 +28,7 @@ RECONSTRUCTION = FolderNames(
     frozenset({"overview.png", "normals.png", "height.tif", "height.npy", MARK})
     | {f"mesh{suffix}" for suffix in MESH_SUFFIXES},
     frozenset({MARK}),
+    judged=False,
 )
 
 
@@ -36,8 +37,8 @@ def write_reconstruction(
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Run a reconstruction and write its results; return its summary and what each file is.
 
-    The output folder is tried first, so that no work is lost to an unwritable one, and what an earlier reconstruction
-    left there is removed.
+    The output folder is tried first, so that no work is lost to an unwritable one. What an earlier reconstruction left
+    there goes when the new files come.
     """
     with atomic_folder(output, RECONSTRUCTION) as folder:
         result = run()

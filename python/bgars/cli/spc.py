@@ -12,13 +12,15 @@ import typer
 import bgars
 from bgars.cli.console import print_json, say, say_files, stage_progress
 from bgars.cli.inspect import EXIT_NOT_PASSED
-from bgars.io.atomic import atomic_folder
+from bgars.io.atomic import FolderNames, atomic_folder
+from bgars.io.given_paths import need_path
 from bgars.studies.pages import spc_page
 from bgars.studies.trend import DEFAULT_SUBGROUP, TARGET
 
 __all__ = ["register"]
 
 FILES = {"spc.html": "the page to look at first", "spc.json": "every figure"}
+NAMES = FolderNames(frozenset(FILES), frozenset({"spc.json"}))
 
 
 def register(app: typer.Typer) -> None:
@@ -55,7 +57,9 @@ def spc(
     Exit code 0: every characteristic with limits is in control and capable. 1: one is not, or it cannot be said; the
     output says which. 2: wrong use, too few results, or results that do not belong together.
     """
-    with stage_progress() as report, atomic_folder(output) as place:
+    for path in results:
+        need_path(path)
+    with stage_progress() as report, atomic_folder(output, NAMES) as place:
         ordered, warnings = bgars.read_results(results, progress=lambda fraction: report("results", fraction))
         found = bgars.process_trend(
             ordered, subgroup=subgroup, target=target, zone_rules=western_electric, warnings=warnings

@@ -26,10 +26,13 @@ class FolderNames(NamedTuple):
         Every name that some run of the command may write.
     marks : frozenset of str
         Those that nothing else writes: where one lies, an earlier run was there.
+    judged : bool
+        They hold a verdict: a run that fails must not leave that of an earlier part.
     """
 
     written: frozenset[str]
     marks: frozenset[str]
+    judged: bool = True
 
 
 @contextmanager
@@ -74,7 +77,8 @@ def atomic_folder(folder: str | os.PathLike[str], names: FolderNames | None = No
     Files of the same name are replaced.
 
     Other files of an existing `folder` stay. The folder is tried before the block runs, so that long work is not lost.
-    With `names`, what an earlier run left is removed before the block runs, too: a folder holds one run or none.
+    With `names`, what an earlier run left is removed: before the block runs where it holds a verdict, else when the new
+    files move in. A folder holds one run or none.
 
     Raises
     ------
@@ -91,10 +95,12 @@ def atomic_folder(folder: str | os.PathLike[str], names: FolderNames | None = No
         parent.mkdir(parents=True, exist_ok=True)
         temporary = Path(tempfile.mkdtemp(prefix=".bgars-partial-", dir=parent))
         try:
-            if names is not None:
+            if names is not None and names.judged:
                 _remove_earlier(folder, names)
             yield temporary
             folder.mkdir(exist_ok=True)
+            if names is not None and not names.judged:
+                _remove_earlier(folder, names)
             for path in sorted(temporary.iterdir()):
                 path.replace(folder / path.name)
         except BaseException:

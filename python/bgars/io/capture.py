@@ -9,6 +9,7 @@ import numpy as np
 
 from bgars.errors import FileFormatError, InputError
 from bgars.io.capture_lights import default_recipe, image_names, match, read_lights
+from bgars.io.given_paths import need_folder
 from bgars.io.images import MAX_MEGAPIXELS, WEIGHTS, decode_stack, read_mask
 from bgars.io.recipe import RECIPE_NAME, CaptureRecipe, GammaResponse, TableResponse, read_recipe
 from bgars.io.response import Curve, gamma_curve, linearise, read_response_table, tabulate
@@ -77,10 +78,7 @@ def read_capture(
     >>> capture.images.shape, capture.pixel_pitch_um
     ((8, 240, 256), 3.4)
     """
-    folder = Path(folder)
-    if not folder.is_dir():
-        msg = f"{folder}: is not a folder" if folder.exists() else f"{folder}: no such folder"
-        raise FileFormatError(msg)
+    folder = need_folder(folder)
     recipe_path = folder / RECIPE_NAME
     recipe = read_recipe(recipe_path) if recipe_path.exists() else default_recipe(folder)
     lights = read_lights(folder, recipe)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from bgars.errors import BgarsError, CalibrationError, FileFormatError, InputError
 from bgars.inspection_pipeline import inspect
 from bgars.io.capture import read_capture
+from bgars.io.given_paths import need_folder
 from bgars.io.part_recipe import read_part_recipe
 from bgars.io.result_file import RESULT_NAME, read_result
 from bgars.normals import DEFAULT_METHOD, Method
@@ -219,9 +220,7 @@ def _walk(folder: Path, names: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...
 
 def _places(folder: Path) -> list[tuple[tuple[str, str, str], Path]]:
     """Part, placement and repeat of every run, and its folder."""
-    if not folder.is_dir():
-        msg = f"{folder}: no such folder"
-        raise FileFormatError(msg)
+    need_folder(folder)
     if _is_run(folder):
         msg = f"{folder}: is a single run; a study is a folder of runs ({', '.join(LEVELS)})"
         raise InputError(msg)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bgars.errors import FileFormatError, InputError
+from bgars.errors import InputError
+from bgars.io.given_paths import need_path
 from bgars.io.result_file import RESULT_NAME, read_result
 from bgars.studies.alike import check_alike
 from bgars.studies.study_folder import natural, subfolders
@@ -73,11 +74,9 @@ def read_results(
 
 
 def _files(path: Path) -> list[Path]:
+    need_path(path)
     if path.is_file():
         return [path]
-    if not path.is_dir():
-        msg = f"{path}: no such file or folder"
-        raise FileFormatError(msg)
     if (path / RESULT_NAME).is_file():
         return [path / RESULT_NAME]
     found = [place / RESULT_NAME for place in subfolders(path) if (place / RESULT_NAME).is_file()]

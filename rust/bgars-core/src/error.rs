@@ -97,7 +97,7 @@ pub enum Error {
         /// How many there are in that image.
         count: usize,
     },
-    /// A normal inside the mask that is NaN or faces away from the camera.
+    /// A normal inside the mask that is NaN, faces away from the camera, or is far from length 1.
     #[error(
         "normals: at row {row}, column {col} inside the mask: must be {rule}, got ({}, {}, {}); mask such pixels out",
         normal[0], normal[1], normal[2]

@@ -33,9 +33,9 @@ const CHECK_PIXELS: usize = 1 << 14;
 /// Oosterlee, Schüller 2001). The constant of each component is free: its mean is set to zero at the end.
 ///
 /// # Errors
-/// Mismatched lengths, an empty mask, normals inside the mask that are not finite, look away or are far from length 1, settings
-/// out of range,
-/// [`Error::NoConvergence`] with iterations and residual, [`Error::Cancelled`].
+/// Mismatched lengths, an empty mask, normals inside the mask that are not finite, look away or are far from length 1, weights
+/// of which none is above 0, settings out of range, [`Error::NoConvergence`] with iterations and residual,
+/// [`Error::Cancelled`].
 ///
 /// # Examples
 /// ```
@@ -101,7 +101,6 @@ pub fn integrate_into(
     let weighted = without_weightless(field);
     let mask = weighted.as_deref().unwrap_or(field.mask);
     let (field, width) = (Field { mask, ..field }, field.width);
-    check_lengths(field)?;
     check_length("height_px", mask.len(), height_px.len())?;
     check_length("labels", mask.len(), labels.len())?;
     let runs = Runs::new(mask, field.regions, width);
@@ -221,24 +220,29 @@ pub(super) fn check_pixels(field: Field<'_>, facing: Facing) -> Result<()> {
     if !chunks.map(sound).all(|sound| sound) {
         (0..pixels).try_for_each(|pixel| check_pixel(field, facing, pixel))?;
     }
+    let weighs = |(&weight, &used): (&f32, &bool)| used && weight > 0.0;
+    if field.weights.is_some_and(|weights| !weights.iter().zip(field.mask).any(weighs)) {
+        let rule = "above 0 in at least one pixel of the mask";
+        return Err(Error::OutOfRange { argument: "weights", rule, value: 0.0 });
+    }
     Ok(())
 }
 
 /// True when [`check_pixel`] refuses none of some pixels; without branches.
 #[allow(clippy::needless_bitwise_bool)]
 fn are_sound(field: Field<'_>, facing: Facing, pixels: Range<usize>) -> bool {
-    // NaN and infinity spread into products with zero.
-    let is_finite = |value: f32| value * 0.0 == 0.0;
     let [least, most] = LENGTHS.map(|length| length * length);
     let mask = &field.mask[pixels.clone()];
     let normals = field.normals[3 * pixels.start..3 * pixels.end].as_chunks::<3>().0;
     let away = facing == Facing::Anywhere;
     let mut sound = true;
     for (&[x, y, z], &used) in normals.iter().zip(mask) {
-        // False for NaN.
         let square = x * x + y * y + z * z;
+        // Comparisons with NaN are false.
         sound &= !used | ((square >= least) & (square <= most) & (away | (z >= 0.0)));
     }
+    // NaN and infinity spread into products with zero.
+    let is_finite = |value: f32| value * 0.0 == 0.0;
     for (&weight, &used) in field.weights.map_or(&[][..], |weights| &weights[pixels]).iter().zip(mask) {
         sound &= !used | (is_finite(weight) & (weight >= 0.0));
     }

@@ -81,16 +81,17 @@ impl<'a> Published<'a> {
         if stopped {
             return Err(Error::Cancelled);
         }
+        fit.inner_iterations += iterations;
         if !left.is_finite() {
             memory::forget();
-            return Err(Error::NoConvergence { iterations, residual: left / scale, tolerance: TOLERANCE });
+            let (iterations, tolerance) = (fit.inner_iterations, TOLERANCE);
+            return Err(Error::NoConvergence { iterations, residual: left / scale, tolerance });
         }
         let rows = z.par_chunks_mut(width).zip(framed[first..].par_chunks(stride));
         rows.enumerate().for_each(|(row, (z, framed))| {
             let span = pixels.span(row);
             z[span.clone()].copy_from_slice(&framed[span]);
         });
-        fit.inner_iterations += iterations;
         fit.residual = fit.residual.max(left / scale);
         Ok(())
     }

@@ -130,9 +130,9 @@ fn check(field: Field<'_>, camera: Option<Pinhole>, params: &BilateralParams) ->
             check_facing(field, camera)?;
         }
     }
-    for (argument, value, least) in [("k", params.k, 0.0), ("tol", params.tolerance, f64::from_bits(1))] {
-        if !(value.is_finite() && value >= least) {
-            let rule = if least == 0.0 { "finite and at least 0" } else { "finite and above 0" };
+    for (argument, value, positive) in [("k", params.k, false), ("tol", params.tolerance, true)] {
+        if !(value.is_finite() && (value > 0.0 || !positive && value == 0.0)) {
+            let rule = if positive { "finite and above 0" } else { "finite and at least 0" };
             return Err(Error::OutOfRange { argument, rule, value });
         }
     }
@@ -199,12 +199,12 @@ fn improve(
     let inner = Params { relative_tolerance: CONVERGED_TOLERANCE, max_iters: CONVERGED_ITERS, ..Params::default() };
     let state = Progress { iteration: fit.rounds, residual: fit.change };
     let solution = conjugate_gradients(&weights, &residual, scale, &inner, &mut |_: Progress| on_progress(state))?;
+    fit.inner_iterations += solution.iterations;
     if !solution.residual.is_finite() {
         let (iterations, tolerance) = (fit.inner_iterations, CONVERGED_TOLERANCE);
         return Err(Error::NoConvergence { iterations, residual: solution.residual, tolerance });
     }
     reds.par_iter_mut().zip(solution.x.par_iter()).for_each(|(red, change)| *red += change);
-    fit.inner_iterations += solution.iterations;
     fit.unsolved = !solution.solved;
     fit.residual = fit.residual.max(solution.residual);
     fill_blacks(&weights, &reds, &mut right.blacks);
