@@ -91,3 +91,53 @@ fn diverge([above, along, below]: [&[f64]; 3], divergence: &mut [f64]) {
         *divergence += left;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::checkerboard::{DOWN, LEFT, RIGHT, UP};
+    use super::*;
+
+    /// A number of its own for every edge.
+    fn weight(axis: Axis, row: usize, k: usize) -> f32 {
+        (1 + row * 1_000 + 2 * k + usize::from(axis == Axis::Below)) as f32
+    }
+
+    /// Weights by edge and divergences by pixel, one at a time; the push of an edge is its weight squared.
+    #[test]
+    fn a_red_knows_its_four_edges_and_each_pixel_its_pushes() {
+        for (height, width) in [(1, 1), (1, 2), (2, 1), (3, 7), (33, 16), (34, 31), (64, 32), (65, 33), (97, 48)] {
+            let grid = Grid { height, width };
+            let edges_of = |axis: Axis| if axis == Axis::Right { width - 1 } else { width };
+            let join = |axis: Axis, row: usize, edges: &mut EdgeRow| {
+                for k in 0..edges_of(axis) {
+                    edges.weight[k] = weight(axis, row, k);
+                    edges.push[k] = f64::from(edges.weight[k]).powi(2);
+                }
+            };
+            let (weights, right) = from_edges(grid, || join);
+            let half = grid.half();
+            for row in 0..height {
+                for place in 0..2 * half {
+                    let at = |axis: Axis, row: isize, col: isize, inside: bool| {
+                        if inside { weight(axis, row as usize, col as usize) } else { 0.0 }
+                    };
+                    let (r, c, exists) = (row as isize, place as isize, place < width);
+                    let mut edges = [0.0; 4];
+                    edges[LEFT] = at(Axis::Right, r, c - 1, exists && place > 0);
+                    edges[RIGHT] = at(Axis::Right, r, c, place + 1 < width);
+                    edges[UP] = at(Axis::Below, r - 1, c, exists && row > 0);
+                    edges[DOWN] = at(Axis::Below, r, c, exists && row + 1 < height);
+                    let (k, is_red) = (place / 2, (row + place) % 2 == 0);
+                    if is_red {
+                        let kept = [weights.left(r), weights.right(r), weights.up(r), weights.down(r)];
+                        assert_eq!(kept.map(|side| side[k + 1]), edges, "{grid:?}: red at {row}, {place}");
+                    }
+                    let push = edges.map(|weight| f64::from(weight).powi(2));
+                    let colour = if is_red { &right.reds } else { &right.blacks };
+                    let expected = push[UP] - push[DOWN] - push[RIGHT] + push[LEFT];
+                    assert_eq!(colour[row * half + k], expected, "{grid:?}: pushes at {row}, {place}");
+                }
+            }
+        }
+    }
+}
