@@ -8,8 +8,8 @@ use crate::memory::Aligned;
 /// Numbers that a loop takes at a time.
 pub(super) const LANES: usize = 16;
 
-/// Columns without a pixel that are worth another loop over the rest of the row.
-const MIN_GAP: usize = 4 * LANES;
+/// Lanes without a pixel that are worth another loop over the rest of the row.
+const MIN_GAP: usize = 4;
 
 /// The layout of a *framed* array: each row is followed by numbers of no pixel, and a row of such lies before the first and
 /// after the last. They stay zero, so a neighbour can be read without asking whether there is one.
@@ -18,7 +18,7 @@ const MIN_GAP: usize = 4 * LANES;
 #[derive(Clone, Debug)]
 pub(super) struct Frame {
     pub width: usize,
-    /// Columns of the mask from left to right, outward to whole lanes, row by row; smaller gaps than [`MIN_GAP`] count in.
+    /// Columns of the mask from left to right in whole [`LANES`], row by row; smaller gaps than [`MIN_GAP`] count in.
     spans: Vec<(usize, usize)>,
     /// Where the spans of each row begin, and where the last ones end.
     rows: Vec<usize>,
@@ -32,10 +32,9 @@ impl Frame {
         for row in mask.chunks(width) {
             let first = spans.len();
             for (lanes, _) in row.chunks(LANES).enumerate().filter(|(_, pixels)| pixels.contains(&true)) {
-                let (lo, hi) = (lanes * LANES, (lanes + 1) * LANES);
                 match spans[first..].last_mut() {
-                    Some(last) if lo - last.1 < MIN_GAP => last.1 = hi,
-                    _ => spans.push((lo, hi)),
+                    Some(last) if lanes - last.1 < MIN_GAP => last.1 = lanes + 1,
+                    _ => spans.push((lanes, lanes + 1)),
                 }
             }
             rows.push(spans.len());
@@ -79,7 +78,7 @@ impl Frame {
     /// The first and last (exclusive) column of the mask in a row; both 0 without one.
     pub fn reach(&self, row: usize) -> (usize, usize) {
         let spans = self.spans(row as isize);
-        (spans.first().map_or(0, |first| first.0), spans.last().map_or(0, |last| last.1))
+        (spans.first().map_or(0, |first| first.0 * LANES), spans.last().map_or(0, |last| last.1 * LANES))
     }
 
     /// Where the mask's part of a row starts in a framed array.
@@ -87,7 +86,7 @@ impl Frame {
         self.start(row) + self.reach(row).0
     }
 
-    /// The columns of the mask in a row, in parts from left to right; none in rows outside the box.
+    /// The columns of the mask in a row in whole [`LANES`], in parts from left to right; none in rows outside the box.
     #[inline(always)]
     pub fn spans(&self, row: isize) -> &[(usize, usize)] {
         match usize::try_from(row) {

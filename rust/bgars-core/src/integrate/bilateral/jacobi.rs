@@ -29,9 +29,7 @@ enum End {
 impl<'a, T: Number> Jacobi<'a, T> {
     /// For systems in a frame.
     pub fn new(frame: &'a Frame) -> Self {
-        let [right, below, diagonal] = std::array::from_fn(|_| frame.zeros());
-        let scaled = Scaled { frame, right, below, diagonal };
-        Self { scaled, vectors: Vectors::new(frame), roots: frame.zeros() }
+        Self { scaled: Scaled::new(frame), vectors: Vectors::new(frame), roots: frame.zeros() }
     }
 
     /// Brings `z` (framed) closer to the solution of a system.
@@ -71,14 +69,14 @@ impl<'a, T: Number> Jacobi<'a, T> {
         let Self { scaled, vectors, roots } = self;
         let mut steps = Steps::default();
         let mut iterations = 0;
-        let (norm, end) = loop {
+        let (norm, end, ahead) = loop {
             let now = sweep(scaled, steps, vectors);
             let norm = now.r_d_r.max(0.0).sqrt();
             if norm <= target || iterations >= max_iters || !each() {
-                break (norm, End::Asked);
+                break (norm, End::Asked, 0.0);
             }
             if !(now.p_v > 0.0) {
-                break (norm, End::Rounding);
+                break (norm, End::Rounding, 0.0);
             }
             let (a0, norm_between) = first_step(&now);
             iterations += 1;
@@ -87,15 +85,13 @@ impl<'a, T: Number> Jacobi<'a, T> {
                 iterations += 1;
                 steps = next;
             } else {
-                let a0 = T::of(a0);
-                vectors.x.par_iter_mut().zip(vectors.p.par_iter()).for_each(|(x, p)| *x += a0 * *p);
-                break (norm_between, if is_asked { End::Asked } else { End::Rounding });
+                break (norm_between, if is_asked { End::Asked } else { End::Rounding }, a0);
             }
         };
         let frame = scaled.frame;
         frame.parts_mut(z).enumerate().for_each(|(row, z)| {
-            let at = frame.first(row);
-            for ((z, x), root) in z.iter_mut().zip(&vectors.x[at..]).zip(&roots[at..]) {
+            let x = vectors.x_ahead(frame, row, T::of(ahead));
+            for ((z, x), root) in z.iter_mut().zip(x).zip(&roots[frame.first(row)..]) {
                 *z += x.to_f64() * root;
             }
         });
@@ -104,23 +100,13 @@ impl<'a, T: Number> Jacobi<'a, T> {
 
     /// Scales the system to a diagonal of ones, `D^-1/2 A D^-1/2`, and starts at the residual of `z`.
     fn begin(&mut self, system: &NormalEquations, z: &[f64]) {
-        let Self { scaled: Scaled { frame, right, below, diagonal }, vectors, roots } = self;
-        let stride = frame.stride();
+        let Self { scaled, vectors, roots } = self;
+        let frame = scaled.frame;
         frame
             .parts_mut(roots)
             .enumerate()
             .for_each(|(row, roots)| inverse_roots(&system.diagonal[frame.first(row)..], roots));
-        let [right, below, diagonal] = [right, below, diagonal].map(|array| frame.parts_mut(array));
-        (right, below, diagonal, vectors.rows_mut(frame)).into_par_iter().enumerate().for_each(
-            |(row, (right, below, diagonal, [x, p, r, v, u, w]))| {
-                scale_row(system, roots, z, frame.first(row), stride, [right, below, diagonal, r]);
-                p.copy_from_slice(r);
-                for zeros in [x, v, u, w] {
-                    zeros.fill(T::default());
-                }
-            },
-        );
-        vectors.keep_edges(frame);
+        vectors.begin(scaled, |row, out| scale_row(system, roots, z, frame.first(row), frame.stride(), out));
     }
 }
 

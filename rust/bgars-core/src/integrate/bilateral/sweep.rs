@@ -12,29 +12,35 @@ use rayon::prelude::*;
 use super::super::real::{Real, on_vectors};
 use super::frame::{Frame, LANES};
 use super::number::Number;
-use super::rows::{Beside, Factors, SUMS, Stencil, add_products, advance, flush, multiply, multiply_beside, step};
+use super::rows::{
+    Around, BELOW, Block, DIAGONAL, Edge, Factors, KEPT, P, R, RIGHT, SUMS, TIES, Ties, VECTORS, X, add_products,
+    advance, advance_beside, flush, multiply,
+};
 use crate::memory::Aligned;
 use crate::vector::Packed;
 
 /// Most rows that one task sweeps; of two more on either side it updates the residual for itself.
 const MAX_BAND: usize = 64;
+/// Rows on either side of a band that it needs.
+const BESIDE: usize = 2;
 /// Rows of a band that its neighbours need: the first two and the last two.
-const EDGE: usize = 4;
-/// Vectors that a band needs of the rows beside it: r, A p, A r and A A p.
-const KEPT: usize = 4;
+const EDGE: usize = 2 * BESIDE;
 /// Rows after which the sums of `f32` go over into `f64`.
 const FLUSH: usize = 8;
 
-/// `I - C` of a 5-point system scaled to a diagonal of ones. Arrays are framed.
+/// `I - C` of a 5-point system scaled to a diagonal of ones.
 #[derive(Debug)]
 pub(super) struct Scaled<'a, T: Number> {
     pub frame: &'a Frame,
-    /// `-C` between each pixel and its right neighbour.
-    pub right: Aligned<T>,
-    /// `-C` between each pixel and the one below.
-    pub below: Aligned<T>,
-    /// The diagonal that was scaled to one.
-    pub diagonal: Aligned<T>,
+    /// [`Ties`] of a row of zeros, and of every row.
+    ties: Aligned<T>,
+}
+
+impl<'a, T: Number> Scaled<'a, T> {
+    /// No ties.
+    pub fn new(frame: &'a Frame) -> Self {
+        Self { frame, ties: Aligned::zeros((frame.height() + 1) * stride(frame) * TIES * LANES) }
+    }
 }
 
 /// What two iterations do: `r1 = r - a0 A p`, `p1 = r1 + b0 p`, `r2 = r1 - a1 A p1`, `p2 = r2 + b1 p1`.
@@ -64,69 +70,99 @@ pub(super) struct Products {
     pub u_w: f64,
 }
 
-/// The vectors of conjugate gradient, framed.
+/// The vectors of conjugate gradient.
 #[derive(Debug)]
 pub(super) struct Vectors<T: Number> {
-    pub x: Aligned<T>,
-    pub p: Aligned<T>,
-    pub r: Aligned<T>,
-    /// A p.
-    v: Aligned<T>,
-    /// A r.
-    u: Aligned<T>,
-    /// A A p.
-    w: Aligned<T>,
-    /// The edge of each band, row by row: r, v, u and w as they were before a sweep, and as they are after it.
+    /// [`Block`]s of each band: of its rows, and of [`BESIDE`] more on either side.
+    blocks: Aligned<T>,
+    /// [`Edge`]s of each band, row by row: as they were before a sweep, and as they are after it.
     edges: [Aligned<T>; 2],
-    /// Of each band.
-    beside: Vec<Beside<T>>,
 }
 
 impl<T: Number> Vectors<T> {
-    /// All zero. A sweep of no steps, p and r given, makes the products.
+    /// All zero.
     pub fn new(frame: &Frame) -> Self {
-        let [x, p, r, v, u, w] = std::array::from_fn(|_| frame.zeros());
-        let edges = std::array::from_fn(|_| Aligned::zeros(bands(frame) * EDGE * KEPT * frame.stride()));
-        let beside = (0..bands(frame)).map(|_| Beside::new(frame.width)).collect();
-        Self { x, p, r, v, u, w, edges, beside }
+        let edges = std::array::from_fn(|_| Aligned::zeros(bands(frame) * edge_length(frame)));
+        Self { blocks: Aligned::zeros(bands(frame) * band_length(frame)), edges }
     }
 
-    /// Rows of x, p, r and the three products, to start anew: p = r, all others zero. [`Self::keep_edges`] must follow.
-    pub fn rows_mut<'a>(&'a mut self, frame: &'a Frame) -> impl IndexedParallelIterator<Item = [&'a mut [T]; 6]> {
-        let Self { x, p, r, v, u, w, .. } = self;
-        let [x, p, r, v, u, w] = [x, p, r, v, u, w].map(|vector| frame.parts_mut(vector));
-        (x, p, r, v, u, w).into_par_iter().map(|(x, p, r, v, u, w)| [x, p, r, v, u, w])
+    /// Starts anew: `scale` gives right and lower ties, D and r of the part of a row from the first column of the mask to the last;
+    /// p = r, all others zero. A sweep of no steps makes the products.
+    pub fn begin(&mut self, system: &mut Scaled<'_, T>, scale: impl Fn(usize, [&mut [T]; 4]) + Sync) {
+        let Scaled { frame, ties } = system;
+        let stride = stride(frame);
+        let ties = ties[stride * TIES * LANES..].par_chunks_mut(band_rows(frame) * stride * TIES * LANES);
+        let bands =
+            self.blocks.par_chunks_mut(band_length(frame)).zip(self.edges[0].par_chunks_mut(edge_length(frame)));
+        bands.zip(ties).enumerate().for_each(|(band, ((blocks, edge), ties))| {
+            let blocks = blocks_mut(blocks);
+            let ties = ties.as_chunks_mut().0.as_chunks_mut::<TIES>().0;
+            let mut numbers: [Vec<T>; 4] = std::array::from_fn(|_| vec![T::default(); frame.width]);
+            for (row, ties) in ties.chunks_mut(stride).enumerate() {
+                let (start, (lo, hi)) = (band * band_rows(frame) + row, frame.reach(band * band_rows(frame) + row));
+                scale(start, numbers.each_mut().map(|numbers| &mut numbers[..hi - lo]));
+                let [right, below, diagonal, r] = numbers.each_ref().map(|numbers| numbers.as_chunks::<LANES>().0);
+                let (lo, hi) = (lo / LANES, hi / LANES);
+                let blocks = &mut blocks[(row + BESIDE) * stride..][lo..hi];
+                for (k, (block, ties)) in blocks.iter_mut().zip(&mut ties[lo..hi]).enumerate() {
+                    *block = [[T::default(); LANES]; VECTORS];
+                    (block[R], block[P]) = (r[k], r[k]);
+                    (ties[RIGHT], ties[BELOW], ties[DIAGONAL]) = (right[k], below[k], diagonal[k]);
+                }
+            }
+            keep_edge(frame, band, blocks, edge);
+        });
     }
 
-    /// Keeps what a first sweep needs of the rows, and forgets the last one.
-    pub fn keep_edges(&mut self, frame: &Frame) {
-        let Self { r, v, u, w, edges: [edges, _], beside, .. } = self;
-        beside.iter_mut().for_each(Beside::clear);
-        let [r, v, u, w] =
-            [r, v, u, w].map(|vector| vector[frame.start(0)..].par_chunks(band_rows(frame) * frame.stride()));
-        let edges = edges.par_chunks_mut(EDGE * KEPT * frame.stride()).enumerate();
-        edges.zip((r, v, u, w)).for_each(|((band, edge), (r, v, u, w))| keep_edge(frame, band, [r, v, u, w], edge));
+    /// `x + ahead p` in a row, from the first column of the mask to the last.
+    pub fn x_ahead(&self, frame: &Frame, row: usize, ahead: T) -> impl Iterator<Item = T> {
+        let (band, (lo, hi)) = (row / band_rows(frame), frame.reach(row));
+        let blocks = blocks(&self.blocks[band * band_length(frame)..][..band_length(frame)]);
+        let blocks = &blocks[(row % band_rows(frame) + BESIDE) * stride(frame)..][lo / LANES..hi / LANES];
+        blocks.iter().flat_map(move |block| block[X].iter().zip(&block[P]).map(move |(&x, &p)| x + ahead * p))
     }
 }
 
-/// Copies the edge of a band from its rows of r, v, u and w.
-fn keep_edge<T: Copy>(frame: &Frame, band: usize, vectors: [&[T]; KEPT], edge: &mut [T]) {
-    let (most, stride) = (band_rows(frame), frame.stride());
-    let start = band * most;
-    let rows = most.min(frame.height() - start);
-    for (row, kept) in [0, 1, most - 2, most - 1].into_iter().zip(edge.chunks_mut(KEPT * stride)) {
-        if row < rows {
-            let (lo, hi) = frame.reach(start + row);
-            for (vector, kept) in vectors.iter().zip(kept.chunks_mut(stride)) {
-                kept[lo..hi].copy_from_slice(&vector[row * stride..][lo..hi]);
+/// Numbers as blocks.
+fn blocks<T>(numbers: &[T]) -> &[Block<T>] {
+    numbers.as_chunks().0.as_chunks().0
+}
+
+fn blocks_mut<T>(numbers: &mut [T]) -> &mut [Block<T>] {
+    numbers.as_chunks_mut().0.as_chunks_mut().0
+}
+
+/// Copies the edge of a band from its blocks.
+fn keep_edge<T: Copy>(frame: &Frame, band: usize, blocks: &[Block<T>], edge: &mut [T]) {
+    let (most, stride) = (band_rows(frame), stride(frame));
+    let edge: &mut [Edge<T>] = edge.as_chunks_mut().0.as_chunks_mut().0;
+    for (row, kept) in [0, 1, most - 2, most - 1].into_iter().zip(edge.chunks_mut(stride)) {
+        for &(lo, hi) in frame.spans((band * most + row) as isize) {
+            for (block, kept) in blocks[(row + BESIDE) * stride..][lo..hi].iter().zip(&mut kept[lo..hi]) {
+                kept.copy_from_slice(&block[R..]);
             }
         }
     }
 }
 
+/// Blocks from a pixel to the one below: those of a row, and one of zeros.
+fn stride(frame: &Frame) -> usize {
+    frame.width / LANES + 1
+}
+
+/// Numbers of a band's blocks.
+fn band_length(frame: &Frame) -> usize {
+    (band_rows(frame) + 2 * BESIDE) * stride(frame) * VECTORS * LANES
+}
+
+/// Numbers of a band's edges.
+fn edge_length(frame: &Frame) -> usize {
+    EDGE * stride(frame) * KEPT * LANES
+}
+
 /// Rows of a band, so that their number is even: two threads then have as many each. The neighbours of a band need two.
 fn band_rows(frame: &Frame) -> usize {
-    frame.height().div_ceil(2 * frame.height().div_ceil(2 * MAX_BAND)).max(EDGE / 2)
+    frame.height().div_ceil(2 * frame.height().div_ceil(2 * MAX_BAND)).max(BESIDE)
 }
 
 fn bands(frame: &Frame) -> usize {
@@ -136,16 +172,14 @@ fn bands(frame: &Frame) -> usize {
 /// Takes two iterations and returns the products of the vectors after them, summed in an order without threads.
 pub(super) fn sweep<T: Number>(system: &Scaled<'_, T>, steps: Steps, vectors: &mut Vectors<T>) -> Products {
     let frame = system.frame;
-    let (chunk, first) = (band_rows(frame) * frame.stride(), frame.start(0));
-    let Vectors { x, p, r, v, u, w, edges: [before, after], beside } = vectors;
-    let [x, p, r, v, u, w] = [x, p, r, v, u, w].map(|vector| vector[first..].par_chunks_mut(chunk));
-    let edges = after.par_chunks_mut(EDGE * KEPT * frame.stride());
-    let sums: Vec<[f64; SUMS]> = (x, p, r, v, u, w, edges, beside)
-        .into_par_iter()
+    let Vectors { blocks, edges: [before, after] } = vectors;
+    let bands = blocks.par_chunks_mut(band_length(frame)).zip(after.par_chunks_mut(edge_length(frame)));
+    let sums: Vec<[f64; SUMS]> = bands
         .enumerate()
-        .map(|(band, (x, p, r, v, u, w, edge, beside))| {
-            let sums = sweep_band(system, steps, before, band, &mut Own { x, p, r, v, u, w }, beside);
-            keep_edge(frame, band, [r, v, u, w], edge);
+        .map(|(band, (blocks, edge))| {
+            let blocks = blocks_mut(blocks);
+            let sums = sweep_band(system, steps, before, band, blocks);
+            keep_edge(frame, band, blocks, edge);
             sums
         })
         .collect();
@@ -160,99 +194,94 @@ pub(super) fn sweep<T: Number>(system: &Scaled<'_, T>, steps: Steps, vectors: &m
     Products { r_r, p_v, r_v, v_v, r_d_r, r_d_v, v_d_v, r_u, u_v, u_u, v_w, w_w, u_w }
 }
 
-/// The rows of the vectors that a band owns.
-struct Own<'a, T> {
-    x: &'a mut [T],
-    p: &'a mut [T],
-    r: &'a mut [T],
-    v: &'a mut [T],
-    u: &'a mut [T],
-    w: &'a mut [T],
-}
-
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 fn sweep_band<T: Number>(
     system: &Scaled<'_, T>,
     steps: Steps,
     edges: &[T],
     band: usize,
-    own: &mut Own<'_, T>,
-    beside: &mut Beside<T>,
+    blocks: &mut [Block<T>],
 ) -> [f64; SUMS] {
-    on_vectors!(T, sweep_band_with::<T>(system, steps, edges, band, own, beside))
+    on_vectors!(T, sweep_band_with::<T>(system, steps, edges, band, blocks))
 }
 
 /// A row goes through three stages, each a row behind the one before, whose neighbours it needs: r after both iterations (and
-/// `A p1`, which waits in the row of v), then `A r` and `A p`, then `A A p`. Rows beside the band go through the first two in
-/// memory of their own.
+/// `A p1`, in the place of A p), then `A r` and `A p`, then `A A p`. Rows beside the band go through the first two as well.
 #[inline(always)]
 fn sweep_band_with<T: Number, V: Packed<Number = T>>(
     system: &Scaled<'_, T>,
     steps: Steps,
     edges: &[T],
     band: usize,
-    own: &mut Own<'_, T>,
-    beside: &mut Beside<T>,
+    blocks: &mut [Block<T>],
 ) -> [f64; SUMS] {
     let frame = system.frame;
-    let stride = frame.stride();
-    let rows = band_rows(frame);
-    let (start, end) = ((band * rows) as isize, ((band + 1) * rows).min(frame.height()) as isize);
+    let (stride, most) = (stride(frame), band_rows(frame));
+    let rows = most.min(frame.height() - band * most);
+    let edges: &[Edge<T>] = edges.as_chunks().0.as_chunks().0;
+    let ties: &[Ties<T>] = system.ties.as_chunks().0.as_chunks().0;
     let factors = Factors::<V>::new(steps);
     let mut lanes = [V::splat(T::default()); SUMS];
     let mut sums = [[0.0; LANES]; SUMS];
-    let is_own = |row: isize| (start..end).contains(&row);
-    let place = |row: isize, span: (usize, usize)| (row - start) as usize * stride + span.0;
-    for row in start - 2..end + 2 {
-        for &span in frame.spans(row) {
-            if is_own(row) {
-                let at = place(row, span);
-                let vectors = [&mut own.x[at..], &mut own.p[at..], &mut own.r[at..], &mut own.v[at..]];
-                advance(&factors, vectors, [&own.u[at..], &own.w[at..]], (span.1 - span.0) / V::WIDTH);
+    // A row of the band's blocks, as one of the image.
+    let spans = |row: usize| frame.spans((band * most + row) as isize - BESIDE as isize);
+    for front in 0..rows + 2 * BESIDE {
+        for &(lo, hi) in spans(front) {
+            let blocks = &mut blocks[front * stride..][lo..hi];
+            if front < BESIDE {
+                // The last rows of the band above.
+                advance_beside(&factors, &edges[(band * EDGE + front - BESIDE) * stride..][lo..hi], blocks);
+            } else if front >= rows + BESIDE {
+                // The first rows of the band below.
+                advance_beside(
+                    &factors,
+                    &edges[((band + 1) * EDGE + front - rows - BESIDE) * stride..][lo..hi],
+                    blocks,
+                );
             } else {
-                // Above are the last rows of the band before, below the first of the next one.
-                let edge = if row < start { row - start } else { EDGE as isize + row - end };
-                let first = (band * EDGE).wrapping_add_signed(edge) * KEPT;
-                let kept = |vector: usize| &edges[(first + vector) * stride..][span.0..span.1];
-                let outs = [beside.r.row_mut(row, span), beside.between.row_mut(row, span)];
-                step(&factors, [kept(0), kept(1), kept(2), kept(3)], outs);
+                advance(&factors, blocks);
             }
         }
-
-        let row = row - 1;
-        if row < start - 1 {
+        if front < BESIDE {
             continue;
         }
-        for &span in frame.spans(row) {
-            let wide = (span.0, span.1 + LANES);
-            let of_r = |row| if is_own(row) { &own.r[place(row, span)..] } else { beside.r.row(row, wide) };
-            let product = Stencil::new(system, [of_r(row - 1), of_r(row), of_r(row + 1)], row, span);
-            if is_own(row) {
-                let at = place(row, span);
-                multiply(&factors, product, [&mut own.u[at..], &mut own.v[at..]]);
-            } else {
-                multiply_beside(&factors, product, beside.between.row(row, span), beside.v.row_mut(row, span));
-            }
+        for &span in spans(front - 1) {
+            multiply(&factors, around(blocks, ties, stride, front - 1, band * most + front - 1, span));
         }
-
-        let row = row - 1;
-        if !is_own(row) {
+        if front < 2 * BESIDE {
             continue;
         }
-        for &span in frame.spans(row) {
-            let at = place(row, span);
-            let wide = (span.0, span.1 + LANES);
-            let of_v = |row| if is_own(row) { &own.v[place(row, span)..] } else { beside.v.row(row, wide) };
-            let product = Stencil::new(system, [of_v(row - 1), of_v(row), of_v(row + 1)], row, span);
-            let diagonal = &system.diagonal[frame.start(row as usize) + span.0..];
-            let vectors = [&own.r[at..], &own.p[at..], &own.u[at..], diagonal];
-            add_products(product, vectors, &mut own.w[at..], &mut lanes);
+        let row = front - 2;
+        for &span in spans(row) {
+            add_products(around(blocks, ties, stride, row, band * most + row, span), &mut lanes);
         }
-        if (row - start) as usize % FLUSH == FLUSH - 1 || row == end - 1 {
+        if (row - BESIDE) % FLUSH == FLUSH - 1 || row == rows + BESIDE - 1 {
             flush(&mut lanes, &mut sums);
         }
     }
     sums.map(|lanes| lanes.iter().sum())
+}
+
+/// Part of a row of a band, which is row `at` of the image and [`BESIDE`], with its neighbours and ties.
+#[inline(always)]
+fn around<'a, T>(
+    blocks: &'a mut [Block<T>],
+    ties: &'a [Ties<T>],
+    stride: usize,
+    row: usize,
+    at: usize,
+    (lo, hi): (usize, usize),
+) -> Around<'a, T> {
+    let (above, here) = blocks.split_at_mut(row * stride);
+    let (here, below) = here.split_at_mut(stride);
+    Around {
+        above: &above[(row - 1) * stride..][lo..hi],
+        here: &mut here[lo..=hi],
+        below: &below[lo..hi],
+        // The first row of ties is the one above the image.
+        ties_above: &ties[(at - BESIDE) * stride..][lo..hi],
+        ties: &ties[(at - BESIDE + 1) * stride..][lo..hi],
+    }
 }
 
 #[cfg(test)]
@@ -264,25 +293,31 @@ mod tests {
         ((seed * 2_654_435_761) >> 7) as f64 % 1000.0 / 1000.0
     }
 
-    /// Ties below a fifth on all edges between pixels of a frame.
+    /// Ties below a fifth on all edges between pixels of a frame, and any vectors.
     fn tied<T: Number>(frame: &Frame) -> (Scaled<'_, T>, Vectors<T>) {
-        let used = |row: isize, col: usize| frame.spans(row).iter().any(|span| (span.0..span.1).contains(&col));
-        let mut system = Scaled { frame, right: frame.zeros(), below: frame.zeros(), diagonal: frame.zeros() };
-        let mut vectors = Vectors::new(frame);
+        let used =
+            |row: isize, col: usize| frame.spans(row).iter().any(|&(lo, hi)| (lo * LANES..hi * LANES).contains(&col));
+        let (mut system, mut vectors) = (Scaled::new(frame), Vectors::new(frame));
+        let (stride, most) = (stride(frame), band_rows(frame));
         for row in 0..frame.height() {
             for col in (0..frame.width).filter(|&col| used(row as isize, col)) {
-                let at = frame.start(row) + col;
-                system.right[at] = T::of(if used(row as isize, col + 1) { -0.2 * number(at) } else { 0.0 });
-                system.below[at] = T::of(if used(row as isize + 1, col) { -0.2 * number(at + 7) } else { 0.0 });
-                system.diagonal[at] = T::of(1.0 + number(at + 3));
-                for (shift, vector) in
-                    [&mut vectors.x, &mut vectors.p, &mut vectors.r, &mut vectors.v, &mut vectors.u, &mut vectors.w]
-                        .into_iter()
-                        .enumerate()
-                {
-                    vector[at] = T::of(number(at * 6 + shift) - 0.5);
+                let seed = row * frame.width + col;
+                let ties: &mut [Ties<T>] = system.ties.as_chunks_mut().0.as_chunks_mut().0;
+                let ties = &mut ties[(row + 1) * stride + col / LANES];
+                let tie = |other: bool, seed: usize| T::of(if other { -0.2 * number(seed) } else { 0.0 });
+                ties[RIGHT][col % LANES] = tie(used(row as isize, col + 1), seed);
+                ties[BELOW][col % LANES] = tie(used(row as isize + 1, col), seed + 7);
+                ties[DIAGONAL][col % LANES] = T::of(1.0 + number(seed + 3));
+                let band = &mut vectors.blocks[row / most * band_length(frame)..];
+                let block = &mut blocks_mut(band)[(row % most + BESIDE) * stride + col / LANES];
+                for (vector, lanes) in block.iter_mut().enumerate() {
+                    lanes[col % LANES] = T::of(number(seed * VECTORS + vector) - 0.5);
                 }
             }
+        }
+        for band in 0..bands(frame) {
+            let blocks = blocks(&vectors.blocks[band * band_length(frame)..]);
+            keep_edge(frame, band, blocks, &mut vectors.edges[0][band * edge_length(frame)..][..edge_length(frame)]);
         }
         (system, vectors)
     }
@@ -291,24 +326,18 @@ mod tests {
     fn swept<T: Number>(
         frame: &Frame,
         steps: Steps,
-        band: impl Fn(&Scaled<'_, T>, Steps, &[T], usize, &mut Own<'_, T>, &mut Beside<T>) -> [f64; SUMS],
+        band: impl Fn(&Scaled<'_, T>, Steps, &[T], usize, &mut [Block<T>]) -> [f64; SUMS],
     ) -> (Vec<f64>, Vec<f64>) {
         let (system, mut vectors) = tied::<T>(frame);
-        vectors.keep_edges(frame);
-        let Vectors { x, p, r, v, u, w, edges: [edges, _], beside } = &mut vectors;
-        let chunk = band_rows(frame) * frame.stride();
-        let mut sums = Vec::new();
-        for index in 0..bands(frame) {
-            let from = frame.start(0) + index * chunk;
-            let [x, p, r, v, u, w] = [&mut *x, p, r, v, u, w].map(|vector| {
-                let end = (from + chunk).min(vector.len());
-                &mut vector[from..end]
-            });
-            let mut own = Own { x, p, r, v, u, w };
-            sums.extend(band(&system, steps, edges, index, &mut own, &mut beside[index]));
+        let [edges, _] = &vectors.edges;
+        let (mut numbers, mut sums) = (Vec::new(), Vec::new());
+        for (index, all) in vectors.blocks.chunks_mut(band_length(frame)).enumerate() {
+            sums.extend(band(&system, steps, edges, index, blocks_mut(all)));
+            let beside = BESIDE * stride(frame);
+            let own = &blocks(all)[beside..][..band_rows(frame) * stride(frame)];
+            numbers.extend(own.as_flattened().as_flattened().iter().map(|number| number.to_f64()));
         }
-        let all = [&*x, p, r, v, u, w].into_iter().flat_map(|vector| vector.iter().map(|number| number.to_f64()));
-        (all.collect(), sums)
+        (numbers, sums)
     }
 
     fn assert_near(a: &[f64], b: &[f64], rounding: f64) {
