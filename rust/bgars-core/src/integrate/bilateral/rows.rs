@@ -141,17 +141,16 @@ impl<T> Around<'_, T> {
     }
 }
 
-/// A vector on its way along a row, and the tie to the right, of the pixels before; the vector at the pixels to come.
+/// What the pixels before give to those on their right, and the vector at the pixels to come.
 struct Walk<V> {
-    before: [V; 2],
+    before: V,
     here: V,
 }
 
 impl<T: Number, V: Packed<Number = T>> Walk<V> {
     #[inline(always)]
     fn new(first: &[T; LANES]) -> Self {
-        let zero = V::splat(T::default());
-        Self { before: [zero, zero], here: read(first, 0) }
+        Self { before: V::splat(T::default()), here: read(first, 0) }
     }
 
     /// Vector `OF` at part `part` of block k, and its product with the system.
@@ -160,11 +159,12 @@ impl<T: Number, V: Packed<Number = T>> Walk<V> {
         let is_last = part + 1 == LANES / V::WIDTH;
         let next = if is_last { read(&row.here[k + 1][OF], 0) } else { read(&row.here[k][OF], part + 1) };
         let (here, tie) = (self.here, read::<T, V>(&row.ties[k][RIGHT], part));
-        let mut product = tie.after_last_of(self.before[1]).times_plus(here.after_last_of(self.before[0]), here);
+        let given = tie * here;
+        let mut product = here + given.after_last_of(self.before);
         product = tie.times_plus(here.before_first_of(next), product);
         product = read::<T, V>(&row.ties_above[k][BELOW], part).times_plus(read(&row.above[k][OF], part), product);
         product = read::<T, V>(&row.ties[k][BELOW], part).times_plus(read(&row.below[k][OF], part), product);
-        self.before = [here, tie];
+        self.before = given;
         self.here = next;
         [here, product]
     }
