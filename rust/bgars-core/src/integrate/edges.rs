@@ -93,6 +93,7 @@ fn diverge([above, along, below]: [&[f64]; 3], divergence: &mut [f64]) {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp)]
 mod tests {
     use super::super::checkerboard::{DOWN, LEFT, RIGHT, UP};
     use super::*;

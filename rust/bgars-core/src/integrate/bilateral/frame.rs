@@ -1,5 +1,7 @@
 //! Rows of the box in a frame of zeros, and the part of each row that the mask reaches.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::number::Number;
@@ -61,13 +63,9 @@ impl Frame {
         LANES + (row + 1) * self.stride()
     }
 
-    /// The part of each row of a framed array from the first column of the mask to the last.
-    pub fn parts_mut<'a, T: Send>(&'a self, framed: &'a mut [T]) -> impl IndexedParallelIterator<Item = &'a mut [T]> {
-        let rows = framed[self.start(0)..].par_chunks_mut(self.stride()).take(self.height());
-        rows.enumerate().map(|(row, numbers)| {
-            let (lo, hi) = self.reach(row);
-            &mut numbers[lo..hi]
-        })
+    /// The rows of a framed array.
+    pub fn rows_mut<'a, T: Send>(&self, framed: &'a mut [T]) -> impl IndexedParallelIterator<Item = &'a mut [T]> {
+        framed[self.start(0)..].par_chunks_mut(self.stride()).take(self.height())
     }
 
     /// A framed array of zeros.
@@ -75,15 +73,9 @@ impl Frame {
         Aligned::zeros(self.len())
     }
 
-    /// The first and last (exclusive) column of the mask in a row; both 0 without one.
-    pub fn reach(&self, row: usize) -> (usize, usize) {
-        let spans = self.spans(row as isize);
-        (spans.first().map_or(0, |first| first.0 * LANES), spans.last().map_or(0, |last| last.1 * LANES))
-    }
-
-    /// Where the mask's part of a row starts in a framed array.
-    pub fn first(&self, row: usize) -> usize {
-        self.start(row) + self.reach(row).0
+    /// [`Self::spans`] in columns; they may end beyond the width that the mask had.
+    pub fn columns(&self, row: usize) -> impl Iterator<Item = Range<usize>> {
+        self.spans(row as isize).iter().map(|&(lo, hi)| lo * LANES..hi * LANES)
     }
 
     /// The columns of the mask in a row in whole [`LANES`], in parts from left to right; none in rows outside the box.

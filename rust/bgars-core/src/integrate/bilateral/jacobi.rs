@@ -89,10 +89,12 @@ impl<'a, T: Number> Jacobi<'a, T> {
             }
         };
         let frame = scaled.frame;
-        frame.parts_mut(z).enumerate().for_each(|(row, z)| {
-            let x = vectors.x_ahead(frame, row, T::of(ahead));
-            for ((z, x), root) in z.iter_mut().zip(x).zip(&roots[frame.first(row)..]) {
-                *z += x.to_f64() * root;
+        frame.rows_mut(z).enumerate().for_each(|(row, z)| {
+            for span in frame.columns(row) {
+                let x = vectors.x_ahead(frame, row, span.clone(), T::of(ahead));
+                for ((z, x), root) in z[span.clone()].iter_mut().zip(x).zip(&roots[frame.start(row) + span.start..]) {
+                    *z += x.to_f64() * root;
+                }
             }
         });
         (iterations, norm, end)
@@ -102,11 +104,12 @@ impl<'a, T: Number> Jacobi<'a, T> {
     fn begin(&mut self, system: &NormalEquations, z: &[f64]) {
         let Self { scaled, vectors, roots } = self;
         let frame = scaled.frame;
-        frame
-            .parts_mut(roots)
-            .enumerate()
-            .for_each(|(row, roots)| inverse_roots(&system.diagonal[frame.first(row)..], roots));
-        vectors.begin(scaled, |row, out| scale_row(system, roots, z, frame.first(row), frame.stride(), out));
+        frame.rows_mut(roots).enumerate().for_each(|(row, roots)| {
+            for span in frame.columns(row) {
+                inverse_roots(&system.diagonal[frame.start(row) + span.start..], &mut roots[span]);
+            }
+        });
+        vectors.begin(scaled, |at, out| scale_span(system, roots, z, at, frame.stride(), out));
     }
 }
 
@@ -118,10 +121,10 @@ fn inverse_roots(diagonal: &[f64], roots: &mut [f64]) {
     }
 }
 
-/// A row of `-C`, where `D^-1/2 A D^-1/2 = I - C`, to the right and below, of D, and of `D^-1/2 (b - A z)`; its first pixel lies
+/// Part of a row of `-C`, where `D^-1/2 A D^-1/2 = I - C`, to the right and below, of D, and of `D^-1/2 (b - A z)`; its first pixel lies
 /// `at`.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn scale_row<'a, T: Number>(
+fn scale_span<'a, T: Number>(
     system: &'a NormalEquations,
     roots: &'a [f64],
     z: &'a [f64],

@@ -42,15 +42,17 @@ impl NormalEquations {
                 edges.of_row(row, &mut weights[..width], &mut pushes[..width]);
             });
         }
-        let rows = (frame.parts_mut(diagonal), frame.parts_mut(source)).into_par_iter().enumerate();
+        let rows = (frame.rows_mut(diagonal), frame.rows_mut(source)).into_par_iter().enumerate();
         rows.for_each(|(row, (diagonal, source))| {
-            let at = frame.first(row);
-            add_up([right, below, push_right, push_below], at, stride, diagonal, source);
+            for span in frame.columns(row) {
+                let (at, edges) = (frame.start(row) + span.start, [&*right, below, push_right, push_below]);
+                add_up(edges.map(|edges| &edges[..]), at, stride, &mut diagonal[span.clone()], &mut source[span]);
+            }
         });
     }
 }
 
-/// Diagonal and right side of a row whose first pixel lies `at`, from weights and pushes to the right and below.
+/// Diagonal and right side of part of a row whose first pixel lies `at`, from weights and pushes to the right and below.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 fn add_up(edges: [&[f64]; 4], at: usize, stride: usize, diagonal: &mut [f64], source: &mut [f64]) {
     let count = diagonal.len();

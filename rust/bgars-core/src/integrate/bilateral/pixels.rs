@@ -51,8 +51,8 @@ pub(super) struct Pixels {
     /// 1 where a pixel is joined to its right neighbour, or to the one below, else 0.
     pub ties: [Aligned<f64>; 2],
     mask: Vec<bool>,
-    /// The columns of each row from the first to the last pixel of the mask.
-    spans: Vec<Range<usize>>,
+    /// Of the box.
+    pub frame: Frame,
 }
 
 impl Pixels {
@@ -94,12 +94,12 @@ impl Pixels {
                 mask[k] = true;
             }
         });
-        let spans = mask.chunks(width).map(span_of).collect();
+        let frame = Frame::new(&mask, width);
         let weights =
             (&*trust, &*g_x, &*g_y).into_par_iter().map(|(trust, g_x, g_y)| trust * (g_x * g_x).max(g_y * g_y));
         let unit = to_unit(weights.reduce(|| 0.0, f64::max));
         trust.par_iter_mut().for_each(|trust| *trust *= unit);
-        Self { crop, n: [n_x, n_y], g: [g_x, g_y], trust, unit, ties: [tied_right, tied_below], mask, spans }
+        Self { crop, n: [n_x, n_y], g: [g_x, g_y], trust, unit, ties: [tied_right, tied_below], mask, frame }
     }
 
     /// Pixels of the box.
@@ -107,14 +107,10 @@ impl Pixels {
         self.mask.len()
     }
 
-    /// The frame of the box.
-    pub fn frame(&self) -> Frame {
-        Frame::new(&self.mask, self.crop.grid.width)
-    }
-
-    /// The columns of a row that the mask reaches, from the first to the last.
-    pub fn span(&self, row: usize) -> Range<usize> {
-        self.spans[row].clone()
+    /// The columns of the mask in a row, in parts from left to right.
+    pub fn spans(&self, row: usize) -> impl Iterator<Item = Range<usize>> {
+        let width = self.crop.grid.width;
+        self.frame.columns(row).map(move |span| span.start..span.end.min(width))
     }
 
     /// True for a pixel of the mask.
@@ -140,13 +136,6 @@ impl Pixels {
     }
 }
 
-/// The columns of a row from its first pixel to its last; none without one.
-fn span_of(row: &[bool]) -> Range<usize> {
-    row.iter()
-        .position(|&used| used)
-        .map_or(0..0, |first| first..1 + row.iter().rposition(|&used| used).unwrap_or(first))
-}
-
 /// The edges along an axis: to the right (0), or to the pixel below (1).
 #[derive(Debug)]
 pub(super) struct Edges<'a> {
@@ -160,14 +149,18 @@ pub(super) struct Edges<'a> {
 
 impl Edges<'_> {
     /// Weights of a row's edges, and how much of the right side each pushes from its first pixel to its second; columns
-    /// outside the row's span, which have none, are left alone.
+    /// outside the row's spans, which have none, are left alone.
     pub fn of_row(&self, row: usize, weight: &mut [f64], push: &mut [f64]) {
         let Pixels { crop: Crop { grid, .. }, .. } = self.pixels;
         // Nothing ties a pixel to one that is not there: not the last row, nor the last column.
-        let span = if self.axis == 1 && row + 1 == grid.height { 0..0 } else { self.pixels.span(row) };
-        let span = span.start..span.end.min(if self.axis == 0 { grid.width - 1 } else { grid.width }).max(span.start);
-        let stride = if self.axis == 0 { 1 } else { grid.width };
-        edges_of(self, row * grid.width + span.start, stride, &mut weight[span.clone()], &mut push[span]);
+        if self.axis == 1 && row + 1 == grid.height {
+            return;
+        }
+        let (end, stride) = if self.axis == 0 { (grid.width - 1, 1) } else { (grid.width, grid.width) };
+        for span in self.pixels.spans(row) {
+            let span = span.start..span.end.min(end);
+            edges_of(self, row * grid.width + span.start, stride, &mut weight[span.clone()], &mut push[span]);
+        }
     }
 }
 

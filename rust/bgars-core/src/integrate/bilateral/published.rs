@@ -63,8 +63,9 @@ impl<'a> Published<'a> {
         let (first, stride, width) = (frame.start(0), frame.stride(), pixels.crop.grid.width);
         let rows = framed[first..].par_chunks_mut(stride).zip(z.par_chunks(width));
         rows.enumerate().for_each(|(row, (framed, z))| {
-            let span = pixels.span(row);
-            framed[span.clone()].copy_from_slice(&z[span]);
+            for span in pixels.spans(row) {
+                framed[span.clone()].copy_from_slice(&z[span]);
+            }
         });
         let mut stopped = false;
         let mut done = 0;
@@ -89,8 +90,9 @@ impl<'a> Published<'a> {
         }
         let rows = z.par_chunks_mut(width).zip(framed[first..].par_chunks(stride));
         rows.enumerate().for_each(|(row, (z, framed))| {
-            let span = pixels.span(row);
-            z[span.clone()].copy_from_slice(&framed[span]);
+            for span in pixels.spans(row) {
+                z[span.clone()].copy_from_slice(&framed[span]);
+            }
         });
         fit.residual = fit.residual.max(left / scale);
         Ok(())

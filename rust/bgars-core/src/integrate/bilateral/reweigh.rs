@@ -41,8 +41,11 @@ pub(super) fn reweigh(pixels: &Pixels, z: &[f64], k: f64, shares: &mut Shares) -
             let rows = rightward.chunks_mut(width).zip(upward.chunks_mut(width)).enumerate();
             rows.map(|(row, (rightward, upward))| {
                 let row = band * BAND_ROWS + row;
-                let span = pixels.span(row);
-                reweigh_row(pixels, z, row, k, &mut steps, [&mut rightward[span.clone()], &mut upward[span]])
+                let spans = pixels.spans(row).map(|span| {
+                    let shares = [&mut rightward[span.clone()], &mut upward[span.clone()]];
+                    reweigh_span(pixels, z, row * width + span.start, k, &mut steps, shares)
+                });
+                spans.sum::<f64>()
             })
             .sum()
         })
@@ -50,16 +53,11 @@ pub(super) fn reweigh(pixels: &Pixels, z: &[f64], k: f64, shares: &mut Shares) -
     energies.iter().sum::<f64>() / pixels.unit
 }
 
-/// Sets the shares of a row's span and returns their energy.
+/// Sets the shares of part of a row, from pixel `first` on, and returns their energy.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn reweigh_row(pixels: &Pixels, z: &[f64], row: usize, k: f64, steps: &mut Steps, shares: [&mut [f64]; 2]) -> f64 {
-    let span = pixels.span(row);
-    let (first, count) = (row * pixels.crop.grid.width + span.start, span.len());
-    if count == 0 {
-        return 0.0;
-    }
-    steps.load(pixels, z, first, count);
+fn reweigh_span(pixels: &Pixels, z: &[f64], first: usize, k: f64, steps: &mut Steps, shares: [&mut [f64]; 2]) -> f64 {
     let [rightward, upward] = shares;
+    steps.load(pixels, z, first, rightward.len());
     let right = Side { ahead: &steps.right[1..], behind: &steps.right, axis: 0 };
     let up = Side { ahead: &steps.up, behind: &steps.down, axis: 1 };
     row_of(pixels, first, &right, k, rightward) + row_of(pixels, first, &up, k, upward)

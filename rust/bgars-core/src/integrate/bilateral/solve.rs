@@ -71,8 +71,8 @@ pub fn integrate_bilateral(
     let Field { mask, width, .. } = field;
     check(field, camera, params)?;
     let pixels = Pixels::new(field, camera, params.setting);
-    let frame = (params.setting == Setting::Compatible).then(|| pixels.frame());
-    let mut published = frame.as_ref().map(|frame| Published::new(frame, params.precision));
+    let mut published =
+        (params.setting == Setting::Compatible).then(|| Published::new(&pixels.frame, params.precision));
     let mut z = Aligned::zeros(pixels.len());
     let mut shares = even(&pixels);
     let mut fit = Progressed::default();

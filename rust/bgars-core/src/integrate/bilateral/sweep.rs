@@ -6,6 +6,8 @@
 //! row, multiplies twice by A (`A p` follows from `A r`, as p from r), and at once takes the products that the next two
 //! iterations need. What each iteration does is otherwise that of the textbook, and so is where it ends.
 
+use std::ops::Range;
+
 use multiversion::{multiversion, target::target_cfg_f};
 use rayon::prelude::*;
 
@@ -13,8 +15,8 @@ use super::super::real::{Real, on_vectors};
 use super::frame::{Frame, LANES};
 use super::number::Number;
 use super::rows::{
-    Around, BELOW, Block, DIAGONAL, Edge, Factors, KEPT, P, R, RIGHT, SUMS, TIES, Ties, VECTORS, X, add_products,
-    advance, advance_beside, flush, multiply,
+    A_A_P, A_P, A_R, Around, BELOW, Block, DIAGONAL, Edge, Factors, KEPT, P, R, RIGHT, SUMS, TIES, Ties, VECTORS, X,
+    add_products, advance, advance_beside, flush, multiply,
 };
 use crate::memory::Aligned;
 use crate::vector::Packed;
@@ -86,8 +88,8 @@ impl<T: Number> Vectors<T> {
         Self { blocks: Aligned::zeros(bands(frame) * band_length(frame)), edges }
     }
 
-    /// Starts anew: `scale` gives right and lower ties, D and r of the part of a row from the first column of the mask to the last;
-    /// p = r, all others zero. A sweep of no steps makes the products.
+    /// Starts anew: `scale` gives right and lower ties, D and r of part of a row, from a place in framed arrays on; p = r, all
+    /// others zero. A sweep of no steps makes the products.
     pub fn begin(&mut self, system: &mut Scaled<'_, T>, scale: impl Fn(usize, [&mut [T]; 4]) + Sync) {
         let Scaled { frame, ties } = system;
         let stride = stride(frame);
@@ -99,26 +101,27 @@ impl<T: Number> Vectors<T> {
             let ties = ties.as_chunks_mut().0.as_chunks_mut::<TIES>().0;
             let mut numbers: [Vec<T>; 4] = std::array::from_fn(|_| vec![T::default(); frame.width]);
             for (row, ties) in ties.chunks_mut(stride).enumerate() {
-                let (start, (lo, hi)) = (band * band_rows(frame) + row, frame.reach(band * band_rows(frame) + row));
-                scale(start, numbers.each_mut().map(|numbers| &mut numbers[..hi - lo]));
-                let [right, below, diagonal, r] = numbers.each_ref().map(|numbers| numbers.as_chunks::<LANES>().0);
-                let (lo, hi) = (lo / LANES, hi / LANES);
-                let blocks = &mut blocks[(row + BESIDE) * stride..][lo..hi];
-                for (k, (block, ties)) in blocks.iter_mut().zip(&mut ties[lo..hi]).enumerate() {
-                    *block = [[T::default(); LANES]; VECTORS];
-                    (block[R], block[P]) = (r[k], r[k]);
-                    (ties[RIGHT], ties[BELOW], ties[DIAGONAL]) = (right[k], below[k], diagonal[k]);
+                let (blocks, at) = (&mut blocks[(row + BESIDE) * stride..], band * band_rows(frame) + row);
+                for &(lo, hi) in frame.spans(at as isize) {
+                    let parts = numbers.each_mut().map(|numbers| &mut numbers[..(hi - lo) * LANES]);
+                    scale(frame.start(at) + lo * LANES, parts);
+                    let [right, below, diagonal, r] = numbers.each_ref().map(|numbers| numbers.as_chunks::<LANES>().0);
+                    for (k, (block, ties)) in blocks[lo..hi].iter_mut().zip(&mut ties[lo..hi]).enumerate() {
+                        *block = [[T::default(); LANES]; VECTORS];
+                        (block[R], block[P]) = (r[k], r[k]);
+                        (ties[RIGHT], ties[BELOW], ties[DIAGONAL]) = (right[k], below[k], diagonal[k]);
+                    }
                 }
             }
             keep_edge(frame, band, blocks, edge);
         });
     }
 
-    /// `x + ahead p` in a row, from the first column of the mask to the last.
-    pub fn x_ahead(&self, frame: &Frame, row: usize, ahead: T) -> impl Iterator<Item = T> {
-        let (band, (lo, hi)) = (row / band_rows(frame), frame.reach(row));
-        let blocks = blocks(&self.blocks[band * band_length(frame)..][..band_length(frame)]);
-        let blocks = &blocks[(row % band_rows(frame) + BESIDE) * stride(frame)..][lo / LANES..hi / LANES];
+    /// `x + ahead p` in some columns of a row.
+    pub fn x_ahead(&self, frame: &Frame, row: usize, columns: Range<usize>, ahead: T) -> impl Iterator<Item = T> {
+        let blocks = blocks(&self.blocks[row / band_rows(frame) * band_length(frame)..]);
+        let blocks = &blocks[(row % band_rows(frame) + BESIDE) * stride(frame)..];
+        let blocks = &blocks[columns.start / LANES..columns.end / LANES];
         blocks.iter().flat_map(move |block| block[X].iter().zip(&block[P]).map(move |(&x, &p)| x + ahead * p))
     }
 }
@@ -139,7 +142,7 @@ fn keep_edge<T: Copy>(frame: &Frame, band: usize, blocks: &[Block<T>], edge: &mu
     for (row, kept) in [0, 1, most - 2, most - 1].into_iter().zip(edge.chunks_mut(stride)) {
         for &(lo, hi) in frame.spans((band * most + row) as isize) {
             for (block, kept) in blocks[(row + BESIDE) * stride..][lo..hi].iter().zip(&mut kept[lo..hi]) {
-                kept.copy_from_slice(&block[R..]);
+                *kept = [block[R], block[A_P], block[A_R], block[A_A_P]];
             }
         }
     }
