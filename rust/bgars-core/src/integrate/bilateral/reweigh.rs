@@ -123,18 +123,24 @@ fn row_of(pixels: &Pixels, first: usize, side: &Side<'_>, k: f64, share: &mut [f
         let (ahead, behind) = (ahead[i] * g[i], behind[i] * g[i]);
         share[i] = sigmoid(k * (behind * behind - ahead * ahead));
     }
-    let term = |i: usize| {
-        let (ahead, behind) = (ahead[i] * g[i] + n[i], behind[i] * g[i] + n[i]);
-        trust[i] * (share[i] * (ahead * ahead) + (1.0 - share[i]) * (behind * behind))
-    };
-    let whole = width - width % LANES;
+    let rows = [trust, share, ahead, behind, g, n];
     let mut lanes = [0.0; LANES];
-    for start in (0..whole).step_by(LANES) {
-        for (lane, sum) in lanes.iter_mut().enumerate() {
-            *sum += term(start + lane);
+    let [trust, share, ahead, behind, g, n] = rows.map(|row| row.as_chunks::<LANES>().0);
+    for i in 0..width / LANES {
+        for lane in 0..LANES {
+            let row = [trust, share, ahead, behind, g, n].map(|row| row[i][lane]);
+            lanes[lane] += term(row);
         }
     }
-    lanes.iter().sum::<f64>() + (whole..width).map(term).sum::<f64>()
+    let rest = (width - width % LANES..width).map(|i| term(rows.map(|row| row[i])));
+    lanes.iter().sum::<f64>() + rest.sum::<f64>()
+}
+
+/// Energy of a pixel along an axis.
+#[inline(always)]
+fn term([trust, share, ahead, behind, g, n]: [f64; 6]) -> f64 {
+    let (ahead, behind) = (ahead * g + n, behind * g + n);
+    trust * (share * (ahead * ahead) + (1.0 - share) * (behind * behind))
 }
 
 #[inline(always)]
