@@ -121,8 +121,8 @@ fn inverse_roots(diagonal: &[f64], roots: &mut [f64]) {
     }
 }
 
-/// Part of a row of `-C`, where `D^-1/2 A D^-1/2 = I - C`, to the right and below, of D, and of `D^-1/2 (b - A z)`; its first pixel lies
-/// `at`.
+/// Part of a row of `-C`, where `D^-1/2 A D^-1/2 = I - C`, to the right and below, of D, and of `D^-1/2 (b - A z)`; its first
+/// pixel lies `at`.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 fn scale_span<'a, T: Number>(
     system: &'a NormalEquations,
