@@ -26,10 +26,13 @@ pub(super) trait Real:
 
     /// Exactly as `f64`.
     fn to_f64(self) -> f64;
+
+    /// Numbers as floats: as they are, or rounded into `memory`.
+    fn floats<'a>(numbers: &'a [Self], memory: &'a mut [f32]) -> &'a [f32];
 }
 
 macro_rules! real {
-    ($type:ty, $avx512:ident, $avx2:ident, $portable:ident) => {
+    ($type:ty, $avx512:ident, $avx2:ident, $portable:ident, |$numbers:ident, $memory:ident| $floats:expr) => {
         impl Real for $type {
             #[cfg(target_arch = "x86_64")]
             type Avx512 = crate::vector::$avx512;
@@ -48,11 +51,22 @@ macro_rules! real {
             fn to_f64(self) -> f64 {
                 f64::from(self)
             }
+
+            #[inline(always)]
+            fn floats<'a>($numbers: &'a [Self], $memory: &'a mut [f32]) -> &'a [f32] {
+                $floats
+            }
         }
     };
 }
-real!(f32, Avx512, Avx2, Portable);
-real!(f64, Avx512Double, Avx2Double, PortableDouble);
+real!(f32, Avx512, Avx2, Portable, |numbers, _memory| numbers);
+real!(f64, Avx512Double, Avx2Double, PortableDouble, |numbers, memory| {
+    let memory = &mut memory[..numbers.len()];
+    for (float, number) in memory.iter_mut().zip(numbers) {
+        *float = *number as f32;
+    }
+    memory
+});
 
 /// Calls `function::<.., V>(..)` with the vectors `V` of a type of numbers that the enclosing function is compiled for; where a
 /// grid comes first, with single numbers if its rows are too short for any.

@@ -15,92 +15,43 @@ mod restrict;
 pub(super) use prolong::prolong;
 pub(super) use restrict::restrict;
 
-use super::checkerboard::{PaddedRow, Weights};
-use super::real::Real;
+use super::checkerboard::{DOWN, LEFT, RIGHT, UP, Weights};
 use super::ring::Ring;
 use super::spans::Span;
+use super::stencil::Sides;
 use crate::vector::Packed;
-
-/// Sums of the weights that tie a row's blacks to corners: left and right in even rows, up and down in odd ones.
-#[inline(always)]
-fn black_ties<V: Packed<Number = f32>>(weights: &Weights, row: isize, span: Span, out: &mut [f32]) {
-    if !weights.grid.contains(row) {
-        return;
-    }
-    let (first, second) = corner_ties::<V>(weights, row, span);
-    let out = V::chunks_mut(&mut out[span.start..], first.len());
-    for k in 0..first.len() {
-        (V::read(&first[k]).magnitude() + V::read(&second[k]).magnitude()).put(&mut out[k]);
-    }
-}
 
 /// The weights between a row's blacks and their corners: left and right in even rows, above and below in odd ones.
 #[inline(always)]
-fn corner_ties<V: Packed<Number = f32>>(weights: &Weights, row: isize, span: Span) -> (&[V::Chunk], &[V::Chunk]) {
-    let (first, second) = if row.rem_euclid(2) == 0 {
-        (&weights.right(row)[1..], &weights.left(row)[2..])
-    } else {
-        (&weights.down(row - 1)[1..], &weights.up(row + 1)[1..])
-    };
-    let n = span.vectors::<V>();
-    (V::chunks(&first[span.start..], n), V::chunks(&second[span.start..], n))
+fn corner_ties<V: Packed<Number = f32>>(weights: &Weights, row: isize, span: Span) -> [&[V::Floats]; 2] {
+    let Sides([left, right, up, down]) = weights.blacks::<V>(row, span);
+    if row.rem_euclid(2) == 0 { [left, right] } else { [up, down] }
 }
 
-/// Divides by the weights that tie the centres of odd `row` to blacks that have a corner themselves.
-#[inline(always)]
-fn divide_by_centre_ties<V: Packed<Number = f32>>(
-    weights: &Weights,
-    row: isize,
-    span: Span,
-    ties: &Ring<f32>,
-    values: &mut [f32],
-) {
-    let n = span.vectors::<V>();
-    let [above, here, below] = ties.around(row);
-    let sides: [(PaddedRow<'_, f32>, PaddedRow<'_, f32>); 4] = [
-        (&weights.left(row)[1..], &here[1..]),
-        (&weights.right(row)[1..], &here[2..]),
-        (&weights.up(row)[1..], &above[1..]),
-        (&weights.down(row)[1..], &below[1..]),
-    ];
-    let [left, right, up, down] =
-        sides.map(|(weight, tie)| (V::chunks(&weight[span.start..], n), V::chunks(&tie[span.start..], n)));
-    let values = V::chunks_mut(&mut values[span.start..], n);
-    for k in 0..n {
-        let mut sum = V::read(&left.0[k]).where_positive(V::read(&left.1[k]));
-        for (weight, tie) in [right, up, down] {
-            sum = sum + V::read(&weight[k]).where_positive(V::read(&tie[k]));
+/// The weights that tie the centres of an odd row to blacks that have a corner themselves.
+struct CentreTies<'a, V: Packed> {
+    sides: [&'a [V::Floats]; 4],
+    /// Of the black on each side, to its corners.
+    ties: [&'a [V::Chunk]; 4],
+}
+
+impl<'a, V: Packed<Number = f32>> CentreTies<'a, V> {
+    #[inline(always)]
+    fn new(weights: &'a Weights, row: isize, span: Span, ties: &'a Ring<f32>) -> Self {
+        let (Sides(sides), n) = (weights.reds::<V>(row, span), span.vectors::<V>());
+        let [above, here, below] = ties.around(row);
+        let ties = [&here[1..], &here[2..], &above[1..], &below[1..]].map(|ties| V::chunks(&ties[span.start..], n));
+        Self { sides, ties }
+    }
+
+    /// One over their sum at vector `k`.
+    #[inline(always)]
+    fn inverse(&self, k: usize) -> V {
+        let mut sum = V::widen(&self.sides[LEFT][k]).where_positive(V::read(&self.ties[LEFT][k]));
+        for side in [RIGHT, UP, DOWN] {
+            sum = sum + V::widen(&self.sides[side][k]).where_positive(V::read(&self.ties[side][k]));
         }
-        (V::read(&values[k]) * sum.inverse()).put(&mut values[k]);
-    }
-}
-
-/// `D^-1 b` of a row. `rounded` takes b.
-#[inline(always)]
-fn smoothed_row<T: Real, V: Packed<Number = f32>>(
-    weights: &Weights,
-    b: &[T],
-    row: isize,
-    span: Span,
-    rounded: &mut [f32],
-    out: &mut [f32],
-) {
-    if !weights.grid.contains(row) {
-        return;
-    }
-    round(&b[row as usize * out.len()..][span.range()], rounded);
-    let sides = weights.reds::<V>(row, span);
-    let (b, out) = (V::chunks(rounded, sides.len()), V::chunks_mut(&mut out[span.start..], sides.len()));
-    for k in 0..sides.len() {
-        (V::read(&b[k]) * sides.diagonal(k).inverse()).put(&mut out[k]);
-    }
-}
-
-/// A part of a row as the first floats of `out`.
-#[inline(always)]
-fn round<T: Real>(part: &[T], out: &mut [f32]) {
-    for (out, value) in out.iter_mut().zip(part) {
-        *out = value.to_f32();
+        sum.inverse()
     }
 }
 

@@ -3,7 +3,7 @@
 use multiversion::{multiversion, target::target_cfg_f};
 use rayon::prelude::*;
 
-use super::{black_ties, corner_ties, divide_by_centre_ties, round, smoothed_row};
+use super::{CentreTies, corner_ties};
 use crate::integrate::checkerboard::{BAND_ROWS, Weights};
 use crate::integrate::real::{Real, on_vectors};
 use crate::integrate::reduction::{dot, solve_blacks};
@@ -34,7 +34,6 @@ pub(super) struct Prolonging {
     /// The coarse grid at the blacks.
     on_edges: Ring<f32>,
     corners: Ring<f32>,
-    centres: Vec<f32>,
     /// The right side of a row.
     rounded: Vec<f32>,
 }
@@ -42,8 +41,7 @@ pub(super) struct Prolonging {
 impl Prolonging {
     pub fn new(n: usize) -> Self {
         let [smooth, blacks, ties, on_edges, corners] = std::array::from_fn(|_| Ring::new(n));
-        let [centres, rounded] = std::array::from_fn(|_| vec![0.0; n]);
-        Self { smooth, blacks, ties, on_edges, corners, centres, rounded }
+        Self { smooth, blacks, ties, on_edges, corners, rounded: vec![0.0; n] }
     }
 }
 
@@ -81,10 +79,7 @@ pub(super) fn prolong_band_with<T: Real, V: Packed<Number = f32>>(
         if row < first - 2 {
             continue;
         }
-        smoothed_row::<T, V>(weights, b, row, span, &mut rows.rounded, rows.smooth.row_mut(row));
-        if grid.contains(row) {
-            add_coarse::<V>(weights, row, span, coarse, rows);
-        }
+        smooth_and_correct::<T, V>(weights, b, row, span, coarse, rows);
 
         let row = row - 1;
         if row < first - 1 {
@@ -98,9 +93,9 @@ pub(super) fn prolong_band_with<T: Real, V: Packed<Number = f32>>(
         }
         let values = &mut x[(row - first) as usize * n..][span.range()];
         let b = &b[row as usize * n..][span.range()];
-        round(b, &mut rows.rounded);
         let stencil = weights.red_stencil::<V>(row, span, rows.blacks.around(row));
-        let (rounded, out) = (V::chunks(&rows.rounded, stencil.len()), V::chunks_mut(values, stencil.len()));
+        let rounded = V::chunks(T::floats(b, &mut rows.rounded), stencil.len());
+        let out = V::chunks_mut(values, stencil.len());
         for k in 0..stencil.len() {
             ((V::read(&rounded[k]) + stencil.sum(k)) * stencil.diagonal(k).inverse()).put(&mut out[k]);
         }
@@ -128,52 +123,58 @@ fn corners_to_blacks<V: Packed<Number = f32>>(
         return;
     }
     let half = weights.grid.half();
-    black_ties::<V>(weights, row, span, rows.ties.row_mut(row));
+    let Prolonging { corners, ties, on_edges, .. } = rows;
     let (first, second) = if row % 2 == 0 {
         let beyond = (span.end + 1).min(half);
-        rows.corners.row_mut(row)[span.start..beyond]
-            .copy_from_slice(&corner_row(coarse, row, half)[span.start..beyond]);
-        (&rows.corners.row(row)[1..], &rows.corners.row(row)[2..])
+        corners.row_mut(row)[span.start..beyond].copy_from_slice(&corner_row(coarse, row, half)[span.start..beyond]);
+        (&corners.row(row)[1..], &corners.row(row)[2..])
     } else {
         let above = corner_row(coarse, row - 1, half);
         (above, if weights.grid.contains(row + 1) { corner_row(coarse, row + 1, half) } else { above })
     };
-    let (to_first, to_second) = corner_ties::<V>(weights, row, span);
+    let [to_first, to_second] = corner_ties::<V>(weights, row, span);
     let n = to_first.len();
     let (first, second) = (V::chunks(&first[span.start..], n), V::chunks(&second[span.start..], n));
-    let tie = V::chunks(&rows.ties.row(row)[1 + span.start..], n);
-    let out = V::chunks_mut(&mut rows.on_edges.row_mut(row)[span.start..], n);
+    let ties = V::chunks_mut(&mut ties.row_mut(row)[span.start..], n);
+    let out = V::chunks_mut(&mut on_edges.row_mut(row)[span.start..], n);
     for k in 0..n {
-        let from_second = V::read(&to_second[k]).magnitude() * V::read(&second[k]);
-        let sum = V::read(&to_first[k]).magnitude().times_plus(V::read(&first[k]), from_second);
-        (sum * V::read(&tie[k]).inverse()).put(&mut out[k]);
+        let (to_first, to_second) = (V::widen(&to_first[k]).magnitude(), V::widen(&to_second[k]).magnitude());
+        let sum = to_first.times_plus(V::read(&first[k]), to_second * V::read(&second[k]));
+        let tie = to_first + to_second;
+        tie.put(&mut ties[k]);
+        (sum * tie.inverse()).put(&mut out[k]);
     }
 }
 
-/// Adds the coarse grid to the reds of a row: itself at corners, from the blacks around them at centres.
+/// `D^-1 b` of a row, and the coarse grid: itself at corners, from the blacks around them at centres.
 #[inline(always)]
-fn add_coarse<V: Packed<Number = f32>>(
+fn smooth_and_correct<T: Real, V: Packed<Number = f32>>(
     weights: &Weights,
+    b: &[T],
     row: isize,
     span: Span,
     coarse: &[f32],
     rows: &mut Prolonging,
 ) {
-    let change = if row % 2 == 0 {
-        corner_row(coarse, row, weights.grid.half())
-    } else {
-        let stencil = weights.red_stencil::<V>(row, span, rows.on_edges.around(row));
-        let out = V::chunks_mut(&mut rows.centres[span.start..], stencil.len());
-        for k in 0..stencil.len() {
-            stencil.sum(k).put(&mut out[k]);
+    if !weights.grid.contains(row) {
+        return;
+    }
+    let (half, n) = (weights.grid.half(), span.vectors::<V>());
+    let Prolonging { smooth, ties, on_edges, rounded, .. } = rows;
+    let b = V::chunks(T::floats(&b[row as usize * half..][span.range()], rounded), n);
+    let out = V::chunks_mut(&mut smooth.row_mut(row)[span.start..], n);
+    if row % 2 == 0 {
+        let sides = weights.reds::<V>(row, span);
+        let corners = V::chunks(&corner_row(coarse, row, half)[span.start..], n);
+        for k in 0..n {
+            (V::read(&b[k]) * sides.diagonal(k).inverse() + V::read(&corners[k])).put(&mut out[k]);
         }
-        divide_by_centre_ties::<V>(weights, row, span, &rows.ties, &mut rows.centres);
-        &rows.centres
-    };
-    let n = span.vectors::<V>();
-    let change = V::chunks(&change[span.start..], n);
-    let out = V::chunks_mut(&mut rows.smooth.row_mut(row)[span.start..], n);
-    for k in 0..n {
-        (V::read(&out[k]) + V::read(&change[k])).put(&mut out[k]);
+    } else {
+        let stencil = weights.red_stencil::<V>(row, span, on_edges.around(row));
+        let ties = CentreTies::<V>::new(weights, row, span, ties);
+        for k in 0..n {
+            let centre = stencil.sum(k) * ties.inverse(k);
+            (V::read(&b[k]) * stencil.diagonal(k).inverse() + centre).put(&mut out[k]);
+        }
     }
 }

@@ -3,10 +3,9 @@
 use multiversion::{multiversion, target::target_cfg_f};
 use rayon::prelude::*;
 
-use super::{black_ties, divide_by_centre_ties, smoothed_row};
+use super::{CentreTies, corner_ties};
 use crate::integrate::checkerboard::{BAND_ROWS, PaddedRow, Weights, split_row};
 use crate::integrate::real::{Real, on_vectors};
-use crate::integrate::reduction::solve_blacks;
 use crate::integrate::ring::Ring;
 use crate::integrate::spans::Span;
 use crate::vector::Packed;
@@ -31,7 +30,7 @@ pub(in crate::integrate) fn restrict<T: Real>(
 pub(super) struct Restricting {
     smooth: Ring<f32>,
     blacks: Ring<f32>,
-    residual: Ring<f32>,
+    corners: Ring<f32>,
     centres: Ring<f32>,
     vertical: Ring<f32>,
     horizontal: Ring<f32>,
@@ -43,9 +42,9 @@ pub(super) struct Restricting {
 
 impl Restricting {
     pub fn new(n: usize) -> Self {
-        let [smooth, blacks, residual, centres, vertical, horizontal, ties] = std::array::from_fn(|_| Ring::new(n));
+        let [smooth, blacks, corners, centres, vertical, horizontal, ties] = std::array::from_fn(|_| Ring::new(n));
         let [rounded, coarse] = std::array::from_fn(|_| vec![0.0; n]);
-        Self { smooth, blacks, residual, centres, vertical, horizontal, ties, rounded, coarse }
+        Self { smooth, blacks, corners, centres, vertical, horizontal, ties, rounded, coarse }
     }
 }
 
@@ -74,27 +73,19 @@ pub(super) fn restrict_band_with<T: Real, V: Packed<Number = f32>>(
     let coarse_rows = coarse_reds.len() / coarse_half;
     let end = first + 2 * coarse_rows as isize;
     for row in first - 3..=end + 1 {
-        smoothed_row::<T, V>(weights, b, row, span, &mut rows.rounded, rows.smooth.row_mut(row));
+        smooth::<T, V>(weights, b, row, span, rows);
 
         let row = row - 1;
         if row < first - 2 {
             continue;
         }
-        solve_blacks::<V>(weights, row, span, &rows.smooth, &mut rows.blacks);
-        black_ties::<V>(weights, row, span, rows.ties.row_mut(row));
+        solve_and_tie_blacks::<V>(weights, row, span, rows);
 
-        // The residual: D - N applied to D^-1 b leaves N D^-1 b.
         let row = row - 1;
         if row < first - 1 {
             continue;
         }
-        if grid.contains(row) {
-            let stencil = weights.red_stencil::<V>(row, span, rows.blacks.around(row));
-            let out = V::chunks_mut(&mut rows.residual.row_mut(row)[span.start..], stencil.len());
-            for k in 0..stencil.len() {
-                stencil.sum(k).put(&mut out[k]);
-            }
-        }
+        leave_residual::<V>(weights, row, span, rows);
         if row.rem_euclid(2) == 0 {
             continue;
         }
@@ -113,6 +104,65 @@ pub(super) fn restrict_band_with<T: Real, V: Packed<Number = f32>>(
     }
 }
 
+/// `D^-1 b` of a row.
+#[inline(always)]
+fn smooth<T: Real, V: Packed<Number = f32>>(
+    weights: &Weights,
+    b: &[T],
+    row: isize,
+    span: Span,
+    rows: &mut Restricting,
+) {
+    if !weights.grid.contains(row) {
+        return;
+    }
+    let b = T::floats(&b[row as usize * weights.grid.half()..][span.range()], &mut rows.rounded);
+    let sides = weights.reds::<V>(row, span);
+    let (b, out) = (V::chunks(b, sides.len()), V::chunks_mut(&mut rows.smooth.row_mut(row)[span.start..], sides.len()));
+    for k in 0..sides.len() {
+        (V::read(&b[k]) * sides.diagonal(k).inverse()).put(&mut out[k]);
+    }
+}
+
+/// `D_black^-1 W^T` of the smoothed reds of a row, and what ties its blacks to corners.
+#[inline(always)]
+fn solve_and_tie_blacks<V: Packed<Number = f32>>(weights: &Weights, row: isize, span: Span, rows: &mut Restricting) {
+    if !weights.grid.contains(row) {
+        return;
+    }
+    let Restricting { smooth, blacks, ties, .. } = rows;
+    let stencil = weights.black_stencil::<V>(row, span, smooth.around(row));
+    let [first, second] = corner_ties::<V>(weights, row, span);
+    let blacks = V::chunks_mut(&mut blacks.row_mut(row)[span.start..], stencil.len());
+    let ties = V::chunks_mut(&mut ties.row_mut(row)[span.start..], stencil.len());
+    for k in 0..stencil.len() {
+        (stencil.sum(k) * stencil.diagonal(k).inverse()).put(&mut blacks[k]);
+        (V::widen(&first[k]).magnitude() + V::widen(&second[k]).magnitude()).put(&mut ties[k]);
+    }
+}
+
+/// The residual of a row: `D - N` applied to `D^-1 b` leaves `N D^-1 b`. At centres, over their ties.
+#[inline(always)]
+fn leave_residual<V: Packed<Number = f32>>(weights: &Weights, row: isize, span: Span, rows: &mut Restricting) {
+    if !weights.grid.contains(row) {
+        return;
+    }
+    let Restricting { blacks, ties, corners, centres, .. } = rows;
+    let stencil = weights.red_stencil::<V>(row, span, blacks.around(row));
+    if row % 2 == 0 {
+        let out = V::chunks_mut(&mut corners.row_mut(row)[span.start..], stencil.len());
+        for k in 0..stencil.len() {
+            stencil.sum(k).put(&mut out[k]);
+        }
+    } else {
+        let ties = CentreTies::<V>::new(weights, row, span, ties);
+        let out = V::chunks_mut(&mut centres.row_mut(row)[span.start..], stencil.len());
+        for k in 0..stencil.len() {
+            (stencil.sum(k) * ties.inverse(k)).put(&mut out[k]);
+        }
+    }
+}
+
 /// The centres of an odd row to the blacks beside them.
 #[inline(always)]
 fn centres_to_blacks<V: Packed<Number = f32>>(weights: &Weights, row: isize, span: Span, rows: &mut Restricting) {
@@ -120,8 +170,6 @@ fn centres_to_blacks<V: Packed<Number = f32>>(weights: &Weights, row: isize, spa
         return;
     }
     let (start, n) = (span.start, span.vectors::<V>());
-    rows.centres.row_mut(row)[span.range()].copy_from_slice(&rows.residual.row(row)[1..][span.range()]);
-    divide_by_centre_ties::<V>(weights, row, span, &rows.ties, rows.centres.row_mut(row));
     let here = &rows.centres.row(row)[start..];
     let (before, after) = (V::chunks(here, n), V::chunks(&here[1..], n));
     let (right, left) = (V::chunks(&weights.right(row)[start..], n), V::chunks(&weights.left(row)[1 + start..], n));
@@ -154,7 +202,7 @@ fn blacks_to_corners<V: Packed<Number = f32>>(weights: &Weights, row: isize, spa
         (&weights.down(row)[1..], &below[1..]),
     ];
     let sides = sides.map(|(weight, value)| (V::chunks(&weight[span.start..], n), V::chunks(&value[span.start..], n)));
-    let corner = V::chunks(&rows.residual.row(row)[first..], n);
+    let corner = V::chunks(&rows.corners.row(row)[first..], n);
     let coarse = V::chunks_mut(&mut rows.coarse[span.start..], n);
     for k in 0..n {
         let mut sum = V::read(&corner[k]);
