@@ -226,7 +226,7 @@ fn sweep_band_with<T: Number, V: Packed<Number = T>>(
     let factors = Factors::<V>::new(steps);
     let mut lanes = [V::splat(T::default()); SUMS];
     let mut sums = [[0.0; LANES]; SUMS];
-    // A row of the band's blocks, as one of the image.
+    // Rows are those of the band's blocks: the first of the image's is `BESIDE` further down.
     let spans = |row: usize| frame.spans((band * most + row) as isize - BESIDE as isize);
     for front in 0..rows + 2 * BESIDE {
         for &(lo, hi) in spans(front) {
@@ -265,7 +265,7 @@ fn sweep_band_with<T: Number, V: Packed<Number = T>>(
     sums.map(|lanes| lanes.iter().sum())
 }
 
-/// Part of a row of a band, which is row `at` of the image and [`BESIDE`], with its neighbours and ties.
+/// Part of a row of a band's blocks with its neighbours and ties; `at` counts that row from [`BESIDE`] above the image.
 #[inline(always)]
 fn around<'a, T>(
     blocks: &'a mut [Block<T>],
