@@ -74,10 +74,10 @@ macro_rules! on_vectors {
     ($number:ty, $function:ident $(::<$generic:ty>)? ($($argument:expr),* $(,)?)) => {{
         #[cfg(target_arch = "x86_64")]
         {
-            if target_cfg_f!(target_feature = "avx512f") {
+            if multiversion::target::target_cfg_f!(target_feature = "avx512f") {
                 return $function::<$($generic,)? <$number as Real>::Avx512>($($argument),*);
             }
-            if target_cfg_f!(target_feature = "avx2") {
+            if multiversion::target::target_cfg_f!(target_feature = "avx2") {
                 return $function::<$($generic,)? <$number as Real>::Avx2>($($argument),*);
             }
         }

@@ -1,6 +1,6 @@
 //! The blacks eliminated: `S = D_red - W D_black^-1 W^T` acts on the reds alone, and half the pixels are gone exactly.
 
-use multiversion::{multiversion, target::target_cfg_f};
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::checkerboard::{BAND_ROWS, Grid, Weights};

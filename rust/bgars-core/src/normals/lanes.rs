@@ -5,7 +5,7 @@
 use std::ops::Range;
 
 use bytemuck::NoUninit;
-use multiversion::{multiversion, target::target_cfg_f};
+use multiversion::multiversion;
 
 use super::cutoff::{LANES, Lanes};
 use super::finish::{Finished, Spare};
@@ -117,10 +117,10 @@ fn run_blocks<K: Pixel>(
 ) {
     #[cfg(target_arch = "x86_64")]
     {
-        if target_cfg_f!(target_feature = "avx512f") {
+        if multiversion::target::target_cfg_f!(target_feature = "avx512f") {
             return run_blocks_with::<K, Avx512>(solver, source, offsets, common, pixels, sink);
         }
-        if target_cfg_f!(target_feature = "avx2") {
+        if multiversion::target::target_cfg_f!(target_feature = "avx2") {
             return run_blocks_with::<K, Avx2>(solver, source, offsets, common, pixels, sink);
         }
     }

@@ -8,7 +8,7 @@
 
 use std::ops::Range;
 
-use multiversion::{multiversion, target::target_cfg_f};
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::super::real::{Real, on_vectors};

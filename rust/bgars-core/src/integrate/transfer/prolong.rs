@@ -1,6 +1,6 @@
 //! Up: the coarser grid's correction added, and smoothed.
 
-use multiversion::{multiversion, target::target_cfg_f};
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::{CentreTies, corner_ties};

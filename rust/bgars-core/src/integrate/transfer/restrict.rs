@@ -1,6 +1,6 @@
 //! Down: smoothed from zero, and what is left taken to the coarser grid.
 
-use multiversion::{multiversion, target::target_cfg_f};
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::{CentreTies, corner_ties};
