@@ -119,4 +119,86 @@ mod tests {
         assert_near(&fast, &portable);
         assert_near(&fast, &one);
     }
+
+    /// Rows of a matrix times a vector.
+    fn times(matrix: &[Vec<f64>], vector: &[f64]) -> Vec<f64> {
+        matrix.iter().map(|row| row.iter().zip(vector).map(|(a, b)| a * b).sum()).collect()
+    }
+
+    fn transposed(matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        (0..matrix[0].len()).map(|col| matrix.iter().map(|row| row[col]).collect()).collect()
+    }
+
+    fn inverse(value: f64) -> f64 {
+        if value > 0.0 { value.recip() } else { 0.0 }
+    }
+
+    /// Both halves by matrices that are written down: reds by blacks, and reds by corners.
+    #[test]
+    fn both_halves_are_those_of_plain_matrices() {
+        let grid = Grid { height: 9, width: 64 };
+        let (mut weights, n, reds) = (weights(grid), grid.half(), grid.half_pixels());
+        let mut edges = vec![vec![0.0; reds]; reds];
+        for row in 0..grid.height {
+            for k in 0..n {
+                let at = row as isize;
+                let sides = [weights.left(at), weights.right(at), weights.up(at), weights.down(at)];
+                let mut sides = sides.map(|side| side[k + 1]);
+                if row % 2 == 1 {
+                    // Virtual edges are tied to corners.
+                    sides = sides.map(|weight| weight.max(0.0));
+                    weights.set_red(row, k, sides);
+                }
+                let left = (row * n + k).wrapping_add_signed(row as isize % 2 - 1);
+                let ends = [left, left.wrapping_add(1), (row * n + k).wrapping_sub(n), row * n + k + n];
+                for (weight, end) in sides.into_iter().zip(ends).filter(|(weight, _)| *weight != 0.0) {
+                    edges[row * n + k][end] = f64::from(weight);
+                }
+            }
+        }
+        let real: Vec<Vec<f64>> = edges.iter().map(|row| row.iter().map(|weight| weight.max(0.0)).collect()).collect();
+        let scale = |matrix: &[Vec<f64>]| -> Vec<f64> { matrix.iter().map(|row| inverse(row.iter().sum())).collect() };
+        let (of_reds, of_blacks) = (scale(&real), scale(&transposed(&real)));
+        let by = |scale: &[f64], vector: &[f64]| -> Vec<f64> { scale.iter().zip(vector).map(|(a, b)| a * b).collect() };
+        let around = |x: &[f64]| times(&real, &by(&of_blacks, &times(&transposed(&real), x)));
+        let corners: Vec<usize> = (0..reds).filter(|red| red / n % 2 == 0).collect();
+        let to_corners = |black: usize| corners.iter().map(|&corner| edges[corner][black].abs()).collect::<Vec<_>>();
+        let on_blacks: Vec<Vec<f64>> = (0..reds)
+            .map(|black| {
+                let ties = to_corners(black);
+                let share = inverse(ties.iter().sum());
+                ties.iter().map(|tie| tie * share).collect()
+            })
+            .collect();
+        let interpolation: Vec<Vec<f64>> = (0..reds)
+            .map(|red| {
+                if red / n % 2 == 0 {
+                    return corners.iter().map(|&corner| f64::from(u8::from(corner == red))).collect();
+                }
+                let tied = |black: usize| on_blacks[black].iter().any(|share| *share > 0.0);
+                let share = inverse((0..reds).filter(|&black| tied(black)).map(|black| real[red][black]).sum());
+                times(&transposed(&on_blacks), &real[red]).iter().map(|sum| sum * share).collect()
+            })
+            .collect();
+        let single = |values: &[f64]| -> Vec<f32> { values.iter().map(|value| *value as f32).collect() };
+
+        let b: Vec<f64> = (0..reds).map(|place| f64::from(number(place)) - 0.5).collect();
+        let coarse: Vec<f64> = (0..corners.len()).map(|place| f64::from(number(place + 5)) - 0.5).collect();
+        let sum: Vec<f64> = by(&of_reds, &b).iter().zip(times(&interpolation, &coarse)).map(|(a, c)| a + c).collect();
+        let around_sum: Vec<f64> = b.iter().zip(around(&sum)).map(|(b, n)| b + n).collect();
+        let mut x = vec![0.0; reds];
+        prolong(&weights, &b, &single(&coarse), &mut x);
+        assert_near(&x, &single(&by(&of_reds, &around_sum)));
+
+        let expected = times(&transposed(&interpolation), &around(&by(&of_reds, &b)));
+        let half = grid.coarser().half();
+        let colours: [Vec<f32>; 2] = std::array::from_fn(|_| vec![0.0; grid.coarser().half_pixels()]);
+        let [mut reds, mut blacks] = colours;
+        restrict(&weights, &b, &mut reds, &mut blacks);
+        let found = (0..corners.len()).map(|at| (at / n, at % n)).map(|(row, k)| {
+            let colour = if (row + k) % 2 == 0 { &reds } else { &blacks };
+            colour[row * half + k / 2]
+        });
+        assert_near(&found.collect::<Vec<_>>(), &single(&expected));
+    }
 }
