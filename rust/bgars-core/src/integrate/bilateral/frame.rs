@@ -10,6 +10,11 @@ use crate::memory::Aligned;
 /// Numbers that a loop takes at a time.
 pub(super) const LANES: usize = 16;
 
+/// Most rows of a band on average.
+const MAX_BAND_ROWS: usize = 64;
+/// Fewest rows of a band that is not the only one: the next one needs as many of it.
+pub(super) const MIN_BAND_ROWS: usize = 2;
+
 /// Lanes without a pixel that are worth another loop over the rest of the row.
 const MIN_GAP: usize = 4;
 
@@ -78,12 +83,63 @@ impl Frame {
         self.spans(row as isize).iter().map(|&(lo, hi)| lo * LANES..hi * LANES)
     }
 
+    /// The rows in bands, from the first to the last, each with about as many lanes as any other.
+    ///
+    /// Their number is even: two threads then have half of the work each, and neither waits for the other.
+    pub fn bands(&self) -> Vec<Range<usize>> {
+        let height = self.height();
+        let count = (2 * height.div_ceil(2 * MAX_BAND_ROWS)).min(height / MIN_BAND_ROWS).max(1);
+        // To begin a span takes about as long as one of its lanes.
+        let cost = |row: usize| -> usize { self.spans(row as isize).iter().map(|(lo, hi)| hi - lo + 1).sum() };
+        let total: usize = (0..height).map(cost).sum();
+        let (mut row, mut before) = (0, 0);
+        let bands = (1..=count).map(|band| {
+            let (start, most) = (row, height - (count - band) * MIN_BAND_ROWS);
+            // A row goes where its middle lies.
+            let belongs = |row, before| band == count || (2 * before + cost(row)) * count < 2 * total * band;
+            while row < most && (row < start + MIN_BAND_ROWS || belongs(row, before)) {
+                before += cost(row);
+                row += 1;
+            }
+            start..row
+        });
+        bands.collect()
+    }
+
     /// The columns of the mask in a row in whole [`LANES`], in parts from left to right; none in rows outside the box.
     #[inline(always)]
     pub fn spans(&self, row: isize) -> &[(usize, usize)] {
         match usize::try_from(row) {
             Ok(row) if row < self.height() => &self.spans[self.rows[row]..self.rows[row + 1]],
             _ => &[],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_share_all_rows_and_the_work_alike() {
+        // Wide above and narrow below, as a goblet is.
+        let width = |row: usize| if row < 100 { 320 } else { 16 };
+        for height in [1, 2, 3, 4, 5, 64, 127, 128, 129, 250, 1000] {
+            let mask: Vec<bool> = (0..height * 320).map(|at| at % 320 < width(at / 320)).collect();
+            let (frame, mut next) = (Frame::new(&mask, 320), 0);
+            let bands = frame.bands();
+            for rows in &bands {
+                assert_eq!(rows.start, next);
+                assert!(rows.len() >= MIN_BAND_ROWS || height < MIN_BAND_ROWS);
+                next = rows.end;
+            }
+            assert_eq!(next, height);
+            assert!(height < 4 || bands.len() % 2 == 0);
+            let work = |rows: &[Range<usize>]| -> usize {
+                rows.iter().cloned().flatten().map(|row| width(row) / 16 + 1).sum()
+            };
+            let (first, second) = bands.split_at(bands.len() / 2);
+            assert!(height < 4 || work(first).abs_diff(work(second)) <= 21, "{height}: {bands:?}");
         }
     }
 }

@@ -12,7 +12,7 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::super::real::{Real, on_vectors};
-use super::frame::{Frame, LANES};
+use super::frame::{Frame, LANES, MIN_BAND_ROWS};
 use super::number::Number;
 use super::rows::{
     A_A_P, A_P, A_R, Around, BELOW, Block, DIAGONAL, Edge, Factors, KEPT, P, R, RIGHT, SUMS, TIES, Ties, VECTORS, X,
@@ -21,10 +21,8 @@ use super::rows::{
 use crate::memory::Aligned;
 use crate::vector::Packed;
 
-/// Most rows that one task sweeps; of two more on either side it updates the residual for itself.
-const MAX_BAND: usize = 64;
-/// Rows on either side of a band that it needs.
-const BESIDE: usize = 2;
+/// Rows on either side of a band whose residual it updates for itself.
+const BESIDE: usize = MIN_BAND_ROWS;
 /// Rows of a band that its neighbours need: the first two and the last two.
 const EDGE: usize = 2 * BESIDE;
 /// Rows after which the sums of `f32` go over into `f64`.
@@ -75,17 +73,49 @@ pub(super) struct Products {
 /// The vectors of conjugate gradient.
 #[derive(Debug)]
 pub(super) struct Vectors<T: Number> {
-    /// [`Block`]s of each band: of its rows, and of [`BESIDE`] more on either side.
-    blocks: Aligned<T>,
+    bands: Vec<Band<T>>,
     /// [`Edge`]s of each band, row by row: as they were before a sweep, and as they are after it.
     edges: [Aligned<T>; 2],
+}
+
+/// What one task sweeps.
+#[derive(Debug)]
+struct Band<T: Number> {
+    rows: Range<usize>,
+    /// [`Block`]s of its rows, and of [`BESIDE`] more on either side.
+    blocks: Aligned<T>,
+}
+
+impl<T: Number> Band<T> {
+    fn new(frame: &Frame, rows: Range<usize>) -> Self {
+        let blocks = Aligned::zeros((rows.len() + 2 * BESIDE) * stride(frame) * VECTORS * LANES);
+        Self { rows, blocks }
+    }
+
+    /// Copies to the edge what the bands beside this one need.
+    fn keep_edge(&self, frame: &Frame, edge: &mut [T]) {
+        let (Range { start, end }, stride) = (self.rows.clone(), stride(frame));
+        let edge: &mut [Edge<T>] = edge.as_chunks_mut().0.as_chunks_mut().0;
+        let rows = (start..start + BESIDE).chain(end.saturating_sub(BESIDE)..end);
+        for (row, kept) in rows.zip(edge.chunks_mut(stride)) {
+            // An image of a single row has no second one, nor a band beside this one.
+            for &(lo, hi) in frame.spans(row as isize) {
+                for (block, kept) in
+                    blocks(&self.blocks)[(row + BESIDE - start) * stride..][lo..hi].iter().zip(&mut kept[lo..hi])
+                {
+                    *kept = [block[R], block[A_P], block[A_R], block[A_A_P]];
+                }
+            }
+        }
+    }
 }
 
 impl<T: Number> Vectors<T> {
     /// All zero.
     pub fn new(frame: &Frame) -> Self {
-        let edges = std::array::from_fn(|_| Aligned::zeros(bands(frame) * edge_length(frame)));
-        Self { blocks: Aligned::zeros(bands(frame) * band_length(frame)), edges }
+        let bands: Vec<_> = frame.bands().into_iter().map(|rows| Band::new(frame, rows)).collect();
+        let edges = std::array::from_fn(|_| Aligned::zeros(bands.len() * edge_length(frame)));
+        Self { bands, edges }
     }
 
     /// Starts anew: `scale` gives right and lower ties, D and r of part of a row, from a place in framed arrays on; p = r, all
@@ -93,15 +123,16 @@ impl<T: Number> Vectors<T> {
     pub fn begin(&mut self, system: &mut Scaled<'_, T>, scale: impl Fn(usize, [&mut [T]; 4]) + Sync) {
         let Scaled { frame, ties } = system;
         let stride = stride(frame);
-        let ties = ties[stride * TIES * LANES..].par_chunks_mut(band_rows(frame) * stride * TIES * LANES);
-        let bands =
-            self.blocks.par_chunks_mut(band_length(frame)).zip(self.edges[0].par_chunks_mut(edge_length(frame)));
-        bands.zip(ties).enumerate().for_each(|(band, ((blocks, edge), ties))| {
-            let blocks = blocks_mut(blocks);
-            let ties = ties.as_chunks_mut().0.as_chunks_mut::<TIES>().0;
+        // Of each band, after the row of zeros.
+        let mut ties = ties.as_chunks_mut().0.as_chunks_mut::<TIES>().0.split_at_mut(stride).1;
+        let ties = self.bands.iter().map(|band| ties.split_off_mut(..band.rows.len() * stride).unwrap_or_default());
+        let ties: Vec<&mut [Ties<T>]> = ties.collect();
+        let bands = self.bands.par_iter_mut().zip(self.edges[0].par_chunks_mut(edge_length(frame)));
+        bands.zip(ties).for_each(|((band, edge), ties)| {
+            let blocks = blocks_mut(&mut band.blocks);
             let mut numbers: [Vec<T>; 4] = std::array::from_fn(|_| vec![T::default(); frame.width]);
-            for (row, ties) in ties.chunks_mut(stride).enumerate() {
-                let (blocks, at) = (&mut blocks[(row + BESIDE) * stride..], band * band_rows(frame) + row);
+            for (row, at) in band.rows.clone().enumerate() {
+                let (blocks, ties) = (&mut blocks[(row + BESIDE) * stride..], &mut ties[row * stride..]);
                 for &(lo, hi) in frame.spans(at as isize) {
                     let parts = numbers.each_mut().map(|numbers| &mut numbers[..(hi - lo) * LANES]);
                     scale(frame.start(at) + lo * LANES, parts);
@@ -113,14 +144,14 @@ impl<T: Number> Vectors<T> {
                     }
                 }
             }
-            keep_edge(frame, band, blocks, edge);
+            band.keep_edge(frame, edge);
         });
     }
 
     /// `x + ahead p` in some columns of a row.
     pub fn x_ahead(&self, frame: &Frame, row: usize, columns: Range<usize>, ahead: T) -> impl Iterator<Item = T> {
-        let blocks = blocks(&self.blocks[row / band_rows(frame) * band_length(frame)..]);
-        let blocks = &blocks[(row % band_rows(frame) + BESIDE) * stride(frame)..];
+        let band = &self.bands[self.bands.partition_point(|band| band.rows.end <= row)];
+        let blocks = &blocks(&band.blocks)[(row - band.rows.start + BESIDE) * stride(frame)..];
         let blocks = &blocks[columns.start / LANES..columns.end / LANES];
         blocks.iter().flat_map(move |block| block[X].iter().zip(&block[P]).map(move |(&x, &p)| x + ahead * p))
     }
@@ -135,27 +166,9 @@ fn blocks_mut<T>(numbers: &mut [T]) -> &mut [Block<T>] {
     numbers.as_chunks_mut().0.as_chunks_mut().0
 }
 
-/// Copies the edge of a band from its blocks.
-fn keep_edge<T: Copy>(frame: &Frame, band: usize, blocks: &[Block<T>], edge: &mut [T]) {
-    let (most, stride) = (band_rows(frame), stride(frame));
-    let edge: &mut [Edge<T>] = edge.as_chunks_mut().0.as_chunks_mut().0;
-    for (row, kept) in [0, 1, most - 2, most - 1].into_iter().zip(edge.chunks_mut(stride)) {
-        for &(lo, hi) in frame.spans((band * most + row) as isize) {
-            for (block, kept) in blocks[(row + BESIDE) * stride..][lo..hi].iter().zip(&mut kept[lo..hi]) {
-                *kept = [block[R], block[A_P], block[A_R], block[A_A_P]];
-            }
-        }
-    }
-}
-
 /// Blocks from a pixel to the one below: those of a row, and one of zeros.
 fn stride(frame: &Frame) -> usize {
     frame.width / LANES + 1
-}
-
-/// Numbers of a band's blocks.
-fn band_length(frame: &Frame) -> usize {
-    (band_rows(frame) + 2 * BESIDE) * stride(frame) * VECTORS * LANES
 }
 
 /// Numbers of a band's edges.
@@ -163,26 +176,16 @@ fn edge_length(frame: &Frame) -> usize {
     EDGE * stride(frame) * KEPT * LANES
 }
 
-/// Rows of a band, so that their number is even: two threads then have as many each. The neighbours of a band need two.
-fn band_rows(frame: &Frame) -> usize {
-    frame.height().div_ceil(2 * frame.height().div_ceil(2 * MAX_BAND)).max(BESIDE)
-}
-
-fn bands(frame: &Frame) -> usize {
-    frame.height().div_ceil(band_rows(frame))
-}
-
 /// Takes two iterations and returns the products of the vectors after them, summed in an order without threads.
 pub(super) fn sweep<T: Number>(system: &Scaled<'_, T>, steps: Steps, vectors: &mut Vectors<T>) -> Products {
     let frame = system.frame;
-    let Vectors { blocks, edges: [before, after] } = vectors;
-    let bands = blocks.par_chunks_mut(band_length(frame)).zip(after.par_chunks_mut(edge_length(frame)));
+    let Vectors { bands, edges: [before, after] } = vectors;
+    let bands = bands.par_iter_mut().zip(after.par_chunks_mut(edge_length(frame)));
     let sums: Vec<[f64; SUMS]> = bands
         .enumerate()
-        .map(|(band, (blocks, edge))| {
-            let blocks = blocks_mut(blocks);
-            let sums = sweep_band(system, steps, before, band, blocks);
-            keep_edge(frame, band, blocks, edge);
+        .map(|(index, (band, edge))| {
+            let sums = sweep_band(system, steps, before, index, band);
+            band.keep_edge(frame, edge);
             sums
         })
         .collect();
@@ -202,10 +205,10 @@ fn sweep_band<T: Number>(
     system: &Scaled<'_, T>,
     steps: Steps,
     edges: &[T],
-    band: usize,
-    blocks: &mut [Block<T>],
+    index: usize,
+    band: &mut Band<T>,
 ) -> [f64; SUMS] {
-    on_vectors!(T, sweep_band_with::<T>(system, steps, edges, band, blocks))
+    on_vectors!(T, sweep_band_with::<T>(system, steps, edges, index, band))
 }
 
 /// A row goes through three stages, each a row behind the one before, whose neighbours it needs: r after both iterations (and
@@ -215,30 +218,30 @@ fn sweep_band_with<T: Number, V: Packed<Number = T>>(
     system: &Scaled<'_, T>,
     steps: Steps,
     edges: &[T],
-    band: usize,
-    blocks: &mut [Block<T>],
+    index: usize,
+    band: &mut Band<T>,
 ) -> [f64; SUMS] {
     let frame = system.frame;
-    let (stride, most) = (stride(frame), band_rows(frame));
-    let rows = most.min(frame.height() - band * most);
+    let (stride, Range { start, end }) = (stride(frame), band.rows.clone());
+    let (rows, blocks) = (end - start, blocks_mut(&mut band.blocks));
     let edges: &[Edge<T>] = edges.as_chunks().0.as_chunks().0;
     let ties: &[Ties<T>] = system.ties.as_chunks().0.as_chunks().0;
     let factors = Factors::<V>::new(steps);
     let mut lanes = [V::splat(T::default()); SUMS];
     let mut sums = [[0.0; LANES]; SUMS];
     // Rows are those of the band's blocks: the first of the image's is `BESIDE` further down.
-    let spans = |row: usize| frame.spans((band * most + row) as isize - BESIDE as isize);
+    let spans = |row: usize| frame.spans((start + row) as isize - BESIDE as isize);
     for front in 0..rows + 2 * BESIDE {
         for &(lo, hi) in spans(front) {
             let blocks = &mut blocks[front * stride..][lo..hi];
             if front < BESIDE {
                 // The last rows of the band above.
-                advance_beside(&factors, &edges[(band * EDGE + front - BESIDE) * stride..][lo..hi], blocks);
+                advance_beside(&factors, &edges[(index * EDGE + front - BESIDE) * stride..][lo..hi], blocks);
             } else if front >= rows + BESIDE {
                 // The first rows of the band below.
                 advance_beside(
                     &factors,
-                    &edges[((band + 1) * EDGE + front - rows - BESIDE) * stride..][lo..hi],
+                    &edges[((index + 1) * EDGE + front - rows - BESIDE) * stride..][lo..hi],
                     blocks,
                 );
             } else {
@@ -249,14 +252,14 @@ fn sweep_band_with<T: Number, V: Packed<Number = T>>(
             continue;
         }
         for &span in spans(front - 1) {
-            multiply(&factors, around(blocks, ties, stride, front - 1, band * most + front - 1, span));
+            multiply(&factors, around(blocks, ties, stride, front - 1, start + front - 1, span));
         }
         if front < 2 * BESIDE {
             continue;
         }
         let row = front - 2;
         for &span in spans(row) {
-            add_products(around(blocks, ties, stride, row, band * most + row, span), &mut lanes);
+            add_products(around(blocks, ties, stride, row, start + row, span), &mut lanes);
         }
         if (row - BESIDE) % FLUSH == FLUSH - 1 || row == rows + BESIDE - 1 {
             flush(&mut lanes, &mut sums);
@@ -301,7 +304,7 @@ mod tests {
         let used =
             |row: isize, col: usize| frame.spans(row).iter().any(|&(lo, hi)| (lo * LANES..hi * LANES).contains(&col));
         let (mut system, mut vectors) = (Scaled::new(frame), Vectors::new(frame));
-        let (stride, most) = (stride(frame), band_rows(frame));
+        let stride = stride(frame);
         for row in 0..frame.height() {
             for col in (0..frame.width).filter(|&col| used(row as isize, col)) {
                 let seed = row * frame.width + col;
@@ -311,16 +314,15 @@ mod tests {
                 ties[RIGHT][col % LANES] = tie(used(row as isize, col + 1), seed);
                 ties[BELOW][col % LANES] = tie(used(row as isize + 1, col), seed + 7);
                 ties[DIAGONAL][col % LANES] = T::of(1.0 + number(seed + 3));
-                let band = &mut vectors.blocks[row / most * band_length(frame)..];
-                let block = &mut blocks_mut(band)[(row % most + BESIDE) * stride + col / LANES];
+                let band = vectors.bands.iter_mut().find(|band| band.rows.contains(&row)).unwrap();
+                let block = &mut blocks_mut(&mut band.blocks)[(row - band.rows.start + BESIDE) * stride + col / LANES];
                 for (vector, lanes) in block.iter_mut().enumerate() {
                     lanes[col % LANES] = T::of(number(seed * VECTORS + vector) - 0.5);
                 }
             }
         }
-        for band in 0..bands(frame) {
-            let blocks = blocks(&vectors.blocks[band * band_length(frame)..]);
-            keep_edge(frame, band, blocks, &mut vectors.edges[0][band * edge_length(frame)..][..edge_length(frame)]);
+        for (band, edge) in vectors.bands.iter().zip(vectors.edges[0].chunks_mut(edge_length(frame))) {
+            band.keep_edge(frame, edge);
         }
         (system, vectors)
     }
@@ -329,15 +331,14 @@ mod tests {
     fn swept<T: Number>(
         frame: &Frame,
         steps: Steps,
-        band: impl Fn(&Scaled<'_, T>, Steps, &[T], usize, &mut [Block<T>]) -> [f64; SUMS],
+        sweep_band: impl Fn(&Scaled<'_, T>, Steps, &[T], usize, &mut Band<T>) -> [f64; SUMS],
     ) -> (Vec<f64>, Vec<f64>) {
         let (system, mut vectors) = tied::<T>(frame);
         let [edges, _] = &vectors.edges;
         let (mut numbers, mut sums) = (Vec::new(), Vec::new());
-        for (index, all) in vectors.blocks.chunks_mut(band_length(frame)).enumerate() {
-            sums.extend(band(&system, steps, edges, index, blocks_mut(all)));
-            let beside = BESIDE * stride(frame);
-            let own = &blocks(all)[beside..][..band_rows(frame) * stride(frame)];
+        for (index, band) in vectors.bands.iter_mut().enumerate() {
+            sums.extend(sweep_band(&system, steps, edges, index, band));
+            let own = &blocks(&band.blocks)[BESIDE * stride(frame)..][..band.rows.len() * stride(frame)];
             numbers.extend(own.as_flattened().as_flattened().iter().map(|number| number.to_f64()));
         }
         (numbers, sums)
