@@ -25,32 +25,60 @@ const MIN_GAP: usize = 4;
 #[derive(Clone, Debug)]
 pub(super) struct Frame {
     pub width: usize,
-    /// Columns of the mask from left to right in whole [`LANES`], row by row; smaller gaps than [`MIN_GAP`] count in.
+    /// Of each row.
+    spans: Spans,
+    /// Of each row and the two above it together.
+    trios: Spans,
+}
+
+/// Columns of a mask from left to right in whole [`LANES`], row by row; smaller gaps than [`MIN_GAP`] count in.
+#[derive(Clone, Debug)]
+struct Spans {
     spans: Vec<(usize, usize)>,
     /// Where the spans of each row begin, and where the last ones end.
     rows: Vec<usize>,
 }
 
-impl Frame {
-    /// Of a mask with rows of `width`.
-    pub fn new(mask: &[bool], width: usize) -> Self {
+impl Spans {
+    /// Of lanes that have a pixel or not, `lanes` a row; a row counts in the `above` rows above it.
+    fn new(used: &[bool], lanes: usize, above: usize) -> Self {
         let mut spans: Vec<(usize, usize)> = Vec::new();
         let mut rows = vec![0];
-        for row in mask.chunks(width) {
+        for row in 0..used.len() / lanes {
             let first = spans.len();
-            for (lanes, _) in row.chunks(LANES).enumerate().filter(|(_, pixels)| pixels.contains(&true)) {
+            let is_used = |lane: &usize| (row.saturating_sub(above)..=row).any(|row| used[row * lanes + lane]);
+            for lane in (0..lanes).filter(is_used) {
                 match spans[first..].last_mut() {
-                    Some(last) if lanes - last.1 < MIN_GAP => last.1 = lanes + 1,
-                    _ => spans.push((lanes, lanes + 1)),
+                    Some(last) if lane - last.1 < MIN_GAP => last.1 = lane + 1,
+                    _ => spans.push((lane, lane + 1)),
                 }
             }
             rows.push(spans.len());
         }
-        Self { width: width.next_multiple_of(LANES), spans, rows }
+        Self { spans, rows }
+    }
+
+    /// None in rows outside the box.
+    #[inline(always)]
+    fn of(&self, row: isize) -> &[(usize, usize)] {
+        match usize::try_from(row) {
+            Ok(row) if row + 1 < self.rows.len() => &self.spans[self.rows[row]..self.rows[row + 1]],
+            _ => &[],
+        }
+    }
+}
+
+impl Frame {
+    /// Of a mask with rows of `width`.
+    pub fn new(mask: &[bool], width: usize) -> Self {
+        let lanes = |row: &[bool]| row.chunks(LANES).map(|pixels| pixels.contains(&true)).collect::<Vec<_>>();
+        let used: Vec<bool> = mask.chunks(width).flat_map(lanes).collect();
+        let [spans, trios] = [0, 2].map(|above| Spans::new(&used, width.div_ceil(LANES), above));
+        Self { width: width.next_multiple_of(LANES), spans, trios }
     }
 
     pub fn height(&self) -> usize {
-        self.rows.len() - 1
+        self.spans.rows.len() - 1
     }
 
     /// Numbers from a pixel to the one below.
@@ -109,10 +137,13 @@ impl Frame {
     /// The columns of the mask in a row in whole [`LANES`], in parts from left to right; none in rows outside the box.
     #[inline(always)]
     pub fn spans(&self, row: isize) -> &[(usize, usize)] {
-        match usize::try_from(row) {
-            Ok(row) if row < self.height() => &self.spans[self.rows[row]..self.rows[row + 1]],
-            _ => &[],
-        }
+        self.spans.of(row)
+    }
+
+    /// The same of a row and the two above it together.
+    #[inline(always)]
+    pub fn trios(&self, row: isize) -> &[(usize, usize)] {
+        self.trios.of(row)
     }
 }
 

@@ -3,10 +3,12 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
+use super::band::Scaled;
 use super::frame::Frame;
 use super::normal_equations::NormalEquations;
 use super::number::Number;
-use super::sweep::{Products, Scaled, Steps, Vectors, sweep};
+use super::rows::Steps;
+use super::sweep::{Products, Vectors, sweep};
 use crate::memory::Aligned;
 
 /// The memory of a solver in numbers of type `T`, used again from system to system.

@@ -15,6 +15,7 @@
 //! `normal_equations` makes it in a `frame` for `jacobi`, which takes two iterations in a `sweep`.
 
 mod assemble;
+mod band;
 mod camera;
 mod frame;
 mod jacobi;

@@ -2,8 +2,16 @@
 
 use super::frame::LANES;
 use super::number::Number;
-use super::sweep::Steps;
 use crate::vector::Packed;
+
+/// What two iterations do: `r1 = r - a0 A p`, `p1 = r1 + b0 p`, `r2 = r1 - a1 A p1`, `p2 = r2 + b1 p1`.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Steps {
+    pub a0: f64,
+    pub b0: f64,
+    pub a1: f64,
+    pub b1: f64,
+}
 
 /// Sums of [`super::sweep::Products`], in its order.
 pub(super) const SUMS: usize = 13;
@@ -89,15 +97,20 @@ impl<T: Number, V: Packed<Number = T>> Factors<V> {
 pub(super) fn advance<T: Number, V: Packed<Number = T>>(by: &Factors<V>, row: &mut [Block<T>]) {
     for block in row {
         for part in 0..LANES / V::WIDTH {
-            let [x, p0, r0, v0, u, w] = block.each_ref().map(|lanes| read::<T, V>(lanes, part));
-            let [r2, a_p1] = by.step([r0, v0, u, w]);
-            let p1 = by.minus_a0.times_plus(v0, by.b0.times_plus(p0, r0));
-            write(by.a1.times_plus(p1, by.a0.times_plus(p0, x)), &mut block[X], part);
-            write(by.b1.times_plus(p1, r2), &mut block[P], part);
-            write(r2, &mut block[R], part);
-            write(a_p1, &mut block[A_P], part);
+            advance_part(by, block, part);
         }
     }
+}
+
+#[inline(always)]
+fn advance_part<T: Number, V: Packed<Number = T>>(by: &Factors<V>, block: &mut Block<T>, part: usize) {
+    let [x, p0, r0, v0, u, w] = block.each_ref().map(|lanes| read::<T, V>(lanes, part));
+    let [r2, a_p1] = by.step([r0, v0, u, w]);
+    let p1 = by.minus_a0.times_plus(v0, by.b0.times_plus(p0, r0));
+    write(by.a1.times_plus(p1, by.a0.times_plus(p0, x)), &mut block[X], part);
+    write(by.b1.times_plus(p1, r2), &mut block[P], part);
+    write(r2, &mut block[R], part);
+    write(a_p1, &mut block[A_P], part);
 }
 
 /// The same of a row beside the band, of which it needs r and v alone.
@@ -141,6 +154,18 @@ impl<T> Around<'_, T> {
     }
 }
 
+/// Four rows that follow each other, and what ties them.
+pub(super) struct Rows<'a, T> {
+    pub top: &'a [Block<T>],
+    /// A block longer than the others, as is `middle`.
+    pub last: &'a mut [Block<T>],
+    pub middle: &'a mut [Block<T>],
+    pub front: &'a mut [Block<T>],
+    pub ties_top: &'a [Ties<T>],
+    pub ties_last: &'a [Ties<T>],
+    pub ties_middle: &'a [Ties<T>],
+}
+
 /// What the pixels before give to those on their right, and the vector at the pixels to come.
 struct Walk<V> {
     before: V,
@@ -153,81 +178,147 @@ impl<T: Number, V: Packed<Number = T>> Walk<V> {
         Self { before: V::splat(T::default()), here: read(first, 0) }
     }
 
-    /// Vector `OF` at part `part` of block k, and its product with the system.
+    /// Vector `OF` at part `part` of block `here[k]`, and its product with the system.
     #[inline(always)]
-    fn next<const OF: usize>(&mut self, row: &Around<'_, T>, k: usize, part: usize) -> [V; 2] {
+    fn next<const OF: usize>(&mut self, at: &Cross<'_, T>, k: usize, part: usize) -> [V; 2] {
+        let Cross { above, here, below, ties_above, ties } = at;
         let is_last = part + 1 == LANES / V::WIDTH;
-        let next = if is_last { read(&row.here[k + 1][OF], 0) } else { read(&row.here[k][OF], part + 1) };
-        let (here, tie) = (self.here, read::<T, V>(&row.ties[k][RIGHT], part));
+        let next = if is_last { read(&here[k + 1][OF], 0) } else { read(&here[k][OF], part + 1) };
+        let (here, tie) = (self.here, read::<T, V>(&ties[RIGHT], part));
         let given = tie * here;
         let mut product = here + given.after_last_of(self.before);
         product = tie.times_plus(here.before_first_of(next), product);
-        product = read::<T, V>(&row.ties_above[k][BELOW], part).times_plus(read(&row.above[k][OF], part), product);
-        product = read::<T, V>(&row.ties[k][BELOW], part).times_plus(read(&row.below[k][OF], part), product);
+        product = read::<T, V>(&ties_above[BELOW], part).times_plus(read(&above[OF], part), product);
+        product = read::<T, V>(&ties[BELOW], part).times_plus(read(&below[OF], part), product);
         self.before = given;
         self.here = next;
         [here, product]
     }
 }
 
-/// A r of the new r, and with it A p of the new p: `A p2 = A r2 + b1 A p1`, the last from its place and to it.
+/// A block of a row with those around it, and what ties them.
+struct Cross<'a, T> {
+    above: &'a Block<T>,
+    /// The row.
+    here: &'a [Block<T>],
+    below: &'a Block<T>,
+    ties_above: &'a Ties<T>,
+    ties: &'a Ties<T>,
+}
+
+impl<T> Around<'_, T> {
+    #[inline(always)]
+    fn cross(&self, k: usize) -> Cross<'_, T> {
+        Cross {
+            above: &self.above[k],
+            here: self.here,
+            below: &self.below[k],
+            ties_above: &self.ties_above[k],
+            ties: &self.ties[k],
+        }
+    }
+}
+
+/// A r of the new r, and with it A p of the new p.
 #[inline(always)]
 pub(super) fn multiply<T: Number, V: Packed<Number = T>>(by: &Factors<V>, mut row: Around<'_, T>) {
     let row = row.cut();
     let mut walk = Walk::<V>::new(&row.here[0][R]);
     for k in 0..row.ties.len() {
         for part in 0..LANES / V::WIDTH {
-            let [_, a_r] = walk.next::<R>(&row, k, part);
-            let block = &mut row.here[k];
-            write(a_r, &mut block[A_R], part);
-            write(by.b1.times_plus(read(&block[A_P], part), a_r), &mut block[A_P], part);
+            let [_, a_r] = walk.next::<R>(&row.cross(k), k, part);
+            keep_a_r(by, a_r, &mut row.here[k], part);
         }
     }
+}
+
+/// `A p2 = A r2 + b1 A p1`, the last from its place and to it.
+#[inline(always)]
+fn keep_a_r<T: Number, V: Packed<Number = T>>(by: &Factors<V>, a_r: V, block: &mut Block<T>, part: usize) {
+    write(a_r, &mut block[A_R], part);
+    write(by.b1.times_plus(read(&block[A_P], part), a_r), &mut block[A_P], part);
 }
 
 /// A A p of a row, and its share of the products.
 #[inline(always)]
 pub(super) fn add_products<T: Number, V: Packed<Number = T>>(mut row: Around<'_, T>, sums: &mut [V; SUMS]) {
     let row = row.cut();
-    let [mut r_r, mut p_v, mut r_v, mut v_v, mut r_d_r, mut r_d_v, mut v_d_v, ..] = *sums;
-    let [.., mut r_u, mut u_v, mut u_u, mut v_w, mut w_w, mut u_w] = *sums;
+    let mut own = *sums;
     let mut walk = Walk::<V>::new(&row.here[0][A_P]);
     for k in 0..row.ties.len() {
         for part in 0..LANES / V::WIDTH {
-            let [v, w] = walk.next::<A_P>(&row, k, part);
-            let block = &mut row.here[k];
-            write(w, &mut block[A_A_P], part);
-            let (r, p): (V, V) = (read(&block[R], part), read(&block[P], part));
-            let u: V = read(&block[A_R], part);
-            let d: V = read(&row.ties[k][DIAGONAL], part);
-            let (d_r, d_v) = (d * r, d * v);
-            r_r = r.times_plus(r, r_r);
-            p_v = p.times_plus(v, p_v);
-            r_v = r.times_plus(v, r_v);
-            v_v = v.times_plus(v, v_v);
-            r_d_r = r.times_plus(d_r, r_d_r);
-            r_d_v = r.times_plus(d_v, r_d_v);
-            v_d_v = v.times_plus(d_v, v_d_v);
-            r_u = r.times_plus(u, r_u);
-            u_v = u.times_plus(v, u_v);
-            u_u = u.times_plus(u, u_u);
-            v_w = v.times_plus(w, v_w);
-            w_w = w.times_plus(w, w_w);
-            u_w = u.times_plus(w, u_w);
+            let products = walk.next::<A_P>(&row.cross(k), k, part);
+            add_products_of(products, &mut row.here[k], &row.ties[k], part, &mut own);
         }
     }
-    *sums = [r_r, p_v, r_v, v_v, r_d_r, r_d_v, v_d_v, r_u, u_v, u_u, v_w, w_w, u_w];
+    *sums = own;
 }
 
-/// Adds what the lanes hold to their sums, and empties them.
+/// What a part of a block, with its `[A p, A A p]`, adds to the sums.
 #[inline(always)]
-pub(super) fn flush<T: Number, V: Packed<Number = T>>(lanes: &mut [V; SUMS], sums: &mut [[f64; LANES]; SUMS]) {
-    for (lanes, sums) in lanes.iter_mut().zip(sums) {
+fn add_products_of<T: Number, V: Packed<Number = T>>(
+    [v, w]: [V; 2],
+    block: &mut Block<T>,
+    ties: &Ties<T>,
+    part: usize,
+    sums: &mut [V; SUMS],
+) {
+    write(w, &mut block[A_A_P], part);
+    let (r, p): (V, V) = (read(&block[R], part), read(&block[P], part));
+    let u: V = read(&block[A_R], part);
+    let d: V = read(&ties[DIAGONAL], part);
+    let (d_r, d_v) = (d * r, d * v);
+    let [r_r, p_v, r_v, v_v, r_d_r, r_d_v, v_d_v, r_u, u_v, u_u, v_w, w_w, u_w] = sums;
+    *r_r = r.times_plus(r, *r_r);
+    *p_v = p.times_plus(v, *p_v);
+    *r_v = r.times_plus(v, *r_v);
+    *v_v = v.times_plus(v, *v_v);
+    *r_d_r = r.times_plus(d_r, *r_d_r);
+    *r_d_v = r.times_plus(d_v, *r_d_v);
+    *v_d_v = v.times_plus(d_v, *v_d_v);
+    *r_u = r.times_plus(u, *r_u);
+    *u_v = u.times_plus(v, *u_v);
+    *u_u = u.times_plus(u, *u_u);
+    *v_w = v.times_plus(w, *v_w);
+    *w_w = w.times_plus(w, *w_w);
+    *u_w = u.times_plus(w, *u_w);
+}
+
+/// The front row advances, the one above it is multiplied, and the last adds its products, block by block: to begin three loops
+/// a row takes as long as several blocks.
+#[inline(always)]
+pub(super) fn all_stages<T: Number, V: Packed<Number = T>>(by: &Factors<V>, rows: Rows<'_, T>, sums: &mut [V; SUMS]) {
+    let Rows { top, last, middle, front, ties_top, ties_last, ties_middle } = rows;
+    // Their lengths known to the loop.
+    let n = front.len();
+    let (top, last, middle, front) = (&top[..n], &mut last[..=n], &mut middle[..=n], &mut front[..n]);
+    let [ties_top, ties_last, ties_middle] = [ties_top, ties_last, ties_middle].map(|ties| &ties[..n]);
+    let mut own = *sums;
+    let (mut walk_middle, mut walk_last) = (Walk::<V>::new(&middle[0][R]), Walk::<V>::new(&last[0][A_P]));
+    for k in 0..n {
+        for part in 0..LANES / V::WIDTH {
+            advance_part(by, &mut front[k], part);
+            let (ties_above, ties) = (&ties_last[k], &ties_middle[k]);
+            let cross = Cross { above: &last[k], here: middle, below: &front[k], ties_above, ties };
+            let [_, a_r] = walk_middle.next::<R>(&cross, k, part);
+            keep_a_r(by, a_r, &mut middle[k], part);
+            let (ties_above, ties) = (&ties_top[k], &ties_last[k]);
+            let cross = Cross { above: &top[k], here: last, below: &middle[k], ties_above, ties };
+            let products = walk_last.next::<A_P>(&cross, k, part);
+            add_products_of(products, &mut last[k], ties, part, &mut own);
+        }
+    }
+    *sums = own;
+}
+
+/// Adds what the lanes hold to their sums.
+#[inline(always)]
+pub(super) fn flush<T: Number, V: Packed<Number = T>>(lanes: &[V; SUMS], sums: &mut [[f64; LANES]; SUMS]) {
+    for (lanes, sums) in lanes.iter().zip(sums) {
         let mut numbers = [T::default(); LANES];
         lanes.write(&mut numbers);
         for (sum, number) in sums.iter_mut().zip(numbers) {
             *sum += number.to_f64();
         }
-        *lanes = V::splat(T::default());
     }
 }

@@ -8,49 +8,13 @@
 
 use std::ops::Range;
 
-use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::super::real::{Real, on_vectors};
-use super::frame::{Frame, LANES, MIN_BAND_ROWS};
+use super::band::{BESIDE, Band, Scaled, blocks, blocks_mut, edge_length, stride, sweep_band};
+use super::frame::{Frame, LANES};
 use super::number::Number;
-use super::rows::{
-    A_A_P, A_P, A_R, Around, BELOW, Block, DIAGONAL, Edge, Factors, KEPT, P, R, RIGHT, SUMS, TIES, Ties, VECTORS, X,
-    add_products, advance, advance_beside, flush, multiply,
-};
+use super::rows::{BELOW, DIAGONAL, P, R, RIGHT, SUMS, Steps, TIES, Ties, VECTORS, X};
 use crate::memory::Aligned;
-use crate::vector::Packed;
-
-/// Rows on either side of a band whose residual it updates for itself.
-const BESIDE: usize = MIN_BAND_ROWS;
-/// Rows of a band that its neighbours need: the first two and the last two.
-const EDGE: usize = 2 * BESIDE;
-/// Rows after which the sums of `f32` go over into `f64`.
-const FLUSH: usize = 8;
-
-/// `I - C` of a 5-point system scaled to a diagonal of ones.
-#[derive(Debug)]
-pub(super) struct Scaled<'a, T: Number> {
-    pub frame: &'a Frame,
-    /// [`Ties`] of a row of zeros, and of every row.
-    ties: Aligned<T>,
-}
-
-impl<'a, T: Number> Scaled<'a, T> {
-    /// No ties.
-    pub fn new(frame: &'a Frame) -> Self {
-        Self { frame, ties: Aligned::zeros((frame.height() + 1) * stride(frame) * TIES * LANES) }
-    }
-}
-
-/// What two iterations do: `r1 = r - a0 A p`, `p1 = r1 + b0 p`, `r2 = r1 - a1 A p1`, `p2 = r2 + b1 p1`.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Steps {
-    pub a0: f64,
-    pub b0: f64,
-    pub a1: f64,
-    pub b1: f64,
-}
 
 /// Products of the vectors, with `v = A p`, `w = A v`, `u = A r`, and D the diagonal that was scaled to one.
 #[derive(Clone, Copy, Debug, Default)]
@@ -74,40 +38,8 @@ pub(super) struct Products {
 #[derive(Debug)]
 pub(super) struct Vectors<T: Number> {
     bands: Vec<Band<T>>,
-    /// [`Edge`]s of each band, row by row: as they were before a sweep, and as they are after it.
+    /// [`Edge`](super::rows::Edge)s of each band, row by row: as they were before a sweep, and as they are after it.
     edges: [Aligned<T>; 2],
-}
-
-/// What one task sweeps.
-#[derive(Debug)]
-struct Band<T: Number> {
-    rows: Range<usize>,
-    /// [`Block`]s of its rows, and of [`BESIDE`] more on either side.
-    blocks: Aligned<T>,
-}
-
-impl<T: Number> Band<T> {
-    fn new(frame: &Frame, rows: Range<usize>) -> Self {
-        let blocks = Aligned::zeros((rows.len() + 2 * BESIDE) * stride(frame) * VECTORS * LANES);
-        Self { rows, blocks }
-    }
-
-    /// Copies to the edge what the bands beside this one need.
-    fn keep_edge(&self, frame: &Frame, edge: &mut [T]) {
-        let (Range { start, end }, stride) = (self.rows.clone(), stride(frame));
-        let edge: &mut [Edge<T>] = edge.as_chunks_mut().0.as_chunks_mut().0;
-        let rows = (start..start + BESIDE).chain(end.saturating_sub(BESIDE)..end);
-        for (row, kept) in rows.zip(edge.chunks_mut(stride)) {
-            // An image of a single row has no second one, nor a band beside this one.
-            for &(lo, hi) in frame.spans(row as isize) {
-                for (block, kept) in
-                    blocks(&self.blocks)[(row + BESIDE - start) * stride..][lo..hi].iter().zip(&mut kept[lo..hi])
-                {
-                    *kept = [block[R], block[A_P], block[A_R], block[A_A_P]];
-                }
-            }
-        }
-    }
 }
 
 impl<T: Number> Vectors<T> {
@@ -157,25 +89,6 @@ impl<T: Number> Vectors<T> {
     }
 }
 
-/// Numbers as blocks.
-fn blocks<T>(numbers: &[T]) -> &[Block<T>] {
-    numbers.as_chunks().0.as_chunks().0
-}
-
-fn blocks_mut<T>(numbers: &mut [T]) -> &mut [Block<T>] {
-    numbers.as_chunks_mut().0.as_chunks_mut().0
-}
-
-/// Blocks from a pixel to the one below: those of a row, and one of zeros.
-fn stride(frame: &Frame) -> usize {
-    frame.width / LANES + 1
-}
-
-/// Numbers of a band's edges.
-fn edge_length(frame: &Frame) -> usize {
-    EDGE * stride(frame) * KEPT * LANES
-}
-
 /// Takes two iterations and returns the products of the vectors after them, summed in an order without threads.
 pub(super) fn sweep<T: Number>(system: &Scaled<'_, T>, steps: Steps, vectors: &mut Vectors<T>) -> Products {
     let frame = system.frame;
@@ -200,98 +113,9 @@ pub(super) fn sweep<T: Number>(system: &Scaled<'_, T>, steps: Steps, vectors: &m
     Products { r_r, p_v, r_v, v_v, r_d_r, r_d_v, v_d_v, r_u, u_v, u_u, v_w, w_w, u_w }
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn sweep_band<T: Number>(
-    system: &Scaled<'_, T>,
-    steps: Steps,
-    edges: &[T],
-    index: usize,
-    band: &mut Band<T>,
-) -> [f64; SUMS] {
-    on_vectors!(T, sweep_band_with::<T>(system, steps, edges, index, band))
-}
-
-/// A row goes through three stages, each a row behind the one before, whose neighbours it needs: r after both iterations (and
-/// `A p1`, in the place of A p), then `A r` and `A p`, then `A A p`. Rows beside the band go through the first two as well.
-#[inline(always)]
-fn sweep_band_with<T: Number, V: Packed<Number = T>>(
-    system: &Scaled<'_, T>,
-    steps: Steps,
-    edges: &[T],
-    index: usize,
-    band: &mut Band<T>,
-) -> [f64; SUMS] {
-    let frame = system.frame;
-    let (stride, Range { start, end }) = (stride(frame), band.rows.clone());
-    let (rows, blocks) = (end - start, blocks_mut(&mut band.blocks));
-    let edges: &[Edge<T>] = edges.as_chunks().0.as_chunks().0;
-    let ties: &[Ties<T>] = system.ties.as_chunks().0.as_chunks().0;
-    let factors = Factors::<V>::new(steps);
-    let mut lanes = [V::splat(T::default()); SUMS];
-    let mut sums = [[0.0; LANES]; SUMS];
-    // Rows are those of the band's blocks: the first of the image's is `BESIDE` further down.
-    let spans = |row: usize| frame.spans((start + row) as isize - BESIDE as isize);
-    for front in 0..rows + 2 * BESIDE {
-        for &(lo, hi) in spans(front) {
-            let blocks = &mut blocks[front * stride..][lo..hi];
-            if front < BESIDE {
-                // The last rows of the band above.
-                advance_beside(&factors, &edges[(index * EDGE + front - BESIDE) * stride..][lo..hi], blocks);
-            } else if front >= rows + BESIDE {
-                // The first rows of the band below.
-                advance_beside(
-                    &factors,
-                    &edges[((index + 1) * EDGE + front - rows - BESIDE) * stride..][lo..hi],
-                    blocks,
-                );
-            } else {
-                advance(&factors, blocks);
-            }
-        }
-        if front < BESIDE {
-            continue;
-        }
-        for &span in spans(front - 1) {
-            multiply(&factors, around(blocks, ties, stride, front - 1, start + front - 1, span));
-        }
-        if front < 2 * BESIDE {
-            continue;
-        }
-        let row = front - 2;
-        for &span in spans(row) {
-            add_products(around(blocks, ties, stride, row, start + row, span), &mut lanes);
-        }
-        if (row - BESIDE) % FLUSH == FLUSH - 1 || row == rows + BESIDE - 1 {
-            flush(&mut lanes, &mut sums);
-        }
-    }
-    sums.map(|lanes| lanes.iter().sum())
-}
-
-/// Part of a row of a band's blocks with its neighbours and ties; `at` counts that row from [`BESIDE`] above the image.
-#[inline(always)]
-fn around<'a, T>(
-    blocks: &'a mut [Block<T>],
-    ties: &'a [Ties<T>],
-    stride: usize,
-    row: usize,
-    at: usize,
-    (lo, hi): (usize, usize),
-) -> Around<'a, T> {
-    let (above, here) = blocks.split_at_mut(row * stride);
-    let (here, below) = here.split_at_mut(stride);
-    Around {
-        above: &above[(row - 1) * stride..][lo..hi],
-        here: &mut here[lo..=hi],
-        below: &below[lo..hi],
-        // The first row of ties is the one above the image.
-        ties_above: &ties[(at - BESIDE) * stride..][lo..hi],
-        ties: &ties[(at - BESIDE + 1) * stride..][lo..hi],
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::band::sweep_band_with;
     use super::*;
     use crate::vector::{Portable, PortableDouble};
 
