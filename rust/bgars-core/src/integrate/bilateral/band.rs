@@ -54,13 +54,12 @@ impl<T: Number> Band<T> {
     pub fn keep_edge(&self, frame: &Frame, edge: &mut [T]) {
         let (Range { start, end }, stride) = (self.rows.clone(), stride(frame));
         let edge: &mut [Edge<T>] = edge.as_chunks_mut().0.as_chunks_mut().0;
+        // An image of a single row has no second one: no spans.
         let rows = (start..start + BESIDE).chain(end.saturating_sub(BESIDE)..end);
         for (row, kept) in rows.zip(edge.chunks_mut(stride)) {
-            // An image of a single row has no second one, nor a band beside this one.
+            let blocks = &blocks(&self.blocks)[(row + BESIDE - start) * stride..];
             for &(lo, hi) in frame.spans(row as isize) {
-                for (block, kept) in
-                    blocks(&self.blocks)[(row + BESIDE - start) * stride..][lo..hi].iter().zip(&mut kept[lo..hi])
-                {
+                for (block, kept) in blocks[lo..hi].iter().zip(&mut kept[lo..hi]) {
                     *kept = [block[R], block[A_P], block[A_R], block[A_A_P]];
                 }
             }
@@ -109,8 +108,8 @@ pub(super) fn sweep_band_with<T: Number, V: Packed<Number = T>>(
     band: &mut Band<T>,
 ) -> [f64; SUMS] {
     let frame = system.frame;
-    let (stride, Range { start, end }) = (stride(frame), band.rows.clone());
-    let (rows, blocks) = (end - start, blocks_mut(&mut band.blocks));
+    let (stride, start, rows) = (stride(frame), band.rows.start, band.rows.len());
+    let blocks = blocks_mut(&mut band.blocks);
     let edges: &[Edge<T>] = edges.as_chunks().0.as_chunks().0;
     let ties: &[Ties<T>] = system.ties.as_chunks().0.as_chunks().0;
     let factors = Factors::<V>::new(steps);

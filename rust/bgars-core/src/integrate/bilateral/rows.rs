@@ -152,6 +152,27 @@ impl<T> Around<'_, T> {
             ties: &self.ties[..n],
         }
     }
+
+    #[inline(always)]
+    fn cross(&self, k: usize) -> Cross<'_, T> {
+        Cross {
+            above: &self.above[k],
+            here: self.here,
+            below: &self.below[k],
+            ties_above: &self.ties_above[k],
+            ties: &self.ties[k],
+        }
+    }
+}
+
+/// A block of a row with those above and below, and what ties them.
+struct Cross<'a, T> {
+    above: &'a Block<T>,
+    /// The whole row.
+    here: &'a [Block<T>],
+    below: &'a Block<T>,
+    ties_above: &'a Ties<T>,
+    ties: &'a Ties<T>,
 }
 
 /// Four rows that follow each other, and what ties them.
@@ -193,29 +214,6 @@ impl<T: Number, V: Packed<Number = T>> Walk<V> {
         self.before = given;
         self.here = next;
         [here, product]
-    }
-}
-
-/// A block of a row with those around it, and what ties them.
-struct Cross<'a, T> {
-    above: &'a Block<T>,
-    /// The row.
-    here: &'a [Block<T>],
-    below: &'a Block<T>,
-    ties_above: &'a Ties<T>,
-    ties: &'a Ties<T>,
-}
-
-impl<T> Around<'_, T> {
-    #[inline(always)]
-    fn cross(&self, k: usize) -> Cross<'_, T> {
-        Cross {
-            above: &self.above[k],
-            here: self.here,
-            below: &self.below[k],
-            ties_above: &self.ties_above[k],
-            ties: &self.ties[k],
-        }
     }
 }
 
