@@ -150,6 +150,7 @@ pub(super) fn sweep_band_with<T: Number, V: Packed<Number = T>>(
         }
         flush(&lanes, &mut sums);
         for first in inner.clone().step_by(FLUSH) {
+            // Of their own: shared with the loops above, they would go to memory and back every row.
             let mut lanes = [V::splat(T::default()); SUMS];
             for front in first..inner.end.min(first + FLUSH) {
                 for &span in frame.trios((start + front) as isize - BESIDE as isize) {
@@ -194,7 +195,6 @@ fn four_rows<'a, T>(
     at: usize,
     (lo, hi): (usize, usize),
 ) -> Rows<'a, T> {
-    // Chunks take the compiler fewer checks than one cut after the other.
     let mut rows = blocks[(row - 3) * stride..(row + 1) * stride].chunks_exact_mut(stride);
     let [top, last, middle, front] = std::array::from_fn(|_| rows.next().unwrap_or_default());
     // The first row of ties is the one above the image.

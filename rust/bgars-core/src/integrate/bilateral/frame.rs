@@ -116,6 +116,7 @@ impl Frame {
     /// Their number is even: two threads then have half of the work each, and neither waits for the other.
     pub fn bands(&self) -> Vec<Range<usize>> {
         let height = self.height();
+        // One band where two would be too low for each other's needs.
         let count = (2 * height.div_ceil(2 * MAX_BAND_ROWS)).min(height / MIN_BAND_ROWS).max(1);
         // To begin a span takes about as long as one of its lanes.
         let cost = |row: usize| -> usize { self.spans(row as isize).iter().map(|(lo, hi)| hi - lo + 1).sum() };

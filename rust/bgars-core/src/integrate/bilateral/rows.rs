@@ -282,8 +282,8 @@ fn add_products_of<T: Number, V: Packed<Number = T>>(
     *u_w = u.times_plus(w, *u_w);
 }
 
-/// The front row advances, the one above it is multiplied, and the last adds its products, block by block: to begin three loops
-/// a row takes as long as several blocks.
+/// The front row advances, the one above it is multiplied, and the last adds its products, block by block: to begin two more
+/// loops a row takes as long as two blocks.
 #[inline(always)]
 pub(super) fn all_stages<T: Number, V: Packed<Number = T>>(by: &Factors<V>, rows: Rows<'_, T>, sums: &mut [V; SUMS]) {
     let Rows { top, last, middle, front, ties_top, ties_last, ties_middle } = rows;
