@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use multiversion::multiversion;
+use rayon::prelude::*;
 
 use super::super::real::{Real, on_vectors};
 use super::frame::{Frame, LANES, MIN_BAND_ROWS};
@@ -33,6 +34,18 @@ impl<'a, T: Number> Scaled<'a, T> {
     /// No ties.
     pub fn new(frame: &'a Frame) -> Self {
         Self { frame, ties: Aligned::zeros((frame.height() + 1) * stride(frame) * TIES * LANES) }
+    }
+
+    /// `set` writes the ties of every part of a row, of which it gets where that begins in framed arrays.
+    pub fn each_part(&mut self, set: impl Fn(usize, &mut [Ties<T>]) + Sync) {
+        let Self { frame, ties } = self;
+        let ties = ties.as_chunks_mut().0.as_chunks_mut().0;
+        // After the row of zeros.
+        ties.par_chunks_exact_mut(stride(frame)).skip(1).enumerate().for_each(|(row, ties)| {
+            for &(lo, hi) in frame.spans(row as isize) {
+                set(frame.start(row) + lo * LANES, &mut ties[lo..hi]);
+            }
+        });
     }
 }
 

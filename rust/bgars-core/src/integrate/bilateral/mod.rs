@@ -23,8 +23,10 @@ mod normal_equations;
 mod number;
 mod pixels;
 mod published;
+mod renewal;
 mod reweigh;
 mod rows;
+mod scaling;
 mod solve;
 mod sweep;
 

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use super::band::{BESIDE, Band, Scaled, blocks, blocks_mut, edge_length, stride, sweep_band};
 use super::frame::{Frame, LANES};
 use super::number::Number;
-use super::rows::{BELOW, DIAGONAL, P, R, RIGHT, SUMS, Steps, TIES, Ties, VECTORS, X};
+use super::rows::{Block, P, SUMS, Steps, X};
 use crate::memory::Aligned;
 
 /// Products of the vectors, with `v = A p`, `w = A v`, `u = A r`, and D the diagonal that was scaled to one.
@@ -50,33 +50,34 @@ impl<T: Number> Vectors<T> {
         Self { bands, edges }
     }
 
-    /// Starts anew: `scale` gives right and lower ties, D and r of part of a row, from a place in framed arrays on; p = r, all
-    /// others zero. A sweep of no steps makes the products.
-    pub fn begin(&mut self, system: &mut Scaled<'_, T>, scale: impl Fn(usize, [&mut [T]; 4]) + Sync) {
-        let Scaled { frame, ties } = system;
+    /// Does `work` to every part of a row: it gets where that begins in framed arrays, and its blocks. Returns the sum of what
+    /// it returns, in an order without threads.
+    pub fn each_part(&mut self, frame: &Frame, work: impl Fn(usize, &mut [Block<T>]) -> f64 + Sync) -> f64 {
         let stride = stride(frame);
-        // Of each band, after the row of zeros.
-        let mut ties = ties.as_chunks_mut().0.as_chunks_mut::<TIES>().0.split_at_mut(stride).1;
-        let ties = self.bands.iter().map(|band| ties.split_off_mut(..band.rows.len() * stride).unwrap_or_default());
-        let ties: Vec<&mut [Ties<T>]> = ties.collect();
         let bands = self.bands.par_iter_mut().zip(self.edges[0].par_chunks_mut(edge_length(frame)));
-        bands.zip(ties).for_each(|((band, edge), ties)| {
-            let blocks = blocks_mut(&mut band.blocks);
-            let mut numbers: [Vec<T>; 4] = std::array::from_fn(|_| vec![T::default(); frame.width]);
-            for (row, at) in band.rows.clone().enumerate() {
-                let (blocks, ties) = (&mut blocks[(row + BESIDE) * stride..], &mut ties[row * stride..]);
-                for &(lo, hi) in frame.spans(at as isize) {
-                    let parts = numbers.each_mut().map(|numbers| &mut numbers[..(hi - lo) * LANES]);
-                    scale(frame.start(at) + lo * LANES, parts);
-                    let [right, below, diagonal, r] = numbers.each_ref().map(|numbers| numbers.as_chunks::<LANES>().0);
-                    for (k, (block, ties)) in blocks[lo..hi].iter_mut().zip(&mut ties[lo..hi]).enumerate() {
-                        *block = [[T::default(); LANES]; VECTORS];
-                        (block[R], block[P]) = (r[k], r[k]);
-                        (ties[RIGHT], ties[BELOW], ties[DIAGONAL]) = (right[k], below[k], diagonal[k]);
+        let sums: Vec<f64> = bands
+            .map(|(band, edge)| {
+                let mut sum = 0.0;
+                let rows = blocks_mut(&mut band.blocks).chunks_exact_mut(stride).skip(BESIDE);
+                for (row, blocks) in band.rows.clone().zip(rows) {
+                    for &(lo, hi) in frame.spans(row as isize) {
+                        sum += work(frame.start(row) + lo * LANES, &mut blocks[lo..hi]);
                     }
                 }
+                band.keep_edge(frame, edge);
+                sum
+            })
+            .collect();
+        sums.iter().sum()
+    }
+
+    /// Does `work` to every block of the mask.
+    pub fn each_block(&mut self, frame: &Frame, work: impl Fn(&mut Block<T>) + Sync) {
+        self.each_part(frame, |_, blocks| {
+            for block in blocks {
+                work(block);
             }
-            band.keep_edge(frame, edge);
+            0.0
         });
     }
 
@@ -116,6 +117,7 @@ pub(super) fn sweep<T: Number>(system: &Scaled<'_, T>, steps: Steps, vectors: &m
 #[cfg(test)]
 mod tests {
     use super::super::band::sweep_band_with;
+    use super::super::rows::{BELOW, DIAGONAL, RIGHT, Ties, VECTORS};
     use super::*;
     use crate::vector::{Portable, PortableDouble};
 
