@@ -38,7 +38,7 @@ Difference = Literal["trapezoid", "forward"]
 DIFFERENCES: tuple[Difference, ...] = get_args(Difference)
 IntegrationMethod = Literal["least-squares", "bilateral"]
 Solver = Literal["converged", "compatible"]
-Precision = Literal["double", "single"]
+Precision = Literal["auto", "double", "single"]
 LEAST_SQUARES_ITERS, BILATERAL_ITERS = 2_000, 150
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def integrate_normals(
     k: float = 2.0,
     tol: float = 1e-4,
     solver: Solver = "converged",
-    precision: Precision = "double",
+    precision: Precision = "auto",
     camera: Pinhole | None = None,
     anchors: Anchors | None = None,
     pixel_pitch_um: float | None = None,
@@ -134,9 +134,10 @@ def integrate_normals(
         Bilateral: every system solved by multigrid to 1e-6, or the published iteration, Jacobi-preconditioned conjugate
         gradient to 1e-3. Stopped that early, jumps depend on how far the solver happened to come. Under a camera whose
         two focal lengths differ, "compatible" also takes the published approximation for it.
-    precision : {"double", "single"}
-        Bilateral, compatible: numbers inside a solve; "single" is faster, and what a solve changes is still added in
-        double.
+    precision : {"auto", "double", "single"}
+        Bilateral: numbers inside a solve; surface and weights are always double. "single", which only "compatible" has,
+        takes half the time. "auto" is single for "compatible", whose tolerance is far above rounding, and double for
+        "converged".
     camera : Pinhole, optional
         Bilateral: perspective; the result is then a :class:`DepthMap`.
     anchors : Anchors, optional
@@ -196,6 +197,8 @@ def integrate_normals(
     bilateral = {"k": number("k", k), "tol": number("tol", tol), "solver": solver, "precision": precision}
     own, others = (bilateral, least_squares) if method == "bilateral" else (least_squares, bilateral)
     check_others(method, others, own)
+    if precision == "auto":
+        precision = "single" if solver == "compatible" else "double"
     iters = count("max_iters", max_iters, BILATERAL_ITERS if method == "bilateral" else LEAST_SQUARES_ITERS)
     check_camera(camera, method, anchors)
     if isinstance(normals, NormalField):
@@ -247,6 +250,7 @@ def integrate_normals(
                 converged=surface["converged"],
                 k=k,
                 solver=solver,
+                precision=precision,
             ),
         }
     if camera is not None:

@@ -39,7 +39,7 @@ DEFAULTS = {
     "k": 2.0,
     "tol": 1e-4,
     "solver": "converged",
-    "precision": "double",
+    "precision": "auto",
 }
 """Of the arguments that only one method has."""
 

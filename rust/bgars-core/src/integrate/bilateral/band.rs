@@ -9,8 +9,8 @@ use super::super::real::{Real, on_vectors};
 use super::frame::{Frame, LANES, MIN_BAND_ROWS};
 use super::number::Number;
 use super::rows::{
-    A_A_P, A_P, A_R, Around, Block, Edge, Factors, KEPT, R, Rows, SUMS, Steps, TIES, Ties, VECTORS, add_products,
-    advance, advance_beside, all_stages, flush, multiply,
+    Around, Block, Edge, Factors, KEPT, Rows, SUMS, Steps, TIES, Ties, VECTORS, add_products, advance, advance_beside,
+    all_stages, flush, multiply,
 };
 use crate::memory::Aligned;
 use crate::vector::Packed;
@@ -73,7 +73,8 @@ impl<T: Number> Band<T> {
             let blocks = &blocks(&self.blocks)[(row + BESIDE - start) * stride..];
             for &(lo, hi) in frame.spans(row as isize) {
                 for (block, kept) in blocks[lo..hi].iter().zip(&mut kept[lo..hi]) {
-                    *kept = [block[R], block[A_P], block[A_R], block[A_A_P]];
+                    let [_, p, r, a_p, a_r, a_a_p] = *block;
+                    *kept = [p, r, a_p, a_r, a_a_p];
                 }
             }
         }
@@ -110,8 +111,8 @@ pub(super) fn sweep_band<T: Number>(
     on_vectors!(T, sweep_band_with::<T>(system, steps, edges, index, band))
 }
 
-/// A row goes through three stages, each a row behind the one before, whose neighbours it needs: r after both iterations (and
-/// `A p1`, in the place of A p), then `A r` and `A p`, then `A A p`. Rows beside the band go through the first two as well.
+/// A row goes through three stages, each a row behind the one before, whose neighbours it needs: r and p after both iterations
+/// (and `A p1`, in the place of A p), then `A p` and `A r`, then `A A p`. Rows beside the band go through the first two as well.
 #[inline(always)]
 pub(super) fn sweep_band_with<T: Number, V: Packed<Number = T>>(
     system: &Scaled<'_, T>,

@@ -290,10 +290,10 @@ mod tests {
         let (iterations, norm) = Jacobi::<f32>::new(&frame).improve(&system, &mut single, target, 2000, || true);
         let (most, _) = Jacobi::<f64>::new(&frame).improve(&system, &mut double, target, 2000, || true);
         assert!(norm <= target);
-        // Left to itself, the residual of `f32` ends at a true one of 80 times this.
+        // Left to itself, the residual of `f32` ends at a true one of ninety times this.
         let left = norm_left(&frame, &system, &single);
         assert!(left <= 1.3 * target, "{left} for {target}");
-        assert!(2 * iterations <= 3 * most, "{iterations} iterations, {most} of f64");
+        assert!(10 * iterations <= 11 * most, "{iterations} iterations, {most} of f64");
     }
 
     #[test]

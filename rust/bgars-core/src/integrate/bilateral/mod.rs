@@ -50,7 +50,8 @@ pub enum Setting {
 pub enum Precision {
     /// `f64`.
     Double,
-    /// `f32` within a solve, which finds the change of the surface only. [`Setting::Compatible`] alone has it.
+    /// `f32` within a solve, which finds the change of the surface only; a residual that rounding leads away is replaced by the
+    /// true one. [`Setting::Compatible`] alone has it.
     Single,
 }
 

@@ -18,9 +18,9 @@ const FIRST_LOOK: usize = 128;
 /// Fewest and most sweeps from one comparison to the next.
 const LOOKS: [f64; 2] = [16.0, 256.0];
 /// Largest gap between the residuals that is left, of what the solve aims at.
-const LEFT_GAP: f64 = 0.1;
+const LEFT_GAP: f64 = 0.5;
 /// The next comparison is where the gap will have grown to this.
-const PLANNED_GAP: f64 = 0.25;
+const PLANNED_GAP: f64 = 0.75;
 
 /// When to compare the residuals again.
 pub(super) struct Watch {
@@ -70,18 +70,18 @@ impl<T: Number> Jacobi<'_, T> {
             vectors.each_block(frame, |block| block[X] = zero);
             return None;
         }
-        // A (p - r) first, in the place of A p; these steps leave x and p as they are.
-        let still = Steps { a0: 0.0, b0: -1.0, a1: 0.0, b1: -1.0 };
+        // First A (p - r), in the place of A p.
         vectors.each_block(frame, |block| {
             block[R] = std::array::from_fn(|lane| block[P][lane] - block[X][lane]);
             (block[A_P], block[A_R], block[A_A_P]) = (zero, zero, zero);
         });
-        sweep(scaled, still, vectors);
-        // Then A r, and with it A p.
+        sweep(scaled, Steps::default(), vectors);
+        // Then A p, and A r as what is left of it; these steps leave x, p and r as they are.
         vectors.each_block(frame, |block| {
-            (block[R], block[X]) = (block[X], zero);
-            (block[A_R], block[A_A_P]) = (zero, zero);
+            block[P] = std::array::from_fn(|lane| block[P][lane] + block[X][lane]);
+            (block[R], block[X], block[A_R], block[A_A_P]) = (block[X], zero, zero, zero);
         });
+        let still = Steps { a0: 0.0, b0: -1.0, a1: 0.0, b1: -1.0 };
         Some(sweep(scaled, still, vectors))
     }
 }

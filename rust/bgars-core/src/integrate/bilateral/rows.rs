@@ -29,10 +29,10 @@ pub(super) const A_A_P: usize = 5;
 /// Vectors of a block.
 pub(super) const VECTORS: usize = 6;
 
-/// What a band needs of a block beside it: r, A p, A r and A A p.
+/// What a band needs of a block beside it: all but x.
 pub(super) type Edge<T> = [[T; LANES]; KEPT];
 /// Vectors of an edge, the last of a block.
-pub(super) const KEPT: usize = VECTORS - R;
+pub(super) const KEPT: usize = VECTORS - P;
 
 /// The system at [`LANES`] pixels.
 pub(super) type Ties<T> = [[T; LANES]; TIES];
@@ -64,6 +64,7 @@ pub(super) struct Factors<V> {
     a1: V,
     minus_a1: V,
     b1: V,
+    minus_b1: V,
     /// `r2 = r + of_v v - a1 u + of_w w`.
     of_v: V,
     of_w: V,
@@ -79,16 +80,18 @@ impl<T: Number, V: Packed<Number = T>> Factors<V> {
             a1: V::splat(T::of(a1)),
             minus_a1: V::splat(T::of(-a1)),
             b1: V::splat(T::of(b1)),
+            minus_b1: V::splat(T::of(-b1)),
             of_v: V::splat(T::of(-(a0 + a1 * b0))),
             of_w: V::splat(T::of(a0 * a1)),
         }
     }
 
-    /// The new residual, and `A p1` between the two iterations.
+    /// The residual after both iterations, and p between them and after them.
     #[inline(always)]
-    fn step(&self, [r, v, u, w]: [V; 4]) -> [V; 2] {
+    fn step(&self, [p, r, v, u, w]: [V; 5]) -> [V; 3] {
         let new_r = self.minus_a1.times_plus(u, self.of_w.times_plus(w, self.of_v.times_plus(v, r)));
-        [new_r, self.minus_a0.times_plus(w, self.b0.times_plus(v, u))]
+        let p1 = self.minus_a0.times_plus(v, self.b0.times_plus(p, r));
+        [new_r, p1, self.b1.times_plus(p1, new_r)]
     }
 }
 
@@ -104,16 +107,15 @@ pub(super) fn advance<T: Number, V: Packed<Number = T>>(by: &Factors<V>, row: &m
 
 #[inline(always)]
 fn advance_part<T: Number, V: Packed<Number = T>>(by: &Factors<V>, block: &mut Block<T>, part: usize) {
-    let [x, p0, r0, v0, u, w] = block.each_ref().map(|lanes| read::<T, V>(lanes, part));
-    let [r2, a_p1] = by.step([r0, v0, u, w]);
-    let p1 = by.minus_a0.times_plus(v0, by.b0.times_plus(p0, r0));
-    write(by.a1.times_plus(p1, by.a0.times_plus(p0, x)), &mut block[X], part);
-    write(by.b1.times_plus(p1, r2), &mut block[P], part);
+    let [x, p, r, v, u, w] = block.each_ref().map(|lanes| read::<T, V>(lanes, part));
+    let [r2, p1, p2] = by.step([p, r, v, u, w]);
+    write(by.a1.times_plus(p1, by.a0.times_plus(p, x)), &mut block[X], part);
+    write(p2, &mut block[P], part);
     write(r2, &mut block[R], part);
-    write(a_p1, &mut block[A_P], part);
+    write(by.minus_a0.times_plus(w, by.b0.times_plus(v, u)), &mut block[A_P], part);
 }
 
-/// The same of a row beside the band, of which it needs r and v alone.
+/// The same of a row beside the band, of which it needs p alone.
 #[inline(always)]
 pub(super) fn advance_beside<T: Number, V: Packed<Number = T>>(
     by: &Factors<V>,
@@ -122,9 +124,8 @@ pub(super) fn advance_beside<T: Number, V: Packed<Number = T>>(
 ) {
     for (edge, block) in edge.iter().zip(row) {
         for part in 0..LANES / V::WIDTH {
-            let [r, a_p1] = by.step(edge.each_ref().map(|lanes| read::<T, V>(lanes, part)));
-            write(r, &mut block[R], part);
-            write(a_p1, &mut block[A_P], part);
+            let [_, _, p2] = by.step(edge.each_ref().map(|lanes| read::<T, V>(lanes, part)));
+            write(p2, &mut block[P], part);
         }
     }
 }
@@ -217,24 +218,25 @@ impl<T: Number, V: Packed<Number = T>> Walk<V> {
     }
 }
 
-/// A r of the new r, and with it A p of the new p.
+/// A p of the new p, and with it A r of the new r.
 #[inline(always)]
 pub(super) fn multiply<T: Number, V: Packed<Number = T>>(by: &Factors<V>, mut row: Around<'_, T>) {
     let row = row.cut();
-    let mut walk = Walk::<V>::new(&row.here[0][R]);
+    let mut walk = Walk::<V>::new(&row.here[0][P]);
     for k in 0..row.ties.len() {
         for part in 0..LANES / V::WIDTH {
-            let [_, a_r] = walk.next::<R>(&row.cross(k), k, part);
-            keep_a_r(by, a_r, &mut row.here[k], part);
+            let [_, a_p] = walk.next::<P>(&row.cross(k), k, part);
+            keep_a_p(by, a_p, &mut row.here[k], part);
         }
     }
 }
 
-/// `A p2 = A r2 + b1 A p1`, the last from its place and to it.
+/// `A r2 = A p2 - b1 A p1`, the last from the place of A p. The other way round, A p from A r, would hand the rounding of one A p
+/// on to the next.
 #[inline(always)]
-fn keep_a_r<T: Number, V: Packed<Number = T>>(by: &Factors<V>, a_r: V, block: &mut Block<T>, part: usize) {
-    write(a_r, &mut block[A_R], part);
-    write(by.b1.times_plus(read(&block[A_P], part), a_r), &mut block[A_P], part);
+fn keep_a_p<T: Number, V: Packed<Number = T>>(by: &Factors<V>, a_p: V, block: &mut Block<T>, part: usize) {
+    write(by.minus_b1.times_plus(read(&block[A_P], part), a_p), &mut block[A_R], part);
+    write(a_p, &mut block[A_P], part);
 }
 
 /// A A p of a row, and its share of the products.
@@ -292,14 +294,14 @@ pub(super) fn all_stages<T: Number, V: Packed<Number = T>>(by: &Factors<V>, rows
     let (top, last, middle, front) = (&top[..n], &mut last[..=n], &mut middle[..=n], &mut front[..n]);
     let [ties_top, ties_last, ties_middle] = [ties_top, ties_last, ties_middle].map(|ties| &ties[..n]);
     let mut own = *sums;
-    let (mut walk_middle, mut walk_last) = (Walk::<V>::new(&middle[0][R]), Walk::<V>::new(&last[0][A_P]));
+    let (mut walk_middle, mut walk_last) = (Walk::<V>::new(&middle[0][P]), Walk::<V>::new(&last[0][A_P]));
     for k in 0..n {
         for part in 0..LANES / V::WIDTH {
             advance_part(by, &mut front[k], part);
             let (ties_above, ties) = (&ties_last[k], &ties_middle[k]);
             let cross = Cross { above: &last[k], here: middle, below: &front[k], ties_above, ties };
-            let [_, a_r] = walk_middle.next::<R>(&cross, k, part);
-            keep_a_r(by, a_r, &mut middle[k], part);
+            let [_, a_p] = walk_middle.next::<P>(&cross, k, part);
+            keep_a_p(by, a_p, &mut middle[k], part);
             let (ties_above, ties) = (&ties_top[k], &ties_last[k]);
             let cross = Cross { above: &top[k], here: last, below: &middle[k], ties_above, ties };
             let products = walk_last.next::<A_P>(&cross, k, part);

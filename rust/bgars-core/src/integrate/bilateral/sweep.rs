@@ -3,7 +3,7 @@
 //! Plain conjugate gradient reads and writes every vector at least once an iteration. Two iterations take only `A p`, `A A p`
 //! and `A r` of the vectors before them, and all their coefficients follow from products of these five (Chronopoulos and Gear,
 //! "s-step iterative methods for symmetric linear systems", 1989, with s = 2). The five are kept; a sweep updates them row by
-//! row, multiplies twice by A (`A p` follows from `A r`, as p from r), and at once takes the products that the next two
+//! row, multiplies twice by A (`A r` follows from `A p`, as r from p), and at once takes the products that the next two
 //! iterations need. What each iteration does is otherwise that of the textbook, and so is where it ends.
 
 use std::ops::Range;
