@@ -65,9 +65,6 @@ pub(super) struct Factors<V> {
     minus_a1: V,
     b1: V,
     minus_b1: V,
-    /// `r2 = r + of_v v - a1 u + of_w w`.
-    of_v: V,
-    of_w: V,
 }
 
 impl<T: Number, V: Packed<Number = T>> Factors<V> {
@@ -81,17 +78,17 @@ impl<T: Number, V: Packed<Number = T>> Factors<V> {
             minus_a1: V::splat(T::of(-a1)),
             b1: V::splat(T::of(b1)),
             minus_b1: V::splat(T::of(-b1)),
-            of_v: V::splat(T::of(-(a0 + a1 * b0))),
-            of_w: V::splat(T::of(a0 * a1)),
         }
     }
 
-    /// The residual after both iterations, and p between them and after them.
+    /// p between the two iterations, `A p1`, and residual and p after them.
     #[inline(always)]
-    fn step(&self, [p, r, v, u, w]: [V; 5]) -> [V; 3] {
-        let new_r = self.minus_a1.times_plus(u, self.of_w.times_plus(w, self.of_v.times_plus(v, r)));
-        let p1 = self.minus_a0.times_plus(v, self.b0.times_plus(p, r));
-        [new_r, p1, self.b1.times_plus(p1, new_r)]
+    fn step(&self, [p, r, v, u, w]: [V; 5]) -> [V; 4] {
+        let r1 = self.minus_a0.times_plus(v, r);
+        let p1 = self.b0.times_plus(p, r1);
+        let a_p1 = self.minus_a0.times_plus(w, self.b0.times_plus(v, u));
+        let r2 = self.minus_a1.times_plus(a_p1, r1);
+        [p1, a_p1, r2, self.b1.times_plus(p1, r2)]
     }
 }
 
@@ -108,11 +105,11 @@ pub(super) fn advance<T: Number, V: Packed<Number = T>>(by: &Factors<V>, row: &m
 #[inline(always)]
 fn advance_part<T: Number, V: Packed<Number = T>>(by: &Factors<V>, block: &mut Block<T>, part: usize) {
     let [x, p, r, v, u, w] = block.each_ref().map(|lanes| read::<T, V>(lanes, part));
-    let [r2, p1, p2] = by.step([p, r, v, u, w]);
+    let [p1, a_p1, r2, p2] = by.step([p, r, v, u, w]);
     write(by.a1.times_plus(p1, by.a0.times_plus(p, x)), &mut block[X], part);
     write(p2, &mut block[P], part);
     write(r2, &mut block[R], part);
-    write(by.minus_a0.times_plus(w, by.b0.times_plus(v, u)), &mut block[A_P], part);
+    write(a_p1, &mut block[A_P], part);
 }
 
 /// The same of a row beside the band, of which it needs p alone.
@@ -124,7 +121,7 @@ pub(super) fn advance_beside<T: Number, V: Packed<Number = T>>(
 ) {
     for (edge, block) in edge.iter().zip(row) {
         for part in 0..LANES / V::WIDTH {
-            let [_, _, p2] = by.step(edge.each_ref().map(|lanes| read::<T, V>(lanes, part)));
+            let [.., p2] = by.step(edge.each_ref().map(|lanes| read::<T, V>(lanes, part)));
             write(p2, &mut block[P], part);
         }
     }
