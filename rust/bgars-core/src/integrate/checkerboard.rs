@@ -153,6 +153,12 @@ impl Weights {
         self.side(DOWN, row)
     }
 
+    /// Weights from the reds of `row` to their left, right, upper and lower neighbours.
+    #[inline]
+    pub fn row(&self, row: isize) -> [PaddedRow<'_, f32>; 4] {
+        [LEFT, RIGHT, UP, DOWN].map(|side| self.side(side, row))
+    }
+
     /// The bands of rows, to set.
     pub fn bands_mut(&mut self) -> impl IndexedParallelIterator<Item = Band<'_>> {
         let (half, stride) = (self.grid.half(), self.stride());

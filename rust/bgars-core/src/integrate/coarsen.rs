@@ -34,7 +34,7 @@ pub(super) fn coarsen(weights: &Weights) -> Weights {
 
 /// What a row of corners conducts to the right, and to the next row of corners.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn conduct(weights: &Weights, coarse_row: usize, rightward: &mut [f32], downward: &mut [f32]) {
+pub(super) fn conduct(weights: &Weights, coarse_row: usize, rightward: &mut [f32], downward: &mut [f32]) {
     let (grid, n) = (weights.grid, rightward.len());
     let downward = &mut downward[..n];
     let row = 2 * coarse_row as isize;

@@ -10,11 +10,26 @@ use rayon::prelude::*;
 
 use super::checkerboard::{PaddedRow, Weights};
 use super::coarsen::series;
+use super::stops::stops;
 
-/// Ties every corner without edges to the neighbours around it. These are a grid's last edges: its spans follow.
+/// Ties every corner without edges to the neighbours around it, or makes it a stop. These are a grid's last edges: its spans
+/// follow.
 pub(super) fn fill_corners(weights: &mut Weights) {
+    for tied in [ways_around, stops] {
+        for (row, k, ties) in tied(weights) {
+            weights.set_red(row, k, ties.map(|tie| -tie));
+        }
+    }
+    weights.find_spans();
+}
+
+/// Corners to be tied, by row and number, and their ties: left, right, up, down.
+pub(super) type Tied = Vec<(usize, usize, [f32; 4])>;
+
+/// The corners without edges that have a way around.
+fn ways_around(weights: &Weights) -> Tied {
     let n = weights.grid.half();
-    let found: Vec<(usize, usize, [f32; 4])> = (0..weights.grid.height.div_ceil(2))
+    (0..weights.grid.height.div_ceil(2))
         .into_par_iter()
         .flat_map_iter(|coarse_row| {
             let row = 2 * coarse_row;
@@ -24,15 +39,11 @@ pub(super) fn fill_corners(weights: &mut Weights) {
             let free = free.into_iter().enumerate().filter(|corner| corner.1 > 0.0);
             free.filter_map(move |(k, _)| around.virtual_ties(k).map(|ties| (row, k, ties)))
         })
-        .collect();
-    for (row, k, ties) in found {
-        weights.set_red(row, k, ties.map(|tie| -tie));
-    }
-    weights.find_spans();
+        .collect()
 }
 
 /// The weights in and beside a row of corners: left, right, up, down.
-struct Around<'a> {
+pub(super) struct Around<'a> {
     above: [PaddedRow<'a, f32>; 4],
     here: [PaddedRow<'a, f32>; 4],
     below: [PaddedRow<'a, f32>; 4],
@@ -65,25 +76,35 @@ fn find_free(around: &Around<'_>, free: &mut [f32]) {
 }
 
 impl<'a> Around<'a> {
-    fn new(weights: &'a Weights, row: isize) -> Self {
-        let sides = |row| [weights.left(row), weights.right(row), weights.up(row), weights.down(row)];
-        Self { above: sides(row - 1), here: sides(row), below: sides(row + 1) }
+    pub fn new(weights: &'a Weights, row: isize) -> Self {
+        Self { above: weights.row(row - 1), here: weights.row(row), below: weights.row(row + 1) }
     }
 
-    /// Weights to the left, right, upper and lower neighbour of corner `k`; `None` if it has edges, or nothing to be tied to.
-    fn virtual_ties(&self, k: usize) -> Option<[f32; 4]> {
+    /// What the four ways around corner `k` conduct, each through one centre: from left to up, up to right, right to down, down to
+    /// left; `None` for a corner with edges.
+    fn arcs(&self, k: usize) -> Option<[f32; 4]> {
         let red = k + 1;
         if self.here.iter().any(|side| side[red] != 0.0) {
             return None;
         }
         let ([left_above, right_above, _, down_above], [left_below, right_below, up_below, _]) =
             (self.above, self.below);
-        // The four ways around, each through one centre.
-        let left_up = series(down_above[k], right_above[k]);
-        let up_right = series(left_above[red], down_above[red]);
-        let right_down = series(up_below[red], left_below[red]);
-        let down_left = series(right_below[k], up_below[k]);
-        let arcs = [left_up, up_right, right_down, down_left];
+        Some([
+            series(down_above[k], right_above[k]),
+            series(left_above[red], down_above[red]),
+            series(up_below[red], left_below[red]),
+            series(right_below[k], up_below[k]),
+        ])
+    }
+
+    /// True for a corner without edges and without a way around.
+    pub fn is_free(&self, k: usize) -> bool {
+        self.arcs(k).is_some_and(|arcs| arcs.iter().all(|&arc| arc <= 0.0))
+    }
+
+    /// Weights to the left, right, upper and lower neighbour of corner `k`; `None` if it has edges, or nothing to be tied to.
+    fn virtual_ties(&self, k: usize) -> Option<[f32; 4]> {
+        let arcs = self.arcs(k)?;
         if arcs.iter().all(|&arc| arc <= 0.0) {
             return None;
         }

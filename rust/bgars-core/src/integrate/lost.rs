@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::checkerboard::Weights;
+use super::checkerboard::{Grid, Weights};
 use super::detours::Window;
 use super::places::{Place, blacks_around, diagonal};
 use super::strays::is_alone;
@@ -55,12 +55,15 @@ impl Lost {
 
 /// The centres that corner `k` of `row` is tied to.
 fn tied_centres(weights: &Weights, row: isize, k: usize) -> impl Iterator<Item = Place> {
-    // Cells above left, above right, below right, below left; the corner's number in each.
-    let cells = [(row - 1, k.wrapping_sub(1), 2), (row - 1, k, 3), (row + 1, k, 0), (row + 1, k.wrapping_sub(1), 1)];
-    cells.into_iter().filter_map(move |(row, k, corner)| {
-        let inside = weights.grid.contains(row) && k < weights.grid.half();
-        (inside && Rim::around(weights, row, k).is_tied(corner)).then_some((row, k))
-    })
+    let tied = move |&(cell, corner): &(Place, usize)| Rim::around(weights, cell.0, cell.1).is_tied(corner);
+    cells_around(weights.grid, (row, k)).filter(tied).map(|(cell, _)| cell)
+}
+
+/// The cells around a corner by their centres: above left, above right, below right, below left; the corner's number in each.
+pub(super) fn cells_around(grid: Grid, (row, k): Place) -> impl Iterator<Item = (Place, usize)> {
+    let before = k.wrapping_sub(1);
+    let cells = [((row - 1, before), 2), ((row - 1, k), 3), ((row + 1, k), 0), ((row + 1, before), 1)];
+    cells.into_iter().filter(move |&((row, k), _)| grid.contains(row) && k < grid.half())
 }
 
 /// The centres of odd `row` that tie together what has no coarse edge along the rim of their cell.
@@ -113,15 +116,15 @@ fn has_detour(weights: &Weights, coarser: &Weights, row: isize, k: usize) -> boo
 }
 
 /// The weights of the edges in a row of cells.
-struct CellRow<'a> {
-    spokes: [&'a [f32]; 4],
-    rims: [[&'a [f32]; 2]; 4],
+pub(super) struct CellRow<'a> {
+    pub spokes: [&'a [f32]; 4],
+    pub rims: [[&'a [f32]; 2]; 4],
     beyond: [&'a [f32]; 4],
 }
 
 impl<'a> CellRow<'a> {
     /// The cells around the centres of odd `row`.
-    fn new(weights: &'a Weights, row: isize) -> Self {
+    pub fn new(weights: &'a Weights, row: isize) -> Self {
         let n = weights.grid.half();
         let here = 1..=n;
         let next = 2..n + 2;

@@ -5,8 +5,9 @@
 //!
 //! The way through the files: `operator` makes `edges` of the normals, these the system on a `checkerboard`; `reduction`
 //! eliminates every other pixel; `conjugate_gradient` solves for the rest, preconditioned by `multigrid`, whose grids come
-//! from `coarsen` (after `fill` has closed the smallest holes) and talk to each other by `transfer`. What a coarser grid
-//! cannot hold, nor lead around (`detours`), is found by `lost`; it goes as `strays` to the `graph` that takes over from the last grid.
+//! from `coarsen` (after `fill` has closed the smallest holes, and `stops` has led lanes across) and talk to each other by `transfer`.
+//! What a coarser grid cannot hold, nor lead around (`detours`), is found by `lost`; it goes as `strays` to the `graph` that takes
+//! over from the last grid.
 
 mod bilateral;
 mod checkerboard;
@@ -27,6 +28,7 @@ mod ring;
 mod solve;
 mod spans;
 mod stencil;
+mod stops;
 mod strays;
 mod system;
 mod transfer;

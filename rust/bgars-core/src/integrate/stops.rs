@@ -1,0 +1,211 @@
+//! Stops: empty corners that lend their place to a lane which crosses a cell from corner to corner.
+//!
+//! Where a lane turns from one column to the next, only two corners across a cell may lie in it, and a grid has no diagonals.
+//! One of the other two corners becomes a *stop* between them, a virtual pixel (see `fill`): tied to the black beside the one
+//! corner, it gets its edge to the other by the path through the centre. The tie is such that the coarser grid's two edges
+//! conduct, one after the other, what the lane does.
+
+use multiversion::multiversion;
+use rayon::prelude::*;
+
+use super::checkerboard::{DOWN, LEFT, PaddedRow, RIGHT, UP, Weights};
+use super::coarsen::series;
+use super::fill::{Around, Tied};
+use super::lost::{CellRow, Rim, cells_around};
+use super::places::Place;
+
+/// The corners that become stops, and their ties.
+pub(super) fn stops(weights: &Weights) -> Tied {
+    (0..weights.grid.height.div_ceil(2))
+        .into_par_iter()
+        .flat_map_iter(|coarse_row| {
+            let row = 2 * coarse_row;
+            let candidates = beside_lanes(weights, row as isize).into_iter();
+            candidates.filter_map(move |k| stop(weights, (row as isize, k)).map(|ties| (row, k, ties)))
+        })
+        .collect()
+}
+
+/// The corners of a row without edges that have a lane in a cell beside them.
+fn beside_lanes(weights: &Weights, row: isize) -> Vec<usize> {
+    let n = weights.grid.half();
+    let (mut free, mut lanes) = (vec![false; n], vec![0.0; n]);
+    if !find_free(weights.row(row), &mut free) {
+        return Vec::new();
+    }
+    for (beside, corners) in [(row - 1, [3, 2]), (row + 1, [0, 1])] {
+        if weights.grid.contains(beside) {
+            find_lanes(&CellRow::new(weights, beside), corners, &mut lanes);
+        }
+    }
+    (0..n).filter(|&k| free[k] && lanes[k] > 0.0).collect()
+}
+
+/// Marks the corners without edges; true if there are any.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn find_free(edges: [PaddedRow<'_, f32>; 4], free: &mut [bool]) -> bool {
+    let n = free.len();
+    let [left, right, up, down] = edges.map(|side| &side[1..=n]);
+    let mut any = false;
+    for k in 0..n {
+        free[k] = (left[k] == 0.0) & (right[k] == 0.0) & (up[k] == 0.0) & (down[k] == 0.0);
+        any |= free[k];
+    }
+    any
+}
+
+/// The lanes that may cross a cell past its corner `own`: the side of the rim that each comes by, and the end of this side that it
+/// comes from.
+fn lanes_past(own: usize) -> [(usize, usize); 2] {
+    [(own, 1), ((own + 3) % 4, 0)]
+}
+
+/// Raises `lanes` to the weakest edge of the strongest lane past each corner, through the cells of a row of which it is number
+/// `first` of its own and `second` of the one before.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn find_lanes(cells: &CellRow<'_>, [first, second]: [usize; 2], lanes: &mut [f32]) {
+    for (own, skip) in [(first, 0), (second, 1)] {
+        for (side, end) in lanes_past(own) {
+            let across = (side + 2) % 4;
+            let lanes = &mut lanes[skip..];
+            let n = lanes.len();
+            let [a, b] = [&cells.rims[side][end][..n], &cells.spokes[side][..n]];
+            let [c, d] = [&cells.spokes[across][..n], &cells.rims[across][end][..n]];
+            for k in 0..n {
+                lanes[k] = lanes[k].max(a[k].abs().min(b[k]).min(c[k].min(d[k].abs())));
+            }
+        }
+    }
+}
+
+/// The ties of a corner to the left, right, up and down if it is to be a stop.
+fn stop(weights: &Weights, corner: Place) -> Option<[f32; 4]> {
+    if !is_free(weights, corner) {
+        return None;
+    }
+    let mut best = (0.0, [0.0; 4]);
+    for (cell, own) in cells_around(weights.grid, corner) {
+        // Of two corners that could serve, the upper one does.
+        if own >= 2 && is_free(weights, (cell.0 - 1, cell.1 + own - 2)) {
+            continue;
+        }
+        let Rim { spokes, rims, .. } = Rim::around(weights, cell.0, cell.1);
+        for (side, end) in lanes_past(own) {
+            let across = (side + 2) % 4;
+            let lane = [rims[side][end].abs(), spokes[side], spokes[across], rims[across][end].abs()];
+            // The fourth corner of the cell must not hang on the lane.
+            if rims[across][1 - end] > 0.0 || lane.iter().any(|&edge| edge <= 0.0) {
+                continue;
+            }
+            let conductance = 1.0 / lane.iter().map(|edge| 1.0 / edge).sum::<f32>();
+            if conductance > best.0 {
+                let mut ties = [0.0; 4];
+                ties[towards(own, side)] = tie(lane, conductance);
+                best = (conductance, ties);
+            }
+        }
+    }
+    (best.0 > 0.0).then_some(best.1)
+}
+
+/// Where the side of a cell's rim lies, seen from its corner `own`.
+fn towards(own: usize, side: usize) -> usize {
+    match (own, side) {
+        (0, 0) | (3, 2) => RIGHT,
+        (1, 0) | (2, 2) => LEFT,
+        (0, 3) | (1, 1) => DOWN,
+        _ => UP,
+    }
+}
+
+/// The tie of a stop to the first black of a lane of four edges.
+///
+/// With u the share that the stop has in this black, `coarsen` makes of it two edges, a u and q (1 + u) / 2 with
+/// q = b c / (b + c). One after the other they have the lane's conductance g where K u^2 + (K - q - 2 a) u = q, K = a q / g.
+fn tie([a, b, c, _]: [f32; 4], conductance: f32) -> f32 {
+    let q = series(b, c);
+    let k = a * q / conductance;
+    let half = 0.5 * (k - q - 2.0 * a);
+    let share = ((half * half + k * q).sqrt() - half) / k;
+    a * share / (1.0 - share)
+}
+
+/// True for a corner of the grid without edges and without a way around.
+fn is_free(weights: &Weights, (row, k): Place) -> bool {
+    k < weights.grid.half() && Around::new(weights, row).is_free(k)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrate::checkerboard::Grid;
+    use crate::integrate::coarsen::{coarsen, conduct};
+    use crate::integrate::fill::fill_corners;
+    use crate::integrate::lost::Lost;
+
+    #[test]
+    fn two_passes_find_all_stops() {
+        let (weights, mut found) = (Weights::ragged([0.0, 0.0, 0.0, 0.0, 0.3, 0.7]), 0);
+        for row in (0..40).step_by(2) {
+            let beside = beside_lanes(&weights, row);
+            for k in (0..weights.grid.half()).filter(|&k| stop(&weights, (row, k)).is_some()) {
+                assert!(beside.contains(&k), "corner {k} of row {row}");
+                found += 1;
+            }
+        }
+        assert!(found > 5, "{found}");
+    }
+
+    /// A grid with a single lane of four edges, past corner `own` of the cell around red 8 of row 7, and the corners at its ends.
+    fn single_lane(own: usize, (side, end): (usize, usize), lane: [f32; 4]) -> (Weights, [usize; 2]) {
+        const SPOKES: [usize; 4] = [UP, RIGHT, DOWN, LEFT];
+        let mut weights = Weights::zeros(Grid { height: 16, width: 64 });
+        let across = (side + 2) % 4;
+        let ends = [(side + end) % 4, (across + end) % 4];
+        assert!(!ends.contains(&own));
+        for (corner, side, weight) in [(ends[0], side, lane[0]), (ends[1], across, lane[3])] {
+            let mut edges = [0.0; 4];
+            edges[towards(corner, side)] = weight;
+            let (row, k) = [(6, 8), (6, 9), (8, 9), (8, 8)][corner];
+            weights.set_red(row, k, edges);
+        }
+        let mut edges = [0.0; 4];
+        (edges[SPOKES[side]], edges[SPOKES[across]]) = (lane[1], lane[2]);
+        weights.set_red(7, 8, edges);
+        (weights, ends)
+    }
+
+    #[test]
+    fn the_coarser_grid_conducts_across_a_cell_what_the_lane_does() {
+        for own in 0..4 {
+            for past in lanes_past(own) {
+                for lane in [[1.0; 4], [0.3, 2.0, 0.01, 1.0], [5.0, 0.2, 0.9, 0.04]] {
+                    let (mut weights, ends) = single_lane(own, past, lane);
+                    fill_corners(&mut weights);
+                    let [mut right, mut down, mut elsewhere] = [[0.0; 32], [0.0; 32], [0.0; 32]];
+                    conduct(&weights, 3, &mut right, &mut down);
+                    let [top, left, next] = [right[8], down[8], down[9]];
+                    conduct(&weights, 4, &mut right, &mut elsewhere);
+                    // The rim of the coarse cell: sides between its corners 0 and 1, 1 and 2, 2 and 3, 3 and 0.
+                    let rim = [top, next, right[8], left];
+                    let first = ends[0].min(ends[1]);
+                    let ways = [[first, first + 1], [(first + 2) % 4, (first + 3) % 4]];
+                    let conducted: f32 = ways.map(|[a, b]| series(rim[a], rim[b])).iter().sum();
+                    let expected = 1.0 / lane.iter().map(|edge| 1.0 / edge).sum::<f32>();
+                    let error = (conducted / expected - 1.0).abs();
+                    assert!(error < 1e-5, "{own}, {past:?}, {lane:?}: {conducted} for {expected}");
+                    assert!(Lost::centres(&weights, &coarsen(&weights)).reds.is_empty());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_corner_of_the_mask_is_no_stop() {
+        let (mut weights, _) = single_lane(0, (0, 1), [1.0; 4]);
+        // Both corners beside the lane have edges of their own, away from it.
+        weights.set_red(6, 8, [1.0, 0.0, 0.0, 0.0]);
+        weights.set_red(8, 9, [0.0, 1.0, 0.0, 0.0]);
+        assert!(stops(&weights).is_empty());
+    }
+}
