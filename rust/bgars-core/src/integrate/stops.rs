@@ -48,7 +48,8 @@ fn find_free(edges: [PaddedRow<'_, f32>; 4], free: &mut [bool]) -> bool {
     let [left, right, up, down] = edges.map(|side| &side[1..=n]);
     let mut any = false;
     for k in 0..n {
-        free[k] = (left[k] == 0.0) & (right[k] == 0.0) & (up[k] == 0.0) & (down[k] == 0.0);
+        let strongest = left[k].abs().max(right[k].abs()).max(up[k].abs().max(down[k].abs()));
+        free[k] = strongest == 0.0;
         any |= free[k];
     }
     any
