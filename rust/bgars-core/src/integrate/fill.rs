@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::checkerboard::{PaddedRow, Weights};
 use super::coarsen::series;
+use super::places::above_zero;
 use super::stops::stops;
 
 /// Ties every corner without edges to the neighbours around it, or makes it a stop. These are a grid's last edges: its spans
@@ -36,8 +37,8 @@ fn ways_around(weights: &Weights) -> Tied {
             let around = Around::new(weights, row as isize);
             let mut free = vec![0.0; n];
             find_free(&around, &mut free);
-            let free = free.into_iter().enumerate().filter(|corner| corner.1 > 0.0);
-            free.filter_map(move |(k, _)| around.virtual_ties(k).map(|ties| (row, k, ties)))
+            let candidates = above_zero(&free).into_iter();
+            candidates.filter_map(move |k| around.virtual_ties(k).map(|ties| (row, k, ties)))
         })
         .collect()
 }

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::checkerboard::{Grid, Weights};
 use super::detours::Window;
-use super::places::{Place, blacks_around, diagonal};
+use super::places::{Place, above_zero, blacks_around, diagonal};
 use super::strays::is_alone;
 
 /// The reds that get lost: indices in ascending order.
@@ -72,8 +72,7 @@ fn doubtful_in_row(weights: &Weights, row: isize) -> Vec<usize> {
     // All edges there, or none, is the common case: one fast pass finds the cells that are worth a look.
     let mut suspects = vec![0.0; weights.grid.half()];
     suspect(&rows, &mut suspects);
-    let suspects = suspects.iter().enumerate().filter(|suspect| *suspect.1 > 0.0);
-    suspects.map(|suspect| suspect.0).filter(|&k| rows.rim(k).is_doubtful()).collect()
+    above_zero(&suspects).into_iter().filter(|&k| rows.rim(k).is_doubtful()).collect()
 }
 
 /// The strongest spoke of each cell that lacks an edge; 0 for the others.

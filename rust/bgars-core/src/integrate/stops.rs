@@ -12,7 +12,7 @@ use super::checkerboard::{DOWN, LEFT, PaddedRow, RIGHT, UP, Weights};
 use super::coarsen::series;
 use super::fill::{Around, Tied};
 use super::lost::{CellRow, Rim, cells_around};
-use super::places::Place;
+use super::places::{Place, above_zero};
 
 /// The corners that become stops, and their ties.
 pub(super) fn stops(weights: &Weights) -> Tied {
@@ -28,9 +28,8 @@ pub(super) fn stops(weights: &Weights) -> Tied {
 
 /// The corners of a row without edges that have a lane in a cell beside them.
 fn beside_lanes(weights: &Weights, row: isize) -> Vec<usize> {
-    let n = weights.grid.half();
-    let (mut free, mut lanes) = (vec![false; n], vec![0.0; n]);
-    if !find_free(weights.row(row), &mut free) {
+    let mut lanes = vec![0.0; weights.grid.half()];
+    if !find_free(weights.row(row), &mut lanes) {
         return Vec::new();
     }
     for (beside, corners) in [(row - 1, [3, 2]), (row + 1, [0, 1])] {
@@ -38,19 +37,19 @@ fn beside_lanes(weights: &Weights, row: isize) -> Vec<usize> {
             find_lanes(&CellRow::new(weights, beside), corners, &mut lanes);
         }
     }
-    (0..n).filter(|&k| free[k] && lanes[k] > 0.0).collect()
+    above_zero(&lanes)
 }
 
-/// Marks the corners without edges; true if there are any.
+/// Sets corners without edges to 0 and the others to minus infinity; true if there are any of the first.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn find_free(edges: [PaddedRow<'_, f32>; 4], free: &mut [bool]) -> bool {
+fn find_free(edges: [PaddedRow<'_, f32>; 4], free: &mut [f32]) -> bool {
     let n = free.len();
     let [left, right, up, down] = edges.map(|side| &side[1..=n]);
     let mut any = false;
     for k in 0..n {
         let strongest = left[k].abs().max(right[k].abs()).max(up[k].abs().max(down[k].abs()));
-        free[k] = strongest == 0.0;
-        any |= free[k];
+        free[k] = if strongest == 0.0 { 0.0 } else { f32::NEG_INFINITY };
+        any |= strongest == 0.0;
     }
     any
 }
@@ -61,8 +60,8 @@ fn lanes_past(own: usize) -> [(usize, usize); 2] {
     [(own, 1), ((own + 3) % 4, 0)]
 }
 
-/// Raises `lanes` to the weakest edge of the strongest lane past each corner, through the cells of a row of which it is number
-/// `first` of its own and `second` of the one before.
+/// Raises `lanes` by the weakest edge of each lane past a corner, through the cells of a row of which it is number `first` of its
+/// own and `second` of the one before.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 fn find_lanes(cells: &CellRow<'_>, [first, second]: [usize; 2], lanes: &mut [f32]) {
     for (own, skip) in [(first, 0), (second, 1)] {
@@ -72,8 +71,10 @@ fn find_lanes(cells: &CellRow<'_>, [first, second]: [usize; 2], lanes: &mut [f32
             let n = lanes.len();
             let [a, b] = [&cells.rims[side][end][..n], &cells.spokes[side][..n]];
             let [c, d] = [&cells.spokes[across][..n], &cells.rims[across][end][..n]];
+            let fourth = &cells.rims[across][1 - end][..n];
             for k in 0..n {
-                lanes[k] = lanes[k].max(a[k].abs().min(b[k]).min(c[k].min(d[k].abs())));
+                let weakest = a[k].abs().min(b[k]).min(c[k].min(d[k].abs()));
+                lanes[k] += if fourth[k] > 0.0 { 0.0 } else { weakest.max(0.0) };
             }
         }
     }
