@@ -11,13 +11,13 @@ from bgars.anchoring import anchored
 from bgars.errors import InputError
 from bgars.integration_inputs import (
     anchor_regions,
-    bool_mask,
     check_camera,
     check_others,
     count,
     edge_trust,
     normal_array,
     plain,
+    used_pixels,
 )
 from bgars.large_arrays import any_content
 from bgars.records import Component, DepthMap, HeightMap, NormalField
@@ -207,7 +207,7 @@ def integrate_normals(
     else:
         vectors, valid = normal_array(normals, mask)
     check_pitch(pixel_pitch_um)
-    use = np.ascontiguousarray(valid if mask is None else valid & bool_mask(mask, valid.shape))
+    use = used_pixels(valid, mask)
     trust = edge_trust(normals, weights, use)
     regions = anchor_regions(anchors, use.shape)
     arrays = (plain(vectors, np.float32), use, trust, regions)

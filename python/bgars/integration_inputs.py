@@ -9,6 +9,7 @@ import numpy as np
 
 from bgars import _bgars
 from bgars.errors import InputError
+from bgars.large_arrays import any_content
 from bgars.records import NormalField
 from bgars.surface_records import Anchors, Pinhole
 
@@ -21,13 +22,13 @@ if TYPE_CHECKING:
 
 __all__ = [
     "anchor_regions",
-    "bool_mask",
     "check_camera",
     "check_others",
     "count",
     "edge_trust",
     "normal_array",
     "plain",
+    "used_pixels",
 ]
 
 NORMALS_NDIM = 3
@@ -92,17 +93,24 @@ def plain(values: ArrayLike, dtype: DTypeLike) -> NDArray[Any]:
 
 
 def normal_array(normals: ArrayLike, mask: ArrayLike | None) -> tuple[FloatArray, BoolArray]:
-    """Return plain normals and where they can be integrated: everywhere, where a mask says it already."""
+    """Return plain normals and where they can be integrated: where the mask says, if there is one."""
     vectors = _numbers("normals", normals)
     if vectors.ndim != NORMALS_NDIM or vectors.shape[2] != NORMALS_NDIM:
         msg = f"normals: must have shape (H, W, 3), got {vectors.shape}"
         raise InputError(msg)
     if mask is not None:
-        return vectors, np.ones(vectors.shape[:2], dtype=np.bool_)
+        return vectors, _bool_mask(mask, vectors.shape[:2])
     return vectors, _bgars.usable_normals(vectors)
 
 
-def bool_mask(mask: ArrayLike, shape: tuple[int, ...]) -> BoolArray:
+def used_pixels(valid: BoolArray, mask: ArrayLike | None) -> BoolArray:
+    """Return the pixels of both masks, in an array of its own."""
+    use = any_content(valid.shape, np.bool_)
+    np.logical_and(valid, valid if mask is None else _bool_mask(mask, valid.shape), out=use)
+    return use
+
+
+def _bool_mask(mask: ArrayLike, shape: tuple[int, ...]) -> BoolArray:
     """Return the mask, or raise InputError unless it is one of this shape."""
     given = np.asarray(mask)
     if given.dtype != np.bool_ or given.shape != shape:
