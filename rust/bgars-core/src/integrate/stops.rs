@@ -103,11 +103,9 @@ fn stop(weights: &Weights, corner: Place) -> Option<[f32; 4]> {
                 continue;
             }
             let conductance = 1.0 / lane.iter().map(|edge| 1.0 / edge).sum::<f32>();
-            let tie = tie(lane, conductance);
-            // Not so where the edges are too far apart for floats.
-            if conductance > best.0 && tie > 0.0 && tie.is_finite() {
+            if conductance > best.0 {
                 let mut ties = [0.0; 4];
-                ties[towards(own, side)] = tie;
+                ties[towards(own, side)] = tie(lane, conductance);
                 best = (conductance, ties);
             }
         }
@@ -137,6 +135,7 @@ fn tie([a, b, c, _]: [f32; 4], conductance: f32) -> f32 {
     let root = (half * half + k * q).sqrt();
     // Two forms of the same, each without cancellation.
     let share = if half > 0.0 { q / (root + half) } else { (root - half) / k };
+    // Also of NaN, where the edges are too far apart for floats.
     let share = share.min(MAX_SHARE);
     a * share / (1.0 - share)
 }
@@ -216,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn edges_too_far_apart_for_floats_make_no_stop() {
+    fn edges_too_far_apart_for_floats_make_finite_ties() {
         for lane in [[1e-30, 1e30, 1.0, 1.0], [1e30, 1.0, 1.0, 1e-30], [1.0, 1e30, 1e30, 1e-30], [1e-44, 1.0, 1.0, 1.0]]
         {
             let (weights, _) = single_lane(0, (0, 1), lane);
