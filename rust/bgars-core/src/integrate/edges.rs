@@ -130,7 +130,7 @@ mod tests {
                     edges[DOWN] = at(Axis::Below, r, c, exists && row + 1 < height);
                     let (k, is_red) = (place / 2, (row + place) % 2 == 0);
                     if is_red {
-                        let kept = [weights.left(r), weights.right(r), weights.up(r), weights.down(r)];
+                        let kept = weights.row(r);
                         assert_eq!(kept.map(|side| side[k + 1]), edges, "{grid:?}: red at {row}, {place}");
                     }
                     let push = edges.map(|weight| f64::from(weight).powi(2));

@@ -38,7 +38,7 @@ impl Lost {
         let rows = (0..coarser.grid.height).into_par_iter();
         let found = rows.flat_map_iter(|coarse_row| {
             let row = 2 * coarse_row as isize;
-            let sides = [weights.left(row), weights.right(row), weights.up(row), weights.down(row)];
+            let sides = weights.row(row);
             // A corner without edges is tied to nothing.
             let tied = (0..half).filter(move |k| sides.iter().any(|side| side[k + 1] != 0.0));
             let alone = tied.filter(move |&k| is_alone(coarser, coarse_row, k));

@@ -77,7 +77,7 @@ impl Spans {
 /// From the first to the last red with an edge; `None` in a row without any.
 fn reds_with_edges(weights: &Weights, row: usize) -> Option<Range<usize>> {
     let (row, half) = (row as isize, weights.grid.half());
-    let sides = [weights.left(row), weights.right(row), weights.up(row), weights.down(row)];
+    let sides = weights.row(row);
     // All bits but the signs, which zeros may have.
     let bits = |side: &[f32]| side.iter().fold(0, |bits, weight| bits | weight.to_bits()) << 1;
     let has_edges = |reds: &Range<usize>| sides.iter().any(|side| bits(&side[1 + reds.start..=reds.end]) != 0);

@@ -51,8 +51,7 @@ pub(super) fn reduced_graph(weights: &Weights) -> (Nodes, Rows) {
     let nodes: Vec<u32> = (0..grid.height)
         .into_par_iter()
         .flat_map_iter(|row| {
-            let here = row as isize;
-            let sides = [weights.left(here), weights.right(here), weights.up(here), weights.down(here)];
+            let sides = weights.row(row as isize);
             let used = move |k: &usize| sides.iter().any(|side| side[k + 1] > 0.0);
             (0..half).filter(used).map(move |k| (row * half + k) as u32)
         })

@@ -142,7 +142,7 @@ mod tests {
         for row in 0..grid.height {
             for k in 0..n {
                 let at = row as isize;
-                let sides = [weights.left(at), weights.right(at), weights.up(at), weights.down(at)];
+                let sides = weights.row(at);
                 let mut sides = sides.map(|side| side[k + 1]);
                 if row % 2 == 1 {
                     // Virtual edges are tied to corners.
