@@ -65,8 +65,8 @@ pub(super) fn ties(weights: &Weights, red: Place, out: &mut Vec<(Place, f64)>) {
 pub(super) fn above_zero(values: &[f32]) -> Vec<usize> {
     let mut places = Vec::new();
     for (block, values) in values.chunks(LANES).enumerate() {
-        // A block is compared at once.
-        if values.iter().fold(0.0, |largest: f32, &value| largest.max(value)) > 0.0 {
+        // Counted, as the compiler makes vectors of that.
+        if values.iter().map(|&value| u32::from(value > 0.0)).sum::<u32>() > 0 {
             let above = values.iter().enumerate().filter(|value| *value.1 > 0.0);
             places.extend(above.map(|value| block * LANES + value.0));
         }
