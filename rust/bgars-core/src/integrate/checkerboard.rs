@@ -30,14 +30,14 @@ pub(super) struct Grid {
 
 impl Grid {
     /// Pixels of one colour in a row.
-    #[inline]
+    #[inline(always)]
     pub fn half(self) -> usize {
         let half = self.width.div_ceil(2);
         if half < LANES { half } else { half.next_multiple_of(LANES) }
     }
 
     /// Zeros between rows of weights.
-    #[inline]
+    #[inline(always)]
     fn pad(self) -> usize {
         if self.half() < LANES { 1 } else { LANES }
     }
@@ -113,13 +113,13 @@ impl Weights {
     }
 
     /// Weights from one red to the one below.
-    #[inline]
+    #[inline(always)]
     pub fn stride(&self) -> usize {
         self.grid.half() + self.grid.pad()
     }
 
     /// Where the weights of a row start.
-    #[inline]
+    #[inline(always)]
     fn start(&self, row: isize) -> usize {
         self.grid.pad() + (row + 1) as usize * self.stride()
     }
@@ -130,33 +130,33 @@ impl Weights {
     }
 
     /// Weights from the reds of `row` (-1 to `height`) to their left neighbours.
-    #[inline]
+    #[inline(always)]
     pub fn left(&self, row: isize) -> PaddedRow<'_, f32> {
         self.side(LEFT, row)
     }
 
     /// The same to the right.
-    #[inline]
+    #[inline(always)]
     pub fn right(&self, row: isize) -> PaddedRow<'_, f32> {
         self.side(RIGHT, row)
     }
 
     /// The same upward.
-    #[inline]
+    #[inline(always)]
     pub fn up(&self, row: isize) -> PaddedRow<'_, f32> {
         self.side(UP, row)
     }
 
     /// The same downward.
-    #[inline]
+    #[inline(always)]
     pub fn down(&self, row: isize) -> PaddedRow<'_, f32> {
         self.side(DOWN, row)
     }
 
     /// Weights from the reds of `row` to their left, right, upper and lower neighbours.
-    #[inline]
+    #[inline(always)]
     pub fn row(&self, row: isize) -> [PaddedRow<'_, f32>; 4] {
-        [LEFT, RIGHT, UP, DOWN].map(|side| self.side(side, row))
+        [self.left(row), self.right(row), self.up(row), self.down(row)]
     }
 
     /// The bands of rows, to set.
@@ -184,8 +184,14 @@ impl Weights {
     /// The weights of the edges of the reds of `row` along a span.
     #[inline(always)]
     pub fn reds<V: Packed>(&self, row: isize, span: Span) -> Sides<'_, V> {
-        let n = span.vectors::<V>();
-        Sides([LEFT, RIGHT, UP, DOWN].map(|side| V::floats(&self.side(side, row)[1 + span.start..], n)))
+        let (first, n) = (1 + span.start, span.vectors::<V>());
+        let [left, right, up, down] = self.row(row);
+        Sides([
+            V::floats(&left[first..], n),
+            V::floats(&right[first..], n),
+            V::floats(&up[first..], n),
+            V::floats(&down[first..], n),
+        ])
     }
 
     /// The weights of the edges of the blacks of `row`, kept at their four reds.
@@ -210,7 +216,7 @@ impl Weights {
         span: Span,
         blacks: [PaddedRow<'a, V::Number>; 3],
     ) -> Stencil<'a, V> {
-        Stencil::new(self.reds(row, span), blacks.map(|blacks| &blacks[span.start..]), is_odd(row))
+        Stencil::new(self.reds(row, span), blacks, span, is_odd(row))
     }
 
     /// The blacks of `row` among the reds.
@@ -221,7 +227,7 @@ impl Weights {
         span: Span,
         reds: [PaddedRow<'a, V::Number>; 3],
     ) -> Stencil<'a, V> {
-        Stencil::new(self.blacks(row, span), reds.map(|reds| &reds[span.start..]), 1 - is_odd(row))
+        Stencil::new(self.blacks(row, span), reds, span, 1 - is_odd(row))
     }
 }
 

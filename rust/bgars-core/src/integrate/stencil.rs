@@ -1,6 +1,7 @@
 //! A row of the checkerboard, vector by vector.
 
 use super::checkerboard::{DOWN, LEFT, PaddedRow, RIGHT, UP};
+use super::spans::Span;
 use crate::vector::Packed;
 
 /// The weights of the edges of a row's pixels of one colour: left, right, up, down.
@@ -35,13 +36,18 @@ pub(super) struct Stencil<'a, V: Packed> {
 impl<'a, V: Packed> Stencil<'a, V> {
     /// `shift` is 0 where the left neighbour of pixel k is pixel k - 1 of the other colour, 1 where it is pixel k.
     #[inline(always)]
-    pub fn new(sides: Sides<'a, V>, [above, here, below]: [PaddedRow<'a, V::Number>; 3], shift: usize) -> Self {
-        let n = sides.len();
+    pub fn new(
+        sides: Sides<'a, V>,
+        [above, here, below]: [PaddedRow<'a, V::Number>; 3],
+        span: Span,
+        shift: usize,
+    ) -> Self {
+        let (first, n) = (1 + span.start, sides.len());
         let near = [
-            V::chunks(&here[shift..], n),
-            V::chunks(&here[1 + shift..], n),
-            V::chunks(&above[1..], n),
-            V::chunks(&below[1..], n),
+            V::chunks(&here[first - 1 + shift..], n),
+            V::chunks(&here[first + shift..], n),
+            V::chunks(&above[first..], n),
+            V::chunks(&below[first..], n),
         ];
         Self { sides, near }
     }
@@ -64,6 +70,16 @@ impl<'a, V: Packed> Stencil<'a, V> {
         let mut sum = self.sides.at(LEFT, k) * V::read(&self.near[LEFT][k]);
         for side in [RIGHT, UP, DOWN] {
             sum = self.sides.at(side, k).times_plus(V::read(&self.near[side][k]), sum);
+        }
+        sum
+    }
+
+    /// `term`, and the sums of the weights of all edges, virtual ones too, times the neighbours.
+    #[inline(always)]
+    pub fn plus_magnitudes(&self, term: V, k: usize) -> V {
+        let mut sum = term;
+        for side in [LEFT, RIGHT, UP, DOWN] {
+            sum = V::widen(&self.sides.0[side][k]).magnitude().times_plus(V::read(&self.near[side][k]), sum);
         }
         sum
     }

@@ -40,7 +40,13 @@ impl<'a, V: Packed<Number = f32>> CentreTies<'a, V> {
     fn new(weights: &'a Weights, row: isize, span: Span, ties: &'a Ring<f32>) -> Self {
         let (Sides(sides), n) = (weights.reds::<V>(row, span), span.vectors::<V>());
         let [above, here, below] = ties.around(row);
-        let ties = [&here[1..], &here[2..], &above[1..], &below[1..]].map(|ties| V::chunks(&ties[span.start..], n));
+        let first = 1 + span.start;
+        let ties = [
+            V::chunks(&here[first..], n),
+            V::chunks(&here[first + 1..], n),
+            V::chunks(&above[first..], n),
+            V::chunks(&below[first..], n),
+        ];
         Self { sides, ties }
     }
 

@@ -4,7 +4,7 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::{CentreTies, corner_ties};
-use crate::integrate::checkerboard::{BAND_ROWS, PaddedRow, Weights, split_row};
+use crate::integrate::checkerboard::{BAND_ROWS, Weights, split_row};
 use crate::integrate::real::{Real, on_vectors};
 use crate::integrate::ring::Ring;
 use crate::integrate::spans::Span;
@@ -194,21 +194,11 @@ fn blacks_to_corners<V: Packed<Number = f32>>(weights: &Weights, row: isize, spa
         let sum = V::read(&down[k]).times_plus(V::read(&above[k]), V::read(&up[k]) * V::read(&below[k]));
         (sum * V::read(&tie[k]).inverse()).put(&mut out[k]);
     }
-    let ([above, _, below], along) = (rows.vertical.around(row), rows.horizontal.row(row));
-    let sides: [(PaddedRow<'_, f32>, PaddedRow<'_, f32>); 4] = [
-        (&weights.left(row)[1..], along),
-        (&weights.right(row)[1..], &along[1..]),
-        (&weights.up(row)[1..], &above[1..]),
-        (&weights.down(row)[1..], &below[1..]),
-    ];
-    let sides = sides.map(|(weight, value)| (V::chunks(&weight[span.start..], n), V::chunks(&value[span.start..], n)));
+    let [above, _, below] = rows.vertical.around(row);
+    let stencil = weights.red_stencil::<V>(row, span, [above, rows.horizontal.row(row), below]);
     let corner = V::chunks(&rows.corners.row(row)[first..], n);
     let coarse = V::chunks_mut(&mut rows.coarse[span.start..], n);
     for k in 0..n {
-        let mut sum = V::read(&corner[k]);
-        for (weight, value) in sides {
-            sum = V::read(&weight[k]).magnitude().times_plus(V::read(&value[k]), sum);
-        }
-        sum.put(&mut coarse[k]);
+        stencil.plus_magnitudes(V::read(&corner[k]), k).put(&mut coarse[k]);
     }
 }
