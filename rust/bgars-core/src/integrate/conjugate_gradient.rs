@@ -70,9 +70,7 @@ pub(super) fn conjugate_gradients(
                 let beta = (r_z / before) as f32;
                 p.par_chunks_mut(chunk).zip(z.par_chunks(chunk)).enumerate().for_each(|(band, (p, z))| {
                     for part in weights.spans.parts(band) {
-                        for (p, &z) in p[part.clone()].iter_mut().zip(&z[part]) {
-                            *p = z + beta * *p;
-                        }
+                        turn_part(beta, &mut p[part.clone()], &z[part]);
                     }
                 });
             } else {
@@ -104,6 +102,14 @@ pub(super) fn conjugate_gradients(
                 },
             );
         }
+    }
+}
+
+/// `p = z + beta p` of a part of a band.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn turn_part(beta: f32, p: &mut [f32], z: &[f32]) {
+    for (p, &z) in p.iter_mut().zip(z) {
+        *p = z + beta * *p;
     }
 }
 

@@ -23,25 +23,28 @@ pub(super) enum Axis {
 }
 
 /// Weights of a row's edges, and how much of the right side each moves from its first pixel to its second.
-#[derive(Debug, Default, Clone)]
+#[derive(Debug)]
 pub(super) struct EdgeRow {
     pub weight: Vec<f32>,
     pub push: Vec<f64>,
 }
 
 impl EdgeRow {
-    fn clear(&mut self, width: usize) {
-        self.weight.clear();
-        self.weight.resize(width, 0.0);
-        self.push.clear();
-        self.push.resize(width, 0.0);
+    fn zeros(width: usize) -> Self {
+        Self { weight: vec![0.0; width], push: vec![0.0; width] }
+    }
+
+    fn clear(&mut self) {
+        self.weight.fill(0.0);
+        self.push.fill(0.0);
     }
 }
 
 /// Weights and right side of a graph on the pixels of a grid.
 ///
-/// Each band of rows asks `joiner` for a function that sets the edges of a row, which come to it zero; the rows come in order,
-/// each to the right and then below, after the edges above the band's first row.
+/// Each band of rows asks `joiner` for a function that sets the edges of a row, all of them: to the right there is one less than
+/// pixels, and the place of the last stays zero. The rows come in order, each to the right and then below, after the edges
+/// above the band's first row.
 pub(super) fn from_edges<Join>(grid: Grid, joiner: impl Fn() -> Join + Sync) -> (Weights, Colours)
 where
     Join: FnMut(Axis, usize, &mut EdgeRow),
@@ -55,8 +58,7 @@ where
         .zip(right.blacks.par_chunks_mut(BAND_ROWS * half));
     bands.for_each(|((mut weights, reds), blacks)| {
         let mut join = joiner();
-        let [mut above, mut along, mut below] = [EdgeRow::default(), EdgeRow::default(), EdgeRow::default()];
-        above.clear(width);
+        let [mut above, mut along, mut below] = std::array::from_fn(|_| EdgeRow::zeros(width));
         if let Some(row) = weights.rows.start.checked_sub(1) {
             join(Axis::Below, row, &mut above);
         }
@@ -64,11 +66,11 @@ where
         let mut divergence = vec![0.0f64; width];
         let colours = reds.chunks_mut(half).zip(blacks.chunks_mut(half));
         for (row, (reds, blacks)) in weights.rows.clone().zip(colours) {
-            along.clear(width);
             join(Axis::Right, row, &mut along);
-            below.clear(width);
             if row + 1 < grid.height {
                 join(Axis::Below, row, &mut below);
+            } else {
+                below.clear();
             }
             weights.set_row(row, &along.weight, &below.weight);
             diverge([&above.push, &along.push, &below.push], &mut divergence);

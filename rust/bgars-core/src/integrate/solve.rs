@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::checkerboard::join_row;
@@ -231,20 +232,30 @@ pub(super) fn check_pixels(field: Field<'_>, facing: Facing) -> Result<()> {
 /// True when [`check_pixel`] refuses none of some pixels; without branches.
 #[allow(clippy::needless_bitwise_bool)]
 fn are_sound(field: Field<'_>, facing: Facing, pixels: Range<usize>) -> bool {
-    let [least, most] = LENGTHS.map(|length| length * length);
     let mask = &field.mask[pixels.clone()];
     let normals = field.normals[3 * pixels.start..3 * pixels.end].as_chunks::<3>().0;
-    let away = facing == Facing::Anywhere;
-    let mut sound = true;
-    for (&[x, y, z], &used) in normals.iter().zip(mask) {
-        let square = x * x + y * y + z * z;
-        // Comparisons with NaN are false.
-        sound &= !used | ((square >= least) & (square <= most) & (away | (z >= 0.0)));
-    }
+    let mut sound = are_unit(normals, mask, facing == Facing::Anywhere);
     // NaN and infinity spread into products with zero.
     let is_finite = |value: f32| value * 0.0 == 0.0;
     for (&weight, &used) in field.weights.map_or(&[][..], |weights| &weights[pixels]).iter().zip(mask) {
         sound &= !used | (is_finite(weight) & (weight >= 0.0));
+    }
+    sound
+}
+
+/// True when the normals in the mask have about length 1 and, unless they may point `away`, face the camera.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+#[allow(clippy::needless_bitwise_bool)]
+fn are_unit(normals: &[[f32; 3]], mask: &[bool], away: bool) -> bool {
+    let [least, most] = [LENGTHS[0] * LENGTHS[0], LENGTHS[1] * LENGTHS[1]];
+    let n = mask.len();
+    let normals = &normals[..n];
+    let mut sound = true;
+    for k in 0..n {
+        let [x, y, z] = normals[k];
+        let square = x * x + y * y + z * z;
+        // Comparisons with NaN are false.
+        sound &= !mask[k] | ((square >= least) & (square <= most) & (away | (z >= 0.0)));
     }
     sound
 }
