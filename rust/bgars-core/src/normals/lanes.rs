@@ -144,6 +144,8 @@ fn run_blocks_with<K: Pixel, V: Vector>(
     let mut clipped = [0; LANES];
     let mut finished = Finished::new();
     let per_full_scale = 1.0 / full_scale;
+    // A line that is streamed in parts, between other lines, is written part by part.
+    sink.out.streamed &= V::WIDTH * size_of::<f32>() >= LINE_BYTES;
     for first in pixels.clone().step_by(LANES) {
         let block = first..(first + LANES).min(pixels.end);
         let span = first - pixels.start..block.end - pixels.start;
