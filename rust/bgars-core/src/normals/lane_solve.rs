@@ -2,6 +2,8 @@
 //!
 //! A subset of lights whose equations are too badly conditioned for `f32` is left to the careful kernel, pixel by pixel.
 
+use std::borrow::Borrow;
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::confidence::PRIOR_RESIDUAL;
@@ -138,15 +140,15 @@ pub(super) fn solve<K: Pixel, V: Vector>(
 /// Every light of every pixel is kept: one matrix for all.
 #[inline(always)]
 fn solve_all<K: Pixel, V: Vector>(solver: &LaneSolver, readings: &Readings<'_, K>, at: usize) -> Facets<V> {
-    let mut sums = Sums::zero();
-    for (key, column) in readings.keys.iter().zip(&solver.pseudo_inverse) {
-        let mut value = K::load::<V>(&key[at..]);
-        if let Some(offset) = readings.offset {
-            value = value - V::load(&offset[at..]);
+    let Sums { vector: scaled, squares } = if let Some(offset) = readings.offset {
+        let (offset, mut sums) = (V::load(&offset[at..]), Sums::zero());
+        for (key, column) in readings.keys.iter().zip(&solver.pseudo_inverse) {
+            sums.add(K::load::<V>(&key[at..]) - offset, column);
         }
-        sums.add(value, column);
-    }
-    let Sums { vector: scaled, squares } = sums;
+        sums
+    } else {
+        Sums::of(readings.keys, &solver.pseudo_inverse, at)
+    };
     let monomials = Monomials::of(scaled);
     Facets {
         scaled,
@@ -171,16 +173,17 @@ fn solve_kept<K: Pixel, V: Vector>(
     for (tables, bits) in solver.tables.iter().zip(&kept.bits) {
         V::add_sums_of(&bits[at..], tables, &mut gram);
     }
-    let mut sums = Sums::zero();
-    for (light, (key, direction)) in kept.keys.iter().zip(&solver.directions).enumerate() {
-        let mut value = K::load::<V>(&key[at..]);
-        // A dropped key is zero already, but not less an offset.
-        if let Some(offset) = offset {
-            value =
-                (value - V::load(&offset[at..])).where_bit(&kept.bits[light / BYTE_LIGHTS][at..], light % BYTE_LIGHTS);
+    let sums = if let Some(offset) = offset {
+        let (offset, mut sums) = (V::load(&offset[at..]), Sums::zero());
+        for (light, (key, direction)) in kept.keys.iter().zip(&solver.directions).enumerate() {
+            // A dropped key is zero already, but not less an offset.
+            let value = K::load::<V>(&key[at..]) - offset;
+            sums.add(value.where_bit(&kept.bits[light / BYTE_LIGHTS][at..], light % BYTE_LIGHTS), direction);
         }
-        sums.add(value, direction);
-    }
+        sums
+    } else {
+        Sums::of(&kept.keys, &solver.directions, at)
+    };
     let inverse = Inverse::of(gram);
     let mut scaled = inverse.product(sums.vector);
     let explained = dot(scaled, sums.vector);
@@ -229,6 +232,25 @@ impl<V: Vector> Sums<V> {
     #[inline(always)]
     fn zero() -> Self {
         Self { vector: [V::splat(0.0); 3], squares: V::splat(0.0) }
+    }
+
+    /// Of the keys as they are.
+    #[inline(always)]
+    fn of<K: Pixel, B: Borrow<Lanes<K>>>(keys: &[B], vectors: &[[f32; 3]], at: usize) -> Self {
+        /// Lights whose sums are written out: half of the instructions were the loop's.
+        const AT_ONCE: usize = 4;
+        let mut sums = Self::zero();
+        let (keys, last_keys) = keys.as_chunks::<AT_ONCE>();
+        let (vectors, last_vectors) = vectors.as_chunks::<AT_ONCE>();
+        for (keys, vectors) in keys.iter().zip(vectors) {
+            for light in 0..AT_ONCE {
+                sums.add(K::load::<V>(&keys[light].borrow()[at..]), &vectors[light]);
+            }
+        }
+        for (key, vector) in last_keys.iter().zip(last_vectors) {
+            sums.add(K::load::<V>(&key.borrow()[at..]), vector);
+        }
+        sums
     }
 
     #[inline(always)]

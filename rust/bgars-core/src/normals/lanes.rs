@@ -214,7 +214,12 @@ fn run_blocks_with<K: Pixel, V: Vector>(
 /// Mask and counts of a block, and what its unused pixels say.
 #[inline(always)]
 fn write(finished: &Finished, used: Option<&[bool]>, span: Range<usize>, out: &mut Out<'_>) {
-    let valid: [bool; LANES] = std::array::from_fn(|lane| finished.valid >> lane & 1 == 1);
+    // Nearly always all of them; to spread the bits takes as long as to choose the lights.
+    let valid = if finished.valid == u64::MAX {
+        [true; LANES]
+    } else {
+        std::array::from_fn(|lane| finished.valid >> lane & 1 == 1)
+    };
     store(&finished.kept, &mut out.lights_kept[span.clone()], out.streamed);
     store(&valid, &mut out.mask[span.clone()], out.streamed);
     store(&valid, &mut out.measured[span.clone()], out.streamed);

@@ -5,12 +5,12 @@ use std::arch::x86_64::{
     _mm256_andnot_ps, _mm256_blend_ps, _mm256_blendv_ps, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi32,
     _mm256_cvtepi32_ps, _mm256_cvtepu8_epi32, _mm256_cvtepu16_epi32, _mm256_div_ps, _mm256_fmadd_ps, _mm256_max_ps,
     _mm256_movemask_ps, _mm256_mul_ps, _mm256_permute2f128_ps, _mm256_permutevar8x32_ps, _mm256_set1_epi32,
-    _mm256_set1_ps, _mm256_setzero_ps, _mm256_sqrt_ps, _mm256_srli_epi32, _mm256_stream_ps, _mm256_sub_ps,
+    _mm256_set1_ps, _mm256_setzero_ps, _mm256_shuffle_ps, _mm256_sqrt_ps, _mm256_srli_epi32, _mm256_sub_ps,
 };
 
 use super::packed::chunked;
 use super::subset_sums::SubsetSums;
-use super::{Packed, Vector, first, interleaved};
+use super::{Packed, Vector, first};
 
 /// Eight floats.
 #[derive(Clone, Copy)]
@@ -21,11 +21,19 @@ const WIDTH: usize = 8;
 /// The upper half of one vector and the lower half of another.
 const HALVES: i32 = 0x21;
 
+/// The lower halves of two vectors.
+const LOWER_HALVES: i32 = 0x20;
+
+/// The upper halves of two vectors.
+const UPPER_HALVES: i32 = 0x31;
+
+/// The lower half of one vector and the upper half of another, in place.
+const UPPER_HALF: i32 = 0xf0;
+
 /// Calls intrinsics where they are compiled in.
 macro_rules! here {
     ($call:expr) => {{
-        // SAFETY: the type is named only where AVX2 and FMA are compiled in (see `Vector`), and the one store stays
-        // within a slice of WIDTH values and is aligned.
+        // SAFETY: the type is named only where AVX2 and FMA are compiled in (see `Vector`), and none touches memory.
         #[allow(unsafe_code)]
         unsafe {
             $call
@@ -56,7 +64,7 @@ impl Packed for Avx2 {
 
     #[inline(always)]
     fn write(self, to: &mut [f32]) {
-        self.store(to, false);
+        to[..WIDTH].copy_from_slice(&bytemuck::must_cast::<_, [f32; WIDTH]>(self.0));
     }
 
     #[inline(always)]
@@ -118,32 +126,27 @@ impl Vector for Avx2 {
     }
 
     #[inline(always)]
-    fn store(self, to: &mut [f32], streamed: bool) {
-        let to = &mut to[..WIDTH];
-        if streamed && to.as_ptr().addr().is_multiple_of(size_of::<Self>()) {
-            here!(_mm256_stream_ps(to.as_mut_ptr(), self.0));
-        } else {
-            to.copy_from_slice(&bytemuck::must_cast::<_, [f32; WIDTH]>(self.0));
-        }
+    fn store(self, to: &mut [f32], _streamed: bool) {
+        // Half a line past the caches, and other lines before the second half: memory is then written half by half.
+        self.write(to);
     }
 
     #[inline(always)]
-    fn store_interleaved([x, y, z]: [Self; 3], to: &mut [f32], streamed: bool) {
-        const PLACES: [[[i32; WIDTH]; 3]; 3] = interleaved::places();
-        const FILLED: [[u16; 3]; 3] = interleaved::filled::<WIDTH>();
-        macro_rules! store {
-            ($vector:literal) => {{
-                let x = here!(_mm256_permutevar8x32_ps(x.0, bytemuck::must_cast(PLACES[0][$vector])));
-                let y = here!(_mm256_permutevar8x32_ps(y.0, bytemuck::must_cast(PLACES[1][$vector])));
-                let z = here!(_mm256_permutevar8x32_ps(z.0, bytemuck::must_cast(PLACES[2][$vector])));
-                let mixed = here!(_mm256_blend_ps::<{ FILLED[1][$vector] as i32 }>(x, y));
-                let mixed = Self(here!(_mm256_blend_ps::<{ FILLED[2][$vector] as i32 }>(mixed, z)));
-                mixed.store(&mut to[$vector * WIDTH..], streamed);
-            }};
+    fn store_interleaved([x, y, z]: [Self; 3], to: &mut [f32], _streamed: bool) {
+        /// A shuffle's places: two of the first vector, then two of the second, in each half.
+        const fn places([a, b, c, d]: [i32; 4]) -> i32 {
+            a | b << 2 | c << 4 | d << 6
         }
-        store!(0);
-        store!(1);
-        store!(2);
+        // Within each half: x0 x2 y0 y2, y1 y3 z1 z3, z0 z2 x1 x3, and from these x0 y0 z0 x1, y1 z1 x2 y2, z2 x3 y3 z3.
+        let x_y = here!(_mm256_shuffle_ps::<{ places([0, 2, 0, 2]) }>(x.0, y.0));
+        let y_z = here!(_mm256_shuffle_ps::<{ places([1, 3, 1, 3]) }>(y.0, z.0));
+        let z_x = here!(_mm256_shuffle_ps::<{ places([0, 2, 1, 3]) }>(z.0, x.0));
+        let first = here!(_mm256_shuffle_ps::<{ places([0, 2, 0, 2]) }>(x_y, z_x));
+        let second = here!(_mm256_shuffle_ps::<{ places([0, 2, 1, 3]) }>(y_z, x_y));
+        let third = here!(_mm256_shuffle_ps::<{ places([1, 3, 1, 3]) }>(z_x, y_z));
+        Self(here!(_mm256_permute2f128_ps::<LOWER_HALVES>(first, second))).write(to);
+        Self(here!(_mm256_blend_ps::<UPPER_HALF>(third, first))).write(&mut to[WIDTH..]);
+        Self(here!(_mm256_permute2f128_ps::<UPPER_HALVES>(second, third))).write(&mut to[2 * WIDTH..]);
     }
 
     #[inline(always)]
