@@ -24,6 +24,9 @@ const MIN_LANE_CONDITIONING: f64 = 1e-3;
 /// `tests/property/test_normals_twin.py`).
 const MIN_ROUGH_CONDITIONING: f32 = 0.1;
 
+/// Floats of the widest vector.
+const WIDEST: usize = 16;
+
 /// Lights in one byte of kept bits.
 pub(super) const BYTE_LIGHTS: usize = 8;
 
@@ -47,8 +50,10 @@ pub(super) struct LaneSolver {
     pub choice: Choice,
     /// Unit vectors to the lights.
     directions: Vec<[f32; 3]>,
+    /// The same, as whole vectors.
+    spread_directions: Vec<[Spread; 3]>,
     /// `(L^T L)^-1 L^T`, a column a light.
-    pseudo_inverse: Vec<[f32; 3]>,
+    pseudo_inverse: Vec<[Spread; 3]>,
     /// `L^T L` of all lights, less the [prior](PRIOR_RESIDUAL) of the squared residuals.
     explained: [f32; ENTRIES],
     /// `(tr C) I - C` of all lights, `C = (L^T L)^-1`.
@@ -63,15 +68,16 @@ impl LaneSolver {
         let Lights::Directional(directions) = lights else { return None };
         let gram = directions.iter().fold(Matrix3::zeros(), |gram, light| gram + light * light.transpose());
         let exact = gram.try_inverse().filter(|_| conditioning(&gram) >= MIN_LANE_CONDITIONING)?;
-        let pseudo_inverse = directions.iter().map(|light| single(&(exact * light))).collect();
+        let pseudo_inverse = directions.iter().map(|light| single(&(exact * light)).map(Spread::new)).collect();
         let directions: Vec<[f32; 3]> = directions.iter().map(single).collect();
+        let spread_directions = directions.iter().map(|light| light.map(Spread::new)).collect();
         let tables = directions
             .chunks(BYTE_LIGHTS)
             .map(|lights| SubsetSums::new(&lights.iter().map(outer).collect::<Vec<_>>()))
             .collect();
         let explained = upper(&(gram - Matrix3::from_diagonal_element(PRIOR_RESIDUAL * PRIOR_RESIDUAL)));
         let turning = upper(&(Matrix3::from_diagonal_element(exact.trace()) - exact));
-        Some(Self { choice, directions, pseudo_inverse, explained, turning, tables })
+        Some(Self { choice, directions, spread_directions, pseudo_inverse, explained, turning, tables })
     }
 
     /// Their number.
@@ -175,14 +181,14 @@ fn solve_kept<K: Pixel, V: Vector>(
     }
     let sums = if let Some(offset) = offset {
         let (offset, mut sums) = (V::load(&offset[at..]), Sums::zero());
-        for (light, (key, direction)) in kept.keys.iter().zip(&solver.directions).enumerate() {
+        for (light, (key, direction)) in kept.keys.iter().zip(&solver.spread_directions).enumerate() {
             // A dropped key is zero already, but not less an offset.
             let value = K::load::<V>(&key[at..]) - offset;
             sums.add(value.where_bit(&kept.bits[light / BYTE_LIGHTS][at..], light % BYTE_LIGHTS), direction);
         }
         sums
     } else {
-        Sums::of(&kept.keys, &solver.directions, at)
+        Sums::of(&kept.keys, &solver.spread_directions, at)
     };
     let inverse = Inverse::of(gram);
     let mut scaled = inverse.product(sums.vector);
@@ -191,12 +197,13 @@ fn solve_kept<K: Pixel, V: Vector>(
     if V::bits(rough) != 0 {
         // One step of iterative refinement: what the residuals of the lights correct.
         let mut residuals = Sums::zero();
-        for (light, (key, direction)) in kept.keys.iter().zip(&solver.directions).enumerate() {
+        for (light, (key, direction)) in kept.keys.iter().zip(&solver.spread_directions).enumerate() {
             let mut value = K::load::<V>(&key[at..]);
             if let Some(offset) = offset {
                 value = value - V::load(&offset[at..]);
             }
-            let residual = value - dot(scaled, splat3(direction));
+            let residual =
+                value - dot(scaled, [V::load(&direction[0].0), V::load(&direction[1].0), V::load(&direction[2].0)]);
             residuals.add(residual.where_bit(&kept.bits[light / BYTE_LIGHTS][at..], light % BYTE_LIGHTS), direction);
         }
         let correction = inverse.product(residuals.vector);
@@ -236,7 +243,7 @@ impl<V: Vector> Sums<V> {
 
     /// Of the keys as they are.
     #[inline(always)]
-    fn of<K: Pixel, B: Borrow<Lanes<K>>>(keys: &[B], vectors: &[[f32; 3]], at: usize) -> Self {
+    fn of<K: Pixel, B: Borrow<Lanes<K>>>(keys: &[B], vectors: &[[Spread; 3]], at: usize) -> Self {
         /// Lights whose sums are written out: half of the instructions were the loop's.
         const AT_ONCE: usize = 4;
         let mut sums = Self::zero();
@@ -254,17 +261,23 @@ impl<V: Vector> Sums<V> {
     }
 
     #[inline(always)]
-    fn add(&mut self, value: V, vector: &[f32; 3]) {
-        for (sum, &factor) in self.vector.iter_mut().zip(vector) {
-            *sum = value.times_plus(V::splat(factor), *sum);
+    fn add(&mut self, value: V, vector: &[Spread; 3]) {
+        for (sum, factor) in self.vector.iter_mut().zip(vector) {
+            *sum = value.times_plus(V::load(&factor.0), *sum);
         }
         self.squares = value.times_plus(value, self.squares);
     }
 }
 
-#[inline(always)]
-fn splat3<V: Vector>(values: &[f32; 3]) -> [V; 3] {
-    [V::splat(values[0]), V::splat(values[1]), V::splat(values[2])]
+/// A number as often as the widest vector holds.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))] // a cache line
+struct Spread([f32; WIDEST]);
+
+impl Spread {
+    fn new(value: f32) -> Self {
+        Self([value; WIDEST])
+    }
 }
 
 fn single(vector: &Vector3<f64>) -> [f32; 3] {
