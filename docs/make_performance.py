@@ -62,7 +62,8 @@ def section_lines(record: dict[str, Any], group: str) -> list[str]:
     if not tables:
         return []
     option = " --quick" if record["quick"] else ""
-    lines = [f"## {TITLES[group]}", "", f"`{COMMAND}{option} --only {group}`", "", *tables]
+    lines = [f"## {TITLES[group]}", "", machine_line(record["machine"]), ""]
+    lines += [f"`{COMMAND}{option} --only {group}`", "", *tables]
     if of_kind(record["rows"], "point", group):
         lines += ["![Seconds a megapixel against megapixels](images/scaling.png)", ""]
     if of_kind(record["rows"], "roofline", group):
@@ -72,12 +73,7 @@ def section_lines(record: dict[str, Any], group: str) -> list[str]:
 
 def page_text(record: dict[str, Any], before: str) -> str:
     """Everything between the marks of the page; a group not measured keeps the section it had `before`."""
-    lines = [
-        f"{machine_line(record['machine'])} Seconds below belong to it; only ratios within one run mean something.",
-        "",
-    ]
-    if record["quick"]:
-        lines += ["**Quick run: small sizes only, to see that the tools work.**", ""]
+    lines = ["**Quick run: small sizes only, to see that the tools work.**", ""] if record["quick"] else []
     kept = {section.partition("\n")[0]: section for section in re.split(r"(?m)^(?=## )", before)}
     sections = {group: section_lines(record, group) for group in TITLES}
     texts = ["\n".join(section) or kept.get(f"## {TITLES[group]}", "") for group, section in sections.items()]

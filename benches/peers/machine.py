@@ -8,20 +8,38 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 PACKAGES = ("bgars", "numpy", "numba", "scipy", "pyamg", "opencv-python-headless", "tifffile", "trimesh")
+VECTORS = {"avx512f": "AVX-512", "avx2": "AVX2"}
 
 
 def describe() -> dict[str, object]:
-    """Processor, cores, system and the versions of everything that is compared."""
-    return {"processor": _processor(), "cores": os.cpu_count(), "system": platform.system(), "versions": _versions()}
+    """Processor, its vectors, cores, system and the versions of everything that is compared."""
+    return {
+        "processor": _processor(),
+        "vectors": _vectors(),
+        "cores": os.cpu_count(),
+        "system": platform.system(),
+        "versions": _versions(),
+    }
 
 
 def _processor() -> str:
+    return _cpuinfo("model name") or platform.processor() or platform.machine()
+
+
+def _vectors() -> str:
+    """The widest vectors that the kernels know and the processor has."""
+    flags = _cpuinfo("flags").split()
+    return next((name for flag, name in VECTORS.items() if flag in flags), "no AVX2")
+
+
+def _cpuinfo(key: str) -> str:
+    """What Linux says of the first processor; empty where nobody says."""
     cpuinfo = Path("/proc/cpuinfo")
     if cpuinfo.is_file():
         for line in cpuinfo.read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
+            if line.startswith(key):
                 return line.split(":", 1)[1].strip()
-    return platform.processor() or platform.machine()
+    return ""
 
 
 def _versions() -> dict[str, str]:

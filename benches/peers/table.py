@@ -115,7 +115,8 @@ def skipped_lines(rows: Rows) -> list[str]:
 def machine_line(machine: dict[str, Any]) -> str:
     """One sentence about the machine and the versions."""
     versions = ", ".join(f"{name} {number}" for name, number in machine["versions"].items())
-    return f"Machine: {machine['processor']}, {machine['cores']} cores, {machine['system']}. Versions: {versions}."
+    parts = (machine["processor"], machine["vectors"], f"{machine['cores']} cores", machine["system"])
+    return f"Machine: {', '.join(parts)}. Versions: {versions}."
 
 
 TABLES = {"ratio": ratio_table, "check": check_table, "point": scaling_table, "roofline": roofline_table}

@@ -214,7 +214,7 @@ fn run_blocks_with<K: Pixel, V: Vector>(
 /// Mask and counts of a block, and what its unused pixels say.
 #[inline(always)]
 fn write(finished: &Finished, used: Option<&[bool]>, span: Range<usize>, out: &mut Out<'_>) {
-    // Nearly always all of them; to spread the bits takes as long as to choose the lights.
+    // Nearly always all of them, and then nothing has to be spread.
     let valid = if finished.valid == u64::MAX {
         [true; LANES]
     } else {
