@@ -104,9 +104,8 @@ impl Finished {
         // NaN spreads into everything that is computed from it.
         let faces = z.is_over(zero);
         let length = V::pick(faces, square.root(), V::splat(f32::NAN));
-        // Root and division side by side: neither waits for the other.
-        let inverse2 = V::splat(1.0) / square;
-        let inverse = length * inverse2;
+        let inverse = V::splat(1.0) / length;
+        let inverse2 = inverse * inverse;
         let streamed = place.streamed;
         V::store_interleaved([x * inverse, y * inverse, z * inverse], &mut place.normals[3 * at..], streamed);
         (length * V::splat(per_full_scale)).store(&mut place.albedo[at..], streamed);
