@@ -21,62 +21,67 @@ if TYPE_CHECKING:
 
 MIN_BYTES = 1 << 20
 """Smaller arrays come from numpy."""
+LARGE_PAGE_BYTES = 1 << 21
+"""Pages are taken by whole large ones: part of one would be many small pages, each marked anew when it is given back."""
 KEPT_ARRAYS = 16
 """Arrays whose pages are kept at most: those of two normal fields, the one before and the one in use."""
 _HAS_PRIVATE_PAGES = hasattr(mmap, "MAP_PRIVATE") and hasattr(mmap, "MAP_ANONYMOUS")
 
-_free: deque[mmap.mmap] = deque(maxlen=KEPT_ARRAYS)
+_free: deque[tuple[np.dtype[Any], mmap.mmap]] = deque(maxlen=KEPT_ARRAYS)
+"""With the type that was written there: other bytes than 0 and 1 are no value of bool."""
 
 
 def any_content(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """Return a C-contiguous array to be written; large ones start on a page.
+    """Return a C-contiguous array to be written; large ones start on a page and end before the end of a large one.
 
     Parameters
     ----------
     shape : tuple of int
         Its shape.
     dtype : dtype
-        Its type; any bytes must be a value of it that was written before, or zeros.
+        Its type; zeros must be a value of it.
 
     Returns
     -------
     ndarray
-        Zeros, or what an array of the same size held.
+        Zeros, or what an array of this type and about this size held.
     """
-    nbytes = math.prod(shape) * np.dtype(dtype).itemsize
+    dtype = np.dtype(dtype)
+    nbytes = math.prod(shape) * dtype.itemsize
     if nbytes < MIN_BYTES or not _HAS_PRIVATE_PAGES:
         return np.zeros(shape, dtype)
-    pages = _taken(nbytes) or _fresh(nbytes)
-    content = np.frombuffer(pages, np.uint8)
+    page_bytes = math.ceil(nbytes / LARGE_PAGE_BYTES) * LARGE_PAGE_BYTES
+    pages = _taken(dtype, page_bytes) or _fresh(page_bytes)
+    content = np.frombuffer(pages, np.uint8, nbytes)
     # Views hold `content`, which holds the pages; the last of them gives these back.
-    weakref.finalize(content, _give_back, pages).atexit = False
+    weakref.finalize(content, _give_back, dtype, pages).atexit = False
     return content.view(dtype).reshape(shape)
 
 
-def _taken(nbytes: int) -> mmap.mmap | None:
-    """Pages of an earlier array of this size, if there are any."""
+def _taken(dtype: np.dtype[Any], page_bytes: int) -> mmap.mmap | None:
+    """As many pages of an earlier array of the type, if there are any."""
     for _ in range(len(_free)):
         try:
-            pages = _free.popleft()
+            written, pages = _free.popleft()
         except IndexError:  # another thread was faster
             return None
-        if len(pages) == nbytes:
+        if written == dtype and len(pages) == page_bytes:
             return pages
-        _free.append(pages)
+        _free.append((written, pages))
     return None
 
 
-def _fresh(nbytes: int) -> mmap.mmap:
+def _fresh(page_bytes: int) -> mmap.mmap:
     """Pages of zeros, large ones where the system has them."""
-    pages = mmap.mmap(-1, nbytes, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    pages = mmap.mmap(-1, page_bytes, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
     _advise(pages, "MADV_HUGEPAGE")
     return pages
 
 
-def _give_back(pages: mmap.mmap) -> None:
+def _give_back(dtype: np.dtype[Any], pages: mmap.mmap) -> None:
     """Keep pages for the next array; what is kept longest goes to the system."""
     _advise(pages, "MADV_FREE")
-    _free.append(pages)
+    _free.append((dtype, pages))
 
 
 def _advise(pages: mmap.mmap, name: str) -> None:

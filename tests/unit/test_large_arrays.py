@@ -28,14 +28,21 @@ def test_an_array_starts_on_a_page_and_is_zero_at_first() -> None:
     assert not array.any()
 
 
-def test_pages_are_used_again_by_the_next_array_of_the_size() -> None:
+def test_pages_are_used_again_by_the_next_array_of_about_the_size() -> None:
     array = any_content(SHAPE, np.float32)
     place = array.ctypes.data
     array[:] = 1
     del array
     other_size = any_content((2 * SHAPE[0], 3), np.float32)
     assert other_size.ctypes.data != place
-    assert any_content((3, SHAPE[0]), np.uint32).ctypes.data == place
+    assert any_content((3, SHAPE[0] - 5), np.float32).ctypes.data == place  # as many large pages
+
+
+def test_pages_hold_one_type_for_ever() -> None:
+    array = any_content(SHAPE, np.float32)
+    array[:] = 0.1
+    del array
+    assert not any_content((SHAPE[0] * 4, 3), np.bool_).view(np.uint8).any()
 
 
 def test_a_view_keeps_its_pages() -> None:

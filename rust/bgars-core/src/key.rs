@@ -5,7 +5,7 @@ use crate::vector::Vector;
 /// What is sorted: grey levels as they come, or linear values.
 pub trait Key: Copy {
     /// Bits as wide as a key, so that loops over both take the same vectors.
-    type Bits: Copy + std::ops::BitOr<Output = Self::Bits> + From<u8>;
+    type Bits: Copy + std::ops::Add<Output = Self::Bits> + From<u8>;
     /// Smaller than every other.
     const LEAST: Self;
     /// Larger than every other.

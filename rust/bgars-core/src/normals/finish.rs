@@ -12,7 +12,7 @@ use crate::vector::Vector;
 /// `n_z` below which `f32` cannot say whether a facet faces the camera.
 const GRAZING: f32 = 1e-5;
 
-/// Least `|rho n|^2` that leaves residuals and inverses in the normal range of `f32`, and one over the largest.
+/// Least `(rho n_z)^2` that leaves residuals and inverses in the normal range of `f32`, and one over the largest `|rho n|^2`.
 const MIN_SQUARE: f32 = 1e-30;
 
 /// The smallest float above zero.
@@ -87,15 +87,15 @@ impl Finished {
     /// Writes the pixels from `at` on to their place; facets seen from the side, and values far from 1, are left to the careful kernel.
     #[inline(always)]
     pub fn write<V: Vector>(&mut self, at: usize, facets: &Facets<V>, per_full_scale: f32, place: &mut Place<'_>) {
-        const DEG2: f32 =
-            ((180.0 / std::f64::consts::PI) * (180.0 / std::f64::consts::PI) / (HALF_DEG * HALF_DEG)) as f32;
+        /// The square of the half-way point, radians.
+        const HALF2: f64 = (HALF_DEG * std::f64::consts::PI / 180.0) * (HALF_DEG * std::f64::consts::PI / 180.0);
         let zero = V::splat(0.0);
         let [x, y, z] = facets.scaled;
         let square = facets.monomials.square();
         // Not seen from the side, and of a size whose square is in the range of floats; false for NaN.
-        let in_range = V::both(square.is_over(V::splat(MIN_SQUARE)), V::splat(1.0 / MIN_SQUARE).is_over(square));
+        let least = (V::splat(GRAZING * GRAZING) * square).at_least(V::splat(MIN_SQUARE));
         let sound =
-            V::bits(V::both(in_range, facets.monomials.z_square().is_over(V::splat(GRAZING * GRAZING) * square)));
+            V::bits(V::both(facets.monomials.z_square().is_over(least), V::splat(1.0 / MIN_SQUARE).is_over(square)));
         if sound != all_bits::<V>() {
             let size = x.at_least(zero - x) + y.at_least(zero - y) + z.at_least(zero - z);
             let is_zero = V::bits(V::splat(LEAST).is_over(size));
@@ -107,15 +107,29 @@ impl Finished {
         let inverse = V::splat(1.0) / length;
         let inverse2 = inverse * inverse;
         let streamed = place.streamed;
-        V::store_interleaved([x * inverse, y * inverse, z * inverse], &mut place.normals[3 * at..], streamed);
-        (length * V::splat(per_full_scale)).store(&mut place.albedo[at..], streamed);
-        // See `confidence`: the squared standard error over the squared half-way point, with one division in all.
-        let freedom = facets.kept - V::splat(2.0);
+        let normals = &mut place.normals[3 * at..3 * (at + V::WIDTH)];
+        let [first, second, third] = V::interleaved([x * inverse, y * inverse, z * inverse]);
+        put(first, normals, streamed);
+        put(second, &mut normals[V::WIDTH..], streamed);
+        put(third, &mut normals[2 * V::WIDTH..], streamed);
+        put(length * V::splat(per_full_scale), &mut place.albedo[at..], streamed);
+        // See `confidence`: degrees of freedom by the squared half-way point, over themselves and the squared standard error.
+        let freedom = facets.kept.times_minus(V::splat(HALF2 as f32), V::splat((2.0 * HALF2) as f32));
         let variance = facets.squared_residuals * inverse2;
-        let turning = facets.turning * (inverse2 * V::splat(DEG2));
+        let turning = facets.turning * inverse2;
         let certainty = freedom / variance.times_plus(turning, freedom);
-        V::pick(faces, certainty, zero).store(&mut place.confidence[at..], streamed);
+        put(V::pick(faces, certainty, zero), &mut place.confidence[at..], streamed);
         self.valid |= V::bits(faces) << at;
+    }
+}
+
+/// Writes a vector to the caches or past them.
+#[inline(always)]
+fn put<V: Vector>(vector: V, to: &mut [f32], streamed: bool) {
+    if V::STREAMS && streamed {
+        vector.stream(to);
+    } else {
+        vector.write(to);
     }
 }
 

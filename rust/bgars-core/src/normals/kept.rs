@@ -4,17 +4,28 @@ use super::cutoff::{LANES, Lanes};
 use super::lane_solve::BYTE_LIGHTS;
 use crate::Pixel;
 
+/// Pixels whose bytes are compared at once.
+pub(super) const EIGHT: usize = 8;
+
 /// The lights that a block keeps.
 pub(super) struct Kept<K> {
     /// The keys; of a light that is dropped, zero.
     pub keys: Vec<Lanes<K>>,
     /// A bit a light, a byte for every eight; set where nothing was chosen.
     pub bits: Vec<Lanes<u8>>,
+    /// The same of eight pixels that keep every light.
+    all: Vec<u64>,
 }
 
 impl<K: Pixel> Kept<K> {
     pub fn new(lights: usize) -> Self {
-        Self { keys: vec![[K::ZERO; LANES]; lights], bits: vec![[u8::MAX; LANES]; lights.div_ceil(BYTE_LIGHTS)] }
+        let bytes = (0..lights).step_by(BYTE_LIGHTS);
+        let bytes = bytes.map(|first| u8::MAX >> (BYTE_LIGHTS - (lights - first).min(BYTE_LIGHTS)));
+        Self {
+            keys: vec![[K::ZERO; LANES]; lights],
+            bits: bytes.clone().map(|byte| [byte; LANES]).collect(),
+            all: bytes.map(|byte| u64::from_ne_bytes([byte; EIGHT])).collect(),
+        }
     }
 
     /// Takes the keys up to the cutoffs.
@@ -29,8 +40,7 @@ impl<K: Pixel> Kept<K> {
                 for lane in 0..LANES {
                     let keep = is_kept(key[lane], cutoffs[lane]);
                     kept[lane] = if keep { key[lane] } else { K::ZERO };
-                    let bit = K::Bits::from(if keep { 1 << light } else { 0 });
-                    wide[lane] = wide[lane] | bit;
+                    wide[lane] = if keep { wide[lane] + K::Bits::from(1 << light) } else { wide[lane] };
                 }
                 *kept_key = kept;
             }
@@ -56,6 +66,21 @@ impl<K: Pixel> Kept<K> {
         self.bits[light / BYTE_LIGHTS][lane] >> (light % BYTE_LIGHTS) & 1 == 1
     }
 
+    /// Bit k is set where every light of the eight pixels from `8 k` on is kept.
+    #[inline(always)]
+    pub fn whole(&self) -> u8 {
+        let mut whole = u8::MAX;
+        for (bits, &all) in self.bits.iter().zip(&self.all) {
+            // A bit after the other: as vectors, which the compiler else tries, this takes longer.
+            let mut here = 0;
+            for &eight in bits.as_chunks::<EIGHT>().0.iter().rev() {
+                here = here << 1 | u8::from(u64::from_ne_bytes(eight) == all);
+            }
+            whole &= here;
+        }
+        whole
+    }
+
     /// How many they are.
     #[inline(always)]
     pub fn counts(&self) -> Lanes<u16> {
@@ -73,4 +98,29 @@ impl<K: Pixel> Kept<K> {
 #[inline(always)]
 fn is_kept<K: Pixel>(key: K, cutoff: K) -> bool {
     !key.is_over(cutoff, K::gap(0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eight_pixels_are_whole_when_each_holds_every_light() {
+        for lights in [3, 8, 11, 16] {
+            let mut kept = Kept::<u8>::new(lights);
+            assert_eq!(kept.whole(), u8::MAX);
+            for (light, lane) in [(0, 7), (lights - 1, 8), (1, 63)] {
+                let mut keys = vec![[1; LANES]; lights];
+                keys[light][lane] = 9;
+                kept.choose(&keys.iter().collect::<Vec<_>>(), &[1; LANES]);
+                assert_eq!(
+                    kept.whole(),
+                    !(1 << (lane / EIGHT)),
+                    "{lights} lights, light {light} of pixel {lane} is dropped"
+                );
+                assert!(!kept.holds(light, lane));
+                assert_eq!(kept.counts().iter().map(|&count| usize::from(count)).sum::<usize>(), LANES * lights - 1);
+            }
+        }
+    }
 }

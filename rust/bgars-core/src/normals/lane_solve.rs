@@ -9,11 +9,12 @@ use nalgebra::{Matrix3, Vector3};
 use super::confidence::PRIOR_RESIDUAL;
 use super::cutoff::{LANES, Lanes, cutoffs};
 use super::finish::{Facets, Finished, Place, all_bits};
-use super::kept::Kept;
+use super::kept::{EIGHT, Kept};
 use super::robust_lanes::{self, RobustLanes};
-use super::symmetric::{ENTRIES, Inverse, Monomials, dot, outer, splat, upper};
+use super::symmetric::{ENTRIES, Form, Inverse, Monomials, dot, outer};
 use crate::lights::conditioning;
 use crate::vector::Vector;
+use crate::vector::spread::Spread;
 use crate::vector::subset_sums::SubsetSums;
 use crate::{Lights, Pixel};
 
@@ -23,9 +24,6 @@ const MIN_LANE_CONDITIONING: f64 = 1e-3;
 /// Below this one, they are refined; above, rounding turns a normal by less than 2e-4 degrees (held by
 /// `tests/property/test_normals_twin.py`).
 const MIN_ROUGH_CONDITIONING: f32 = 0.1;
-
-/// Floats of the widest vector.
-const WIDEST: usize = 16;
 
 /// Lights in one byte of kept bits.
 pub(super) const BYTE_LIGHTS: usize = 8;
@@ -54,10 +52,10 @@ pub(super) struct LaneSolver {
     spread_directions: Vec<[Spread; 3]>,
     /// `(L^T L)^-1 L^T`, a column a light.
     pseudo_inverse: Vec<[Spread; 3]>,
-    /// `L^T L` of all lights, less the [prior](PRIOR_RESIDUAL) of the squared residuals.
-    explained: [f32; ENTRIES],
+    /// `-L^T L` of all lights, with the [prior](PRIOR_RESIDUAL) of the squared residuals.
+    unexplained: Form,
     /// `(tr C) I - C` of all lights, `C = (L^T L)^-1`.
-    turning: [f32; ENTRIES],
+    turning: Form,
     /// `L^T L` of any lights, a table for every eight of them.
     tables: Vec<SubsetSums<ENTRIES>>,
 }
@@ -75,9 +73,9 @@ impl LaneSolver {
             .chunks(BYTE_LIGHTS)
             .map(|lights| SubsetSums::new(&lights.iter().map(outer).collect::<Vec<_>>()))
             .collect();
-        let explained = upper(&(gram - Matrix3::from_diagonal_element(PRIOR_RESIDUAL * PRIOR_RESIDUAL)));
-        let turning = upper(&(Matrix3::from_diagonal_element(exact.trace()) - exact));
-        Some(Self { choice, directions, spread_directions, pseudo_inverse, explained, turning, tables })
+        let unexplained = Form::new(&(Matrix3::from_diagonal_element(PRIOR_RESIDUAL * PRIOR_RESIDUAL) - gram));
+        let turning = Form::new(&(Matrix3::from_diagonal_element(exact.trace()) - exact));
+        Some(Self { choice, directions, spread_directions, pseudo_inverse, unexplained, turning, tables })
     }
 
     /// Their number.
@@ -126,13 +124,13 @@ pub(super) fn solve<K: Pixel, V: Vector>(
             kept.counts()
         }
     };
-    let lights = V::splat(keys.len() as f32);
+    let (whole, eights) = (kept.whole(), (1 << (V::WIDTH / EIGHT)) - 1);
     for step in 0..LANES / V::WIDTH {
         let at = step * V::WIDTH;
-        let count = V::from_words(&out.kept[at..]);
-        let facets = if V::bits(lights.is_over(count)) == 0 {
+        let facets = if whole >> (at / EIGHT) & eights == eights {
             solve_all::<K, V>(solver, readings, at)
         } else {
+            let count = V::from_words(&out.kept[at..]);
             let (facets, unusable) = solve_kept::<K, V>(solver, kept, offset, at, count);
             out.careful |= unusable << at;
             facets
@@ -160,8 +158,8 @@ fn solve_all<K: Pixel, V: Vector>(solver: &LaneSolver, readings: &Readings<'_, K
         scaled,
         monomials,
         // |I|^2 - |L g|^2; what rounding leaves is far below the prior of 2 %.
-        squared_residuals: squares - monomials.form(splat(&solver.explained)),
-        turning: monomials.form(splat(&solver.turning)),
+        squared_residuals: monomials.added_to(squares, &solver.unexplained),
+        turning: monomials.added_to(V::splat(0.0), &solver.turning),
         kept: V::splat(readings.keys.len() as f32),
     }
 }
@@ -175,9 +173,11 @@ fn solve_kept<K: Pixel, V: Vector>(
     at: usize,
     count: V,
 ) -> (Facets<V>, Careful) {
-    let mut gram = [V::splat(0.0); ENTRIES];
-    for (tables, bits) in solver.tables.iter().zip(&kept.bits) {
-        V::add_sums_of(&bits[at..], tables, &mut gram);
+    let mut gram = V::sums_of(&kept.bits[0][at..], &solver.tables[0]);
+    for (tables, bits) in solver.tables.iter().zip(&kept.bits).skip(1) {
+        for (entry, more) in gram.iter_mut().zip(V::sums_of(&bits[at..], tables)) {
+            *entry = *entry + more;
+        }
     }
     let sums = if let Some(offset) = offset {
         let (offset, mut sums) = (V::load(&offset[at..]), Sums::zero());
@@ -202,8 +202,8 @@ fn solve_kept<K: Pixel, V: Vector>(
             if let Some(offset) = offset {
                 value = value - V::load(&offset[at..]);
             }
-            let residual =
-                value - dot(scaled, [V::load(&direction[0].0), V::load(&direction[1].0), V::load(&direction[2].0)]);
+            let residual = value
+                - dot(scaled, [V::repeated(&direction[0]), V::repeated(&direction[1]), V::repeated(&direction[2])]);
             residuals.add(residual.where_bit(&kept.bits[light / BYTE_LIGHTS][at..], light % BYTE_LIGHTS), direction);
         }
         let correction = inverse.product(residuals.vector);
@@ -263,20 +263,9 @@ impl<V: Vector> Sums<V> {
     #[inline(always)]
     fn add(&mut self, value: V, vector: &[Spread; 3]) {
         for (sum, factor) in self.vector.iter_mut().zip(vector) {
-            *sum = value.times_plus(V::load(&factor.0), *sum);
+            *sum = value.times_plus(V::repeated(factor), *sum);
         }
         self.squares = value.times_plus(value, self.squares);
-    }
-}
-
-/// A number as often as the widest vector holds.
-#[derive(Clone, Copy, Debug)]
-#[repr(align(64))] // a cache line
-struct Spread([f32; WIDEST]);
-
-impl Spread {
-    fn new(value: f32) -> Self {
-        Self([value; WIDEST])
     }
 }
 

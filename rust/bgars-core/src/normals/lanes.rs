@@ -13,7 +13,7 @@ use super::kept::Kept;
 use super::lane_solve::{Choice, LaneSolver, Readings, solve};
 use super::out::Out;
 #[cfg(target_arch = "x86_64")]
-use crate::vector::{Avx2, Avx512};
+use crate::vector::{Avx2, Avx512, Pair};
 use crate::vector::{Portable, Vector};
 use crate::{Pixel, Radiometry, stream};
 
@@ -118,7 +118,7 @@ fn run_blocks<K: Pixel>(
     #[cfg(target_arch = "x86_64")]
     {
         if multiversion::target::target_cfg_f!(target_feature = "avx512f") {
-            return run_blocks_with::<K, Avx512>(solver, source, offsets, common, pixels, sink);
+            return run_blocks_with::<K, Pair<Avx512>>(solver, source, offsets, common, pixels, sink);
         }
         if multiversion::target::target_cfg_f!(target_feature = "avx2") {
             return run_blocks_with::<K, Avx2>(solver, source, offsets, common, pixels, sink);
@@ -144,8 +144,7 @@ fn run_blocks_with<K: Pixel, V: Vector>(
     let mut clipped = [0; LANES];
     let mut finished = Finished::new();
     let per_full_scale = 1.0 / full_scale;
-    // A line that is streamed in parts, between other lines, is written part by part.
-    sink.out.streamed &= V::WIDTH * size_of::<f32>() >= LINE_BYTES;
+    sink.out.streamed &= V::STREAMS;
     for first in pixels.clone().step_by(LANES) {
         let block = first..(first + LANES).min(pixels.end);
         let span = first - pixels.start..block.end - pixels.start;

@@ -3,9 +3,13 @@
 use nalgebra::Matrix3;
 
 use crate::vector::Vector;
+use crate::vector::spread::Spread;
 
 /// Entries of the upper triangle.
 pub(super) const ENTRIES: usize = 6;
+
+/// Rows and columns of these.
+const UPPER: [(usize, usize); ENTRIES] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 
 /// `a^T b`.
 #[inline(always)]
@@ -19,15 +23,14 @@ fn product<V: Vector>([xx, xy, xz, yy, yz, zz]: [V; ENTRIES], vector: [V; 3]) ->
     [dot([xx, xy, xz], vector), dot([xy, yy, yz], vector), dot([xz, yz, zz], vector)]
 }
 
-/// The products of the components of a vector that every quadratic form of it is a sum of.
+/// The products of the components of a vector: xx, xy, xz, yy, yz, zz. Every quadratic form of it is a sum of these.
 #[derive(Clone, Copy)]
 pub(super) struct Monomials<V>([V; ENTRIES]);
 
 impl<V: Vector> Monomials<V> {
     #[inline(always)]
     pub fn of([x, y, z]: [V; 3]) -> Self {
-        let (twice_x, twice_y) = (x + x, y + y);
-        Self([x * x, twice_x * y, twice_x * z, y * y, twice_y * z, z * z])
+        Self([x * x, x * y, x * z, y * y, y * z, z * z])
     }
 
     /// `v^T v`.
@@ -47,7 +50,29 @@ impl<V: Vector> Monomials<V> {
     #[inline(always)]
     pub fn form(&self, [xx, xy, xz, yy, yz, zz]: [V; ENTRIES]) -> V {
         let [first, second, third, fourth, fifth, sixth] = self.0;
-        dot([xx, xy, xz], [first, second, third]) + dot([yy, yz, zz], [fourth, fifth, sixth])
+        let mixed = dot([xy, xz, yz], [second, third, fifth]);
+        dot([xx, yy, zz], [first, fourth, sixth]) + (mixed + mixed)
+    }
+
+    /// `start + v^T A v`.
+    #[inline(always)]
+    pub fn added_to(&self, start: V, Form([xx, xy, xz, yy, yz, zz]): &Form) -> V {
+        let [first, second, third, fourth, fifth, sixth] = self.0;
+        let begun = third
+            .times_plus(V::repeated(xz), second.times_plus(V::repeated(xy), first.times_plus(V::repeated(xx), start)));
+        begun + dot([fourth, fifth, sixth], [V::repeated(yy), V::repeated(yz), V::repeated(zz)])
+    }
+}
+
+/// A quadratic form that is the same for all pixels: the factors of the [products](Monomials), of mixed ones twice the entry.
+#[derive(Debug)]
+pub(super) struct Form([Spread; ENTRIES]);
+
+impl Form {
+    /// `v^T A v`.
+    pub fn new(matrix: &Matrix3<f64>) -> Self {
+        let factors = matrix + matrix.transpose() - Matrix3::from_diagonal(&matrix.diagonal());
+        Self(UPPER.map(|entry| Spread::new(factors[entry] as f32)))
     }
 }
 
@@ -89,22 +114,10 @@ impl<V: Vector> Inverse<V> {
 /// `a b - c d`.
 #[inline(always)]
 fn minor<V: Vector>(a: V, b: V, c: V, d: V) -> V {
-    a.times_plus(b, (V::splat(0.0) - c) * d)
-}
-
-/// A vector of each entry.
-#[inline(always)]
-pub(super) fn splat<V: Vector>(entries: &[f32; ENTRIES]) -> [V; ENTRIES] {
-    let [xx, xy, xz, yy, yz, zz] = *entries;
-    [V::splat(xx), V::splat(xy), V::splat(xz), V::splat(yy), V::splat(yz), V::splat(zz)]
+    a.times_minus(b, c * d)
 }
 
 /// `l l^T`.
 pub(super) fn outer(&[x, y, z]: &[f32; 3]) -> [f32; ENTRIES] {
     [x * x, x * y, x * z, y * y, y * z, z * z]
-}
-
-/// The upper triangle of a matrix.
-pub(super) fn upper(matrix: &Matrix3<f64>) -> [f32; ENTRIES] {
-    [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|entry| matrix[entry] as f32)
 }

@@ -3,14 +3,15 @@
 use std::arch::x86_64::{
     __m256, __m256i, _CMP_GT_OQ, _mm_cvtsi64_si128, _mm256_add_ps, _mm256_alignr_epi8, _mm256_and_ps, _mm256_and_si256,
     _mm256_andnot_ps, _mm256_blend_ps, _mm256_blendv_ps, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi32,
-    _mm256_cvtepi32_ps, _mm256_cvtepu8_epi32, _mm256_cvtepu16_epi32, _mm256_div_ps, _mm256_fmadd_ps, _mm256_max_ps,
-    _mm256_movemask_ps, _mm256_mul_ps, _mm256_permute2f128_ps, _mm256_permutevar8x32_ps, _mm256_set1_epi32,
-    _mm256_set1_ps, _mm256_setzero_ps, _mm256_shuffle_ps, _mm256_sqrt_ps, _mm256_srli_epi32, _mm256_sub_ps,
+    _mm256_cvtepi32_ps, _mm256_cvtepu8_epi32, _mm256_cvtepu16_epi32, _mm256_div_ps, _mm256_fmadd_ps, _mm256_fmsub_ps,
+    _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_permute2f128_ps, _mm256_permutevar8x32_ps,
+    _mm256_set1_epi32, _mm256_set1_ps, _mm256_setzero_ps, _mm256_shuffle_ps, _mm256_sqrt_ps, _mm256_srli_epi32,
+    _mm256_sub_ps,
 };
 
 use super::packed::chunked;
 use super::subset_sums::SubsetSums;
-use super::{Packed, Vector, first};
+use super::{Arithmetic, Packed, Vector, first};
 
 /// Eight floats.
 #[derive(Clone, Copy)]
@@ -49,8 +50,9 @@ fn widened(bytes: &[u8]) -> __m256i {
     here!(_mm256_cvtepu8_epi32(_mm_cvtsi64_si128(i64::from_le_bytes(first(bytes)))))
 }
 
-impl Packed for Avx2 {
-    chunked!(f32, WIDTH, |from| Self::load(from));
+impl Arithmetic for Avx2 {
+    type Number = f32;
+    const WIDTH: usize = WIDTH;
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
@@ -71,6 +73,10 @@ impl Packed for Avx2 {
     fn times_plus(self, factor: Self, term: Self) -> Self {
         Self(here!(_mm256_fmadd_ps(self.0, factor.0, term.0)))
     }
+}
+
+impl Packed for Avx2 {
+    chunked!(f32, WIDTH, |from| Self::load(from));
 
     #[inline(always)]
     fn after_last_of(self, before: Self) -> Self {
@@ -126,13 +132,7 @@ impl Vector for Avx2 {
     }
 
     #[inline(always)]
-    fn store(self, to: &mut [f32], _streamed: bool) {
-        // Half a line past the caches, and other lines before the second half: memory is then written half by half.
-        self.write(to);
-    }
-
-    #[inline(always)]
-    fn store_interleaved([x, y, z]: [Self; 3], to: &mut [f32], _streamed: bool) {
+    fn interleaved([x, y, z]: [Self; 3]) -> [Self; 3] {
         /// A shuffle's places: two of the first vector, then two of the second, in each half.
         const fn places([a, b, c, d]: [i32; 4]) -> i32 {
             a | b << 2 | c << 4 | d << 6
@@ -144,9 +144,16 @@ impl Vector for Avx2 {
         let first = here!(_mm256_shuffle_ps::<{ places([0, 2, 0, 2]) }>(x_y, z_x));
         let second = here!(_mm256_shuffle_ps::<{ places([0, 2, 1, 3]) }>(y_z, x_y));
         let third = here!(_mm256_shuffle_ps::<{ places([1, 3, 1, 3]) }>(z_x, y_z));
-        Self(here!(_mm256_permute2f128_ps::<LOWER_HALVES>(first, second))).write(to);
-        Self(here!(_mm256_blend_ps::<UPPER_HALF>(third, first))).write(&mut to[WIDTH..]);
-        Self(here!(_mm256_permute2f128_ps::<UPPER_HALVES>(second, third))).write(&mut to[2 * WIDTH..]);
+        [
+            Self(here!(_mm256_permute2f128_ps::<LOWER_HALVES>(first, second))),
+            Self(here!(_mm256_blend_ps::<UPPER_HALF>(third, first))),
+            Self(here!(_mm256_permute2f128_ps::<UPPER_HALVES>(second, third))),
+        ]
+    }
+
+    #[inline(always)]
+    fn times_minus(self, factor: Self, term: Self) -> Self {
+        Self(here!(_mm256_fmsub_ps(self.0, factor.0, term.0)))
     }
 
     #[inline(always)]
@@ -187,14 +194,17 @@ impl Vector for Avx2 {
     }
 
     #[inline(always)]
-    fn add_sums_of<const ENTRIES: usize>(bytes: &[u8], sums: &SubsetSums<ENTRIES>, to: &mut [Self; ENTRIES]) {
+    fn sums_of<const ENTRIES: usize>(bytes: &[u8], sums: &SubsetSums<ENTRIES>) -> [Self; ENTRIES] {
         // A permutation looks at the lowest three bits alone.
         let first = widened(bytes);
-        let groups = here!([first, _mm256_srli_epi32::<3>(first), _mm256_srli_epi32::<6>(first)]);
-        for (entry, to) in to.iter_mut().enumerate() {
-            for (tables, group) in sums.tables.iter().zip(groups) {
-                *to = *to + Self(here!(_mm256_permutevar8x32_ps(Self::load(&tables[entry]).0, group)));
-            }
+        let (second, third) = here!((_mm256_srli_epi32::<3>(first), _mm256_srli_epi32::<6>(first)));
+        let mut found = [Self::splat(0.0); ENTRIES];
+        let [of_first, of_second, of_third] = &sums.of_three;
+        for (((found, of_first), of_second), of_third) in found.iter_mut().zip(of_first).zip(of_second).zip(of_third) {
+            *found = Self(here!(_mm256_permutevar8x32_ps(Self::load(of_first).0, first)))
+                + Self(here!(_mm256_permutevar8x32_ps(Self::load(of_second).0, second)))
+                + Self(here!(_mm256_permutevar8x32_ps(Self::load(of_third).0, third)));
         }
+        found
     }
 }

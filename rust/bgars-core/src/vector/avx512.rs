@@ -2,15 +2,15 @@
 
 use std::arch::x86_64::{
     __m512, __m512i, _CMP_GT_OQ, _mm512_abs_ps, _mm512_add_ps, _mm512_alignr_epi32, _mm512_cmp_ps_mask,
-    _mm512_cvtepi32_ps, _mm512_cvtepu8_epi32, _mm512_cvtepu16_epi32, _mm512_div_ps, _mm512_fmadd_ps,
-    _mm512_mask_blend_ps, _mm512_mask_permutexvar_ps, _mm512_maskz_div_ps, _mm512_maskz_mov_ps, _mm512_max_ps,
-    _mm512_mul_ps, _mm512_permutexvar_ps, _mm512_set1_epi32, _mm512_set1_ps, _mm512_setzero_ps, _mm512_sqrt_ps,
-    _mm512_srli_epi32, _mm512_stream_ps, _mm512_sub_ps, _mm512_test_epi32_mask,
+    _mm512_cvtepi32_ps, _mm512_cvtepu8_epi32, _mm512_cvtepu16_epi32, _mm512_div_ps, _mm512_fmadd_ps, _mm512_fmsub_ps,
+    _mm512_mask_blend_ps, _mm512_maskz_div_ps, _mm512_maskz_mov_ps, _mm512_max_ps, _mm512_mul_ps,
+    _mm512_permutex2var_ps, _mm512_permutexvar_ps, _mm512_set1_epi32, _mm512_set1_ps, _mm512_setzero_ps,
+    _mm512_sqrt_ps, _mm512_srli_epi32, _mm512_stream_ps, _mm512_sub_ps, _mm512_test_epi32_mask,
 };
 
 use super::packed::chunked;
 use super::subset_sums::SubsetSums;
-use super::{Packed, Vector, first, interleaved};
+use super::{Arithmetic, Packed, Vector, first, interleaved};
 
 /// Sixteen floats.
 #[derive(Clone, Copy)]
@@ -38,8 +38,9 @@ fn widened(bytes: &[u8]) -> __m512i {
     here!(_mm512_cvtepu8_epi32(bytemuck::must_cast(first::<_, WIDTH>(bytes))))
 }
 
-impl Packed for Avx512 {
-    chunked!(f32, WIDTH, |from| Self::load(from));
+impl Arithmetic for Avx512 {
+    type Number = f32;
+    const WIDTH: usize = WIDTH;
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
@@ -53,13 +54,17 @@ impl Packed for Avx512 {
 
     #[inline(always)]
     fn write(self, to: &mut [f32]) {
-        self.store(to, false);
+        to[..WIDTH].copy_from_slice(&bytemuck::must_cast::<_, [f32; WIDTH]>(self.0));
     }
 
     #[inline(always)]
     fn times_plus(self, factor: Self, term: Self) -> Self {
         Self(here!(_mm512_fmadd_ps(self.0, factor.0, term.0)))
     }
+}
+
+impl Packed for Avx512 {
+    chunked!(f32, WIDTH, |from| Self::load(from));
 
     #[inline(always)]
     fn after_last_of(self, before: Self) -> Self {
@@ -102,6 +107,7 @@ impl Packed for Avx512 {
 
 impl Vector for Avx512 {
     type Mask = u16;
+    const STREAMS: bool = true;
 
     #[inline(always)]
     fn from_bytes(from: &[u8]) -> Self {
@@ -114,25 +120,29 @@ impl Vector for Avx512 {
     }
 
     #[inline(always)]
-    fn store(self, to: &mut [f32], streamed: bool) {
+    fn stream(self, to: &mut [f32]) {
         let to = &mut to[..WIDTH];
-        if streamed && to.as_ptr().addr().is_multiple_of(size_of::<Self>()) {
+        if to.as_ptr().addr().is_multiple_of(size_of::<Self>()) {
             here!(_mm512_stream_ps(to.as_mut_ptr(), self.0));
         } else {
-            to.copy_from_slice(&bytemuck::must_cast::<_, [f32; WIDTH]>(self.0));
+            self.write(to);
         }
     }
 
     #[inline(always)]
-    fn store_interleaved([x, y, z]: [Self; 3], to: &mut [f32], streamed: bool) {
-        const PLACES: [[[i32; WIDTH]; 3]; 3] = interleaved::places();
-        const FILLED: [[u16; 3]; 3] = interleaved::filled::<WIDTH>();
-        for (vector, to) in to[..3 * WIDTH].chunks_exact_mut(WIDTH).enumerate() {
-            let from = |plane: usize| -> __m512i { bytemuck::must_cast(PLACES[plane][vector]) };
-            let mixed = here!(_mm512_permutexvar_ps(from(0), x.0));
-            let mixed = here!(_mm512_mask_permutexvar_ps(mixed, FILLED[1][vector], from(1), y.0));
-            Self(here!(_mm512_mask_permutexvar_ps(mixed, FILLED[2][vector], from(2), z.0))).store(to, streamed);
+    fn interleaved([x, y, z]: [Self; 3]) -> [Self; 3] {
+        const PLACES: [[[i32; WIDTH]; 2]; 3] = interleaved::places();
+        let mut mixed = [x; 3];
+        for ([x_y, with_z], mixed) in PLACES.into_iter().zip(&mut mixed) {
+            let x_y = here!(_mm512_permutex2var_ps(x.0, bytemuck::must_cast(x_y), y.0));
+            *mixed = Self(here!(_mm512_permutex2var_ps(x_y, bytemuck::must_cast(with_z), z.0)));
         }
+        mixed
+    }
+
+    #[inline(always)]
+    fn times_minus(self, factor: Self, term: Self) -> Self {
+        Self(here!(_mm512_fmsub_ps(self.0, factor.0, term.0)))
     }
 
     #[inline(always)]
@@ -172,14 +182,16 @@ impl Vector for Avx512 {
     }
 
     #[inline(always)]
-    fn add_sums_of<const ENTRIES: usize>(bytes: &[u8], sums: &SubsetSums<ENTRIES>, to: &mut [Self; ENTRIES]) {
-        // A permutation looks at the lowest four bits alone; the tables repeat after three.
+    fn sums_of<const ENTRIES: usize>(bytes: &[u8], sums: &SubsetSums<ENTRIES>) -> [Self; ENTRIES] {
+        // A permutation looks at the lowest four bits alone.
         let first = widened(bytes);
-        let groups = here!([first, _mm512_srli_epi32::<3>(first), _mm512_srli_epi32::<6>(first)]);
-        for (entry, to) in to.iter_mut().enumerate() {
-            for (tables, group) in sums.tables.iter().zip(groups) {
-                *to = *to + Self(here!(_mm512_permutexvar_ps(group, Self::load(&tables[entry]).0)));
-            }
+        let second = here!(_mm512_srli_epi32::<4>(first));
+        let mut found = [Self::splat(0.0); ENTRIES];
+        let [of_first, of_second] = &sums.of_four;
+        for ((found, of_first), of_second) in found.iter_mut().zip(of_first).zip(of_second) {
+            *found = Self(here!(_mm512_permutexvar_ps(first, Self::load(of_first).0)))
+                + Self(here!(_mm512_permutexvar_ps(second, Self::load(of_second).0)));
         }
+        found
     }
 }

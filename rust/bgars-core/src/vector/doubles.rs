@@ -9,7 +9,7 @@ use std::arch::x86_64::{
 };
 
 use super::packed::chunked;
-use super::{Packed, first};
+use super::{Arithmetic, Packed, first};
 
 /// The upper half of one vector and the lower half of another.
 const HALVES: i32 = 0x21;
@@ -40,8 +40,9 @@ macro_rules! double {
 
         super::operators!($vector, $add, $sub, $mul);
 
-        impl Packed for $vector {
-            chunked!(f64, $width, |from| Self(here!($convert(bytemuck::must_cast(*from)))));
+        impl Arithmetic for $vector {
+            type Number = f64;
+            const WIDTH: usize = $width;
 
             #[inline(always)]
             fn splat(value: f64) -> Self {
@@ -62,6 +63,10 @@ macro_rules! double {
             fn times_plus(self, factor: Self, term: Self) -> Self {
                 Self(here!($fused(self.0, factor.0, term.0)))
             }
+        }
+
+        impl Packed for $vector {
+            chunked!(f64, $width, |from| Self(here!($convert(bytemuck::must_cast(*from)))));
 
             #[inline(always)]
             fn after_last_of(self, before: Self) -> Self {

@@ -2,6 +2,7 @@
 //!
 //! One body of code, written against [`Packed`] or [`Vector`], is compiled for each instruction set inside a function that enables it.
 
+mod arithmetic;
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]
@@ -12,7 +13,10 @@ mod doubles;
 mod interleaved;
 mod one;
 mod packed;
+#[cfg(any(target_arch = "x86_64", test))]
+mod pair;
 mod portable;
+pub mod spread;
 pub mod subset_sums;
 #[cfg(test)]
 mod tests;
@@ -42,6 +46,7 @@ macro_rules! operators {
 #[cfg(target_arch = "x86_64")]
 use operators;
 
+pub(crate) use arithmetic::Arithmetic;
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
 #[cfg(target_arch = "x86_64")]
@@ -50,23 +55,39 @@ pub(crate) use avx512::Avx512;
 pub(crate) use doubles::{Avx2Double, Avx512Double};
 pub(crate) use one::One;
 pub(crate) use packed::Packed;
+#[cfg(any(target_arch = "x86_64", test))]
+pub(crate) use pair::Pair;
 pub(crate) use portable::{Portable, PortableDouble};
+use spread::Spread;
 use subset_sums::SubsetSums;
 
-/// Packed floats, with what an image asks of them.
-pub trait Vector: Packed<Number = f32> + Div<Output = Self> {
+/// Floats, with what an image asks of them.
+pub trait Vector: Arithmetic<Number = f32> + Div<Output = Self> {
     /// True or false for each value.
     type Mask: Copy;
+    /// Whether [`Self::stream`] is more than [`Arithmetic::write`]: parts of a cache line that are streamed one by one, between
+    /// other lines, are written to memory one by one.
+    const STREAMS: bool = false;
 
+    /// The same number everywhere, from memory.
+    #[inline(always)]
+    fn repeated(number: &Spread) -> Self {
+        Self::load(&number.0)
+    }
     /// Bytes as floats.
     fn from_bytes(from: &[u8]) -> Self;
     /// Words of 16 bits as floats.
     fn from_words(from: &[u16]) -> Self;
-    /// Writes the values; past the caches where `streamed`, supported, and aligned ([`crate::stream::finish`] must follow).
-    fn store(self, to: &mut [f32], streamed: bool);
-    /// Writes `x[0] y[0] z[0] x[1] ...`.
-    fn store_interleaved(vectors: [Self; 3], to: &mut [f32], streamed: bool);
+    /// Writes the values; past the caches where supported and aligned ([`crate::stream::finish`] must follow).
+    #[inline(always)]
+    fn stream(self, to: &mut [f32]) {
+        self.write(to);
+    }
+    /// `x[0] y[0] z[0] x[1] ...` in three vectors.
+    fn interleaved(vectors: [Self; 3]) -> [Self; 3];
 
+    /// `self factor - term`, in one rounding where [`Arithmetic::times_plus`] is.
+    fn times_minus(self, factor: Self, term: Self) -> Self;
     /// Square root.
     fn root(self) -> Self;
     /// `self > other`; false for NaN.
@@ -81,8 +102,8 @@ pub trait Vector: Packed<Number = f32> + Div<Output = Self> {
     fn bits(mask: Self::Mask) -> u64;
     /// The value where bit `bit` of its byte is set, 0 elsewhere.
     fn where_bit(self, bytes: &[u8], bit: usize) -> Self;
-    /// Adds, for each byte, the sums over the elements whose bits are set.
-    fn add_sums_of<const ENTRIES: usize>(bytes: &[u8], sums: &SubsetSums<ENTRIES>, to: &mut [Self; ENTRIES]);
+    /// For each byte, the sums over the elements whose bits are set.
+    fn sums_of<const ENTRIES: usize>(bytes: &[u8], sums: &SubsetSums<ENTRIES>) -> [Self; ENTRIES];
 }
 
 /// The first values of a slice.

@@ -2,8 +2,8 @@
 
 use std::ops::{Add, Mul, Sub};
 
-use super::Packed;
 use super::packed::chunked;
+use super::{Arithmetic, Packed};
 
 /// One number.
 #[derive(Clone, Copy)]
@@ -38,8 +38,9 @@ macro_rules! one {
             }
         }
 
-        impl Packed for One<$number> {
-            chunked!($number, 1, |from| Self(<$number>::from(from[0])));
+        impl Arithmetic for One<$number> {
+            type Number = $number;
+            const WIDTH: usize = 1;
 
             #[inline(always)]
             fn splat(value: $number) -> Self {
@@ -60,6 +61,10 @@ macro_rules! one {
             fn times_plus(self, factor: Self, term: Self) -> Self {
                 self * factor + term
             }
+        }
+
+        impl Packed for One<$number> {
+            chunked!($number, 1, |from| Self(<$number>::from(from[0])));
 
             #[inline(always)]
             fn after_last_of(self, before: Self) -> Self {

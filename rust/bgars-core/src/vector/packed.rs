@@ -1,26 +1,13 @@
-//! What linear algebra asks of a vector, in either precision.
+//! What linear algebra on rows asks of a vector, in either precision.
 
-use std::ops::{Add, Mul, Sub};
+use super::Arithmetic;
 
-/// `WIDTH` numbers that are worked on at once. Slices hold at least as many; of longer ones the first count.
-///
-/// A type may be named only where its instructions are there: in a function compiled for them.
-pub trait Packed: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
-    /// `f32` or `f64`.
-    type Number: Copy;
+/// Numbers of a row of many.
+pub trait Packed: Arithmetic {
     /// The numbers of a vector in memory.
     type Chunk;
     /// As many floats in memory.
     type Floats;
-    /// Numbers in a vector.
-    const WIDTH: usize;
-
-    /// The same number everywhere.
-    fn splat(value: Self::Number) -> Self;
-    /// Numbers of a slice.
-    fn load(from: &[Self::Number]) -> Self;
-    /// Writes the numbers.
-    fn write(self, to: &mut [Self::Number]);
 
     /// The first `n` vectors of a row: loops over several rows of `n` ask for no bound.
     fn chunks(row: &[Self::Number], n: usize) -> &[Self::Chunk];
@@ -35,8 +22,6 @@ pub trait Packed: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = 
     /// Floats as numbers.
     fn widen(from: &Self::Floats) -> Self;
 
-    /// `self factor + term`, in one rounding where the processor does so at no cost.
-    fn times_plus(self, factor: Self, term: Self) -> Self;
     /// Without its sign.
     fn magnitude(self) -> Self;
     /// 0 where below.
@@ -54,10 +39,8 @@ pub trait Packed: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = 
 /// The part of [`Packed`] that only moves numbers.
 macro_rules! chunked {
     ($number:ty, $width:expr, |$floats:ident| $widen:expr) => {
-        type Number = $number;
         type Chunk = [$number; $width];
         type Floats = [f32; $width];
-        const WIDTH: usize = $width;
 
         #[inline(always)]
         fn chunks(row: &[$number], n: usize) -> &[[$number; $width]] {

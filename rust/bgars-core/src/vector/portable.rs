@@ -5,8 +5,8 @@ use std::ops::{Add, Div, Mul, Sub};
 use wide::{f32x8, f64x4};
 
 use super::packed::chunked;
-use super::subset_sums::{GROUP, SubsetSums};
-use super::{Packed, Vector, first};
+use super::subset_sums::SubsetSums;
+use super::{Arithmetic, Packed, Vector, first};
 
 const WIDTH: usize = 8;
 
@@ -20,8 +20,9 @@ macro_rules! portable {
         portable!(@operator $vector, Sub sub);
         portable!(@operator $vector, Mul mul);
 
-        impl Packed for $vector {
-            chunked!($number, $width, |$floats| $widen);
+        impl Arithmetic for $vector {
+            type Number = $number;
+            const WIDTH: usize = $width;
 
             #[inline(always)]
             fn splat(value: $number) -> Self {
@@ -46,6 +47,10 @@ macro_rules! portable {
                     self * factor + term
                 }
             }
+        }
+
+        impl Packed for $vector {
+            chunked!($number, $width, |$floats| $widen);
 
             #[inline(always)]
             fn after_last_of(self, before: Self) -> Self {
@@ -127,16 +132,15 @@ impl Vector for Portable {
     }
 
     #[inline(always)]
-    fn store(self, to: &mut [f32], _streamed: bool) {
-        self.write(to);
+    fn interleaved(vectors: [Self; 3]) -> [Self; 3] {
+        let planes = vectors.map(|vector| vector.0.to_array());
+        let value = |at: usize| planes[at % 3][at / 3];
+        [0, WIDTH, 2 * WIDTH].map(|first| Self::from_fn(|lane| value(first + lane)))
     }
 
     #[inline(always)]
-    fn store_interleaved(vectors: [Self; 3], to: &mut [f32], _streamed: bool) {
-        let planes = vectors.map(|vector| vector.0.to_array());
-        for (lane, triple) in to[..3 * WIDTH].as_chunks_mut::<3>().0.iter_mut().enumerate() {
-            *triple = planes.map(|plane| plane[lane]);
-        }
+    fn times_minus(self, factor: Self, term: Self) -> Self {
+        self.times_plus(factor, Self::splat(0.0) - term)
     }
 
     #[inline(always)]
@@ -176,13 +180,15 @@ impl Vector for Portable {
     }
 
     #[inline(always)]
-    fn add_sums_of<const ENTRIES: usize>(bytes: &[u8], sums: &SubsetSums<ENTRIES>, to: &mut [Self; ENTRIES]) {
+    fn sums_of<const ENTRIES: usize>(bytes: &[u8], sums: &SubsetSums<ENTRIES>) -> [Self; ENTRIES] {
         let bytes: [u8; WIDTH] = first(bytes);
-        for (entry, to) in to.iter_mut().enumerate() {
-            for (group, tables) in sums.tables.iter().enumerate() {
-                *to = *to
-                    + Self::from_fn(|lane| tables[entry][usize::from(bytes[lane] >> (GROUP * group)) % (1 << GROUP)]);
-            }
+        let mut found = [Self::splat(0.0); ENTRIES];
+        let [of_first, of_second, of_third] = &sums.of_three;
+        for (((found, of_first), of_second), of_third) in found.iter_mut().zip(of_first).zip(of_second).zip(of_third) {
+            *found = Self::from_fn(|lane| of_first[usize::from(bytes[lane] % 8)])
+                + Self::from_fn(|lane| of_second[usize::from(bytes[lane] >> 3) % 8])
+                + Self::from_fn(|lane| of_third[usize::from(bytes[lane] >> 6)]);
         }
+        found
     }
 }

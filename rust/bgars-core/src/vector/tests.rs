@@ -3,14 +3,14 @@
 #![allow(clippy::float_cmp)]
 
 use super::subset_sums::SubsetSums;
-use super::{One, Packed, Portable, PortableDouble, Vector};
+use super::{One, Packed, Pair, Portable, PortableDouble, Vector};
 
 /// More than the widest vector needs.
-const VALUES: usize = 16;
+const VALUES: usize = 32;
 
 fn values<V: Vector>(vector: V) -> Vec<f32> {
     let mut out = [f32::NAN; VALUES];
-    vector.store(&mut out, false);
+    vector.write(&mut out);
     assert!(out[V::WIDTH..].iter().all(|value| value.is_nan()), "written past the end");
     out[..V::WIDTH].to_vec()
 }
@@ -26,8 +26,11 @@ fn assert_values<V: Vector>(vector: V, expected: impl Fn(usize) -> f32) {
 fn check<V: Vector>() {
     let a: [f32; VALUES] = std::array::from_fn(|lane| lane as f32 - 3.0);
     let b: [f32; VALUES] = std::array::from_fn(|lane| [0.5, -2.0, 7.0, f32::NAN][lane % 4]);
+    let c: [f32; VALUES] = std::array::from_fn(|lane| 0.5 * lane as f32);
     let (x, y) = (V::load(&a), V::load(&b));
     assert_values(x / y, |lane| a[lane] / b[lane]);
+    let w = V::load(&c);
+    assert_values(x.times_minus(w, x), |lane| a[lane] * c[lane] - a[lane]); // exact for these values
     assert_values((x * x).root(), |lane| a[lane].abs());
     assert_values(V::splat(-1.0).root(), |_| f32::NAN);
     assert_values(V::pick(x.is_over(y), x, V::splat(0.0)), |lane| if a[lane] > b[lane] { a[lane] } else { 0.0 });
@@ -106,12 +109,10 @@ fn check_sums<V: Vector>() {
         let sums = SubsetSums::new(&table);
         for first in (0..1 << elements).step_by(V::WIDTH) {
             let bytes: [u8; VALUES] = std::array::from_fn(|lane| ((first + lane) & ((1 << elements) - 1)) as u8);
-            let mut found = [V::splat(0.5); 2];
-            V::add_sums_of(&bytes, &sums, &mut found);
-            for (entry, found) in found.into_iter().enumerate() {
+            for (entry, found) in V::sums_of(&bytes, &sums).into_iter().enumerate() {
                 assert_values(found, |lane| {
                     let kept = table.iter().enumerate().filter(|(index, _)| bytes[lane] >> index & 1 == 1);
-                    0.5 + kept.map(|(_, element)| element[entry]).sum::<f32>()
+                    kept.map(|(_, element)| element[entry]).sum::<f32>()
                 });
             }
         }
@@ -124,7 +125,14 @@ fn check_stores<V: Vector>() {
     let planes: [[f32; VALUES]; 3] = [0, 1, 2].map(|plane| std::array::from_fn(|lane| (3 * lane + plane) as f32));
     for (start, streamed) in [(0, true), (0, false), (1, true), (5, false)] {
         let mut out = Lines([-1.0; 4 * VALUES]);
-        V::store_interleaved(planes.map(|plane| V::load(&plane)), &mut out.0[start..], streamed);
+        let vectors = V::interleaved(planes.map(|plane| V::load(&plane)));
+        for (vector, to) in vectors.into_iter().zip(out.0[start..].chunks_mut(V::WIDTH)) {
+            if streamed {
+                vector.stream(to);
+            } else {
+                vector.write(to);
+            }
+        }
         crate::stream::finish();
         for (at, &value) in out.0.iter().enumerate() {
             let inside = (start..start + 3 * V::WIDTH).contains(&at);
@@ -133,12 +141,17 @@ fn check_stores<V: Vector>() {
     }
 }
 
-fn check_all<V: Vector, Double: Packed<Number = f64>>() {
-    check_packed::<V>();
-    check_packed::<Double>();
+fn check_vector<V: Vector>() {
     check::<V>();
     check_sums::<V>();
     check_stores::<V>();
+}
+
+fn check_all<V: Vector + Packed, Double: Packed<Number = f64>>() {
+    check_packed::<V>();
+    check_packed::<Double>();
+    check_vector::<V>();
+    check_vector::<Pair<V>>();
 }
 
 #[test]
