@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 MIN_BYTES = 1 << 20
 """Smaller arrays come from numpy."""
 LARGE_PAGE_BYTES = 1 << 21
-"""Pages are taken by whole large ones: part of one would be many small pages, each marked anew when it is given back."""
+"""Pages are taken by whole large ones: part of one would be many small pages, each marked anew at every call."""
 KEPT_ARRAYS = 16
 """Arrays whose pages are kept at most: those of two normal fields, the one before and the one in use."""
 _HAS_PRIVATE_PAGES = hasattr(mmap, "MAP_PRIVATE") and hasattr(mmap, "MAP_ANONYMOUS")
