@@ -21,18 +21,19 @@ NORMAL_BYTES = {
     "8 values read": 8,
     "normal written": 12,
     "albedo written": 4,
-    "mask, confidence, number of lights written": 1 + 4 + 2,
+    "mask, measured, confidence, number of lights written": 1 + 1 + 4 + 2,
 }
 NORMAL_OPERATIONS = {
     "sorting network, 19 exchanges of a least and a greatest": 38,
     "cut-off, 5 gaps of a difference, a comparison, a choice": 15,
     "kept lights, 8 comparisons, choices and bits": 24,
-    "Gram matrix, 6 sums of 3 look-ups": 36,
-    "its inverse": 35,
+    "Gram matrix, 6 sums of 3 look-ups": 18 + 12,
+    "its 6 minors, determinant, largest determinant at its trace, a division": 18 + 5 + 5 + 1,
     "four sums over 8 lights": 64,
-    "solution, residual": 21,
-    "products of its components, three quadratic forms of them": 27,
-    "length, normal, albedo, confidence": 32,
+    "solution, its conditioning compared twice, squared residual": 18 + 4 + 8,
+    "products of its components, their square, a quadratic form, what turns the normal": 6 + 2 + 12 + 5,
+    "range, length, normal, albedo": 5 + 4 + 3 + 1,
+    "confidence": 9,
 }
 """Of a pixel that loses a light; where a vector keeps all of them, Gram matrix and inverse fall away."""
 ITERATION_BYTES = {
