@@ -35,7 +35,10 @@ NORMAL_OPERATIONS = {
     "range, length, normal, albedo": 5 + 4 + 3 + 1,
     "confidence": 9,
 }
-"""Of a pixel that loses a light; where a vector keeps all of them, Gram matrix and inverse fall away."""
+"""Of a pixel that loses a light; where a vector keeps all of them, Gram matrix and inverse fall away.
+
+With AVX-512 two look-ups do for three, and the Gram matrix takes 18.
+"""
 ITERATION_BYTES = {
     "direction: z and p read, p written": 2 + 2 + 2,
     "product: weights and p read, q written": 8 + 2 + 4,
