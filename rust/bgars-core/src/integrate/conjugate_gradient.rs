@@ -3,8 +3,6 @@
 //! Written out here for its memory traffic: the sums ride along with the passes that make their vectors, and every pass runs on
 //! all threads. faer's solver, with which the tests compare it, does its vector work on one thread and in passes of its own.
 
-use std::ops::Range;
-
 use multiversion::multiversion;
 use rayon::prelude::*;
 
@@ -46,10 +44,10 @@ pub(super) fn conjugate_gradients(
     }
     let target = (params.relative_tolerance * scale).max(params.absolute_tolerance * (2.0 * size as f64).sqrt());
     let preconditioner = Multigrid::new(weights);
-    let chunk = BAND_ROWS * weights.grid.half();
+    let mut vectors = preconditioner.vectors();
     let Solution { x, iterations, residual, solved } = &mut solution;
     // A direction may be any; what x and r take along it agrees in `f64`.
-    let [mut p, mut z] = [Aligned::<f32>::any(size), Aligned::any(size)];
+    let [mut p, mut previous] = [Aligned::<f32>::any(size), Aligned::any(size)];
     let [mut q, mut r] = [Aligned::<f64>::any(size), Aligned::any(size)];
     r.par_chunks_mut(BLOCK).zip(b.par_chunks(BLOCK)).for_each(|(r, b)| r.copy_from_slice(b));
     let mut norm = square_sum(b).sqrt();
@@ -59,87 +57,98 @@ pub(super) fn conjugate_gradients(
             return Ok(solution);
         }
         let mut r_z_before = None;
+        // A step that x has not taken yet: two at once touch its memory half as often.
+        let mut waiting = None;
         // Written so that NaN goes on, to be found below.
         while !(norm <= target) {
-            if *iterations == params.max_iters {
-                (*residual, *solved) = (norm / scale, false);
-                return Ok(solution);
+            *solved = *iterations < params.max_iters;
+            if !*solved {
+                break;
             }
-            let r_z = preconditioner.cycle(&r, &mut z);
-            if let Some(before) = r_z_before.replace(r_z) {
-                let beta = (r_z / before) as f32;
-                p.par_chunks_mut(chunk).zip(z.par_chunks(chunk)).enumerate().for_each(|(band, (p, z))| {
-                    for part in weights.spans.parts(band) {
-                        turn_part(beta, &mut p[part.clone()], &z[part]);
-                    }
-                });
-            } else {
-                std::mem::swap(&mut p, &mut z);
-            }
-            let p_q = multiply(weights, &p, &mut q);
+            let r_z = preconditioner.descend(&r, &mut vectors);
+            // What was there before the first direction is finite, and counts nothing.
+            let beta = r_z_before.replace(r_z).map_or(0.0, |before| (r_z / before) as f32);
+            std::mem::swap(&mut p, &mut previous);
+            let p_q = preconditioner.advance(&r, &vectors, (beta, &previous), &mut p, &mut q);
             // Both are positive but for rounding; what is lost in it cannot be found again.
-            if !(r_z > 0.0 && p_q > 0.0) {
+            *solved = r_z > 0.0 && p_q > 0.0;
+            if !*solved {
                 memory::forget();
-                (*residual, *solved) = (norm / scale, false);
-                return Ok(solution);
+                // What waits is a step along the direction before.
+                std::mem::swap(&mut p, &mut previous);
+                break;
             }
-            norm = step(weights, r_z / p_q, [x, &mut r], &p, &q).sqrt();
+            let alpha = r_z / p_q;
+            norm = subtract(weights, alpha, &q, &mut r).sqrt();
+            waiting = match waiting {
+                Some(before) => {
+                    take_steps(weights, [(before, &previous), (alpha, &p)], x);
+                    None
+                }
+                None => Some(alpha),
+            };
             *iterations += 1;
             if on_progress(Progress { iteration: *iterations, residual: norm / scale }).is_break() {
                 return Err(Error::Cancelled);
             }
         }
+        if let Some(alpha) = waiting {
+            take_steps(weights, [(alpha, &p), (0.0, &p)], x);
+        }
+        if !*solved {
+            *residual = norm / scale;
+            return Ok(solution);
+        }
         norm = residual_norm(weights, x, b);
         if norm > target {
             multiply(weights, x, &mut q);
-            (r.par_chunks_mut(chunk), b.par_chunks(chunk), q.par_chunks(chunk)).into_par_iter().enumerate().for_each(
-                |(band, (r, b, q))| {
-                    for part in weights.spans.parts(band) {
-                        for ((r, b), q) in r[part.clone()].iter_mut().zip(&b[part.clone()]).zip(&q[part]) {
-                            *r = b - q;
-                        }
-                    }
-                },
-            );
+            r.par_chunks_mut(BLOCK).zip(b.par_chunks(BLOCK)).for_each(|(r, b)| r.copy_from_slice(b));
+            subtract(weights, 1.0, &q, &mut r);
         }
     }
 }
 
-/// `p = z + beta p` of a part of a band.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn turn_part(beta: f32, p: &mut [f32], z: &[f32]) {
-    for (p, &z) in p.iter_mut().zip(z) {
-        *p = z + beta * *p;
-    }
-}
-
-/// `x += alpha p`, `r -= alpha q` along the spans of the grid; returns `<r, r>`.
-fn step(weights: &Weights, alpha: f64, [x, r]: [&mut [f64]; 2], p: &[f32], q: &[f64]) -> f64 {
+/// `r -= alpha q` along the spans of the grid; returns `<r, r>`, each band summed by itself.
+fn subtract(weights: &Weights, alpha: f64, q: &[f64], r: &mut [f64]) -> f64 {
     let chunk = BAND_ROWS * weights.grid.half();
-    let squares: Vec<f64> =
-        (x.par_chunks_mut(chunk), r.par_chunks_mut(chunk), p.par_chunks(chunk), q.par_chunks(chunk))
-            .into_par_iter()
-            .enumerate()
-            .map(|(band, (x, r, p, q))| {
-                let step = |part: Range<usize>| {
-                    step_part(alpha, &mut x[part.clone()], &mut r[part.clone()], &p[part.clone()], &q[part])
-                };
-                weights.spans.parts(band).map(step).sum::<f64>()
-            })
-            .collect();
+    let bands = r.par_chunks_mut(chunk).zip(q.par_chunks(chunk)).enumerate();
+    let of_band = |(band, (r, q)): (usize, (&mut [f64], &[f64]))| -> f64 {
+        weights.spans.parts(band).map(|part| subtract_part(alpha, &q[part.clone()], &mut r[part])).sum()
+    };
+    let squares: Vec<f64> = bands.map(of_band).collect();
     squares.iter().sum()
 }
 
-/// [`step`] of a part of a band.
+/// [`subtract`] from a part of a band.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn step_part(alpha: f64, x: &mut [f64], r: &mut [f64], p: &[f32], q: &[f64]) -> f64 {
-    for (x, &p) in x.iter_mut().zip(p) {
-        *x += alpha * f64::from(p);
-    }
+fn subtract_part(alpha: f64, q: &[f64], r: &mut [f64]) -> f64 {
     for (r, q) in r.iter_mut().zip(q) {
         *r -= alpha * q;
     }
     dot(r, r)
+}
+
+/// A step, and the direction it is taken along.
+type Step<'a> = (f64, &'a [f32]);
+
+/// `x` takes two steps, one after the other, along the spans of the grid.
+fn take_steps(weights: &Weights, [(alpha, p), (beta, q)]: [Step<'_>; 2], x: &mut [f64]) {
+    let chunk = BAND_ROWS * weights.grid.half();
+    (x.par_chunks_mut(chunk), p.par_chunks(chunk), q.par_chunks(chunk)).into_par_iter().enumerate().for_each(
+        |(band, (x, p, q))| {
+            for part in weights.spans.parts(band) {
+                take_steps_of_part([(alpha, &p[part.clone()]), (beta, &q[part.clone()])], &mut x[part]);
+            }
+        },
+    );
+}
+
+/// [`take_steps`] in a part of a band.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn take_steps_of_part([(alpha, p), (beta, q)]: [Step<'_>; 2], x: &mut [f64]) {
+    for ((x, &p), &q) in x.iter_mut().zip(p).zip(q) {
+        *x = (*x + alpha * f64::from(p)) + beta * f64::from(q);
+    }
 }
 
 /// Sum of squares, by blocks in parallel and then in order: the same bits for any number of threads.

@@ -3,8 +3,6 @@
 //! Grids as long as their pixels hold all that the mask keeps apart, and from there a graph; what a grid loses here and there
 //! goes to the graph as `strays`.
 
-use std::sync::{Mutex, PoisonError};
-
 use rayon::prelude::*;
 
 use super::checkerboard::{Grid, Weights, join_row};
@@ -13,9 +11,9 @@ use super::fill::fill_corners;
 use super::graph::{GraphCycle, GraphVectors};
 use super::lost::Lost;
 use super::real::Real;
-use super::reduction::{eliminate_blacks, fill_blacks};
-use super::strays::Strays;
-use super::transfer::{prolong, restrict};
+use super::reduction::{eliminate_blacks, fill_blacks, multiply};
+use super::strays::{Changes, Strays};
+use super::transfer::{Below, advance, prolong, restrict};
 use crate::memory::Aligned;
 
 /// A grid of at most this many pixels is solved directly.
@@ -34,12 +32,11 @@ pub(super) struct Multigrid<'a> {
     strays: Vec<Strays>,
     /// Solves for the reds of the last grid.
     graph: GraphCycle,
-    /// Memory of the coarser grids, reused from cycle to cycle.
-    vectors: Mutex<Vectors>,
 }
 
+/// Memory of the coarser grids, used again from cycle to cycle: a cycle goes down to the solution of the second grid, and up.
 #[derive(Debug)]
-struct Vectors {
+pub(super) struct Vectors {
     levels: Vec<LevelVectors>,
     graph: GraphVectors,
 }
@@ -115,8 +112,12 @@ impl<'a> Multigrid<'a> {
         }
         let weights: Vec<&Weights> = std::iter::once(finest).chain(&levels).collect();
         let graph = GraphCycle::new(&weights, &strays);
-        let vectors = Vectors { levels: levels.iter().map(LevelVectors::new).collect(), graph: graph.vectors() };
-        Self { finest, levels, strays, graph, vectors: Mutex::new(vectors) }
+        Self { finest, levels, strays, graph }
+    }
+
+    /// Memory for cycles.
+    pub fn vectors(&self) -> Vectors {
+        Vectors { levels: self.levels.iter().map(LevelVectors::new).collect(), graph: self.graph.vectors() }
     }
 
     /// Unknowns of the graph that takes over from the grids.
@@ -124,36 +125,73 @@ impl<'a> Multigrid<'a> {
         self.graph.unknowns()
     }
 
-    /// `x = M b`; returns `<b, x>`.
-    pub fn cycle(&self, b: &[f64], x: &mut [f32]) -> f64 {
-        let mut vectors = self.vectors.lock().unwrap_or_else(PoisonError::into_inner);
-        let Vectors { levels, graph } = &mut *vectors;
-        self.reds(0, b, x, levels, graph, 0)
+    /// `x = M b`.
+    pub fn cycle(&self, b: &[f64], vectors: &mut Vectors, x: &mut [f32]) {
+        self.descend(b, vectors);
+        self.up(0, b, x, &vectors.levels, &vectors.graph, 0);
     }
 
-    /// Solves for the reds of a grid (0 is the finest) by a V-cycle; `coarser` are the grids below, `first_stray` counts the
-    /// strays of the finer grids. Returns `<b, x>`.
-    fn reds<T: Real>(
+    /// The way down; returns `<b, M b>`, which is known before `M b` is.
+    pub fn descend(&self, b: &[f64], vectors: &mut Vectors) -> f64 {
+        let Vectors { levels, graph } = vectors;
+        self.down(0, b, levels, graph, 0)
+    }
+
+    /// The way up after [`Self::descend`]: the next direction `p = M b + beta previous` and `q = S p`; returns `<p, q>`.
+    pub fn advance(
+        &self,
+        b: &[f64],
+        vectors: &Vectors,
+        (beta, previous): (f32, &[f32]),
+        p: &mut [f32],
+        q: &mut [f64],
+    ) -> f64 {
+        if let Some(next) = vectors.levels.first() {
+            let changes = self.changes(0, next, &vectors.graph, 0);
+            let below = Below { b, coarse: &next.solution, changes: &changes };
+            return advance(self.finest, below, (beta, previous), p, q);
+        }
+        self.graph.scatter(&vectors.graph, p);
+        p.par_iter_mut().zip(previous).for_each(|(p, previous)| *p += beta * previous);
+        multiply(self.finest, p, q)
+    }
+
+    /// From the right side of the reds of a grid (0 is the finest) to the solution of the next coarser one; `coarser` are the
+    /// grids below, `first_stray` counts the strays of the finer grids. Returns the product of `b` with its solution: all that
+    /// smoothing adds on the way, and the part of the graph.
+    fn down<T: Real>(
         &self,
         level: usize,
         b: &[T],
-        x: &mut [f32],
         coarser: &mut [LevelVectors],
         graph: &mut GraphVectors,
         first_stray: usize,
     ) -> f64 {
-        let Some((next, coarser)) = coarser.split_first_mut() else { return self.graph.solve(b, x, graph) };
-        let weights = if level == 0 { self.finest } else { &self.levels[level - 1] };
+        let Some((next, coarser)) = coarser.split_first_mut() else { return self.graph.solve(b, graph) };
         let strays = &self.strays[level];
         let own = first_stray..first_stray + strays.len();
-        restrict(weights, b, &mut next.reds, &mut next.blacks);
+        let smoothed = restrict(self.weights(level), b, &mut next.reds, &mut next.blacks);
         strays.restrict(b, &mut graph.strays[own.clone()], &mut next.reds, &mut next.blacks);
-        self.whole(level + 1, next, coarser, graph, own.end);
-        let product = prolong(weights, b, &next.solution, x);
-        product + strays.prolong(b, &graph.strays[own], &next.solution, x)
+        smoothed + self.whole(level + 1, next, coarser, graph, own.end)
     }
 
-    /// Solves for the whole of a coarser grid: blacks eliminated, reds by a V-cycle, blacks filled in.
+    /// From there to the reds of the grid.
+    fn up<T: Real>(
+        &self,
+        level: usize,
+        b: &[T],
+        x: &mut [f32],
+        coarser: &[LevelVectors],
+        graph: &GraphVectors,
+        first_stray: usize,
+    ) {
+        let Some(next) = coarser.first() else { return self.graph.scatter(graph, x) };
+        prolong(self.weights(level), b, &next.solution, x);
+        self.changes(level, next, graph, first_stray).add_to(0, x);
+    }
+
+    /// Solves for the whole of a coarser grid: blacks eliminated, reds by a V-cycle, blacks filled in. Returns the product of
+    /// right side and solution.
     fn whole(
         &self,
         level: usize,
@@ -161,12 +199,25 @@ impl<'a> Multigrid<'a> {
         coarser: &mut [LevelVectors],
         graph: &mut GraphVectors,
         first_stray: usize,
-    ) {
-        let weights = &self.levels[level - 1];
-        eliminate_blacks(weights, &mut here.reds, &here.blacks);
-        self.reds(level, &here.reds, &mut here.red_solution, coarser, graph, first_stray);
+    ) -> f64 {
+        let weights = self.weights(level);
+        let of_blacks = eliminate_blacks(weights, &mut here.reds, &here.blacks);
+        let of_reds = self.down(level, &here.reds, coarser, graph, first_stray);
+        self.up(level, &here.reds, &mut here.red_solution, coarser, graph, first_stray);
         fill_blacks(weights, &here.red_solution, &mut here.blacks);
         here.join();
+        of_blacks + of_reds
+    }
+
+    /// The weights of a grid.
+    fn weights(&self, level: usize) -> &Weights {
+        if level == 0 { self.finest } else { &self.levels[level - 1] }
+    }
+
+    /// What the strays of a grid change in it.
+    fn changes(&self, level: usize, next: &LevelVectors, graph: &GraphVectors, first_stray: usize) -> Changes<'_> {
+        let strays = &self.strays[level];
+        strays.changes(&graph.strays[first_stray..first_stray + strays.len()], &next.solution)
     }
 }
 
@@ -186,4 +237,58 @@ fn is_too_coarse([earlier, new]: [usize; 2], level: usize, finest: Grid) -> bool
         _ => 0,
     };
     earlier + new > at_least
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrate::Difference;
+    use crate::integrate::operator::{Field, assemble};
+    use crate::integrate::reduction::dot;
+
+    fn number(seed: usize) -> f64 {
+        ((seed * 2_654_435_761) >> 7) as f64 % 1000.0 / 1000.0
+    }
+
+    /// The product that the way down knows is that of the right side with what the way up makes of it, whether grids, strays or
+    /// the graph alone hold the mask.
+    #[test]
+    fn the_way_down_knows_the_product() {
+        const SIDE: usize = 150;
+        let pixel = |index: usize| (index % SIDE, index / SIDE);
+        let of_spots = |index: usize| {
+            let (x, y) = pixel(index);
+            number(index / 900) > 0.2 && (x % 37 != 0 || y % 31 < 28)
+        };
+        let masks: [(&str, Vec<bool>); 4] = [
+            ("full", vec![true; SIDE * SIDE]),
+            ("slits", (0..SIDE * SIDE).map(|index| pixel(index).0 % 37 != 0 || pixel(index).1 < 9).collect()),
+            ("spots", (0..SIDE * SIDE).map(of_spots).collect()),
+            ("percolation", (0..SIDE * SIDE).map(|index| number(index) > 0.35).collect()),
+        ];
+        let mut with = [false; 3];
+        for (name, mask) in masks {
+            let normals = [0.0, 0.0, 1.0].repeat(mask.len());
+            let field = Field { normals: &normals, mask: &mask, weights: None, regions: None, width: SIDE };
+            let (mut weights, _) = assemble(field, Difference::Trapezoid);
+            fill_corners(&mut weights);
+            let multigrid = Multigrid::new(&weights);
+            let mut vectors = multigrid.vectors();
+            let half = weights.grid.half();
+            let mut b = vec![0.0; weights.grid.half_pixels()];
+            for (red, b) in b.iter_mut().enumerate() {
+                let (row, k) = ((red / half) as isize, red % half);
+                let is_tied = weights.row(row).iter().any(|side| side[k + 1] > 0.0);
+                *b = if is_tied { number(red) - 0.5 } else { 0.0 };
+            }
+            let mut x = vec![0.0; b.len()];
+            multigrid.cycle(&b, &mut vectors, &mut x);
+            let expected = dot(&b, &x);
+            let product = multigrid.descend(&b, &mut vectors);
+            assert!((product - expected).abs() < 1e-5 * expected, "{name}: {product} for {expected}");
+            let strays = multigrid.strays.iter().any(|strays| strays.len() > 0);
+            with = [with[0] || multigrid.levels.is_empty(), with[1] || strays, with[2] || !multigrid.levels.is_empty()];
+        }
+        assert_eq!(with, [true; 3], "no mask that is all graph, has strays, has grids");
+    }
 }

@@ -68,26 +68,29 @@ real!(f64, Avx512Double, Avx2Double, PortableDouble, |numbers, memory| {
     memory
 });
 
-/// Calls `function::<.., V>(..)` with the vectors `V` of a type of numbers that the enclosing function is compiled for; where a
-/// grid comes first, with single numbers if its rows are too short for any.
+/// Calls `function::<.., V>(..)` with the vectors `V` of a type of numbers in brackets, or of several that the enclosing
+/// function is compiled for; where a grid comes first, with single numbers if its rows are too short for any.
 macro_rules! on_vectors {
-    ($number:ty, $function:ident $(::<$generic:ty>)? ($($argument:expr),* $(,)?)) => {{
+    ([$($number:ty),+], $function:ident $(::<$generic:ty>)? ($($argument:expr),* $(,)?)) => {{
         #[cfg(target_arch = "x86_64")]
         {
             if multiversion::target::target_cfg_f!(target_feature = "avx512f") {
-                return $function::<$($generic,)? <$number as Real>::Avx512>($($argument),*);
+                return on_vectors!(@call Avx512 [$($number),+] $function [$($generic)?] ($($argument),*));
             }
             if multiversion::target::target_cfg_f!(target_feature = "avx2") {
-                return $function::<$($generic,)? <$number as Real>::Avx2>($($argument),*);
+                return on_vectors!(@call Avx2 [$($number),+] $function [$($generic)?] ($($argument),*));
             }
         }
-        $function::<$($generic,)? <$number as Real>::Portable>($($argument),*)
+        on_vectors!(@call Portable [$($number),+] $function [$($generic)?] ($($argument),*))
     }};
-    ($grid:expr, $number:ty, $function:ident $(::<$generic:ty>)? ($($argument:expr),* $(,)?)) => {{
+    (@call $kind:ident [$($number:ty),+] $function:ident [$($generic:ty)?] ($($argument:expr),* $(,)?)) => {
+        $function::<$($generic,)? $(<$number as Real>::$kind),+>($($argument),*)
+    };
+    ($grid:expr, [$($number:ty),+], $function:ident $(::<$generic:ty>)? ($($argument:expr),* $(,)?)) => {{
         if !$grid.has_lanes() {
-            return $function::<$($generic,)? <$number as Real>::Single>($($argument),*);
+            return on_vectors!(@call Single [$($number),+] $function [$($generic)?] ($($argument),*));
         }
-        on_vectors!($number, $function $(::<$generic>)? ($($argument),*))
+        on_vectors!([$($number),+], $function $(::<$generic>)? ($($argument),*))
     }};
 }
 pub(super) use on_vectors;

@@ -42,10 +42,12 @@ pub(super) fn residual_norm(weights: &Weights, x: &[f64], b: &[f64]) -> f64 {
     squares.iter().sum::<f64>().sqrt()
 }
 
-/// `reds += W D_black^-1 blacks`: the right side of the reduced system, along its spans.
-pub(super) fn eliminate_blacks<T: Real>(weights: &Weights, reds: &mut [T], blacks: &[T]) {
+/// `reds += W D_black^-1 blacks`: the right side of the reduced system, along its spans. Returns `<blacks, D_black^-1 blacks>`.
+pub(super) fn eliminate_blacks<T: Real>(weights: &Weights, reds: &mut [T], blacks: &[T]) -> f64 {
     let chunk = BAND_ROWS * weights.grid.half();
-    reds.par_chunks_mut(chunk).enumerate().for_each(|(band, reds)| eliminate_band(weights, blacks, band, reds));
+    let bands = reds.par_chunks_mut(chunk).enumerate();
+    let energies: Vec<f64> = bands.map(|(band, reds)| eliminate_band(weights, blacks, band, reds)).collect();
+    energies.iter().sum()
 }
 
 /// `blacks = D_black^-1 (blacks + W^T reds)`: from right side to solution, along the spans.
@@ -86,7 +88,7 @@ fn load<T: Real, U: Real>(grid: Grid, values: &[T], row: isize, span: Span, out:
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 fn multiply_band<T: Real>(weights: &Weights, x: &[T], band: usize, rows: &mut [Ring<f64>; 2], out: &mut [f64]) -> f64 {
-    on_vectors!(weights.grid, f64, multiply_band_with::<T>(weights, x, band, rows, out))
+    on_vectors!(weights.grid, [f64], multiply_band_with::<T>(weights, x, band, rows, out))
 }
 
 #[inline(always)]
@@ -113,16 +115,28 @@ fn multiply_band_with<T: Real, V: Packed<Number = f64>>(
         if row < first {
             continue;
         }
-        let here = &reds.row(row)[1..][span.range()];
         let out = &mut out[(row - first) as usize * n..][span.range()];
-        let stencil = weights.red_stencil::<V>(row, span, blacks.around(row));
-        let (x, products) = (V::chunks(here, stencil.len()), V::chunks_mut(out, stencil.len()));
-        for k in 0..stencil.len() {
-            (stencil.diagonal(k) * V::read(&x[k]) - stencil.sum(k)).put(&mut products[k]);
-        }
-        product += dot(here, out);
+        product += multiply_row::<V>(weights, row, span, [reds, blacks], out);
     }
     product
+}
+
+/// `S x` of a row along a span, from `x` and what [`solve_blacks`] made of it; returns `<x, S x>`.
+#[inline(always)]
+pub(super) fn multiply_row<V: Packed<Number = f64>>(
+    weights: &Weights,
+    row: isize,
+    span: Span,
+    [reds, blacks]: [&Ring<f64>; 2],
+    out: &mut [f64],
+) -> f64 {
+    let x = &reds.row(row)[1..][span.range()];
+    let stencil = weights.red_stencil::<V>(row, span, blacks.around(row));
+    let (values, products) = (V::chunks(x, stencil.len()), V::chunks_mut(out, stencil.len()));
+    for k in 0..stencil.len() {
+        (stencil.diagonal(k) * V::read(&values[k]) - stencil.sum(k)).put(&mut products[k]);
+    }
+    dot(x, out)
 }
 
 /// Sum in eight lanes, so that it vectorises and has one order.
@@ -153,8 +167,8 @@ pub(super) fn dot<A: Real, B: Real>(a: &[A], b: &[B]) -> f64 {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn eliminate_band<T: Real>(weights: &Weights, blacks: &[T], band: usize, reds: &mut [T]) {
-    on_vectors!(weights.grid, T, eliminate_band_with(weights, blacks, band, reds));
+fn eliminate_band<T: Real>(weights: &Weights, blacks: &[T], band: usize, reds: &mut [T]) -> f64 {
+    on_vectors!(weights.grid, [T], eliminate_band_with(weights, blacks, band, reds))
 }
 
 #[inline(always)]
@@ -163,19 +177,24 @@ fn eliminate_band_with<V: Packed<Number: Real>>(
     blacks: &[V::Number],
     band: usize,
     reds: &mut [V::Number],
-) {
+) -> f64 {
     let n = weights.grid.half();
     let first = (band * BAND_ROWS) as isize;
     let end = first + (reds.len() / n) as isize;
     let span = weights.spans.band(band);
     let mut scaled = Ring::<V::Number>::new(n);
+    let mut energy = 0.0;
     for row in first - 1..=end {
         if weights.grid.contains(row) {
             let sides = weights.blacks::<V>(row, span);
             let out = V::chunks_mut(&mut scaled.row_mut(row)[span.start..], sides.len());
-            let blacks = V::chunks(&blacks[row as usize * n + span.start..], sides.len());
+            let blacks = &blacks[row as usize * n..][span.range()];
+            let values = V::chunks(blacks, sides.len());
             for k in 0..sides.len() {
-                (V::read(&blacks[k]) * sides.diagonal(k).inverse()).put(&mut out[k]);
+                (V::read(&values[k]) * sides.diagonal(k).inverse()).put(&mut out[k]);
+            }
+            if (first..end).contains(&row) {
+                energy += dot(blacks, &scaled.row(row)[1..][span.range()]);
             }
         }
         let row = row - 1;
@@ -188,11 +207,12 @@ fn eliminate_band_with<V: Packed<Number: Real>>(
             (V::read(&reds[k]) + stencil.sum(k)).put(&mut reds[k]);
         }
     }
+    energy
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 fn fill_band<T: Real>(weights: &Weights, reds: &[T], band: usize, blacks: &mut [T]) {
-    on_vectors!(weights.grid, T, fill_band_with(weights, reds, band, blacks));
+    on_vectors!(weights.grid, [T], fill_band_with(weights, reds, band, blacks));
 }
 
 #[inline(always)]

@@ -64,6 +64,26 @@ impl Spans {
         self.bands[band]
     }
 
+    /// The span of the band that a row of the grid is in.
+    #[inline(always)]
+    pub fn at(&self, row: isize) -> Span {
+        self.bands[row as usize / BAND_ROWS]
+    }
+
+    /// How many bands.
+    pub fn len(&self) -> usize {
+        self.bands.len()
+    }
+
+    /// Bands that one task works on: rows around a task are worked on twice, but all threads are to end together. What comes
+    /// out is the same for any number.
+    pub fn bands_of_a_task(&self) -> usize {
+        /// Tasks for each of several threads.
+        const TASKS: usize = 4;
+        let threads = rayon::current_num_threads();
+        self.bands.len().div_ceil(if threads == 1 { 1 } else { TASKS * threads })
+    }
+
     /// The parts of a band's rows that its span covers, counted from the band's first pixel of a colour.
     pub fn parts(&self, band: usize) -> impl Iterator<Item = Range<usize>> {
         let (half, Span { start, end }) = (self.grid.half(), self.bands[band]);

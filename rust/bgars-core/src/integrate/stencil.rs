@@ -58,6 +58,12 @@ impl<'a, V: Packed> Stencil<'a, V> {
         self.sides.len()
     }
 
+    /// The weights, those of virtual edges too.
+    #[inline(always)]
+    pub fn sides(&self) -> [&'a [V::Floats]; 4] {
+        self.sides.0
+    }
+
     /// Sums of the weights.
     #[inline(always)]
     pub fn diagonal(&self, k: usize) -> V {

@@ -18,6 +18,10 @@ pub(super) struct Strays {
     reds: Vec<u32>,
     /// A row a stray: `N D_red^-1`, what smoothing carries between it and the reds around it.
     smoothing: Rows,
+    /// The reds around any stray, ascending.
+    around: Vec<u32>,
+    /// A row for each of these: the transpose of `smoothing`.
+    to_around: Rows,
     /// A row a stray: the coarse pixels (row-major) that its value is measured from, and their shares.
     base: Rows,
     /// That less what the transfer between the grids gives the stray.
@@ -63,9 +67,12 @@ impl Strays {
                     .collect()
             })
             .collect();
+        let (around, to_around) = transposed(&smoothing);
         Self {
             reds,
             smoothing: Rows::from_lists(&smoothing, weights.grid.half_pixels()),
+            around,
+            to_around,
             base: Rows::from_lists(&base, coarse_pixels),
             adopted: Rows::from_lists(&adopted, coarse_pixels),
             coarse_width: coarser.grid.width,
@@ -105,19 +112,52 @@ impl Strays {
         }
     }
 
-    /// Adds the strays' `own` correction to `x`, smoothed; returns what `<b, x>` gains.
-    pub fn prolong<T: Real>(&self, b: &[T], own: &[f32], coarse: &[f32], x: &mut [f32]) -> f64 {
-        let mut gain = 0.0;
-        for (stray, own) in own.iter().enumerate() {
-            let adopted: f32 = self.adopted.pairs(stray).map(|(pixel, share)| share * coarse[pixel]).sum();
-            for (red, factor) in self.smoothing.pairs(stray) {
-                let change = factor * (own + adopted);
-                x[red] += change;
-                gain += b[red].to_f64() * f64::from(change);
-            }
-        }
-        gain
+    /// What the strays' `own` correction, smoothed, changes in the reds around them.
+    pub fn changes(&self, own: &[f32], coarse: &[f32]) -> Changes<'_> {
+        let adopted = |stray: usize| self.adopted.pairs(stray).map(|(pixel, share)| share * coarse[pixel]).sum::<f32>();
+        let whole: Vec<f32> = own.iter().enumerate().map(|(stray, own)| own + adopted(stray)).collect();
+        let mut values = vec![0.0; self.around.len()];
+        self.to_around.multiply(&whole, &mut values);
+        Changes { reds: &self.around, values }
     }
+}
+
+/// What is to be added to a few reds.
+#[derive(Debug)]
+pub(super) struct Changes<'a> {
+    /// Their indices, ascending.
+    reds: &'a [u32],
+    values: Vec<f32>,
+}
+
+#[cfg(test)]
+impl<'a> Changes<'a> {
+    pub fn new(reds: &'a [u32], values: Vec<f32>) -> Self {
+        Self { reds, values }
+    }
+}
+
+impl Changes<'_> {
+    /// Adds them to those of `reds` that they concern, which follow each other from `first` on.
+    pub fn add_to(&self, first: usize, reds: &mut [f32]) {
+        let from = |index: usize| self.reds.partition_point(|&red| (red as usize) < index);
+        let concerned = from(first)..from(first + reds.len());
+        for (&red, value) in self.reds[concerned.clone()].iter().zip(&self.values[concerned]) {
+            reds[red as usize - first] += value;
+        }
+    }
+}
+
+/// The columns that have entries, ascending, and the rows of the transpose that are theirs.
+fn transposed(rows: &[Shares]) -> (Vec<u32>, Rows) {
+    let entries =
+        rows.iter().enumerate().flat_map(|(row, shares)| shares.iter().map(move |&(at, share)| (at, row, share)));
+    let mut entries: Vec<_> = entries.collect();
+    entries.sort_unstable_by_key(|&(column, row, _)| (column, row));
+    let columns = entries.chunk_by(|a, b| a.0 == b.0);
+    let lists: Vec<Shares> =
+        columns.clone().map(|column| column.iter().map(|entry| (entry.1, entry.2)).collect()).collect();
+    (columns.map(|column| column[0].0 as u32).collect(), Rows::from_lists(&lists, rows.len()))
 }
 
 /// Coarse pixels and the shares that they have in a value.

@@ -1,12 +1,14 @@
 //! The linear system and its preconditioner for solvers other than ours: faer's `LinOp` and `Precond`.
 
+use std::sync::{Mutex, PoisonError};
+
 use faer::dyn_stack::{MemStack, StackReq};
 use faer::matrix_free::{LinOp, Precond};
 use faer::{MatMut, MatRef, Par};
 
 use super::checkerboard::Weights;
 use super::fill::fill_corners;
-use super::multigrid::Multigrid;
+use super::multigrid::{Multigrid, Vectors};
 use super::operator::{Field, assemble};
 use super::reduction::{eliminate_blacks, multiply};
 use super::solve::check;
@@ -67,7 +69,8 @@ impl System {
     /// One multigrid V-cycle, an approximation of the inverse of `S`.
     #[must_use]
     pub fn preconditioner(&self) -> VCycle<'_> {
-        VCycle { multigrid: Multigrid::new(&self.weights), size: self.right_side.len() }
+        let multigrid = Multigrid::new(&self.weights);
+        VCycle { vectors: Mutex::new(multigrid.vectors()), multigrid, size: self.right_side.len() }
     }
 }
 
@@ -81,6 +84,7 @@ pub struct Operator<'a> {
 #[derive(Debug)]
 pub struct VCycle<'a> {
     multigrid: Multigrid<'a>,
+    vectors: Mutex<Vectors>,
     size: usize,
 }
 
@@ -142,7 +146,8 @@ impl LinOp<f64> for VCycle<'_> {
 
     fn apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, _par: Par, _stack: &mut MemStack) {
         let mut correction = vec![0.0f32; self.size];
-        self.multigrid.cycle(slice(rhs), &mut correction);
+        let mut vectors = self.vectors.lock().unwrap_or_else(PoisonError::into_inner);
+        self.multigrid.cycle(slice(rhs), &mut vectors, &mut correction);
         for (out, correction) in slice_mut(out).iter_mut().zip(correction) {
             *out = f64::from(correction);
         }

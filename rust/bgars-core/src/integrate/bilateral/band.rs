@@ -108,7 +108,7 @@ pub(super) fn sweep_band<T: Number>(
     index: usize,
     band: &mut Band<T>,
 ) -> [f64; SUMS] {
-    on_vectors!(T, sweep_band_with::<T>(system, steps, edges, index, band))
+    on_vectors!([T], sweep_band_with::<T>(system, steps, edges, index, band))
 }
 
 /// A row goes through three stages, each a row behind the one before, whose neighbours it needs: r and p after both iterations

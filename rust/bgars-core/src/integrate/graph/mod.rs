@@ -109,8 +109,9 @@ impl GraphCycle {
         }
     }
 
-    /// `x = M b` on the reds of the grid; returns `<b, x>`.
-    pub fn solve<T: Real>(&self, b: &[T], x: &mut [f32], vectors: &mut GraphVectors) -> f64 {
+    /// Solves for the reds of the grid, whose right side is `b`, and for the strays, whose right side and then solution is in
+    /// `vectors`. Returns the product of the whole right side with the solution.
+    pub fn solve<T: Real>(&self, b: &[T], vectors: &mut GraphVectors) -> f64 {
         self.nodes.gather(b, &mut vectors.levels[0][0]);
         let GraphVectors { levels, strays } = vectors;
         let reds = self.nodes.len();
@@ -122,13 +123,17 @@ impl GraphCycle {
             }
         }
         self.cycle(0, levels);
-        let whole = &levels[0][1];
+        let [right, whole, _] = &levels[0];
         for (stray, own) in strays.iter_mut().enumerate() {
             *own = whole[reds + stray] - self.bases.pairs(stray).map(|(node, share)| share * whole[node]).sum::<f32>();
         }
-        self.nodes.scatter(&vectors.levels[0][1], x);
-        let products: Vec<f64> = b.par_chunks(CHUNK).zip(x.par_chunks(CHUNK)).map(|(b, x)| dot(b, x)).collect();
+        let products: Vec<f64> = right.par_chunks(CHUNK).zip(whole.par_chunks(CHUNK)).map(|(b, x)| dot(b, x)).collect();
         products.iter().sum()
+    }
+
+    /// What [`Self::solve`] found for the reds of the grid.
+    pub fn scatter(&self, vectors: &GraphVectors, x: &mut [f32]) {
+        self.nodes.scatter(&vectors.levels[0][1], x);
     }
 
     fn cycle(&self, depth: usize, vectors: &mut [[Vec<f32>; 3]]) {

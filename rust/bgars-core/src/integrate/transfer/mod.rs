@@ -9,9 +9,11 @@
 //! Smoothing is one damping-free Jacobi step on the reduced system (a red-black Gauss-Seidel sweep on the whole) on the way
 //! down and its adjoint on the way up. Both halves are plain functions of their input: no thread sees another one's writes.
 
+mod advance;
 mod prolong;
 mod restrict;
 
+pub(super) use advance::{Below, advance};
 pub(super) use prolong::prolong;
 pub(super) use restrict::restrict;
 
@@ -37,8 +39,8 @@ struct CentreTies<'a, V: Packed> {
 
 impl<'a, V: Packed<Number = f32>> CentreTies<'a, V> {
     #[inline(always)]
-    fn new(weights: &'a Weights, row: isize, span: Span, ties: &'a Ring<f32>) -> Self {
-        let (Sides(sides), n) = (weights.reds::<V>(row, span), span.vectors::<V>());
+    fn new(sides: [&'a [V::Floats]; 4], row: isize, span: Span, ties: &'a Ring<f32>) -> Self {
+        let n = span.vectors::<V>();
         let [above, here, below] = ties.around(row);
         let first = 1 + span.start;
         let ties = [
@@ -65,6 +67,8 @@ impl<'a, V: Packed<Number = f32>> CentreTies<'a, V> {
 mod tests {
     use super::*;
     use crate::integrate::checkerboard::Grid;
+    use crate::integrate::reduction::multiply;
+    use crate::integrate::strays::Changes;
     use crate::vector::{One, Portable};
 
     fn number(seed: usize) -> f32 {
@@ -98,32 +102,75 @@ mod tests {
         }
     }
 
+    type Down<'a> = dyn Fn(&mut restrict::Restricting, [&mut [f32]; 2], &mut [f64]) + 'a;
+
     #[test]
     fn every_instruction_set_does_the_same() {
         let grid = Grid { height: 32, width: 64 };
         let (weights, n, coarse) = (weights(grid), grid.half(), grid.coarser());
         let b: Vec<f64> = (0..grid.half_pixels()).map(|place| f64::from(number(place)) - 0.5).collect();
-        let down = |band: &dyn Fn(&mut restrict::Restricting, [&mut [f32]; 2])| {
+        let down = |task: &Down<'_>| {
             let [mut reds, mut blacks] = [vec![0.0; coarse.half_pixels()], vec![0.0; coarse.half_pixels()]];
-            band(&mut restrict::Restricting::new(n), [&mut reds, &mut blacks]);
-            [reds, blacks].concat()
+            let mut energy = [0.0];
+            task(&mut restrict::Restricting::new(n), [&mut reds, &mut blacks], &mut energy);
+            [reds, blacks, vec![energy[0] as f32]].concat()
         };
-        let fast = down(&|rows, out| restrict::restrict_band(&weights, &b, 0, rows, out));
-        assert_near(&fast, &down(&|rows, out| restrict::restrict_band_with::<_, Portable>(&weights, &b, 0, rows, out)));
-        assert_near(&fast, &down(&|rows, out| restrict::restrict_band_with::<_, One<f32>>(&weights, &b, 0, rows, out)));
-
-        let correction: Vec<f32> = (0..coarse.height * coarse.width).map(|place| number(place + 5) - 0.5).collect();
-        let up = |band: &dyn Fn(&mut prolong::Prolonging, &mut [f32]) -> f64| {
-            let mut x = vec![0.0; grid.half_pixels()];
-            let product = band(&mut prolong::Prolonging::new(n), &mut x);
-            x.push(product as f32);
-            x
-        };
-        let fast = up(&|rows, x| prolong::prolong_band(&weights, &b, &correction, 0, rows, x));
-        let portable = up(&|rows, x| prolong::prolong_band_with::<_, Portable>(&weights, &b, &correction, 0, rows, x));
-        let one = up(&|rows, x| prolong::prolong_band_with::<_, One<f32>>(&weights, &b, &correction, 0, rows, x));
+        let fast = down(&|rows, out, sum| restrict::restrict_rows(&weights, &b, 0, rows, out, sum));
+        let portable =
+            down(&|rows, out, sum| restrict::restrict_rows_with::<_, Portable>(&weights, &b, 0, rows, out, sum));
+        let one = down(&|rows, out, sum| restrict::restrict_rows_with::<_, One<f32>>(&weights, &b, 0, rows, out, sum));
         assert_near(&fast, &portable);
         assert_near(&fast, &one);
+
+        let correction: Vec<f32> = (0..coarse.height * coarse.width).map(|place| number(place + 5) - 0.5).collect();
+        let up = |task: &dyn Fn(&mut prolong::Prolonging, &mut [f32])| {
+            let mut x = vec![0.0; grid.half_pixels()];
+            task(&mut prolong::Prolonging::new(n), &mut x);
+            x
+        };
+        let fast = up(&|rows, x| prolong::prolong_rows(&weights, &b, &correction, 0, rows, x));
+        let portable = up(&|rows, x| prolong::prolong_rows_with::<_, Portable>(&weights, &b, &correction, 0, rows, x));
+        let one = up(&|rows, x| prolong::prolong_rows_with::<_, One<f32>>(&weights, &b, &correction, 0, rows, x));
+        assert_near(&fast, &portable);
+        assert_near(&fast, &one);
+    }
+
+    /// Up, turned and multiplied in one go, and one after the other: with the same bits, for any number of threads.
+    #[test]
+    fn the_next_direction_is_what_three_passes_make() {
+        let changed: Vec<u32> = (0..4_000).step_by(117).collect();
+        for (height, width) in [(1, 64), (33, 20), (9, 1), (300, 70), (130, 64)] {
+            let grid = Grid { height, width };
+            let (mut weights, n, coarse) = (weights(grid), grid.half(), grid.coarser());
+            weights.find_spans();
+            let b: Vec<f64> = (0..grid.half_pixels()).map(|place| f64::from(number(place)) - 0.5).collect();
+            let correction: Vec<f32> = (0..coarse.height * coarse.width).map(|place| number(place + 5) - 0.5).collect();
+            let previous: Vec<f32> = (0..grid.half_pixels()).map(|place| number(place + 9) - 0.5).collect();
+            let reds: Vec<u32> = changed.iter().copied().filter(|&red| (red as usize) < grid.half_pixels()).collect();
+            let changes = Changes::new(&reds, reds.iter().map(|&red| number(red as usize)).collect());
+
+            let mut p = vec![0.0; grid.half_pixels()];
+            prolong(&weights, &b, &correction, &mut p);
+            changes.add_to(0, &mut p);
+            // A product is fused with its sum where the processor does so.
+            let near = |fast: f32, slow: f32| (fast - slow).abs() <= 1e-6 * (1.0 + slow.abs());
+            let below = Below { b: &b, coarse: &correction, changes: &changes };
+            for threads in [1, 2, 3] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let mut found = (vec![0.0; p.len()], vec![0.0; p.len()]);
+                let product = pool.install(|| advance(&weights, below, (0.25, &previous), &mut found.0, &mut found.1));
+                let mut expected = vec![0.0; p.len()];
+                let slow = multiply(&weights, &found.0, &mut expected);
+                assert_eq!(found.1, expected, "{grid:?}, {threads} threads");
+                assert!((product - slow).abs() <= 1e-12 * slow.abs(), "{grid:?}: {product} for {slow}");
+                for row in 0..height {
+                    for k in weights.spans.at(row as isize).range() {
+                        let at = row * n + k;
+                        assert!(near(found.0[at], p[at] + 0.25 * previous[at]), "{grid:?}: row {row}, red {k}");
+                    }
+                }
+            }
+        }
     }
 
     /// Rows of a matrix times a vector.

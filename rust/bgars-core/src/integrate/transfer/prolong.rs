@@ -6,27 +6,22 @@ use rayon::prelude::*;
 use super::{CentreTies, corner_ties};
 use crate::integrate::checkerboard::{BAND_ROWS, Weights};
 use crate::integrate::real::{Real, on_vectors};
-use crate::integrate::reduction::{dot, solve_blacks};
+use crate::integrate::reduction::solve_blacks;
 use crate::integrate::ring::Ring;
-use crate::integrate::spans::Span;
 use crate::vector::Packed;
 
 /// `x = D^-1 (b + N (D^-1 b + P coarse))`, `N = W D_black^-1 W^T`: the correction of the coarser grid (row-major), smoothed.
 ///
-/// `x` is written along the spans of the grid. Returns `<b, x>`, summed in an order that does not depend on the threads.
-pub(in crate::integrate) fn prolong<T: Real>(weights: &Weights, b: &[T], coarse: &[f32], x: &mut [f32]) -> f64 {
-    let chunk = BAND_ROWS * weights.grid.half();
-    let bands = x.par_chunks_mut(chunk).enumerate();
-    let products: Vec<f64> = bands
-        .map_init(
-            || Prolonging::new(weights.grid.half()),
-            |rows, (band, x)| prolong_band(weights, b, coarse, band, rows, x),
-        )
-        .collect();
-    products.iter().sum()
+/// `x` is written along the spans of the grid.
+pub(in crate::integrate) fn prolong<T: Real>(weights: &Weights, b: &[T], coarse: &[f32], x: &mut [f32]) {
+    let task_rows = weights.spans.bands_of_a_task() * BAND_ROWS;
+    x.par_chunks_mut(task_rows * weights.grid.half()).enumerate().for_each_init(
+        || Prolonging::new(weights.grid.half()),
+        |rows, (task, x)| prolong_rows(weights, b, coarse, task * task_rows, rows, x),
+    );
 }
 
-/// Rows on their way through the prolongation of a band.
+/// Rows on their way through the prolongation.
 pub(super) struct Prolonging {
     smooth: Ring<f32>,
     blacks: Ring<f32>,
@@ -45,63 +40,74 @@ impl Prolonging {
     }
 }
 
+/// [`prolong`] to the rows from `first_row` on.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-pub(super) fn prolong_band<T: Real>(
+pub(super) fn prolong_rows<T: Real>(
     weights: &Weights,
     b: &[T],
     coarse: &[f32],
-    band: usize,
+    first_row: usize,
     rows: &mut Prolonging,
     x: &mut [f32],
-) -> f64 {
-    on_vectors!(weights.grid, f32, prolong_band_with::<T>(weights, b, coarse, band, rows, x))
+) {
+    on_vectors!(weights.grid, [f32], prolong_rows_with::<T>(weights, b, coarse, first_row, rows, x));
 }
 
 #[inline(always)]
-pub(super) fn prolong_band_with<T: Real, V: Packed<Number = f32>>(
+pub(super) fn prolong_rows_with<T: Real, V: Packed<Number = f32>>(
     weights: &Weights,
     b: &[T],
     coarse: &[f32],
-    band: usize,
+    first_row: usize,
     rows: &mut Prolonging,
     x: &mut [f32],
-) -> f64 {
-    let grid = weights.grid;
-    let (n, span) = (grid.half(), weights.spans.band(band));
-    let first = (band * BAND_ROWS) as isize;
+) {
+    let (n, first) = (weights.grid.half(), first_row as isize);
     let end = first + (x.len() / n) as isize;
-    let mut product = 0.0;
-    for ahead in first - 3..=end + 2 {
-        // Blacks between corners, one row ahead: the centres of an odd row need those of the row below.
-        corners_to_blacks::<V>(weights, ahead, span, coarse, rows);
-
-        let row = ahead - 1;
-        if row < first - 2 {
-            continue;
+    for row in first - LEAD..end {
+        go_ahead::<T, V>(weights, b, coarse, row, rows);
+        if row >= first {
+            finish_row::<T, V>(weights, b, row, rows, &mut x[(row - first) as usize * n..][..n]);
         }
-        smooth_and_correct::<T, V>(weights, b, row, span, coarse, rows);
-
-        let row = row - 1;
-        if row < first - 1 {
-            continue;
-        }
-        solve_blacks::<V>(weights, row, span, &rows.smooth, &mut rows.blacks);
-
-        let row = row - 1;
-        if row < first {
-            continue;
-        }
-        let values = &mut x[(row - first) as usize * n..][span.range()];
-        let b = &b[row as usize * n..][span.range()];
-        let stencil = weights.red_stencil::<V>(row, span, rows.blacks.around(row));
-        let rounded = V::chunks(T::floats(b, &mut rows.rounded), stencil.len());
-        let out = V::chunks_mut(values, stencil.len());
-        for k in 0..stencil.len() {
-            ((V::read(&rounded[k]) + stencil.sum(k)) * stencil.diagonal(k).inverse()).put(&mut out[k]);
-        }
-        product += dot(b, values);
     }
-    product
+}
+
+/// How many rows before the first that is finished [`go_ahead`] begins.
+pub(super) const LEAD: isize = 6;
+
+/// What goes ahead of `row`, so that it can be finished: called for one row after the other.
+#[inline(always)]
+pub(super) fn go_ahead<T: Real, V: Packed<Number = f32>>(
+    weights: &Weights,
+    b: &[T],
+    coarse: &[f32],
+    row: isize,
+    rows: &mut Prolonging,
+) {
+    // Blacks between corners, one row further: the centres of an odd row need those of the row below.
+    corners_to_blacks::<V>(weights, row + 3, coarse, rows);
+    smooth_and_correct::<T, V>(weights, b, row + 2, coarse, rows);
+    if weights.grid.contains(row + 1) {
+        solve_blacks::<V>(weights, row + 1, weights.spans.at(row + 1), &rows.smooth, &mut rows.blacks);
+    }
+}
+
+/// `D^-1 (b + N y)` of a row, `y` what [`smooth_and_correct`] left.
+#[inline(always)]
+pub(super) fn finish_row<T: Real, V: Packed<Number = f32>>(
+    weights: &Weights,
+    b: &[T],
+    row: isize,
+    rows: &mut Prolonging,
+    x: &mut [f32],
+) {
+    let (half, span) = (weights.grid.half(), weights.spans.at(row));
+    let stencil = weights.red_stencil::<V>(row, span, rows.blacks.around(row));
+    let b = T::floats(&b[row as usize * half..][span.range()], &mut rows.rounded);
+    let (b, x) = (V::chunks(b, stencil.len()), V::chunks_mut(&mut x[span.range()], stencil.len()));
+    for k in 0..stencil.len() {
+        ((V::read(&b[k]) + stencil.sum(k)) * stencil.diagonal(k).inverse()).put(&mut x[k]);
+    }
 }
 
 /// The corners of an even row.
@@ -112,17 +118,11 @@ fn corner_row(coarse: &[f32], row: isize, n: usize) -> &[f32] {
 
 /// The coarse grid at the blacks of a row, between the corners beside each.
 #[inline(always)]
-fn corners_to_blacks<V: Packed<Number = f32>>(
-    weights: &Weights,
-    row: isize,
-    span: Span,
-    coarse: &[f32],
-    rows: &mut Prolonging,
-) {
+fn corners_to_blacks<V: Packed<Number = f32>>(weights: &Weights, row: isize, coarse: &[f32], rows: &mut Prolonging) {
     if !weights.grid.contains(row) {
         return;
     }
-    let half = weights.grid.half();
+    let (half, span) = (weights.grid.half(), weights.spans.at(row));
     let Prolonging { corners, ties, on_edges, .. } = rows;
     let (first, second) = if row % 2 == 0 {
         let beyond = (span.end + 1).min(half);
@@ -152,14 +152,14 @@ fn smooth_and_correct<T: Real, V: Packed<Number = f32>>(
     weights: &Weights,
     b: &[T],
     row: isize,
-    span: Span,
     coarse: &[f32],
     rows: &mut Prolonging,
 ) {
     if !weights.grid.contains(row) {
         return;
     }
-    let (half, n) = (weights.grid.half(), span.vectors::<V>());
+    let (half, span) = (weights.grid.half(), weights.spans.at(row));
+    let n = span.vectors::<V>();
     let Prolonging { smooth, ties, on_edges, rounded, .. } = rows;
     let b = V::chunks(T::floats(&b[row as usize * half..][span.range()], rounded), n);
     let out = V::chunks_mut(&mut smooth.row_mut(row)[span.start..], n);
@@ -171,7 +171,7 @@ fn smooth_and_correct<T: Real, V: Packed<Number = f32>>(
         }
     } else {
         let stencil = weights.red_stencil::<V>(row, span, on_edges.around(row));
-        let ties = CentreTies::<V>::new(weights, row, span, ties);
+        let ties = CentreTies::<V>::new(stencil.sides(), row, span, ties);
         for k in 0..n {
             let centre = stencil.sum(k) * ties.inverse(k);
             (V::read(&b[k]) * stencil.diagonal(k).inverse() + centre).put(&mut out[k]);

@@ -4,26 +4,36 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::{CentreTies, corner_ties};
-use crate::integrate::checkerboard::{BAND_ROWS, Weights, split_row};
+use crate::integrate::checkerboard::{BAND_ROWS, LANES, Weights, split_row};
 use crate::integrate::real::{Real, on_vectors};
 use crate::integrate::ring::Ring;
-use crate::integrate::spans::Span;
 use crate::vector::Packed;
 
 /// `coarse = P^T (b - S D^-1 b)`: smooths `b` from zero and restricts what is left to the coarser grid, as reds and blacks,
 /// below the spans of this grid.
+///
+/// Returns `<b, D^-1 b + D^-1 N D^-1 b>`, `N = D - S = W D_black^-1 W^T`: what the smoothing adds to `<b, x>` in a V-cycle. Each
+/// band is summed by itself: the same bits for any number of threads.
 pub(in crate::integrate) fn restrict<T: Real>(
     weights: &Weights,
     b: &[T],
     coarse_reds: &mut [f32],
     coarse_blacks: &mut [f32],
-) {
+) -> f64 {
     let coarse_half = weights.grid.coarser().half();
-    let chunk = BAND_ROWS / 2 * coarse_half;
-    coarse_reds.par_chunks_mut(chunk).zip(coarse_blacks.par_chunks_mut(chunk)).enumerate().for_each_init(
-        || Restricting::new(weights.grid.half()),
-        |rows, (band, (reds, blacks))| restrict_band(weights, b, band, rows, [reds, blacks]),
-    );
+    let bands = weights.spans.bands_of_a_task();
+    let chunk = bands * BAND_ROWS / 2 * coarse_half;
+    let mut energies = vec![0.0; weights.spans.len()];
+    (coarse_reds.par_chunks_mut(chunk), coarse_blacks.par_chunks_mut(chunk), energies.par_chunks_mut(bands))
+        .into_par_iter()
+        .enumerate()
+        .for_each_init(
+            || Restricting::new(weights.grid.half()),
+            |rows, (task, (reds, blacks, energies))| {
+                restrict_rows(weights, b, task * bands * BAND_ROWS, rows, [reds, blacks], energies);
+            },
+        );
+    energies.iter().sum()
 }
 
 /// Rows on their way through the restriction of a band.
@@ -48,55 +58,64 @@ impl Restricting {
     }
 }
 
+/// [`restrict`] to the corners of the rows from `first_row` on; an energy for each band.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-pub(super) fn restrict_band<T: Real>(
+pub(super) fn restrict_rows<T: Real>(
     weights: &Weights,
     b: &[T],
-    band: usize,
+    first_row: usize,
     rows: &mut Restricting,
     coarse: [&mut [f32]; 2],
+    energies: &mut [f64],
 ) {
-    on_vectors!(weights.grid, f32, restrict_band_with::<T>(weights, b, band, rows, coarse));
+    on_vectors!(weights.grid, [f32], restrict_rows_with::<T>(weights, b, first_row, rows, coarse, energies));
 }
 
 #[inline(always)]
-pub(super) fn restrict_band_with<T: Real, V: Packed<Number = f32>>(
+pub(super) fn restrict_rows_with<T: Real, V: Packed<Number = f32>>(
     weights: &Weights,
     b: &[T],
-    band: usize,
+    first_row: usize,
     rows: &mut Restricting,
     [coarse_reds, coarse_blacks]: [&mut [f32]; 2],
+    energies: &mut [f64],
 ) {
     let grid = weights.grid;
-    let (coarse_half, span) = (grid.coarser().half(), weights.spans.band(band));
-    let first = (band * BAND_ROWS) as isize;
+    let coarse_half = grid.coarser().half();
+    let first = first_row as isize;
     let coarse_rows = coarse_reds.len() / coarse_half;
     let end = first + 2 * coarse_rows as isize;
+    let mut count = |row: isize, energy: f64| {
+        if (first..end).contains(&row) && grid.contains(row) {
+            energies[(row - first) as usize / BAND_ROWS] += energy;
+        }
+    };
     for row in first - 3..=end + 1 {
-        smooth::<T, V>(weights, b, row, span, rows);
+        count(row, smooth::<T, V>(weights, b, row, rows));
 
         let row = row - 1;
         if row < first - 2 {
             continue;
         }
-        solve_and_tie_blacks::<V>(weights, row, span, rows);
+        count(row, solve_and_tie_blacks::<V>(weights, row, rows));
 
         let row = row - 1;
         if row < first - 1 {
             continue;
         }
-        leave_residual::<V>(weights, row, span, rows);
+        leave_residual::<V>(weights, row, rows);
         if row.rem_euclid(2) == 0 {
             continue;
         }
-        centres_to_blacks::<V>(weights, row, span, rows);
+        centres_to_blacks::<V>(weights, row, rows);
         if row <= first {
             continue;
         }
         let row = row - 1;
-        blacks_to_corners::<V>(weights, row, span, rows);
+        blacks_to_corners::<V>(weights, row, rows);
         let coarse_start = (row - first) as usize / 2 * coarse_half;
         // A corner is one pixel of the coarser grid, where each colour has every other.
+        let span = weights.spans.at(row);
         let [start, end] = [span.start / 2, span.end.div_ceil(2)];
         let halves = coarse_start + start..coarse_start + end;
         let corners = &rows.coarse[2 * start..span.end];
@@ -104,49 +123,65 @@ pub(super) fn restrict_band_with<T: Real, V: Packed<Number = f32>>(
     }
 }
 
-/// `D^-1 b` of a row.
+/// `D^-1 b` of a row; returns `<b, D^-1 b>`.
 #[inline(always)]
-fn smooth<T: Real, V: Packed<Number = f32>>(
-    weights: &Weights,
-    b: &[T],
-    row: isize,
-    span: Span,
-    rows: &mut Restricting,
-) {
+fn smooth<T: Real, V: Packed<Number = f32>>(weights: &Weights, b: &[T], row: isize, rows: &mut Restricting) -> f64 {
     if !weights.grid.contains(row) {
-        return;
+        return 0.0;
     }
+    let span = weights.spans.at(row);
     let b = T::floats(&b[row as usize * weights.grid.half()..][span.range()], &mut rows.rounded);
     let sides = weights.reds::<V>(row, span);
     let (b, out) = (V::chunks(b, sides.len()), V::chunks_mut(&mut rows.smooth.row_mut(row)[span.start..], sides.len()));
+    let mut energy = V::splat(0.0);
     for k in 0..sides.len() {
-        (V::read(&b[k]) * sides.diagonal(k).inverse()).put(&mut out[k]);
+        let b = V::read(&b[k]);
+        let smooth = b * sides.diagonal(k).inverse();
+        smooth.put(&mut out[k]);
+        energy = b.times_plus(smooth, energy);
     }
+    sum_of(energy)
 }
 
-/// `D_black^-1 W^T` of the smoothed reds of a row, and what ties its blacks to corners.
+/// `D_black^-1 W^T` of the smoothed reds of a row, and what ties its blacks to corners; returns the product of the former with
+/// `W^T` of the reds.
 #[inline(always)]
-fn solve_and_tie_blacks<V: Packed<Number = f32>>(weights: &Weights, row: isize, span: Span, rows: &mut Restricting) {
+fn solve_and_tie_blacks<V: Packed<Number = f32>>(weights: &Weights, row: isize, rows: &mut Restricting) -> f64 {
     if !weights.grid.contains(row) {
-        return;
+        return 0.0;
     }
+    let span = weights.spans.at(row);
     let Restricting { smooth, blacks, ties, .. } = rows;
     let stencil = weights.black_stencil::<V>(row, span, smooth.around(row));
     let [first, second] = corner_ties::<V>(weights, row, span);
     let blacks = V::chunks_mut(&mut blacks.row_mut(row)[span.start..], stencil.len());
     let ties = V::chunks_mut(&mut ties.row_mut(row)[span.start..], stencil.len());
+    let mut energy = V::splat(0.0);
     for k in 0..stencil.len() {
-        (stencil.sum(k) * stencil.diagonal(k).inverse()).put(&mut blacks[k]);
+        let sum = stencil.sum(k);
+        let solved = sum * stencil.diagonal(k).inverse();
+        energy = sum.times_plus(solved, energy);
+        solved.put(&mut blacks[k]);
         (V::widen(&first[k]).magnitude() + V::widen(&second[k]).magnitude()).put(&mut ties[k]);
     }
+    sum_of(energy)
+}
+
+/// Sum of a vector's numbers.
+#[inline(always)]
+fn sum_of<V: Packed<Number = f32>>(vector: V) -> f64 {
+    let mut numbers = [0.0; LANES];
+    vector.write(&mut numbers);
+    numbers.iter().map(|&number| f64::from(number)).sum()
 }
 
 /// The residual of a row: `D - N` applied to `D^-1 b` leaves `N D^-1 b`. At centres, over their ties.
 #[inline(always)]
-fn leave_residual<V: Packed<Number = f32>>(weights: &Weights, row: isize, span: Span, rows: &mut Restricting) {
+fn leave_residual<V: Packed<Number = f32>>(weights: &Weights, row: isize, rows: &mut Restricting) {
     if !weights.grid.contains(row) {
         return;
     }
+    let span = weights.spans.at(row);
     let Restricting { blacks, ties, corners, centres, .. } = rows;
     let stencil = weights.red_stencil::<V>(row, span, blacks.around(row));
     if row % 2 == 0 {
@@ -155,7 +190,7 @@ fn leave_residual<V: Packed<Number = f32>>(weights: &Weights, row: isize, span: 
             stencil.sum(k).put(&mut out[k]);
         }
     } else {
-        let ties = CentreTies::<V>::new(weights, row, span, ties);
+        let ties = CentreTies::<V>::new(stencil.sides(), row, span, ties);
         let out = V::chunks_mut(&mut centres.row_mut(row)[span.start..], stencil.len());
         for k in 0..stencil.len() {
             (stencil.sum(k) * ties.inverse(k)).put(&mut out[k]);
@@ -165,10 +200,11 @@ fn leave_residual<V: Packed<Number = f32>>(weights: &Weights, row: isize, span: 
 
 /// The centres of an odd row to the blacks beside them.
 #[inline(always)]
-fn centres_to_blacks<V: Packed<Number = f32>>(weights: &Weights, row: isize, span: Span, rows: &mut Restricting) {
+fn centres_to_blacks<V: Packed<Number = f32>>(weights: &Weights, row: isize, rows: &mut Restricting) {
     if !weights.grid.contains(row) {
         return;
     }
+    let span = weights.spans.at(row);
     let (start, n) = (span.start, span.vectors::<V>());
     let here = &rows.centres.row(row)[start..];
     let (before, after) = (V::chunks(here, n), V::chunks(&here[1..], n));
@@ -183,7 +219,8 @@ fn centres_to_blacks<V: Packed<Number = f32>>(weights: &Weights, row: isize, spa
 
 /// The blacks around the corners of an even row to these; the blacks of the row itself take from the centres first.
 #[inline(always)]
-fn blacks_to_corners<V: Packed<Number = f32>>(weights: &Weights, row: isize, span: Span, rows: &mut Restricting) {
+fn blacks_to_corners<V: Packed<Number = f32>>(weights: &Weights, row: isize, rows: &mut Restricting) {
+    let span = weights.spans.at(row);
     let (first, n) = (1 + span.start, span.vectors::<V>());
     let (down, up) = (V::chunks(&weights.down(row - 1)[first..], n), V::chunks(&weights.up(row + 1)[first..], n));
     let [above, _, below] = rows.centres.around(row);
