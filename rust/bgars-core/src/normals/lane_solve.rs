@@ -124,7 +124,8 @@ pub(super) fn solve<K: Pixel, V: Vector>(
             kept.counts()
         }
     };
-    let (whole, eights) = (kept.whole(), (1 << (V::WIDTH / EIGHT)) - 1);
+    let whole = if let Choice::All = solver.choice { u8::MAX } else { kept.whole() };
+    let eights = (1 << (V::WIDTH / EIGHT)) - 1;
     for step in 0..LANES / V::WIDTH {
         let at = step * V::WIDTH;
         let facets = if whole >> (at / EIGHT) & eights == eights {

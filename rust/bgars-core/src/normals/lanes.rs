@@ -18,10 +18,7 @@ use crate::vector::{Portable, Vector};
 use crate::{Pixel, Radiometry, stream};
 
 /// How far ahead the images are fetched: as many streams as lights are more than processors follow by themselves.
-const AHEAD_PIXELS: usize = 16 * LANES;
-
-/// Bytes of a cache line.
-const LINE_BYTES: usize = 64;
+const BLOCKS_AHEAD: usize = 16;
 
 /// What every block reads.
 pub(super) struct Input<'a, P> {
@@ -121,7 +118,7 @@ fn run_blocks<K: Pixel>(
             return run_blocks_with::<K, Pair<Avx512>>(solver, source, offsets, common, pixels, sink);
         }
         if multiversion::target::target_cfg_f!(target_feature = "avx2") {
-            return run_blocks_with::<K, Avx2>(solver, source, offsets, common, pixels, sink);
+            return run_blocks_with::<K, Pair<Avx2>>(solver, source, offsets, common, pixels, sink);
         }
     }
     run_blocks_with::<K, Portable>(solver, source, offsets, common, pixels, sink);
@@ -140,12 +137,17 @@ fn run_blocks_with<K: Pixel, V: Vector>(
     let mut copies = vec![[K::ZERO; LANES]; solver.lights()];
     let nothing = [K::ZERO; LANES];
     let mut in_place = vec![&nothing; solver.lights()];
+    // The images in blocks from the task's first on: few bounds are left to be checked then.
+    let mut blocks: Vec<&[Lanes<K>]> = Vec::new();
+    if let Source::Images(planes) = source {
+        blocks.extend(planes.iter().map(|plane| plane[pixels.start..].as_chunks().0));
+    }
     let mut offset = [0.0; LANES];
     let mut clipped = [0; LANES];
     let mut finished = Finished::new();
     let per_full_scale = 1.0 / full_scale;
     sink.out.streamed &= V::STREAMS;
-    for first in pixels.clone().step_by(LANES) {
+    for (number, first) in pixels.clone().step_by(LANES).enumerate() {
         let block = first..(first + LANES).min(pixels.end);
         let span = first - pixels.start..block.end - pixels.start;
         let used = mask.map(|mask| &mask[block.clone()]);
@@ -158,12 +160,12 @@ fn run_blocks_with<K: Pixel, V: Vector>(
         let used = used.filter(|_| count < block.len());
         let copied: Vec<&Lanes<K>>;
         let keys = match source {
-            Source::Images(planes) if block.len() == LANES => {
-                for (key, plane) in in_place.iter_mut().zip(*planes) {
-                    for line in 0..size_of::<Lanes<K>>() / LINE_BYTES {
-                        stream::prefetch(plane, first + AHEAD_PIXELS + line * (LINE_BYTES / size_of::<K>()));
+            Source::Images(_) if block.len() == LANES => {
+                for (key, blocks) in in_place.iter_mut().zip(&blocks) {
+                    if let Some(ahead) = blocks.get(number + BLOCKS_AHEAD) {
+                        stream::prefetch(ahead);
                     }
-                    *key = plane[block.clone()].first_chunk().unwrap_or(&nothing);
+                    *key = &blocks[number];
                 }
                 &in_place
             }
