@@ -7,7 +7,8 @@
 //! centres. Nothing passes an edge of weight zero, so the two sides of a cut stay apart however thin it is.
 //!
 //! Smoothing is one damping-free Jacobi step on the reduced system (a red-black Gauss-Seidel sweep on the whole) on the way
-//! down and its adjoint on the way up. Both halves are plain functions of their input: no thread sees another one's writes.
+//! down and its adjoint on the way up. Both halves are plain functions of their input: no thread sees another one's writes. On
+//! the finest grid the way up goes on to conjugate gradient's next direction and its product (`advance`).
 
 mod advance;
 mod prolong;
