@@ -40,11 +40,10 @@ NORMAL_OPERATIONS = {
 With AVX-512 two look-ups do for three, and the Gram matrix takes 18.
 """
 ITERATION_BYTES = {
-    "direction: z and p read, p written": 2 + 2 + 2,
-    "product: weights and p read, q written": 8 + 2 + 4,
-    "step: x and r read and written, p and q read": 16 + 2 + 4,
+    "way up: weights, r, coarse solution and last p read, p and q written": 8 + 4 + 1 + 2 + 2 + 4,
+    "step of r, read and written, q read": 8 + 4,
+    "every second time two steps of x, read and written, two p read": (8 + 2 + 2) // 2,
     "restriction: weights and r read, coarse right side written": 8 + 4 + 1,
-    "prolongation: weights, r and coarse solution read, z written": 8 + 4 + 1 + 2,
     "coarser grids: 60 bytes for each of their pixels, a third as many": 20,
 }
 """Half the pixels are unknowns (float64: 4 bytes a pixel; float32: 2; the four float32 weights of an unknown: 8)."""
@@ -52,7 +51,7 @@ ITERATION_OPERATIONS = {
     "direction": 1,
     "product": 14,
     "step": 3,
-    "restriction": 18,
+    "restriction, and what smoothing adds to <r, z>": 18 + 2,
     "prolongation": 18,
     "coarser grids": 18,
 }
