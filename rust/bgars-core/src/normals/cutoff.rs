@@ -10,14 +10,20 @@ pub(super) const LANES: usize = 64;
 /// One quantity of a block of pixels.
 pub(super) type Lanes<T> = [T; LANES];
 
-/// The largest kept key of each pixel: from the darkest up, the one below the first step over `gap` that leaves at least 3.
-///
-/// `keys` has one entry a light, at least 3.
+/// How far up each pixel keeps its keys.
+pub(super) struct Cutoffs<K> {
+    /// The largest kept key: from the darkest up, the one below the first step over the gap that leaves at least 3.
+    pub largest: Lanes<K>,
+    /// True where it is known that no pixel drops a key.
+    pub keep_all: bool,
+}
+
+/// The cutoffs of keys, one entry a light, at least 3.
 #[inline(always)]
-pub(super) fn cutoffs<K: Key>(keys: &[&Lanes<K>], gap: K) -> Lanes<K> {
+pub(super) fn cutoffs<K: Key>(keys: &[&Lanes<K>], gap: K) -> Cutoffs<K> {
     match keys.try_into() {
         Ok(keys) => sorted_cutoffs(keys, gap),
-        Err(_) => grown_cutoffs(keys, gap),
+        Err(_) => Cutoffs { largest: grown_cutoffs(keys, gap), keep_all: false },
     }
 }
 
@@ -32,10 +38,10 @@ pub(super) use sort_eight;
 
 /// Eight lights: a sorting network, then the steps.
 #[inline(always)]
-fn sorted_cutoffs<K: Key>(keys: &[&Lanes<K>; 8], gap: K) -> Lanes<K> {
+fn sorted_cutoffs<K: Key>(keys: &[&Lanes<K>; 8], gap: K) -> Cutoffs<K> {
     // One array instead of eight places, or the compiler does not vectorise floats.
     let keys = keys.map(|key| *key);
-    let mut cutoffs = [K::LEAST; LANES];
+    let [mut largest, mut brightest] = [[K::LEAST; LANES]; 2];
     for lane in 0..LANES {
         let mut s: [K; 8] = std::array::from_fn(|light| keys[light][lane]);
         macro_rules! exchange {
@@ -48,9 +54,13 @@ fn sorted_cutoffs<K: Key>(keys: &[&Lanes<K>; 8], gap: K) -> Lanes<K> {
         for kept in (3..8).rev() {
             cutoff = if s[kept].is_over(s[kept - 1], gap) { s[kept - 1] } else { cutoff };
         }
-        cutoffs[lane] = cutoff;
+        (largest[lane], brightest[lane]) = (cutoff, s[7]);
     }
-    cutoffs
+    let mut keep_all = true;
+    for lane in 0..LANES {
+        keep_all &= !brightest[lane].is_over(largest[lane], K::gap(0.0));
+    }
+    Cutoffs { largest, keep_all }
 }
 
 /// Any number of lights without sorting: start at the third darkest, and take in what is within the gap until nothing is.
@@ -116,11 +126,13 @@ mod tests {
         for (lights, gap) in [(3, 0), (4, 20), (5, 50), (8, 0), (8, 50), (8, 255), (9, 30), (24, 10), (96, 3)] {
             for seed in 0..50 {
                 let keys = random_keys(lights, seed);
-                let found = cutoffs(&keys.iter().collect::<Vec<_>>(), gap);
+                let Cutoffs { largest: found, keep_all } = cutoffs(&keys.iter().collect::<Vec<_>>(), gap);
+                let dropped = (0..LANES).any(|lane| keys.iter().any(|key| key[lane] > found[lane]));
+                assert_eq!(keep_all, lights == 8 && !dropped, "{lights} lights, gap {gap}");
                 let wide: Vec<Lanes<u16>> = keys.iter().map(|key| key.map(u16::from)).collect();
                 let float: Vec<Lanes<f32>> = keys.iter().map(|key| key.map(f32::from)).collect();
-                assert_eq!(cutoffs(&wide.iter().collect::<Vec<_>>(), u16::from(gap)), found.map(u16::from));
-                assert_eq!(cutoffs(&float.iter().collect::<Vec<_>>(), f32::from(gap)), found.map(f32::from));
+                assert_eq!(cutoffs(&wide.iter().collect::<Vec<_>>(), u16::from(gap)).largest, found.map(u16::from));
+                assert_eq!(cutoffs(&float.iter().collect::<Vec<_>>(), f32::from(gap)).largest, found.map(f32::from));
                 for lane in 0..LANES {
                     let values: Vec<u8> = keys.iter().map(|key| key[lane]).collect();
                     assert_eq!(found[lane], slow_cutoff(&values, gap), "{values:?}, gap {gap}");

@@ -6,7 +6,7 @@ use super::confidence::HALF_DEG;
 use super::cutoff::{LANES, Lanes};
 use super::lane_solve::Careful;
 use super::out::Out;
-use super::symmetric::Monomials;
+use super::symmetric::dot;
 use crate::vector::Vector;
 
 /// `n_z` below which `f32` cannot say whether a facet faces the camera.
@@ -23,8 +23,6 @@ const LEAST: f32 = f32::from_bits(1);
 pub(super) struct Facets<V> {
     /// `g = rho n`, by component.
     pub scaled: [V; 3],
-    /// Of `g`.
-    pub monomials: Monomials<V>,
     /// With the [prior](super::confidence::PRIOR_RESIDUAL).
     pub squared_residuals: V,
     /// `|g|^2 tr C - g^T C g`, `C` the inverse in use.
@@ -91,19 +89,20 @@ impl Finished {
         const HALF2: f64 = (HALF_DEG * std::f64::consts::PI / 180.0) * (HALF_DEG * std::f64::consts::PI / 180.0);
         let zero = V::splat(0.0);
         let [x, y, z] = facets.scaled;
-        let square = facets.monomials.square();
+        let square = dot(facets.scaled, facets.scaled);
         // Not seen from the side, and of a size whose square is in the range of floats; false for NaN.
         let least = (V::splat(GRAZING * GRAZING) * square).at_least(V::splat(MIN_SQUARE));
-        let sound =
-            V::bits(V::both(facets.monomials.z_square().is_over(least), V::splat(1.0 / MIN_SQUARE).is_over(square)));
-        if sound != all_bits::<V>() {
+        let sound = V::both((z * z).is_over(least), V::splat(1.0 / MIN_SQUARE).is_over(square));
+        let faces = z.is_over(zero);
+        let usual = V::all(V::both(sound, faces));
+        let mut length = square.root();
+        if !usual {
             let size = x.at_least(zero - x) + y.at_least(zero - y) + z.at_least(zero - z);
             let is_zero = V::bits(V::splat(LEAST).is_over(size));
-            self.careful |= (all_bits::<V>() & !(sound | is_zero)) << at;
+            self.careful |= (all_bits::<V>() & !(V::bits(sound) | is_zero)) << at;
+            // NaN spreads into everything that is computed from it.
+            length = V::pick(faces, length, V::splat(f32::NAN));
         }
-        // NaN spreads into everything that is computed from it.
-        let faces = z.is_over(zero);
-        let length = V::pick(faces, square.root(), V::splat(f32::NAN));
         let inverse = V::splat(1.0) / length;
         let inverse2 = inverse * inverse;
         let streamed = place.streamed;
@@ -118,8 +117,10 @@ impl Finished {
         let variance = facets.squared_residuals * inverse2;
         let turning = facets.turning * inverse2;
         let certainty = freedom / variance.times_plus(turning, freedom);
-        put(V::pick(faces, certainty, zero), &mut place.confidence[at..], streamed);
-        self.valid |= V::bits(faces) << at;
+        let (certainty, valid) =
+            if usual { (certainty, all_bits::<V>()) } else { (V::pick(faces, certainty, zero), V::bits(faces)) };
+        put(certainty, &mut place.confidence[at..], streamed);
+        self.valid |= valid << at;
     }
 }
 

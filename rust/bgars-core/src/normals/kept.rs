@@ -5,7 +5,7 @@ use super::lane_solve::BYTE_LIGHTS;
 use crate::Pixel;
 
 /// Pixels whose bytes are compared at once.
-pub(super) const EIGHT: usize = 8;
+const EIGHT: usize = 8;
 
 /// The lights that a block keeps.
 pub(super) struct Kept<K> {
@@ -28,10 +28,19 @@ impl<K: Pixel> Kept<K> {
         }
     }
 
+    /// Drops none; the keys are left as they are.
+    #[inline(always)]
+    pub fn keep_all(&mut self) {
+        for (bits, all) in self.bits.iter_mut().zip(&self.all) {
+            *bits = bytemuck::must_cast([*all; LANES / EIGHT]);
+        }
+    }
+
     /// Takes the keys up to the cutoffs.
     #[inline(always)]
     pub fn choose(&mut self, keys: &[&Lanes<K>], cutoffs: &Lanes<K>) {
-        let bytes = keys.chunks(BYTE_LIGHTS).zip(self.keys.chunks_mut(BYTE_LIGHTS)).zip(&mut self.bits);
+        let kept_keys = self.keys[..keys.len()].chunks_mut(BYTE_LIGHTS);
+        let bytes = keys.chunks(BYTE_LIGHTS).zip(kept_keys).zip(&mut self.bits);
         for ((keys, kept_keys), bits) in bytes {
             // Written to once, so that the compiler need not ask what overlaps.
             let mut wide = [K::Bits::from(0); LANES];
@@ -66,26 +75,24 @@ impl<K: Pixel> Kept<K> {
         self.bits[light / BYTE_LIGHTS][lane] >> (light % BYTE_LIGHTS) & 1 == 1
     }
 
-    /// Bit k is set where every light of the eight pixels from `8 k` on is kept.
+    /// True where so many pixels, a multiple of eight of them, keep every light from the one at `at` on.
     #[inline(always)]
-    pub fn whole(&self) -> u8 {
-        let mut whole = u8::MAX;
-        for (bits, &all) in self.bits.iter().zip(&self.all) {
-            // A bit after the other: as vectors, which the compiler else tries, this takes longer.
-            let mut here = 0;
-            for &eight in bits.as_chunks::<EIGHT>().0.iter().rev() {
-                here = here << 1 | u8::from(u64::from_ne_bytes(eight) == all);
+    pub fn are_whole(&self, lights: usize, at: usize, pixels: usize) -> bool {
+        let bytes = lights.div_ceil(BYTE_LIGHTS);
+        let mut whole = true;
+        for (bits, &all) in self.bits[..bytes].iter().zip(&self.all[..bytes]) {
+            for &eight in bits[at..at + pixels].as_chunks::<EIGHT>().0 {
+                whole &= u64::from_ne_bytes(eight) == all;
             }
-            whole &= here;
         }
         whole
     }
 
     /// How many they are.
     #[inline(always)]
-    pub fn counts(&self) -> Lanes<u16> {
+    pub fn counts(&self, lights: usize) -> Lanes<u16> {
         let mut counts = [0; LANES];
-        for bits in &self.bits {
+        for bits in &self.bits[..lights.div_ceil(BYTE_LIGHTS)] {
             for lane in 0..LANES {
                 counts[lane] += bits[lane].count_ones() as u16;
             }
@@ -105,21 +112,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn eight_pixels_are_whole_when_each_holds_every_light() {
+    fn pixels_are_whole_when_each_holds_every_light() {
         for lights in [3, 8, 11, 16] {
             let mut kept = Kept::<u8>::new(lights);
-            assert_eq!(kept.whole(), u8::MAX);
+            assert!(kept.are_whole(lights, 0, LANES));
             for (light, lane) in [(0, 7), (lights - 1, 8), (1, 63)] {
                 let mut keys = vec![[1; LANES]; lights];
                 keys[light][lane] = 9;
                 kept.choose(&keys.iter().collect::<Vec<_>>(), &[1; LANES]);
-                assert_eq!(
-                    kept.whole(),
-                    !(1 << (lane / EIGHT)),
-                    "{lights} lights, light {light} of pixel {lane} is dropped"
-                );
+                for at in (0..LANES).step_by(2 * EIGHT) {
+                    let has_it = (at..at + 2 * EIGHT).contains(&lane);
+                    assert_eq!(
+                        kept.are_whole(lights, at, 2 * EIGHT),
+                        !has_it,
+                        "{lights} lights, light {light} of pixel {lane} is dropped, from pixel {at} on"
+                    );
+                }
                 assert!(!kept.holds(light, lane));
-                assert_eq!(kept.counts().iter().map(|&count| usize::from(count)).sum::<usize>(), LANES * lights - 1);
+                assert_eq!(
+                    kept.counts(lights).iter().map(|&count| usize::from(count)).sum::<usize>(),
+                    LANES * lights - 1
+                );
             }
         }
     }

@@ -9,13 +9,13 @@ use nalgebra::{Matrix3, Vector3};
 use super::confidence::PRIOR_RESIDUAL;
 use super::cutoff::{LANES, Lanes, cutoffs};
 use super::finish::{Facets, Finished, Place, all_bits};
-use super::kept::{EIGHT, Kept};
+use super::kept::Kept;
 use super::robust_lanes::{self, RobustLanes};
-use super::symmetric::{ENTRIES, Form, Inverse, Monomials, dot, outer};
+use super::symmetric::{ENTRIES, Form, Inverse, dot, form, inverse_row, outer};
 use crate::lights::conditioning;
-use crate::vector::Vector;
 use crate::vector::spread::Spread;
 use crate::vector::subset_sums::SubsetSums;
+use crate::vector::{RowTable, Vector};
 use crate::{Lights, Pixel};
 
 /// Subsets of lights below this [`conditioning`] are solved in `f64`: one refinement in `f32` no longer makes up for rounding.
@@ -56,8 +56,10 @@ pub(super) struct LaneSolver {
     unexplained: Form,
     /// `(tr C) I - C` of all lights, `C = (L^T L)^-1`.
     turning: Form,
-    /// `L^T L` of any lights, a table for every eight of them.
-    tables: Vec<SubsetSums<ENTRIES>>,
+    /// `(L^T L)^-1` of any of up to eight lights; `None` for more, and where all are kept.
+    inverses: Option<RowTable>,
+    /// `L^T L` of any lights, a table for every eight of them; for where there are no inverses.
+    grams: Vec<SubsetSums<ENTRIES>>,
 }
 
 impl LaneSolver {
@@ -67,15 +69,17 @@ impl LaneSolver {
         let gram = directions.iter().fold(Matrix3::zeros(), |gram, light| gram + light * light.transpose());
         let exact = gram.try_inverse().filter(|_| conditioning(&gram) >= MIN_LANE_CONDITIONING)?;
         let pseudo_inverse = directions.iter().map(|light| single(&(exact * light)).map(Spread::new)).collect();
+        let chosen = !matches!(choice, Choice::All);
+        let inverses = (chosen && directions.len() <= BYTE_LIGHTS).then(|| inverses_of(directions));
         let directions: Vec<[f32; 3]> = directions.iter().map(single).collect();
         let spread_directions = directions.iter().map(|light| light.map(Spread::new)).collect();
-        let tables = directions
+        let grams = directions
             .chunks(BYTE_LIGHTS)
             .map(|lights| SubsetSums::new(&lights.iter().map(outer).collect::<Vec<_>>()))
             .collect();
         let unexplained = Form::new(&(Matrix3::from_diagonal_element(PRIOR_RESIDUAL * PRIOR_RESIDUAL) - gram));
         let turning = Form::new(&(Matrix3::from_diagonal_element(exact.trace()) - exact));
-        Some(Self { choice, directions, spread_directions, pseudo_inverse, unexplained, turning, tables })
+        Some(Self { choice, directions, spread_directions, pseudo_inverse, unexplained, turning, inverses, grams })
     }
 
     /// Their number.
@@ -105,11 +109,18 @@ pub(super) fn solve<K: Pixel, V: Vector>(
 ) {
     let Readings { keys, clipped, offset } = *readings;
     (out.careful, out.valid) = (0, 0);
-    out.kept = match &solver.choice {
-        Choice::All => [keys.len() as u16; LANES],
+    out.kept = [keys.len() as u16; LANES];
+    let mut all = true;
+    match &solver.choice {
+        Choice::All => {}
         Choice::UpToGap(gap) => {
-            kept.choose(keys, &cutoffs(keys, K::gap(*gap)));
-            kept.counts()
+            let cutoffs = cutoffs(keys, K::gap(*gap));
+            if cutoffs.keep_all {
+                kept.keep_all();
+            } else {
+                kept.choose(keys, &cutoffs.largest);
+                (out.kept, all) = (kept.counts(keys.len()), false);
+            }
         }
         Choice::Window(robust) => {
             let mut bits = [0; LANES];
@@ -121,18 +132,16 @@ pub(super) fn solve<K: Pixel, V: Vector>(
             }
             out.careful = robust_lanes::choose(robust, &solver.directions, &values, clipped, &mut bits);
             kept.choose_bits(keys, bits);
-            kept.counts()
+            (out.kept, all) = (kept.counts(keys.len()), false);
         }
-    };
-    let whole = if let Choice::All = solver.choice { u8::MAX } else { kept.whole() };
-    let eights = (1 << (V::WIDTH / EIGHT)) - 1;
+    }
     for step in 0..LANES / V::WIDTH {
         let at = step * V::WIDTH;
-        let facets = if whole >> (at / EIGHT) & eights == eights {
+        let facets = if all || kept.are_whole(keys.len(), at, V::WIDTH) {
             solve_all::<K, V>(solver, readings, at)
         } else {
             let count = V::from_words(&out.kept[at..]);
-            let (facets, unusable) = solve_kept::<K, V>(solver, kept, offset, at, count);
+            let (facets, unusable) = solve_kept::<K, V>(solver, kept, keys.len(), offset, at, count);
             out.careful |= unusable << at;
             facets
         };
@@ -152,15 +161,13 @@ fn solve_all<K: Pixel, V: Vector>(solver: &LaneSolver, readings: &Readings<'_, K
         }
         sums
     } else {
-        Sums::of(readings.keys, &solver.pseudo_inverse, at)
+        Sums::of(readings.keys, &solver.pseudo_inverse[..readings.keys.len()], at)
     };
-    let monomials = Monomials::of(scaled);
     Facets {
         scaled,
-        monomials,
         // |I|^2 - |L g|^2; what rounding leaves is far below the prior of 2 %.
-        squared_residuals: monomials.added_to(squares, &solver.unexplained),
-        turning: monomials.added_to(V::splat(0.0), &solver.turning),
+        squared_residuals: solver.unexplained.added_to(squares, scaled),
+        turning: solver.turning.added_to(V::splat(0.0), scaled),
         kept: V::splat(readings.keys.len() as f32),
     }
 }
@@ -170,35 +177,41 @@ fn solve_all<K: Pixel, V: Vector>(solver: &LaneSolver, readings: &Readings<'_, K
 fn solve_kept<K: Pixel, V: Vector>(
     solver: &LaneSolver,
     kept: &Kept<K>,
+    lights: usize,
     offset: Option<&Lanes<f32>>,
     at: usize,
     count: V,
 ) -> (Facets<V>, Careful) {
-    let mut gram = V::sums_of(&kept.bits[0][at..], &solver.tables[0]);
-    for (tables, bits) in solver.tables.iter().zip(&kept.bits).skip(1) {
-        for (entry, more) in gram.iter_mut().zip(V::sums_of(&bits[at..], tables)) {
-            *entry = *entry + more;
+    let (keys, directions) = (&kept.keys[..lights], &solver.spread_directions[..lights]);
+    let inverse = if let Some(inverses) = &solver.inverses {
+        Inverse::of_row(V::rows(&kept.bits[0][at..], inverses))
+    } else {
+        let mut gram = V::sums_of(&kept.bits[0][at..], &solver.grams[0]);
+        for (sums, bits) in solver.grams.iter().zip(&kept.bits).skip(1) {
+            for (entry, more) in gram.iter_mut().zip(V::sums_of(&bits[at..], sums)) {
+                *entry = *entry + more;
+            }
         }
-    }
+        Inverse::of(gram)
+    };
     let sums = if let Some(offset) = offset {
         let (offset, mut sums) = (V::load(&offset[at..]), Sums::zero());
-        for (light, (key, direction)) in kept.keys.iter().zip(&solver.spread_directions).enumerate() {
+        for (light, (key, direction)) in keys.iter().zip(directions).enumerate() {
             // A dropped key is zero already, but not less an offset.
             let value = K::load::<V>(&key[at..]) - offset;
             sums.add(value.where_bit(&kept.bits[light / BYTE_LIGHTS][at..], light % BYTE_LIGHTS), direction);
         }
         sums
     } else {
-        Sums::of(&kept.keys, &solver.spread_directions, at)
+        Sums::of(keys, directions, at)
     };
-    let inverse = Inverse::of(gram);
     let mut scaled = inverse.product(sums.vector);
     let explained = dot(scaled, sums.vector);
-    let rough = (inverse.largest * V::splat(MIN_ROUGH_CONDITIONING)).is_over(inverse.determinant);
+    let rough = V::splat(MIN_ROUGH_CONDITIONING).is_over(inverse.conditioning);
     if V::bits(rough) != 0 {
         // One step of iterative refinement: what the residuals of the lights correct.
         let mut residuals = Sums::zero();
-        for (light, (key, direction)) in kept.keys.iter().zip(&solver.spread_directions).enumerate() {
+        for (light, (key, direction)) in keys.iter().zip(directions).enumerate() {
             let mut value = K::load::<V>(&key[at..]);
             if let Some(offset) = offset {
                 value = value - V::load(&offset[at..]);
@@ -213,16 +226,14 @@ fn solve_kept<K: Pixel, V: Vector>(
         }
     }
     // Written so that NaN is unusable.
-    let usable = V::bits(inverse.determinant.is_over(inverse.largest * V::splat(MIN_LANE_CONDITIONING as f32)));
-    let monomials = Monomials::of(scaled);
-    let square = monomials.square();
-    let trace = inverse.cofactors[0] + inverse.cofactors[3] + inverse.cofactors[5];
+    let usable = V::bits(inverse.conditioning.is_over(V::splat(MIN_LANE_CONDITIONING as f32)));
+    let square = dot(scaled, scaled);
+    let trace = inverse.entries[0] + inverse.entries[3] + inverse.entries[5];
     let facets = Facets {
         scaled,
-        monomials,
         squared_residuals: square
             .times_plus(V::splat((PRIOR_RESIDUAL * PRIOR_RESIDUAL) as f32), sums.squares - explained),
-        turning: (trace * square - monomials.form(inverse.cofactors)) * inverse.scale,
+        turning: trace.times_minus(square, form(inverse.entries, scaled)),
         kept: count,
     };
     (facets, all_bits::<V>() & !usable)
@@ -268,6 +279,15 @@ impl<V: Vector> Sums<V> {
         }
         self.squares = value.times_plus(value, self.squares);
     }
+}
+
+/// The inverses of all subsets of up to eight lights.
+fn inverses_of(directions: &[Vector3<f64>]) -> RowTable {
+    RowTable::new((0..1usize << directions.len()).map(|subset| {
+        let lights = directions.iter().enumerate().filter(|(light, _)| subset >> light & 1 == 1);
+        let gram = lights.fold(Matrix3::zeros(), |gram, (_, light)| gram + light * light.transpose());
+        inverse_row(&gram, MIN_LANE_CONDITIONING)
+    }))
 }
 
 fn single(vector: &Vector3<f64>) -> [f32; 3] {

@@ -10,7 +10,7 @@ use multiversion::multiversion;
 use super::cutoff::{LANES, Lanes};
 use super::finish::{Finished, Spare};
 use super::kept::Kept;
-use super::lane_solve::{Choice, LaneSolver, Readings, solve};
+use super::lane_solve::{BYTE_LIGHTS, Choice, LaneSolver, Readings, solve};
 use super::out::Out;
 #[cfg(target_arch = "x86_64")]
 use crate::vector::{Avx2, Avx512, Pair};
@@ -115,28 +115,46 @@ fn run_blocks<K: Pixel>(
     #[cfg(target_arch = "x86_64")]
     {
         if multiversion::target::target_cfg_f!(target_feature = "avx512f") {
-            return run_blocks_with::<K, Pair<Avx512>>(solver, source, offsets, common, pixels, sink);
+            return run_lights::<K, Pair<Avx512>>(solver, source, offsets, common, pixels, sink);
         }
         if multiversion::target::target_cfg_f!(target_feature = "avx2") {
-            return run_blocks_with::<K, Pair<Avx2>>(solver, source, offsets, common, pixels, sink);
+            return run_lights::<K, Pair<Avx2>>(solver, source, offsets, common, pixels, sink);
         }
     }
-    run_blocks_with::<K, Portable>(solver, source, offsets, common, pixels, sink);
+    run_lights::<K, Portable>(solver, source, offsets, common, pixels, sink);
+}
+
+/// Compiled for eight lights once more: loops over lights are written out then.
+#[inline(always)]
+fn run_lights<K: Pixel, V: Vector>(
+    solver: &LaneSolver,
+    source: &Source<'_, K>,
+    offsets: Option<&Offsets<'_>>,
+    common: Common<'_>,
+    pixels: Range<usize>,
+    sink: &mut Sink<'_, '_>,
+) {
+    if solver.lights() == BYTE_LIGHTS {
+        run_blocks_with::<K, V>(solver, BYTE_LIGHTS, source, offsets, common, pixels, sink);
+    } else {
+        run_blocks_with::<K, V>(solver, solver.lights(), source, offsets, common, pixels, sink);
+    }
 }
 
 #[inline(always)]
 fn run_blocks_with<K: Pixel, V: Vector>(
     solver: &LaneSolver,
+    lights: usize,
     source: &Source<'_, K>,
     offsets: Option<&Offsets<'_>>,
     Common { mask, full_scale, clips }: Common<'_>,
     pixels: Range<usize>,
     sink: &mut Sink<'_, '_>,
 ) {
-    let mut kept = Kept::new(solver.lights());
-    let mut copies = vec![[K::ZERO; LANES]; solver.lights()];
+    let mut kept = Kept::new(lights);
+    let mut copies = vec![[K::ZERO; LANES]; lights];
     let nothing = [K::ZERO; LANES];
-    let mut in_place = vec![&nothing; solver.lights()];
+    let mut in_place = vec![&nothing; lights];
     // The images in blocks from the task's first on: few bounds are left to be checked then.
     let mut blocks: Vec<&[Lanes<K>]> = Vec::new();
     if let Source::Images(planes) = source {
@@ -161,11 +179,9 @@ fn run_blocks_with<K: Pixel, V: Vector>(
         let copied: Vec<&Lanes<K>>;
         let keys = match source {
             Source::Images(_) if block.len() == LANES => {
-                for (key, blocks) in in_place.iter_mut().zip(&blocks) {
-                    if let Some(ahead) = blocks.get(number + BLOCKS_AHEAD) {
-                        stream::prefetch(ahead);
-                    }
+                for (key, blocks) in in_place[..lights].iter_mut().zip(&blocks[..lights]) {
                     *key = &blocks[number];
+                    stream::prefetch(*key, BLOCKS_AHEAD);
                 }
                 &in_place
             }
@@ -188,7 +204,7 @@ fn run_blocks_with<K: Pixel, V: Vector>(
         if let Some(mark) = clips {
             mark(&block, &mut clipped);
         }
-        let readings = Readings { keys, clipped: &clipped, offset: offsets.map(|_| &offset) };
+        let readings = Readings { keys: &keys[..lights], clipped: &clipped, offset: offsets.map(|_| &offset) };
         let mut spare = None;
         let mut place = sink.out.place(&span).unwrap_or_else(|| spare.insert(Spare::new()).place());
         solve::<K, V>(solver, &readings, &mut kept, per_full_scale, &mut finished, &mut place);

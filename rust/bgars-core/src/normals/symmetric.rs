@@ -2,8 +2,9 @@
 
 use nalgebra::Matrix3;
 
-use crate::vector::Vector;
+use crate::lights::conditioning;
 use crate::vector::spread::Spread;
+use crate::vector::{ROW, Vector};
 
 /// Entries of the upper triangle.
 pub(super) const ENTRIES: usize = 6;
@@ -23,48 +24,15 @@ fn product<V: Vector>([xx, xy, xz, yy, yz, zz]: [V; ENTRIES], vector: [V; 3]) ->
     [dot([xx, xy, xz], vector), dot([xy, yy, yz], vector), dot([xz, yz, zz], vector)]
 }
 
-/// The products of the components of a vector: xx, xy, xz, yy, yz, zz. Every quadratic form of it is a sum of these.
-#[derive(Clone, Copy)]
-pub(super) struct Monomials<V>([V; ENTRIES]);
-
-impl<V: Vector> Monomials<V> {
-    #[inline(always)]
-    pub fn of([x, y, z]: [V; 3]) -> Self {
-        Self([x * x, x * y, x * z, y * y, y * z, z * z])
-    }
-
-    /// `v^T v`.
-    #[inline(always)]
-    pub fn square(&self) -> V {
-        let [xx, _, _, yy, _, zz] = self.0;
-        xx + yy + zz
-    }
-
-    /// `z^2`.
-    #[inline(always)]
-    pub fn z_square(&self) -> V {
-        self.0[5]
-    }
-
-    /// `v^T A v`.
-    #[inline(always)]
-    pub fn form(&self, [xx, xy, xz, yy, yz, zz]: [V; ENTRIES]) -> V {
-        let [first, second, third, fourth, fifth, sixth] = self.0;
-        let mixed = dot([xy, xz, yz], [second, third, fifth]);
-        dot([xx, yy, zz], [first, fourth, sixth]) + (mixed + mixed)
-    }
-
-    /// `start + v^T A v`.
-    #[inline(always)]
-    pub fn added_to(&self, start: V, Form([xx, xy, xz, yy, yz, zz]): &Form) -> V {
-        let [first, second, third, fourth, fifth, sixth] = self.0;
-        let begun = third
-            .times_plus(V::repeated(xz), second.times_plus(V::repeated(xy), first.times_plus(V::repeated(xx), start)));
-        begun + dot([fourth, fifth, sixth], [V::repeated(yy), V::repeated(yz), V::repeated(zz)])
-    }
+/// `v^T A v`.
+#[inline(always)]
+pub(super) fn form<V: Vector>([xx, xy, xz, yy, yz, zz]: [V; ENTRIES], [x, y, z]: [V; 3]) -> V {
+    let (of_x, of_y) = (z.times_plus(xz, y * xy), z * yz);
+    dot([x.times_plus(xx, of_x + of_x), y.times_plus(yy, of_y + of_y), z * zz], [x, y, z])
 }
 
-/// A quadratic form that is the same for all pixels: the factors of the [products](Monomials), of mixed ones twice the entry.
+/// A quadratic form that is the same for all pixels: the factors of the squares and products of components, of products
+/// twice the entry.
 #[derive(Debug)]
 pub(super) struct Form([Spread; ENTRIES]);
 
@@ -74,21 +42,30 @@ impl Form {
         let factors = matrix + matrix.transpose() - Matrix3::from_diagonal(&matrix.diagonal());
         Self(UPPER.map(|entry| Spread::new(factors[entry] as f32)))
     }
+
+    /// `start + v^T A v`.
+    #[inline(always)]
+    pub fn added_to<V: Vector>(&self, start: V, [x, y, z]: [V; 3]) -> V {
+        let Self([xx, xy, xz, yy, yz, zz]) = self;
+        let of_x = z.times_plus(V::repeated(xz), y.times_plus(V::repeated(xy), x * V::repeated(xx)));
+        let of_y = z.times_plus(V::repeated(yz), y * V::repeated(yy));
+        let of_z = z * V::repeated(zz);
+        z.times_plus(of_z, y.times_plus(of_y, x.times_plus(of_x, start)))
+    }
 }
 
-/// The inverse of a Gram matrix: `scale` times its cofactors. `determinant / largest` is its conditioning.
+/// The inverse of a Gram matrix.
 pub(super) struct Inverse<V> {
-    pub cofactors: [V; ENTRIES],
-    pub scale: V,
-    pub determinant: V,
-    /// The largest determinant at this trace.
-    pub largest: V,
+    pub entries: [V; ENTRIES],
+    /// See [`crate::lights::conditioning`].
+    pub conditioning: V,
 }
 
 impl<V: Vector> Inverse<V> {
+    /// From the matrix itself.
     #[inline(always)]
     pub fn of([xx, xy, xz, yy, yz, zz]: [V; ENTRIES]) -> Self {
-        let cofactors = [
+        let mut entries = [
             minor(yy, zz, yz, yz),
             minor(xz, yz, xy, zz),
             minor(xy, yz, xz, yy),
@@ -96,19 +73,39 @@ impl<V: Vector> Inverse<V> {
             minor(xy, xz, xx, yz),
             minor(xx, yy, xy, xy),
         ];
-        let determinant = dot([xx, xy, xz], [cofactors[0], cofactors[1], cofactors[2]]);
-        let third = (xx + yy + zz) * V::splat(1.0 / 3.0);
+        let determinant = dot([xx, xy, xz], [entries[0], entries[1], entries[2]]);
         let scale = V::splat(1.0) / determinant;
-        Self { cofactors, scale, determinant, largest: third * third * third }
+        for entry in &mut entries {
+            *entry = *entry * scale;
+        }
+        let third = (xx + yy + zz) * V::splat(1.0 / 3.0);
+        Self { entries, conditioning: determinant / (third * third * third) }
+    }
+
+    /// From a row of [`inverse_row`].
+    #[inline(always)]
+    pub fn of_row([xx, xy, xz, yy, yz, zz, conditioning, _]: [V; ROW]) -> Self {
+        Self { entries: [xx, xy, xz, yy, yz, zz], conditioning }
     }
 
     /// The inverse times a vector.
     #[inline(always)]
     pub fn product(&self, vector: [V; 3]) -> [V; 3] {
-        // The division meanwhile goes on.
-        let [x, y, z] = product(self.cofactors, vector);
-        [x * self.scale, y * self.scale, z * self.scale]
+        product(self.entries, vector)
     }
+}
+
+/// The inverse of a Gram matrix and its conditioning, to be kept; zeros of a matrix whose conditioning is below `least`.
+pub(super) fn inverse_row(gram: &Matrix3<f64>, least: f64) -> [f32; ROW] {
+    let mut row = [0.0; ROW];
+    let conditioning = conditioning(gram);
+    if let Some(inverse) = gram.try_inverse().filter(|_| conditioning >= least) {
+        for (place, entry) in row.iter_mut().zip(UPPER) {
+            *place = inverse[entry] as f32;
+        }
+        row[ENTRIES] = conditioning as f32;
+    }
+    row
 }
 
 /// `a b - c d`.

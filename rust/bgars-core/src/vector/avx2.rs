@@ -2,16 +2,17 @@
 
 use std::arch::x86_64::{
     __m256, __m256i, _CMP_GT_OQ, _mm_cvtsi64_si128, _mm256_add_ps, _mm256_alignr_epi8, _mm256_and_ps, _mm256_and_si256,
-    _mm256_andnot_ps, _mm256_blend_ps, _mm256_blendv_ps, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi32,
-    _mm256_cvtepi32_ps, _mm256_cvtepu8_epi32, _mm256_cvtepu16_epi32, _mm256_div_ps, _mm256_fmadd_ps, _mm256_fmsub_ps,
-    _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_permute2f128_ps, _mm256_permutevar8x32_ps,
-    _mm256_set1_epi32, _mm256_set1_ps, _mm256_setzero_ps, _mm256_shuffle_ps, _mm256_sqrt_ps, _mm256_srli_epi32,
-    _mm256_sub_ps,
+    _mm256_andnot_ps, _mm256_blend_ps, _mm256_blendv_ps, _mm256_castps128_ps256, _mm256_castsi256_ps, _mm256_cmp_ps,
+    _mm256_cmpeq_epi32, _mm256_cvtepi32_ps, _mm256_cvtepu8_epi32, _mm256_cvtepu16_epi32, _mm256_div_ps,
+    _mm256_fmadd_ps, _mm256_fmsub_ps, _mm256_insertf128_ps, _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_ps,
+    _mm256_permute2f128_ps, _mm256_permutevar8x32_ps, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setzero_ps,
+    _mm256_shuffle_ps, _mm256_sqrt_ps, _mm256_srli_epi32, _mm256_sub_ps, _mm256_unpackhi_ps, _mm256_unpacklo_ps,
 };
 
 use super::packed::chunked;
+use super::row_table::{FIRST_TWO, LAST_TWO, QUARTER};
 use super::subset_sums::SubsetSums;
-use super::{Arithmetic, Packed, Vector, first};
+use super::{Arithmetic, Packed, ROW, RowTable, Vector, first};
 
 /// Eight floats.
 #[derive(Clone, Copy)]
@@ -177,6 +178,11 @@ impl Vector for Avx2 {
     }
 
     #[inline(always)]
+    fn all(mask: __m256) -> bool {
+        here!(_mm256_movemask_ps(mask)) == (1 << WIDTH) - 1
+    }
+
+    #[inline(always)]
     fn pick(mask: __m256, yes: Self, no: Self) -> Self {
         Self(here!(_mm256_blendv_ps(no.0, yes.0, mask)))
     }
@@ -191,6 +197,30 @@ impl Vector for Avx2 {
         let bit = here!(_mm256_set1_epi32(1 << bit));
         let mask = here!(_mm256_cmpeq_epi32(_mm256_and_si256(widened(bytes), bit), bit));
         Self(here!(_mm256_and_ps(_mm256_castsi256_ps(mask), self.0)))
+    }
+
+    #[inline(always)]
+    fn rows(bytes: &[u8], table: &RowTable) -> [Self; ROW] {
+        /// Half of the rows of two pixels, four apart.
+        #[inline(always)]
+        fn halves(bytes: [u8; WIDTH], table: &RowTable, pixel: usize, half: usize) -> __m256 {
+            let lower = bytemuck::must_cast(table.half(bytes[pixel], half));
+            let upper = bytemuck::must_cast(table.half(bytes[pixel + WIDTH / 2], half));
+            here!(_mm256_insertf128_ps::<1>(_mm256_castps128_ps256(lower), upper))
+        }
+        let bytes = first(bytes);
+        let mut rows = [Self::splat(0.0); ROW];
+        for (half, rows) in rows.as_chunks_mut::<QUARTER>().0.iter_mut().enumerate() {
+            let (a, b) = (halves(bytes, table, 0, half), halves(bytes, table, 1, half));
+            let (c, d) = (halves(bytes, table, 2, half), halves(bytes, table, 3, half));
+            let (a_b, more_a_b) = here!((_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b)));
+            let (c_d, more_c_d) = here!((_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d)));
+            rows[0] = Self(here!(_mm256_shuffle_ps::<FIRST_TWO>(a_b, c_d)));
+            rows[1] = Self(here!(_mm256_shuffle_ps::<LAST_TWO>(a_b, c_d)));
+            rows[2] = Self(here!(_mm256_shuffle_ps::<FIRST_TWO>(more_a_b, more_c_d)));
+            rows[3] = Self(here!(_mm256_shuffle_ps::<LAST_TWO>(more_a_b, more_c_d)));
+        }
+        rows
     }
 
     #[inline(always)]

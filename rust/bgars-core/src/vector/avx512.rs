@@ -1,16 +1,18 @@
 //! Sixteen floats of AVX-512.
 
 use std::arch::x86_64::{
-    __m512, __m512i, _CMP_GT_OQ, _mm512_abs_ps, _mm512_add_ps, _mm512_alignr_epi32, _mm512_cmp_ps_mask,
-    _mm512_cvtepi32_ps, _mm512_cvtepu8_epi32, _mm512_cvtepu16_epi32, _mm512_div_ps, _mm512_fmadd_ps, _mm512_fmsub_ps,
-    _mm512_mask_blend_ps, _mm512_maskz_div_ps, _mm512_maskz_mov_ps, _mm512_max_ps, _mm512_mul_ps,
-    _mm512_permutex2var_ps, _mm512_permutexvar_ps, _mm512_set1_epi32, _mm512_set1_ps, _mm512_setzero_ps,
-    _mm512_sqrt_ps, _mm512_srli_epi32, _mm512_stream_ps, _mm512_sub_ps, _mm512_test_epi32_mask,
+    __m512, __m512i, _CMP_GT_OQ, _mm512_abs_ps, _mm512_add_ps, _mm512_alignr_epi32, _mm512_castps128_ps512,
+    _mm512_cmp_ps_mask, _mm512_cvtepi32_ps, _mm512_cvtepu8_epi32, _mm512_cvtepu16_epi32, _mm512_div_ps,
+    _mm512_fmadd_ps, _mm512_fmsub_ps, _mm512_insertf32x4, _mm512_mask_blend_ps, _mm512_maskz_div_ps,
+    _mm512_maskz_mov_ps, _mm512_max_ps, _mm512_mul_ps, _mm512_permutex2var_ps, _mm512_permutexvar_ps,
+    _mm512_set1_epi32, _mm512_set1_ps, _mm512_setzero_ps, _mm512_shuffle_ps, _mm512_sqrt_ps, _mm512_srli_epi32,
+    _mm512_stream_ps, _mm512_sub_ps, _mm512_test_epi32_mask, _mm512_unpackhi_ps, _mm512_unpacklo_ps,
 };
 
 use super::packed::chunked;
+use super::row_table::{FIRST_TWO, LAST_TWO, QUARTER};
 use super::subset_sums::SubsetSums;
-use super::{Arithmetic, Packed, Vector, first, interleaved};
+use super::{Arithmetic, Packed, ROW, RowTable, Vector, first, interleaved};
 
 /// Sixteen floats.
 #[derive(Clone, Copy)]
@@ -166,6 +168,11 @@ impl Vector for Avx512 {
     }
 
     #[inline(always)]
+    fn all(mask: u16) -> bool {
+        mask == u16::MAX
+    }
+
+    #[inline(always)]
     fn pick(mask: u16, yes: Self, no: Self) -> Self {
         Self(here!(_mm512_mask_blend_ps(mask, no.0, yes.0)))
     }
@@ -179,6 +186,33 @@ impl Vector for Avx512 {
     fn where_bit(self, bytes: &[u8], bit: usize) -> Self {
         let mask = here!(_mm512_test_epi32_mask(widened(bytes), _mm512_set1_epi32(1 << bit)));
         Self(here!(_mm512_maskz_mov_ps(mask, self.0)))
+    }
+
+    #[inline(always)]
+    fn rows(bytes: &[u8], table: &RowTable) -> [Self; ROW] {
+        /// Half of the rows of four pixels, four apart.
+        #[inline(always)]
+        fn halves(bytes: [u8; WIDTH], table: &RowTable, pixel: usize, half: usize) -> __m512 {
+            let first = bytemuck::must_cast(table.half(bytes[pixel], half));
+            let second = bytemuck::must_cast(table.half(bytes[pixel + 4], half));
+            let third = bytemuck::must_cast(table.half(bytes[pixel + 8], half));
+            let fourth = bytemuck::must_cast(table.half(bytes[pixel + 12], half));
+            let two = here!(_mm512_insertf32x4::<1>(_mm512_castps128_ps512(first), second));
+            here!(_mm512_insertf32x4::<3>(_mm512_insertf32x4::<2>(two, third), fourth))
+        }
+        let bytes = first(bytes);
+        let mut rows = [Self::splat(0.0); ROW];
+        for (half, rows) in rows.as_chunks_mut::<QUARTER>().0.iter_mut().enumerate() {
+            let (a, b) = (halves(bytes, table, 0, half), halves(bytes, table, 1, half));
+            let (c, d) = (halves(bytes, table, 2, half), halves(bytes, table, 3, half));
+            let (a_b, more_a_b) = here!((_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b)));
+            let (c_d, more_c_d) = here!((_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d)));
+            rows[0] = Self(here!(_mm512_shuffle_ps::<FIRST_TWO>(a_b, c_d)));
+            rows[1] = Self(here!(_mm512_shuffle_ps::<LAST_TWO>(a_b, c_d)));
+            rows[2] = Self(here!(_mm512_shuffle_ps::<FIRST_TWO>(more_a_b, more_c_d)));
+            rows[3] = Self(here!(_mm512_shuffle_ps::<LAST_TWO>(more_a_b, more_c_d)));
+        }
+        rows
     }
 
     #[inline(always)]

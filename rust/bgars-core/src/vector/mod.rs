@@ -16,6 +16,7 @@ mod packed;
 #[cfg(any(target_arch = "x86_64", test))]
 mod pair;
 mod portable;
+mod row_table;
 pub mod spread;
 pub mod subset_sums;
 #[cfg(test)]
@@ -58,6 +59,7 @@ pub(crate) use packed::Packed;
 #[cfg(any(target_arch = "x86_64", test))]
 pub(crate) use pair::Pair;
 pub(crate) use portable::{Portable, PortableDouble};
+pub use row_table::{ROW, RowTable};
 use spread::Spread;
 use subset_sums::SubsetSums;
 
@@ -96,12 +98,16 @@ pub trait Vector: Arithmetic<Number = f32> + Div<Output = Self> {
     fn at_least(self, other: Self) -> Self;
     /// True where both are.
     fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// True where every value is.
+    fn all(mask: Self::Mask) -> bool;
     /// `yes` where the mask is true, `no` elsewhere.
     fn pick(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// Bit k: value k of the mask.
     fn bits(mask: Self::Mask) -> u64;
     /// The value where bit `bit` of its byte is set, 0 elsewhere.
     fn where_bit(self, bytes: &[u8], bit: usize) -> Self;
+    /// For each byte its row of the table: the first numbers of all rows, the second, and so on.
+    fn rows(bytes: &[u8], table: &RowTable) -> [Self; ROW];
     /// For each byte, the sums over the elements whose bits are set.
     fn sums_of<const ENTRIES: usize>(bytes: &[u8], sums: &SubsetSums<ENTRIES>) -> [Self; ENTRIES];
 }

@@ -4,7 +4,7 @@ use std::ops::{Add, Div, Mul, Sub};
 
 use super::spread::Spread;
 use super::subset_sums::SubsetSums;
-use super::{Arithmetic, Vector};
+use super::{Arithmetic, ROW, RowTable, Vector};
 
 /// The first half of the floats, and the second.
 #[derive(Clone, Copy)]
@@ -113,6 +113,11 @@ impl<V: Vector> Vector for Pair<V> {
     }
 
     #[inline(always)]
+    fn all(mask: Self::Mask) -> bool {
+        V::all(V::both(mask.0, mask.1))
+    }
+
+    #[inline(always)]
     fn pick(mask: Self::Mask, yes: Self, no: Self) -> Self {
         Self(V::pick(mask.0, yes.0, no.0), V::pick(mask.1, yes.1, no.1))
     }
@@ -125,6 +130,16 @@ impl<V: Vector> Vector for Pair<V> {
     #[inline(always)]
     fn where_bit(self, bytes: &[u8], bit: usize) -> Self {
         Self(self.0.where_bit(bytes, bit), self.1.where_bit(&bytes[V::WIDTH..], bit))
+    }
+
+    #[inline(always)]
+    fn rows(bytes: &[u8], table: &RowTable) -> [Self; ROW] {
+        let (first, second) = (V::rows(bytes, table), V::rows(&bytes[V::WIDTH..], table));
+        let mut rows = [Self::splat(0.0); ROW];
+        for ((row, first), second) in rows.iter_mut().zip(first).zip(second) {
+            *row = Self(first, second);
+        }
+        rows
     }
 
     #[inline(always)]

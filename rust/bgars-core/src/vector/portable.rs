@@ -6,7 +6,7 @@ use wide::{f32x8, f64x4};
 
 use super::packed::chunked;
 use super::subset_sums::SubsetSums;
-use super::{Arithmetic, Packed, Vector, first};
+use super::{Arithmetic, Packed, ROW, RowTable, Vector, first};
 
 const WIDTH: usize = 8;
 
@@ -164,6 +164,11 @@ impl Vector for Portable {
     }
 
     #[inline(always)]
+    fn all(mask: f32x8) -> bool {
+        mask.all()
+    }
+
+    #[inline(always)]
     fn pick(mask: f32x8, yes: Self, no: Self) -> Self {
         Self(mask.bitselect(yes.0, no.0))
     }
@@ -177,6 +182,12 @@ impl Vector for Portable {
     fn where_bit(self, bytes: &[u8], bit: usize) -> Self {
         let (values, bytes) = (self.0.to_array(), &bytes[..WIDTH]);
         Self::from_fn(|lane| if bytes[lane] >> bit & 1 == 1 { values[lane] } else { 0.0 })
+    }
+
+    #[inline(always)]
+    fn rows(bytes: &[u8], table: &RowTable) -> [Self; ROW] {
+        let bytes: [u8; WIDTH] = first(bytes);
+        std::array::from_fn(|entry| Self::from_fn(|lane| table.row(bytes[lane])[entry]))
     }
 
     #[inline(always)]

@@ -3,7 +3,7 @@
 #![allow(clippy::float_cmp)]
 
 use super::subset_sums::SubsetSums;
-use super::{One, Packed, Pair, Portable, PortableDouble, Vector};
+use super::{One, Packed, Pair, Portable, PortableDouble, ROW, RowTable, Vector};
 
 /// More than the widest vector needs.
 const VALUES: usize = 32;
@@ -39,6 +39,9 @@ fn check<V: Vector>() {
     assert_values(V::pick(both, x, y), |lane| if a[lane] > b[lane] && a[lane] > 4.0 { a[lane] } else { b[lane] });
     let bits = (0..V::WIDTH).filter(|&lane| a[lane] > b[lane]).fold(0, |bits, lane| bits | 1 << lane);
     assert_eq!(V::bits(x.is_over(y)), bits);
+    assert!(!V::all(both) && V::all(V::splat(1.0).is_over(V::splat(0.5))));
+    let but_one: [f32; VALUES] = std::array::from_fn(|lane| if lane + 1 == V::WIDTH { 0.0 } else { 1.0 });
+    assert!(!V::all(V::load(&but_one).is_over(V::splat(0.5))));
 
     let bytes: [u8; VALUES] = std::array::from_fn(|lane| (lane * 37 % 256) as u8);
     let words: [u16; VALUES] = std::array::from_fn(|lane| (lane * 4099) as u16);
@@ -119,6 +122,15 @@ fn check_sums<V: Vector>() {
     }
 }
 
+fn check_rows<V: Vector>() {
+    let number = |byte: usize, entry: usize| (ROW * byte + entry) as f32 - 77.0;
+    let table = RowTable::new((0..200).map(|byte| std::array::from_fn(|entry| number(byte, entry))));
+    let bytes: [u8; VALUES] = std::array::from_fn(|lane| (lane * 37 % 256) as u8);
+    for (entry, found) in V::rows(&bytes, &table).into_iter().enumerate() {
+        assert_values(found, |lane| if bytes[lane] < 200 { number(usize::from(bytes[lane]), entry) } else { 0.0 });
+    }
+}
+
 fn check_stores<V: Vector>() {
     #[repr(align(64))]
     struct Lines([f32; 4 * VALUES]);
@@ -144,6 +156,7 @@ fn check_stores<V: Vector>() {
 fn check_vector<V: Vector>() {
     check::<V>();
     check_sums::<V>();
+    check_rows::<V>();
     check_stores::<V>();
 }
 
