@@ -27,18 +27,14 @@ NORMAL_OPERATIONS = {
     "sorting network, 19 exchanges of a least and a greatest": 38,
     "cut-off, 5 gaps of a difference, a comparison, a choice": 15,
     "kept lights, 8 comparisons, choices and bits": 24,
-    "Gram matrix, 6 sums of 3 look-ups": 18 + 12,
-    "its 6 minors, determinant, largest determinant at its trace, a division": 18 + 5 + 5 + 1,
+    "inverse of the Gram matrix, 8 numbers looked up": 8,
     "four sums over 8 lights": 64,
-    "solution, its conditioning compared twice, squared residual": 18 + 4 + 8,
-    "products of its components, their square, a quadratic form, what turns the normal": 6 + 2 + 12 + 5,
-    "range, length, normal, albedo": 5 + 4 + 3 + 1,
-    "confidence": 9,
+    "solution, its conditioning compared twice, squared residual": 15 + 2 + 5 + 3,
+    "its square, a trace, a quadratic form, what turns the normal": 5 + 2 + 16 + 2,
+    "range, length, normal, albedo": 5 + 1 + 4 + 1,
+    "confidence": 8,
 }
-"""Of a pixel that loses a light; where a vector keeps all of them, Gram matrix and inverse fall away.
-
-With AVX-512 two look-ups do for three, and the Gram matrix takes 18.
-"""
+"""Of a pixel that loses a light; where a vector keeps all of them, the inverse falls away."""
 ITERATION_BYTES = {
     "way up: weights, r, coarse solution and last p read, p and q written": 8 + 4 + 1 + 2 + 2 + 4,
     "step of r, read and written, q read": 8 + 4,

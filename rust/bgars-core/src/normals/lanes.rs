@@ -181,7 +181,7 @@ fn run_blocks_with<K: Pixel, V: Vector>(
             Source::Images(_) if block.len() == LANES => {
                 for (key, blocks) in in_place[..lights].iter_mut().zip(&blocks[..lights]) {
                     *key = &blocks[number];
-                    stream::prefetch(*key, BLOCKS_AHEAD);
+                    stream::prefetch(key, BLOCKS_AHEAD);
                 }
                 &in_place
             }
