@@ -110,6 +110,7 @@ pub(super) fn solve<K: Pixel, V: Vector>(
     let Readings { keys, clipped, offset } = *readings;
     (out.careful, out.valid) = (0, 0);
     out.kept = [keys.len() as u16; LANES];
+    // Whether every pixel of the block keeps all of them.
     let mut all = true;
     match &solver.choice {
         Choice::All => {}
