@@ -1,5 +1,6 @@
 //! Connected parts of a mask: each keeps its own unknown constant.
 
+use memchr::memchr;
 use rayon::prelude::*;
 
 use super::reduction::sum;
@@ -43,7 +44,7 @@ impl Runs {
         let region = |row: usize, col: usize| regions.map_or(0, |regions| regions[row * width + col]);
         let row_runs = |(row, mask)| {
             let regions = regions.map(|regions| &regions[row * width..(row + 1) * width]);
-            RowRuns { row, mask, regions, col: 0 }
+            RowRuns { row, mask: bytemuck::must_cast_slice::<bool, u8>(mask), regions, col: 0 }
         };
         let mut runs: Vec<Run> = mask.par_chunks(width).enumerate().flat_map_iter(row_runs).collect();
         let mut row_starts = vec![0; height + 1];
@@ -137,7 +138,8 @@ impl Runs {
 /// The runs of one row of a mask.
 struct RowRuns<'a> {
     row: usize,
-    mask: &'a [bool],
+    /// 0 or 1 a pixel.
+    mask: &'a [u8],
     regions: Option<&'a [i32]>,
     col: usize,
 }
@@ -146,9 +148,9 @@ impl Iterator for RowRuns<'_> {
     type Item = Run;
 
     fn next(&mut self) -> Option<Run> {
-        let start = self.col + self.mask[self.col..].iter().position(|&used| used)?;
+        let start = self.col + memchr(1, &self.mask[self.col..])?;
         let rest = &self.mask[start..];
-        let mut end = start + rest.iter().position(|&used| !used).unwrap_or(rest.len());
+        let mut end = start + memchr(0, rest).unwrap_or(rest.len());
         if let Some(regions) = self.regions {
             let rest = &regions[start..end];
             end = start + rest.iter().position(|&region| region != rest[0]).unwrap_or(rest.len());

@@ -7,8 +7,9 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::checkerboard::{BAND_ROWS, Weights};
+use super::edges::Colours;
 use super::multigrid::Multigrid;
-use super::reduction::{dot, multiply, residual_norm};
+use super::reduction::{dot, settle};
 use super::{OnProgress, Params, Progress};
 use crate::memory::{self, Aligned};
 use crate::{Error, Result};
@@ -18,51 +19,50 @@ const BLOCK: usize = 1 << 14;
 
 /// What [`conjugate_gradients`] found.
 pub(super) struct Solution {
-    pub x: Aligned<f64>,
+    pub reds: Aligned<f64>,
+    pub blacks: Aligned<f64>,
     pub iterations: usize,
     /// Norm of the true residual, relative to `scale`.
     pub residual: f64,
-    /// False where the iterations did not suffice, or rounding left nothing of one; x is then what they came to.
+    /// False where the iterations did not suffice, or rounding left nothing of one; the rest is then what they came to.
     pub solved: bool,
 }
 
-/// Solves `S x = b` from zero, until the norm of `b - S x` is at most the tolerance times `scale`; `b` is zero beside the spans.
+/// Solves for the reds, from `x`, until the norm of what the system leaves is at most the tolerance times `scale`; the blacks
+/// follow from them.
 ///
 /// The residual that the iteration carries along drifts from the true one by rounding: when it says done, the true one is
 /// computed, and if it does not agree the iteration starts again from there.
 pub(super) fn conjugate_gradients(
     weights: &Weights,
-    b: &[f64],
+    right: &Colours,
+    mut x: Aligned<f64>,
     scale: f64,
     params: &Params,
     on_progress: OnProgress<'_>,
 ) -> Result<Solution> {
-    let size = b.len();
-    let mut solution = Solution { x: Aligned::zeros(size), iterations: 0, residual: 0.0, solved: true };
-    if scale == 0.0 {
-        return Ok(solution);
-    }
+    let size = x.len();
     let target = (params.relative_tolerance * scale).max(params.absolute_tolerance * (2.0 * size as f64).sqrt());
+    // Between the steps the blacks lie in q.
+    let [mut q, mut r] = [Aligned::<f64>::any(size), Aligned::any(size)];
+    let mut norm = settle(weights, right, &x, &mut q, &mut r).sqrt();
+    let (mut iterations, mut solved) = (0, true);
+    if norm <= target {
+        let residual = if norm > 0.0 { norm / scale } else { 0.0 };
+        return Ok(Solution { reds: x, blacks: q, iterations, residual, solved });
+    }
     let preconditioner = Multigrid::new(weights);
     let mut vectors = preconditioner.vectors();
-    let Solution { x, iterations, residual, solved } = &mut solution;
     // A direction may be any; what x and r take along it agrees in `f64`.
     let [mut p, mut previous] = [Aligned::<f32>::any(size), Aligned::any(size)];
-    let [mut q, mut r] = [Aligned::<f64>::any(size), Aligned::any(size)];
-    r.par_chunks_mut(BLOCK).zip(b.par_chunks(BLOCK)).for_each(|(r, b)| r.copy_from_slice(b));
-    let mut norm = square_sum(b).sqrt();
     loop {
-        *residual = norm / scale;
-        if norm <= target {
-            return Ok(solution);
-        }
         let mut r_z_before = None;
         // A step that x has not taken yet: two at once touch its memory half as often.
         let mut waiting = None;
         // Written so that NaN goes on, to be found below.
         while !(norm <= target) {
-            *solved = *iterations < params.max_iters;
-            if !*solved {
+            solved = iterations < params.max_iters;
+            if !solved {
                 break;
             }
             let r_z = preconditioner.descend(&r, &mut vectors);
@@ -71,8 +71,8 @@ pub(super) fn conjugate_gradients(
             std::mem::swap(&mut p, &mut previous);
             let p_q = preconditioner.advance(&r, &vectors, (beta, &previous), &mut p, &mut q);
             // Both are positive but for rounding; what is lost in it cannot be found again.
-            *solved = r_z > 0.0 && p_q > 0.0;
-            if !*solved {
+            solved = r_z > 0.0 && p_q > 0.0;
+            if !solved {
                 memory::forget();
                 // What waits is a step along the direction before.
                 std::mem::swap(&mut p, &mut previous);
@@ -82,28 +82,22 @@ pub(super) fn conjugate_gradients(
             norm = subtract(weights, alpha, &q, &mut r).sqrt();
             waiting = match waiting {
                 Some(before) => {
-                    take_steps(weights, [(before, &previous), (alpha, &p)], x);
+                    take_steps(weights, [(before, &previous), (alpha, &p)], &mut x);
                     None
                 }
                 None => Some(alpha),
             };
-            *iterations += 1;
-            if on_progress(Progress { iteration: *iterations, residual: norm / scale }).is_break() {
+            iterations += 1;
+            if on_progress(Progress { iteration: iterations, residual: norm / scale }).is_break() {
                 return Err(Error::Cancelled);
             }
         }
         if let Some(alpha) = waiting {
-            take_steps(weights, [(alpha, &p), (0.0, &p)], x);
+            take_steps(weights, [(alpha, &p), (0.0, &p)], &mut x);
         }
-        if !*solved {
-            *residual = norm / scale;
-            return Ok(solution);
-        }
-        norm = residual_norm(weights, x, b);
-        if norm > target {
-            multiply(weights, x, &mut q);
-            r.par_chunks_mut(BLOCK).zip(b.par_chunks(BLOCK)).for_each(|(r, b)| r.copy_from_slice(b));
-            subtract(weights, 1.0, &q, &mut r);
+        norm = settle(weights, right, &x, &mut q, &mut r).sqrt();
+        if !solved || norm <= target {
+            return Ok(Solution { reds: x, blacks: q, iterations, residual: norm / scale, solved });
         }
     }
 }

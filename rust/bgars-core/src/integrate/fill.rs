@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use super::checkerboard::{PaddedRow, Weights};
 use super::coarsen::series;
 use super::places::above_zero;
+use super::real::{greater, lesser};
 use super::stops::stops;
 
 /// Ties every corner without edges to the neighbours around it, or makes it a stop. These are a grid's last edges: its spans
@@ -67,10 +68,10 @@ fn find_free(around: &Around<'_>, free: &mut [f32]) {
     for k in 0..n {
         let (mut tied, mut way) = (0.0f32, 0.0f32);
         for side in own {
-            tied = tied.max(side[k].abs());
+            tied = greater(tied, side[k].abs());
         }
         for [a, b] in arcs {
-            way = way.max(a[k].abs().min(b[k].abs()));
+            way = greater(way, lesser(a[k].abs(), b[k].abs()));
         }
         free[k] = if tied == 0.0 { way } else { 0.0 };
     }

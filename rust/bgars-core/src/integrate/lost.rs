@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::checkerboard::{Grid, Weights};
 use super::detours::Window;
 use super::places::{Place, above_zero, blacks_around, diagonal};
+use super::real::{greater, lesser};
 use super::strays::is_alone;
 
 /// The reds that get lost: indices in ascending order.
@@ -81,14 +82,15 @@ fn suspect(rows: &CellRow<'_>, suspects: &mut [f32]) {
     let n = suspects.len();
     let [up, right, down, left] = rows.spokes.map(|side| &side[..n]);
     for k in 0..n {
-        suspects[k] = up[k].max(right[k]).max(down[k].max(left[k])).max(0.0);
+        suspects[k] = greater(greater(greater(up[k], right[k]), greater(down[k], left[k])), 0.0);
     }
-    let weakest_of = |a: &[f32], b: &[f32], k: usize| a[k].abs().min(b[k].abs());
+    let weakest_of = |a: &[f32], b: &[f32], k: usize| lesser(a[k].abs(), b[k].abs());
     let [[a, b], [c, d], [e, f], [g, h]] = rows.rims.map(|rim| rim.map(|side| &side[..n]));
     for k in 0..n {
-        let spokes = weakest_of(up, right, k).min(weakest_of(down, left, k));
-        let first = weakest_of(a, b, k).min(weakest_of(c, d, k));
-        let weakest = spokes.min(first).min(weakest_of(e, f, k).min(weakest_of(g, h, k)));
+        let spokes = lesser(weakest_of(up, right, k), weakest_of(down, left, k));
+        let first = lesser(weakest_of(a, b, k), weakest_of(c, d, k));
+        let second = lesser(weakest_of(e, f, k), weakest_of(g, h, k));
+        let weakest = lesser(spokes, lesser(first, second));
         suspects[k] = if weakest == 0.0 { suspects[k] } else { 0.0 };
     }
 }

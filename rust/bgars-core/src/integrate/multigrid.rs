@@ -5,13 +5,13 @@
 
 use rayon::prelude::*;
 
-use super::checkerboard::{Grid, Weights, join_row};
+use super::checkerboard::{Grid, Weights};
 use super::coarsen::coarsen;
 use super::fill::fill_corners;
 use super::graph::{GraphCycle, GraphVectors};
 use super::lost::Lost;
 use super::real::Real;
-use super::reduction::{eliminate_blacks, fill_blacks, multiply};
+use super::reduction::{eliminate_blacks, fill_and_join, multiply};
 use super::strays::{Changes, Strays};
 use super::transfer::{Below, advance, prolong, restrict};
 use crate::memory::Aligned;
@@ -44,8 +44,6 @@ pub(super) struct Vectors {
 /// Right side and solution of a coarser grid.
 #[derive(Debug)]
 struct LevelVectors {
-    width: usize,
-    half: usize,
     reds: Aligned<f32>,
     blacks: Aligned<f32>,
     red_solution: Aligned<f32>,
@@ -57,24 +55,11 @@ impl LevelVectors {
     fn new(weights: &Weights) -> Self {
         let grid = weights.grid;
         Self {
-            width: grid.width,
-            half: grid.half(),
             reds: Aligned::zeros(grid.half_pixels()),
             blacks: Aligned::zeros(grid.half_pixels()),
             red_solution: Aligned::zeros(grid.half_pixels()),
             solution: Aligned::any(grid.height * grid.width),
         }
-    }
-
-    /// The solution from the reds and the blacks (which lie where their right side was).
-    fn join(&mut self) {
-        let half = self.half;
-        self.solution
-            .par_chunks_mut(self.width)
-            .zip(self.red_solution.par_chunks(half))
-            .zip(self.blacks.par_chunks(half))
-            .enumerate()
-            .for_each(|(row, ((pixels, reds), blacks))| join_row(row, reds, blacks, pixels));
     }
 }
 
@@ -204,8 +189,7 @@ impl<'a> Multigrid<'a> {
         let of_blacks = eliminate_blacks(weights, &mut here.reds, &here.blacks);
         let of_reds = self.down(level, &here.reds, coarser, graph, first_stray);
         self.up(level, &here.reds, &mut here.red_solution, coarser, graph, first_stray);
-        fill_blacks(weights, &here.red_solution, &mut here.blacks);
-        here.join();
+        fill_and_join(weights, &here.red_solution, &mut here.blacks, &mut here.solution);
         of_blacks + of_reds
     }
 

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::Difference;
 use super::checkerboard::{Grid, Weights};
 use super::edges::{Axis, Colours, EdgeRow, from_edges};
+use super::real::greater;
 
 /// Smallest n_z of an edge: a normal seen edge-on has no finite slope.
 const MIN_N_Z: f64 = 1e-3;
@@ -105,7 +106,7 @@ fn weigh(a: Ends<'_>, b: Ends<'_>, shares: [f64; 2], sign: f64, weight: &mut [f3
     let [share_a, share_b] = shares;
     for k in 0..edges {
         let along = share_a * f64::from(a_along[k]) + share_b * f64::from(b_along[k]);
-        let n_z = (share_a * f64::from(a_z[k]) + share_b * f64::from(b_z[k])).max(MIN_N_Z);
+        let n_z = greater(share_a * f64::from(a_z[k]) + share_b * f64::from(b_z[k]), MIN_N_Z);
         let trust = a_trust[k] * b_trust[k];
         weight[k] = (trust * n_z * n_z) as f32;
         push[k] = -sign * trust * n_z * along;

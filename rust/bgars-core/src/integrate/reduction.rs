@@ -3,7 +3,8 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::checkerboard::{BAND_ROWS, Grid, Weights};
+use super::checkerboard::{BAND_ROWS, Grid, Weights, join_row};
+use super::edges::Colours;
 use super::real::{Real, on_vectors};
 use super::ring::Ring;
 use super::spans::Span;
@@ -19,41 +20,64 @@ pub(super) fn multiply<T: Real>(weights: &Weights, x: &[T], out: &mut [f64]) -> 
     products.iter().sum()
 }
 
-/// The norm of `b - S x`.
-pub(super) fn residual_norm(weights: &Weights, x: &[f64], b: &[f64]) -> f64 {
-    let chunk = BAND_ROWS * weights.grid.half();
-    let memory = || ([Ring::new(weights.grid.half()), Ring::new(weights.grid.half())], vec![0.0; chunk]);
-    let squares: Vec<f64> = b
-        .par_chunks(chunk)
+/// `blacks = D_black^-1 (right.blacks + W^T reds)`, and what the system leaves at the reds: `left = right.reds + W blacks - D_red reds`.
+/// Returns the square sum of `left`. Both are zero beside the spans of the grid.
+///
+/// From no reds, `left` is the right side of the reduced system; from a solution, `blacks` are the rest of it.
+pub(super) fn settle(weights: &Weights, right: &Colours, reds: &[f64], blacks: &mut [f64], left: &mut [f64]) -> f64 {
+    let half = weights.grid.half();
+    let chunk = BAND_ROWS * half;
+    let rows = || [Ring::new(half), Ring::new(half)];
+    let squares: Vec<f64> = (blacks.par_chunks_mut(chunk), left.par_chunks_mut(chunk))
+        .into_par_iter()
         .enumerate()
-        .map_init(memory, |(rows, product), (band, b)| {
-            let product = &mut product[..b.len()];
-            multiply_band(weights, x, band, rows, product);
-            let squares = weights.spans.parts(band).map(|part| {
-                let product = &mut product[part.clone()];
-                for (product, b) in product.iter_mut().zip(&b[part]) {
-                    *product = b - *product;
-                }
-                dot(product, product)
-            });
-            squares.sum::<f64>()
+        .map_init(rows, |rows, (band, (blacks, left))| {
+            let span = weights.spans.band(band);
+            if span.end - span.start < half {
+                blacks.fill(0.0);
+                left.fill(0.0);
+            }
+            settle_band(weights, right, reds, band, rows, [blacks, left])
         })
         .collect();
-    squares.iter().sum::<f64>().sqrt()
+    squares.iter().sum()
 }
 
 /// `reds += W D_black^-1 blacks`: the right side of the reduced system, along its spans. Returns `<blacks, D_black^-1 blacks>`.
 pub(super) fn eliminate_blacks<T: Real>(weights: &Weights, reds: &mut [T], blacks: &[T]) -> f64 {
     let chunk = BAND_ROWS * weights.grid.half();
     let bands = reds.par_chunks_mut(chunk).enumerate();
-    let energies: Vec<f64> = bands.map(|(band, reds)| eliminate_band(weights, blacks, band, reds)).collect();
+    let memory = || Ring::new(weights.grid.half());
+    let energies: Vec<f64> =
+        bands.map_init(memory, |scaled, (band, reds)| eliminate_band(weights, blacks, band, scaled, reds)).collect();
     energies.iter().sum()
 }
 
-/// `blacks = D_black^-1 (blacks + W^T reds)`: from right side to solution, along the spans.
-pub(super) fn fill_blacks<T: Real>(weights: &Weights, reds: &[T], blacks: &mut [T]) {
+/// `blacks = D_black^-1 (blacks + W^T reds)`: from right side to solution, along the spans; reds and blacks to `solution`, row-major.
+pub(super) fn fill_and_join(weights: &Weights, reds: &[f32], blacks: &mut [f32], solution: &mut [f32]) {
+    let width = weights.grid.width;
     let chunk = BAND_ROWS * weights.grid.half();
-    blacks.par_chunks_mut(chunk).enumerate().for_each(|(band, blacks)| fill_band(weights, reds, band, blacks));
+    (blacks.par_chunks_mut(chunk), solution.par_chunks_mut(BAND_ROWS * width))
+        .into_par_iter()
+        .enumerate()
+        .for_each_init(
+            || Ring::new(weights.grid.half()),
+            |here, (band, (blacks, solution))| {
+                fill_band(weights, reds, band, here, blacks);
+                join_band(weights, reds, blacks, band, solution);
+            },
+        );
+}
+
+/// Joins reds and blacks of a band while they are near.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn join_band(weights: &Weights, reds: &[f32], blacks: &[f32], band: usize, solution: &mut [f32]) {
+    let (half, width, span) = (weights.grid.half(), weights.grid.width, weights.spans.band(band));
+    let (first, cols) = (band * BAND_ROWS, 2 * span.start..(2 * span.end).min(width));
+    for (at, solution) in solution.chunks_exact_mut(width).enumerate() {
+        let reds = &reds[(first + at) * half..][span.range()];
+        join_row(first + at, reds, &blacks[at * half..][span.range()], &mut solution[cols.clone()]);
+    }
 }
 
 /// `D_black^-1 W^T reds` of a row, along a span.
@@ -139,6 +163,64 @@ pub(super) fn multiply_row<V: Packed<Number = f64>>(
     dot(x, out)
 }
 
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn settle_band(
+    weights: &Weights,
+    right: &Colours,
+    reds: &[f64],
+    band: usize,
+    rows: &mut [Ring<f64>; 2],
+    out: [&mut [f64]; 2],
+) -> f64 {
+    on_vectors!(weights.grid, [f64], settle_band_with(weights, right, reds, band, rows, out))
+}
+
+#[inline(always)]
+fn settle_band_with<V: Packed<Number = f64>>(
+    weights: &Weights,
+    right: &Colours,
+    reds: &[f64],
+    band: usize,
+    [here, solved]: &mut [Ring<f64>; 2],
+    [blacks, left]: [&mut [f64]; 2],
+) -> f64 {
+    let n = weights.grid.half();
+    let first = (band * BAND_ROWS) as isize;
+    let end = first + (left.len() / n) as isize;
+    let span = weights.spans.band(band);
+    let mut squares = 0.0;
+    for row in first - 2..=end + 1 {
+        load(weights.grid, reds, row, span, here.row_mut(row), |value| value);
+        let row = row - 1;
+        if row >= first - 1 && weights.grid.contains(row) {
+            let stencil = weights.black_stencil::<V>(row, span, here.around(row));
+            let given = V::chunks(&right.blacks[row as usize * n..][span.range()], stencil.len());
+            let out = V::chunks_mut(&mut solved.row_mut(row)[span.start..], stencil.len());
+            for k in 0..stencil.len() {
+                ((V::read(&given[k]) + stencil.sum(k)) * stencil.diagonal(k).inverse()).put(&mut out[k]);
+            }
+            if (first..end).contains(&row) {
+                let solved = &solved.row(row)[1..][span.range()];
+                blacks[(row - first) as usize * n..][span.range()].copy_from_slice(solved);
+            }
+        }
+        let row = row - 1;
+        if row < first {
+            continue;
+        }
+        let stencil = weights.red_stencil::<V>(row, span, solved.around(row));
+        let given = V::chunks(&right.reds[row as usize * n..][span.range()], stencil.len());
+        let own = V::chunks(&here.row(row)[1 + span.start..], stencil.len());
+        let left = &mut left[(row - first) as usize * n..][span.range()];
+        let out = V::chunks_mut(left, stencil.len());
+        for k in 0..stencil.len() {
+            ((V::read(&given[k]) + stencil.sum(k)) - stencil.diagonal(k) * V::read(&own[k])).put(&mut out[k]);
+        }
+        squares += dot(left, left);
+    }
+    squares
+}
+
 /// Sum in eight lanes, so that it vectorises and has one order.
 pub(super) fn sum(values: &[f64]) -> f64 {
     let (blocks, rest) = values.as_chunks::<8>();
@@ -167,8 +249,8 @@ pub(super) fn dot<A: Real, B: Real>(a: &[A], b: &[B]) -> f64 {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn eliminate_band<T: Real>(weights: &Weights, blacks: &[T], band: usize, reds: &mut [T]) -> f64 {
-    on_vectors!(weights.grid, [T], eliminate_band_with(weights, blacks, band, reds))
+fn eliminate_band<T: Real>(weights: &Weights, blacks: &[T], band: usize, scaled: &mut Ring<T>, reds: &mut [T]) -> f64 {
+    on_vectors!(weights.grid, [T], eliminate_band_with(weights, blacks, band, scaled, reds))
 }
 
 #[inline(always)]
@@ -176,13 +258,13 @@ fn eliminate_band_with<V: Packed<Number: Real>>(
     weights: &Weights,
     blacks: &[V::Number],
     band: usize,
+    scaled: &mut Ring<V::Number>,
     reds: &mut [V::Number],
 ) -> f64 {
     let n = weights.grid.half();
     let first = (band * BAND_ROWS) as isize;
     let end = first + (reds.len() / n) as isize;
     let span = weights.spans.band(band);
-    let mut scaled = Ring::<V::Number>::new(n);
     let mut energy = 0.0;
     for row in first - 1..=end {
         if weights.grid.contains(row) {
@@ -211,22 +293,22 @@ fn eliminate_band_with<V: Packed<Number: Real>>(
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn fill_band<T: Real>(weights: &Weights, reds: &[T], band: usize, blacks: &mut [T]) {
-    on_vectors!(weights.grid, [T], fill_band_with(weights, reds, band, blacks));
+fn fill_band(weights: &Weights, reds: &[f32], band: usize, here: &mut Ring<f32>, blacks: &mut [f32]) {
+    on_vectors!(weights.grid, [f32], fill_band_with(weights, reds, band, here, blacks));
 }
 
 #[inline(always)]
-fn fill_band_with<V: Packed<Number: Real>>(
+fn fill_band_with<V: Packed<Number = f32>>(
     weights: &Weights,
-    reds: &[V::Number],
+    reds: &[f32],
     band: usize,
-    blacks: &mut [V::Number],
+    here: &mut Ring<f32>,
+    blacks: &mut [f32],
 ) {
     let n = weights.grid.half();
     let first = (band * BAND_ROWS) as isize;
     let end = first + (blacks.len() / n) as isize;
     let span = weights.spans.band(band);
-    let mut here = Ring::<V::Number>::new(n);
     for row in first - 1..=end {
         load(weights.grid, reds, row, span, here.row_mut(row), |value| value);
         let row = row - 1;
@@ -238,5 +320,63 @@ fn fill_band_with<V: Packed<Number: Real>>(
         for k in 0..stencil.len() {
             ((V::read(&blacks[k]) + stencil.sum(k)) * stencil.diagonal(k).inverse()).put(&mut blacks[k]);
         }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::float_cmp)]
+mod tests {
+    use super::*;
+    use crate::integrate::places::{Place, blacks_around, diagonal, reds_around};
+    use crate::memory::Aligned;
+
+    /// Sum of weights times values at the far ends of a pixel's edges.
+    fn sum_around(edges: [(Place, f64); 4], half: usize, values: &[f64]) -> f64 {
+        let real = edges.into_iter().filter(|edge| edge.1 > 0.0);
+        real.map(|((row, k), weight)| weight * values[row as usize * half + k]).sum()
+    }
+
+    /// One pixel at a time; what is beside the spans is zero, whatever the memory held.
+    #[test]
+    fn blacks_follow_from_reds_and_the_rest_is_left() {
+        let mut weights = Weights::ragged([0.0, 0.3, 1.0, 0.7, -0.5, 0.0]);
+        // Nothing to the right of two whole vectors.
+        for row in 0..weights.grid.height {
+            (31..weights.grid.half()).for_each(|k| weights.set_red(row, k, [0.0; 4]));
+        }
+        weights.find_spans();
+        let (grid, half) = (weights.grid, weights.grid.half());
+        let number = |seed: usize| ((seed * 2_654_435_761) >> 7) as f64 % 1000.0 / 1000.0 - 0.5;
+        let mut right =
+            Colours { reds: Aligned::zeros(grid.half_pixels()), blacks: Aligned::zeros(grid.half_pixels()) };
+        let mut reds = vec![0.0; grid.half_pixels()];
+        let (mut blacks, mut left) = (vec![7.0; reds.len()], vec![7.0; reds.len()]);
+        for (place, red) in reds.iter_mut().enumerate() {
+            *red = number(place);
+            (right.reds[place], right.blacks[place]) = (number(place + 9_999), number(place + 77_777));
+        }
+        let squares = settle(&weights, &right, &reds, &mut blacks, &mut left);
+        let (mut expected, mut beside) = (0.0, 0);
+        for row in 0..grid.height {
+            let span = weights.spans.at(row as isize);
+            for k in 0..half {
+                let (at, place) = (row * half + k, (row as isize, k));
+                if !span.range().contains(&k) {
+                    assert!(blacks[at] == 0.0 && left[at] == 0.0, "beside: {k} of row {row}");
+                    beside += 1;
+                    continue;
+                }
+                let edges = reds_around(&weights, place);
+                let sum = diagonal(edges);
+                let black = if sum > 0.0 { (right.blacks[at] + sum_around(edges, half, &reds)) / sum } else { 0.0 };
+                assert!((blacks[at] - black).abs() < 1e-12, "black {k} of row {row}");
+                let edges = blacks_around(&weights, place);
+                let rest = right.reds[at] + sum_around(edges, half, &blacks) - diagonal(edges) * reds[at];
+                assert!((left[at] - rest).abs() < 1e-12, "red {k} of row {row}");
+                expected += rest * rest;
+            }
+        }
+        assert!(beside > 0);
+        assert!((squares - expected).abs() < 1e-12 * expected && expected > 1.0, "{squares} for {expected}");
     }
 }

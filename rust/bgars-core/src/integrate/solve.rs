@@ -10,9 +10,8 @@ use super::components::Runs;
 use super::conjugate_gradient::{Solution, conjugate_gradients, square_sum};
 use super::fill::fill_corners;
 use super::operator::{Field, assemble};
-use super::reduction::{eliminate_blacks, fill_blacks};
 use super::{Fit, OnProgress, Params, Surface};
-use crate::memory::zeros;
+use crate::memory::{Aligned, zeros};
 use crate::{Error, Result};
 
 /// Shortest and longest normal that is taken for one of length 1: interpolation and 8 bits shorten them, garbage is far off.
@@ -105,20 +104,19 @@ pub fn integrate_into(
     check_length("height_px", mask.len(), height_px.len())?;
     check_length("labels", mask.len(), labels.len())?;
     let runs = Runs::new(mask, field.regions, width);
-    let (mut weights, mut right) = assemble(field, params.difference);
+    let (mut weights, right) = assemble(field, params.difference);
     fill_corners(&mut weights);
     let scale = (square_sum(&right.reds) + square_sum(&right.blacks)).sqrt();
-    eliminate_blacks(&weights, &mut right.reds, &right.blacks);
-    let Solution { x: reds, iterations, residual, solved } =
-        conjugate_gradients(&weights, &right.reds, scale, params, on_progress)?;
+    let start = Aligned::zeros(right.reds.len());
+    let Solution { reds, blacks, iterations, residual, solved } =
+        conjugate_gradients(&weights, &right, start, scale, params, on_progress)?;
     if !solved {
         return Err(Error::NoConvergence { iterations, residual, tolerance: params.relative_tolerance });
     }
-    fill_blacks(&weights, &reds, &mut right.blacks);
     let half = weights.grid.half();
     let fill = |row: usize, values: &mut [f64]| {
         let span = row * half..(row + 1) * half;
-        join_row(row, &reds[span.clone()], &right.blacks[span], values);
+        join_row(row, &reds[span.clone()], &blacks[span], values);
     };
     let means = runs.means(fill);
     height_px.par_chunks_mut(width).enumerate().for_each_init(

@@ -13,6 +13,7 @@ use super::coarsen::series;
 use super::fill::{Around, Tied};
 use super::lost::{CellRow, Rim, cells_around};
 use super::places::{Place, above_zero};
+use super::real::{greater, lesser};
 
 /// Most that a stop has in a black: all of it where the lane ends in a much stronger edge, but that would take an endless tie.
 const MAX_SHARE: f32 = 0.999;
@@ -50,7 +51,7 @@ fn find_free(edges: [PaddedRow<'_, f32>; 4], free: &mut [f32]) -> bool {
     let [left, right, up, down] = edges.map(|side| &side[1..=n]);
     let mut any = false;
     for k in 0..n {
-        let strongest = left[k].abs().max(right[k].abs()).max(up[k].abs().max(down[k].abs()));
+        let strongest = greater(greater(left[k].abs(), right[k].abs()), greater(up[k].abs(), down[k].abs()));
         free[k] = if strongest == 0.0 { 0.0 } else { f32::NEG_INFINITY };
         any |= strongest == 0.0;
     }
@@ -76,8 +77,8 @@ fn find_lanes(cells: &CellRow<'_>, [first, second]: [usize; 2], lanes: &mut [f32
             let [c, d] = [&cells.spokes[across][..n], &cells.rims[across][end][..n]];
             let fourth = &cells.rims[across][1 - end][..n];
             for k in 0..n {
-                let weakest = a[k].abs().min(b[k]).min(c[k].min(d[k].abs()));
-                lanes[k] += if fourth[k] > 0.0 { 0.0 } else { weakest.max(0.0) };
+                let weakest = lesser(lesser(a[k].abs(), b[k]), lesser(c[k], d[k].abs()));
+                lanes[k] += if fourth[k] > 0.0 { 0.0 } else { greater(weakest, 0.0) };
             }
         }
     }

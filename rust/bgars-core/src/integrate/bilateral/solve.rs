@@ -4,13 +4,12 @@ use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
-use super::super::checkerboard::{Weights, join_row, split_row};
+use super::super::checkerboard::{Weights, join_row, split_whole_row};
 use super::super::components::Runs;
 use super::super::conjugate_gradient::{conjugate_gradients, square_sum};
 use super::super::edges::Colours;
 use super::super::fill::fill_corners;
 use super::super::operator::Field;
-use super::super::reduction::{eliminate_blacks, fill_blacks, multiply};
 use super::super::solve::{Facing, check_lengths, check_pixels};
 use super::super::{Params, Progress};
 use super::assemble::assemble;
@@ -83,7 +82,7 @@ pub fn integrate_bilateral(
             published.improve(&pixels, &shares, &mut z, &mut fit, on_progress)?;
         } else {
             let (system, right) = assemble(&pixels, &shares, CONVERGED_LEAST_SHARE);
-            improve(system, right, &mut z, &mut fit, on_progress)?;
+            improve(system, &right, &mut z, &mut fit, on_progress)?;
         }
         let energy = reweigh(&pixels, &z, params.k, &mut shares);
         let before = energies.last().copied().unwrap_or(f64::INFINITY);
@@ -171,7 +170,7 @@ pub(super) struct Progressed {
 /// Brings `z` (row-major in the box) to the solution of a system by multigrid.
 fn improve(
     mut weights: Weights,
-    mut right: Colours,
+    right: &Colours,
     z: &mut [f64],
     fit: &mut Progressed,
     on_progress: OnReweigh<'_>,
@@ -184,33 +183,25 @@ fn improve(
         return Ok(());
     }
     fill_corners(&mut weights);
-    let [mut reds, mut before] = [vec![0.0; grid.half_pixels()], vec![0.0; grid.half_pixels()]];
+    let mut reds = Aligned::any(grid.half_pixels());
+    // Of the blacks only the memory matters: they follow from the reds.
     reds.par_chunks_mut(half)
-        .zip(before.par_chunks_mut(half))
         .zip(z.par_chunks(width))
         .enumerate()
-        .for_each(|(row, ((reds, blacks), z))| split_row(row, z, reds, blacks));
-    // The residual of the reds, the blacks solved for: b - S x.
-    eliminate_blacks(&weights, &mut right.reds, &right.blacks);
-    let mut residual = before;
-    residual.par_chunks_mut(half).for_each(|row| row.fill(0.0));
-    multiply(&weights, &reds, &mut residual);
-    residual.par_iter_mut().zip(right.reds.par_iter()).for_each(|(residual, b)| *residual = b - *residual);
+        .for_each_init(|| vec![0.0; half], |blacks, (row, (reds, z))| split_whole_row(row, z, reds, blacks));
     let inner = Params { relative_tolerance: CONVERGED_TOLERANCE, max_iters: CONVERGED_ITERS, ..Params::default() };
     let state = Progress { iteration: fit.rounds, residual: fit.change };
-    let solution = conjugate_gradients(&weights, &residual, scale, &inner, &mut |_: Progress| on_progress(state))?;
+    let solution = conjugate_gradients(&weights, right, reds, scale, &inner, &mut |_: Progress| on_progress(state))?;
     fit.inner_iterations += solution.iterations;
     if !solution.residual.is_finite() {
         let (iterations, tolerance) = (fit.inner_iterations, CONVERGED_TOLERANCE);
         return Err(Error::NoConvergence { iterations, residual: solution.residual, tolerance });
     }
-    reds.par_iter_mut().zip(solution.x.par_iter()).for_each(|(red, change)| *red += change);
     fit.unsolved = !solution.solved;
     fit.residual = fit.residual.max(solution.residual);
-    fill_blacks(&weights, &reds, &mut right.blacks);
     z.par_chunks_mut(width)
-        .zip(reds.par_chunks(half))
-        .zip(right.blacks.par_chunks(half))
+        .zip(solution.reds.par_chunks(half))
+        .zip(solution.blacks.par_chunks(half))
         .enumerate()
         .for_each(|(row, ((z, reds), blacks))| join_row(row, reds, blacks, z));
     Ok(())
