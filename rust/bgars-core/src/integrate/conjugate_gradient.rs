@@ -3,6 +3,8 @@
 //! Written out here for its memory traffic: the sums ride along with the passes that make their vectors, and every pass runs on
 //! all threads. faer's solver, with which the tests compare it, does its vector work on one thread and in passes of its own.
 
+use std::ops::Range;
+
 use multiversion::multiversion;
 use rayon::prelude::*;
 
@@ -55,7 +57,10 @@ pub(super) fn conjugate_gradients(
     let mut vectors = preconditioner.vectors();
     // A direction may be any; what x and r take along it agrees in `f64`.
     let [mut p, mut previous] = [Aligned::<f32>::any(size), Aligned::any(size)];
+    // r for the V-cycle, which reads it twice.
+    let mut rounded = Aligned::<f32>::any(size);
     loop {
+        round(&r, &mut rounded);
         let mut r_z_before = None;
         // A step that x has not taken yet: two at once touch its memory half as often.
         let mut waiting = None;
@@ -65,11 +70,11 @@ pub(super) fn conjugate_gradients(
             if !solved {
                 break;
             }
-            let r_z = preconditioner.descend(&r, &mut vectors);
+            let r_z = preconditioner.descend(&rounded, &mut vectors);
             // What was there before the first direction is finite, and counts nothing.
             let beta = r_z_before.replace(r_z).map_or(0.0, |before| (r_z / before) as f32);
             std::mem::swap(&mut p, &mut previous);
-            let p_q = preconditioner.advance(&r, &vectors, (beta, &previous), &mut p, &mut q);
+            let p_q = preconditioner.advance(&rounded, &vectors, (beta, &previous), &mut p, &mut q);
             // Both are positive but for rounding; what is lost in it cannot be found again.
             solved = r_z > 0.0 && p_q > 0.0;
             if !solved {
@@ -79,7 +84,7 @@ pub(super) fn conjugate_gradients(
                 break;
             }
             let alpha = r_z / p_q;
-            norm = subtract(weights, alpha, &q, &mut r).sqrt();
+            norm = subtract(weights, (alpha, &q), &mut r, &mut rounded).sqrt();
             waiting = match waiting {
                 Some(before) => {
                     take_steps(weights, [(before, &previous), (alpha, &p)], &mut x);
@@ -102,12 +107,24 @@ pub(super) fn conjugate_gradients(
     }
 }
 
-/// `r -= alpha q` along the spans of the grid; returns `<r, r>`, each band summed by itself.
-fn subtract(weights: &Weights, alpha: f64, q: &[f64], r: &mut [f64]) -> f64 {
+/// A residual as floats.
+fn round(r: &[f64], rounded: &mut [f32]) {
+    rounded.par_chunks_mut(BLOCK).zip(r.par_chunks(BLOCK)).for_each(|(rounded, r)| {
+        for (rounded, &r) in rounded.iter_mut().zip(r) {
+            *rounded = r as f32;
+        }
+    });
+}
+
+/// `r -= alpha q` along the spans of the grid, also rounded; returns `<r, r>`, each band summed by itself.
+fn subtract(weights: &Weights, (alpha, q): (f64, &[f64]), r: &mut [f64], rounded: &mut [f32]) -> f64 {
     let chunk = BAND_ROWS * weights.grid.half();
-    let bands = r.par_chunks_mut(chunk).zip(q.par_chunks(chunk)).enumerate();
-    let of_band = |(band, (r, q)): (usize, (&mut [f64], &[f64]))| -> f64 {
-        weights.spans.parts(band).map(|part| subtract_part(alpha, &q[part.clone()], &mut r[part])).sum()
+    let bands =
+        (r.par_chunks_mut(chunk), rounded.par_chunks_mut(chunk), q.par_chunks(chunk)).into_par_iter().enumerate();
+    let of_band = |(band, (r, rounded, q)): (usize, (&mut [f64], &mut [f32], &[f64]))| -> f64 {
+        let part_of =
+            |part: Range<usize>| subtract_part((alpha, &q[part.clone()]), &mut r[part.clone()], &mut rounded[part]);
+        weights.spans.parts(band).map(part_of).sum()
     };
     let squares: Vec<f64> = bands.map(of_band).collect();
     squares.iter().sum()
@@ -115,9 +132,10 @@ fn subtract(weights: &Weights, alpha: f64, q: &[f64], r: &mut [f64]) -> f64 {
 
 /// [`subtract`] from a part of a band.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn subtract_part(alpha: f64, q: &[f64], r: &mut [f64]) -> f64 {
-    for (r, q) in r.iter_mut().zip(q) {
+fn subtract_part((alpha, q): (f64, &[f64]), r: &mut [f64], rounded: &mut [f32]) -> f64 {
+    for ((r, rounded), q) in r.iter_mut().zip(rounded).zip(q) {
         *r -= alpha * q;
+        *rounded = *r as f32;
     }
     dot(r, r)
 }

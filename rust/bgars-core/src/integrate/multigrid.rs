@@ -10,7 +10,6 @@ use super::coarsen::coarsen;
 use super::fill::fill_corners;
 use super::graph::{GraphCycle, GraphVectors};
 use super::lost::Lost;
-use super::real::Real;
 use super::reduction::{eliminate_blacks, fill_and_join, multiply};
 use super::strays::{Changes, Strays};
 use super::transfer::{Below, advance, prolong, restrict};
@@ -111,13 +110,13 @@ impl<'a> Multigrid<'a> {
     }
 
     /// `x = M b`.
-    pub fn cycle(&self, b: &[f64], vectors: &mut Vectors, x: &mut [f32]) {
+    pub fn cycle(&self, b: &[f32], vectors: &mut Vectors, x: &mut [f32]) {
         self.descend(b, vectors);
         self.up(0, b, x, &vectors.levels, &vectors.graph, 0);
     }
 
     /// The way down; returns `<b, M b>`, which is known before `M b` is.
-    pub fn descend(&self, b: &[f64], vectors: &mut Vectors) -> f64 {
+    pub fn descend(&self, b: &[f32], vectors: &mut Vectors) -> f64 {
         let Vectors { levels, graph } = vectors;
         self.down(0, b, levels, graph, 0)
     }
@@ -125,7 +124,7 @@ impl<'a> Multigrid<'a> {
     /// The way up after [`Self::descend`]: the next direction `p = M b + beta previous` and `q = S p`; returns `<p, q>`.
     pub fn advance(
         &self,
-        b: &[f64],
+        b: &[f32],
         vectors: &Vectors,
         (beta, previous): (f32, &[f32]),
         p: &mut [f32],
@@ -144,10 +143,10 @@ impl<'a> Multigrid<'a> {
     /// From the right side of the reds of a grid (0 is the finest) to the solution of the next coarser one; `coarser` are the
     /// grids below, `first_stray` counts the strays of the finer grids. Returns the product of `b` with its solution: all that
     /// smoothing adds on the way, and the part of the graph.
-    fn down<T: Real>(
+    fn down(
         &self,
         level: usize,
-        b: &[T],
+        b: &[f32],
         coarser: &mut [LevelVectors],
         graph: &mut GraphVectors,
         first_stray: usize,
@@ -161,10 +160,10 @@ impl<'a> Multigrid<'a> {
     }
 
     /// From there to the reds of the grid.
-    fn up<T: Real>(
+    fn up(
         &self,
         level: usize,
-        b: &[T],
+        b: &[f32],
         x: &mut [f32],
         coarser: &[LevelVectors],
         graph: &GraphVectors,
@@ -263,7 +262,7 @@ mod tests {
             for (red, b) in b.iter_mut().enumerate() {
                 let (row, k) = ((red / half) as isize, red % half);
                 let is_tied = weights.row(row).iter().any(|side| side[k + 1] > 0.0);
-                *b = if is_tied { number(red) - 0.5 } else { 0.0 };
+                *b = if is_tied { number(red) as f32 - 0.5 } else { 0.0 };
             }
             let mut x = vec![0.0; b.len()];
             multigrid.cycle(&b, &mut vectors, &mut x);

@@ -21,18 +21,12 @@ pub(super) trait Real:
     /// A single one.
     type Single: Packed<Number = Self>;
 
-    /// Rounded to `f32`.
-    fn to_f32(self) -> f32;
-
     /// Exactly as `f64`.
     fn to_f64(self) -> f64;
-
-    /// Numbers as floats: as they are, or rounded into `memory`.
-    fn floats<'a>(numbers: &'a [Self], memory: &'a mut [f32]) -> &'a [f32];
 }
 
 macro_rules! real {
-    ($type:ty, $avx512:ident, $avx2:ident, $portable:ident, |$numbers:ident, $memory:ident| $floats:expr) => {
+    ($type:ty, $avx512:ident, $avx2:ident, $portable:ident) => {
         impl Real for $type {
             #[cfg(target_arch = "x86_64")]
             type Avx512 = crate::vector::$avx512;
@@ -42,31 +36,14 @@ macro_rules! real {
             type Single = One<$type>;
 
             #[inline(always)]
-            #[allow(clippy::unnecessary_cast)]
-            fn to_f32(self) -> f32 {
-                self as f32
-            }
-
-            #[inline(always)]
             fn to_f64(self) -> f64 {
                 f64::from(self)
-            }
-
-            #[inline(always)]
-            fn floats<'a>($numbers: &'a [Self], $memory: &'a mut [f32]) -> &'a [f32] {
-                $floats
             }
         }
     };
 }
-real!(f32, Avx512, Avx2, Portable, |numbers, _memory| numbers);
-real!(f64, Avx512Double, Avx2Double, PortableDouble, |numbers, memory| {
-    let memory = &mut memory[..numbers.len()];
-    for (float, number) in memory.iter_mut().zip(numbers) {
-        *float = *number as f32;
-    }
-    memory
-});
+real!(f32, Avx512, Avx2, Portable);
+real!(f64, Avx512Double, Avx2Double, PortableDouble);
 
 /// The lesser of two numbers that are none of them NaN: one instruction, where `min` takes three.
 #[inline(always)]

@@ -9,7 +9,6 @@ use super::checkerboard::Weights;
 use super::graph::Rows;
 use super::lost::{Lost, Rim};
 use super::places::{Place, blacks_around, diagonal, reds_around, ties};
-use super::real::Real;
 
 /// The strays of one grid.
 #[derive(Debug)]
@@ -100,10 +99,10 @@ impl Strays {
     }
 
     /// What is left of `b` at the strays after smoothing, to `own` and to the coarse right side.
-    pub fn restrict<T: Real>(&self, b: &[T], own: &mut [f32], coarse_reds: &mut [f32], coarse_blacks: &mut [f32]) {
+    pub fn restrict(&self, b: &[f32], own: &mut [f32], coarse_reds: &mut [f32], coarse_blacks: &mut [f32]) {
         let half = self.coarse_half;
         for (stray, own) in own.iter_mut().enumerate() {
-            *own = self.smoothing.pairs(stray).map(|(red, factor)| factor * b[red].to_f32()).sum();
+            *own = self.smoothing.pairs(stray).map(|(red, factor)| factor * b[red]).sum();
             for (pixel, share) in self.adopted.pairs(stray) {
                 let (row, col) = (pixel / self.coarse_width, pixel % self.coarse_width);
                 let colour = if (row + col).is_multiple_of(2) { &mut *coarse_reds } else { &mut *coarse_blacks };

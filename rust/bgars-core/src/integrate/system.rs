@@ -147,7 +147,8 @@ impl LinOp<f64> for VCycle<'_> {
     fn apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, _par: Par, _stack: &mut MemStack) {
         let mut correction = vec![0.0f32; self.size];
         let mut vectors = self.vectors.lock().unwrap_or_else(PoisonError::into_inner);
-        self.multigrid.cycle(slice(rhs), &mut vectors, &mut correction);
+        let rounded: Vec<f32> = slice(rhs).iter().map(|&number| number as f32).collect();
+        self.multigrid.cycle(&rounded, &mut vectors, &mut correction);
         for (out, correction) in slice_mut(out).iter_mut().zip(correction) {
             *out = f64::from(correction);
         }

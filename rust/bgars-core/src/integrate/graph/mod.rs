@@ -20,7 +20,6 @@ mod splitting;
 use rayon::prelude::*;
 
 use super::checkerboard::Weights;
-use super::real::Real;
 use super::reduction::dot;
 use super::strays::Strays;
 use crate::memory::zeros;
@@ -111,7 +110,7 @@ impl GraphCycle {
 
     /// Solves for the reds of the grid, whose right side is `b`, and for the strays, whose right side and then solution is in
     /// `vectors`. Returns the product of the whole right side with the solution.
-    pub fn solve<T: Real>(&self, b: &[T], vectors: &mut GraphVectors) -> f64 {
+    pub fn solve(&self, b: &[f32], vectors: &mut GraphVectors) -> f64 {
         self.nodes.gather(b, &mut vectors.levels[0][0]);
         let GraphVectors { levels, strays } = vectors;
         let reds = self.nodes.len();

@@ -6,7 +6,6 @@ use super::matrix::{Part, Rows};
 use super::{CHUNK, SETUP_CHUNK};
 use crate::integrate::checkerboard::Weights;
 use crate::integrate::places::ties;
-use crate::integrate::real::Real;
 
 /// Which reds are nodes: those with an edge, row by row.
 #[derive(Debug)]
@@ -22,10 +21,10 @@ impl Nodes {
         self.0.binary_search(&(red as u32)).ok()
     }
 
-    pub fn gather<T: Real>(&self, reds: &[T], nodes: &mut [f32]) {
+    pub fn gather(&self, reds: &[f32], nodes: &mut [f32]) {
         nodes.par_chunks_mut(CHUNK).zip(self.0.par_chunks(CHUNK)).for_each(|(nodes, places)| {
             for (node, &place) in nodes.iter_mut().zip(places) {
-                *node = reds[place as usize].to_f32();
+                *node = reds[place as usize];
             }
         });
     }

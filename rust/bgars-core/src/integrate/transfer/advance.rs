@@ -15,7 +15,7 @@ use crate::vector::Packed;
 #[derive(Clone, Copy)]
 pub(in crate::integrate) struct Below<'a> {
     /// The right side of the finest grid.
-    pub b: &'a [f64],
+    pub b: &'a [f32],
     /// The solution of the next coarser one, row-major.
     pub coarse: &'a [f32],
     /// What the strays change.
@@ -90,7 +90,7 @@ pub(super) fn advance_rows_with<V: Packed<Number = f32>, D: Packed<Number = f64>
     let end = first + (p.len() / n) as isize;
     // The product reaches two rows further.
     for row in first - LEAD - 2..end + 2 {
-        go_ahead::<f64, V>(weights, below.b, below.coarse, row, &mut rows.up);
+        go_ahead::<V>(weights, below.b, below.coarse, row, &mut rows.up);
         if row >= first - 2 && weights.grid.contains(row) {
             let own = (first..end).contains(&row).then(|| &mut p[(row - first) as usize * n..][..n]);
             turn_row::<V, D>(weights, below, before, row, rows, own);
@@ -122,7 +122,7 @@ fn turn_row<V: Packed<Number = f32>, D: Packed<Number = f64>>(
     let (half, span) = (weights.grid.half(), weights.spans.at(row));
     let Advancing { up, beside, reds, .. } = rows;
     let p = own.unwrap_or(beside);
-    finish_row::<f64, V>(weights, b, row, up, p);
+    finish_row::<V>(weights, b, row, up, p);
     changes.add_to(row as usize * half, p);
     let p = &mut p[span.range()];
     let n = span.vectors::<V>();

@@ -109,7 +109,7 @@ mod tests {
     fn every_instruction_set_does_the_same() {
         let grid = Grid { height: 32, width: 64 };
         let (weights, n, coarse) = (weights(grid), grid.half(), grid.coarser());
-        let b: Vec<f64> = (0..grid.half_pixels()).map(|place| f64::from(number(place)) - 0.5).collect();
+        let b: Vec<f32> = (0..grid.half_pixels()).map(|place| number(place) - 0.5).collect();
         let down = |task: &Down<'_>| {
             let [mut reds, mut blacks] = [vec![0.0; coarse.half_pixels()], vec![0.0; coarse.half_pixels()]];
             let mut energy = [0.0];
@@ -118,8 +118,8 @@ mod tests {
         };
         let fast = down(&|rows, out, sum| restrict::restrict_rows(&weights, &b, 0, rows, out, sum));
         let portable =
-            down(&|rows, out, sum| restrict::restrict_rows_with::<_, Portable>(&weights, &b, 0, rows, out, sum));
-        let one = down(&|rows, out, sum| restrict::restrict_rows_with::<_, One<f32>>(&weights, &b, 0, rows, out, sum));
+            down(&|rows, out, sum| restrict::restrict_rows_with::<Portable>(&weights, &b, 0, rows, out, sum));
+        let one = down(&|rows, out, sum| restrict::restrict_rows_with::<One<f32>>(&weights, &b, 0, rows, out, sum));
         assert_near(&fast, &portable);
         assert_near(&fast, &one);
 
@@ -130,8 +130,8 @@ mod tests {
             x
         };
         let fast = up(&|rows, x| prolong::prolong_rows(&weights, &b, &correction, 0, rows, x));
-        let portable = up(&|rows, x| prolong::prolong_rows_with::<_, Portable>(&weights, &b, &correction, 0, rows, x));
-        let one = up(&|rows, x| prolong::prolong_rows_with::<_, One<f32>>(&weights, &b, &correction, 0, rows, x));
+        let portable = up(&|rows, x| prolong::prolong_rows_with::<Portable>(&weights, &b, &correction, 0, rows, x));
+        let one = up(&|rows, x| prolong::prolong_rows_with::<One<f32>>(&weights, &b, &correction, 0, rows, x));
         assert_near(&fast, &portable);
         assert_near(&fast, &one);
     }
@@ -144,7 +144,7 @@ mod tests {
             let grid = Grid { height, width };
             let (mut weights, n, coarse) = (weights(grid), grid.half(), grid.coarser());
             weights.find_spans();
-            let b: Vec<f64> = (0..grid.half_pixels()).map(|place| f64::from(number(place)) - 0.5).collect();
+            let b: Vec<f32> = (0..grid.half_pixels()).map(|place| number(place) - 0.5).collect();
             let correction: Vec<f32> = (0..coarse.height * coarse.width).map(|place| number(place + 5) - 0.5).collect();
             let previous: Vec<f32> = (0..grid.half_pixels()).map(|place| number(place + 9) - 0.5).collect();
             let reds: Vec<u32> = changed.iter().copied().filter(|&red| (red as usize) < grid.half_pixels()).collect();
@@ -241,14 +241,14 @@ mod tests {
         let sum: Vec<f64> = by(&of_reds, &b).iter().zip(times(&interpolation, &coarse)).map(|(a, c)| a + c).collect();
         let around_sum: Vec<f64> = b.iter().zip(around(&sum)).map(|(b, n)| b + n).collect();
         let mut x = vec![0.0; reds];
-        prolong(&weights, &b, &single(&coarse), &mut x);
+        prolong(&weights, &single(&b), &single(&coarse), &mut x);
         assert_near(&x, &single(&by(&of_reds, &around_sum)));
 
         let expected = times(&transposed(&interpolation), &around(&by(&of_reds, &b)));
         let half = grid.coarser().half();
         let colours: [Vec<f32>; 2] = std::array::from_fn(|_| vec![0.0; grid.coarser().half_pixels()]);
         let [mut reds, mut blacks] = colours;
-        restrict(&weights, &b, &mut reds, &mut blacks);
+        restrict(&weights, &single(&b), &mut reds, &mut blacks);
         let found = (0..corners.len()).map(|at| (at / n, at % n)).map(|(row, k)| {
             let colour = if (row + k) % 2 == 0 { &reds } else { &blacks };
             colour[row * half + k / 2]

@@ -13,7 +13,7 @@ use crate::vector::Packed;
 /// `x = D^-1 (b + N (D^-1 b + P coarse))`, `N = W D_black^-1 W^T`: the correction of the coarser grid (row-major), smoothed.
 ///
 /// `x` is written along the spans of the grid.
-pub(in crate::integrate) fn prolong<T: Real>(weights: &Weights, b: &[T], coarse: &[f32], x: &mut [f32]) {
+pub(in crate::integrate) fn prolong(weights: &Weights, b: &[f32], coarse: &[f32], x: &mut [f32]) {
     let task_rows = weights.spans.bands_of_a_task() * BAND_ROWS;
     x.par_chunks_mut(task_rows * weights.grid.half()).enumerate().for_each_init(
         || Prolonging::new(weights.grid.half()),
@@ -29,34 +29,32 @@ pub(super) struct Prolonging {
     /// The coarse grid at the blacks.
     on_edges: Ring<f32>,
     corners: Ring<f32>,
-    /// The right side of a row.
-    rounded: Vec<f32>,
 }
 
 impl Prolonging {
     pub fn new(n: usize) -> Self {
         let [smooth, blacks, ties, on_edges, corners] = std::array::from_fn(|_| Ring::new(n));
-        Self { smooth, blacks, ties, on_edges, corners, rounded: vec![0.0; n] }
+        Self { smooth, blacks, ties, on_edges, corners }
     }
 }
 
 /// [`prolong`] to the rows from `first_row` on.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-pub(super) fn prolong_rows<T: Real>(
+pub(super) fn prolong_rows(
     weights: &Weights,
-    b: &[T],
+    b: &[f32],
     coarse: &[f32],
     first_row: usize,
     rows: &mut Prolonging,
     x: &mut [f32],
 ) {
-    on_vectors!(weights.grid, [f32], prolong_rows_with::<T>(weights, b, coarse, first_row, rows, x));
+    on_vectors!(weights.grid, [f32], prolong_rows_with(weights, b, coarse, first_row, rows, x));
 }
 
 #[inline(always)]
-pub(super) fn prolong_rows_with<T: Real, V: Packed<Number = f32>>(
+pub(super) fn prolong_rows_with<V: Packed<Number = f32>>(
     weights: &Weights,
-    b: &[T],
+    b: &[f32],
     coarse: &[f32],
     first_row: usize,
     rows: &mut Prolonging,
@@ -65,9 +63,9 @@ pub(super) fn prolong_rows_with<T: Real, V: Packed<Number = f32>>(
     let (n, first) = (weights.grid.half(), first_row as isize);
     let end = first + (x.len() / n) as isize;
     for row in first - LEAD..end {
-        go_ahead::<T, V>(weights, b, coarse, row, rows);
+        go_ahead::<V>(weights, b, coarse, row, rows);
         if row >= first {
-            finish_row::<T, V>(weights, b, row, rows, &mut x[(row - first) as usize * n..][..n]);
+            finish_row::<V>(weights, b, row, rows, &mut x[(row - first) as usize * n..][..n]);
         }
     }
 }
@@ -77,16 +75,16 @@ pub(super) const LEAD: isize = 6;
 
 /// What goes ahead of `row`, so that it can be finished: called for one row after the other.
 #[inline(always)]
-pub(super) fn go_ahead<T: Real, V: Packed<Number = f32>>(
+pub(super) fn go_ahead<V: Packed<Number = f32>>(
     weights: &Weights,
-    b: &[T],
+    b: &[f32],
     coarse: &[f32],
     row: isize,
     rows: &mut Prolonging,
 ) {
     // Blacks between corners, one row further: the centres of an odd row need those of the row below.
     corners_to_blacks::<V>(weights, row + 3, coarse, rows);
-    smooth_and_correct::<T, V>(weights, b, row + 2, coarse, rows);
+    smooth_and_correct::<V>(weights, b, row + 2, coarse, rows);
     if weights.grid.contains(row + 1) {
         solve_blacks::<V>(weights, row + 1, weights.spans.at(row + 1), &rows.smooth, &mut rows.blacks);
     }
@@ -94,17 +92,19 @@ pub(super) fn go_ahead<T: Real, V: Packed<Number = f32>>(
 
 /// `D^-1 (b + N y)` of a row, `y` what [`smooth_and_correct`] left.
 #[inline(always)]
-pub(super) fn finish_row<T: Real, V: Packed<Number = f32>>(
+pub(super) fn finish_row<V: Packed<Number = f32>>(
     weights: &Weights,
-    b: &[T],
+    b: &[f32],
     row: isize,
     rows: &mut Prolonging,
     x: &mut [f32],
 ) {
     let (half, span) = (weights.grid.half(), weights.spans.at(row));
     let stencil = weights.red_stencil::<V>(row, span, rows.blacks.around(row));
-    let b = T::floats(&b[row as usize * half..][span.range()], &mut rows.rounded);
-    let (b, x) = (V::chunks(b, stencil.len()), V::chunks_mut(&mut x[span.range()], stencil.len()));
+    let (b, x) = (
+        V::chunks(&b[row as usize * half..][span.range()], stencil.len()),
+        V::chunks_mut(&mut x[span.range()], stencil.len()),
+    );
     for k in 0..stencil.len() {
         ((V::read(&b[k]) + stencil.sum(k)) * stencil.diagonal(k).inverse()).put(&mut x[k]);
     }
@@ -148,9 +148,9 @@ fn corners_to_blacks<V: Packed<Number = f32>>(weights: &Weights, row: isize, coa
 
 /// `D^-1 b` of a row, and the coarse grid: itself at corners, from the blacks around them at centres.
 #[inline(always)]
-fn smooth_and_correct<T: Real, V: Packed<Number = f32>>(
+fn smooth_and_correct<V: Packed<Number = f32>>(
     weights: &Weights,
-    b: &[T],
+    b: &[f32],
     row: isize,
     coarse: &[f32],
     rows: &mut Prolonging,
@@ -160,8 +160,8 @@ fn smooth_and_correct<T: Real, V: Packed<Number = f32>>(
     }
     let (half, span) = (weights.grid.half(), weights.spans.at(row));
     let n = span.vectors::<V>();
-    let Prolonging { smooth, ties, on_edges, rounded, .. } = rows;
-    let b = V::chunks(T::floats(&b[row as usize * half..][span.range()], rounded), n);
+    let Prolonging { smooth, ties, on_edges, .. } = rows;
+    let b = V::chunks(&b[row as usize * half..][span.range()], n);
     let out = V::chunks_mut(&mut smooth.row_mut(row)[span.start..], n);
     if row % 2 == 0 {
         let sides = weights.reds::<V>(row, span);

@@ -14,9 +14,9 @@ use crate::vector::Packed;
 ///
 /// Returns `<b, D^-1 b + D^-1 N D^-1 b>`, `N = D - S = W D_black^-1 W^T`: what the smoothing adds to `<b, x>` in a V-cycle. Each
 /// band is summed by itself: the same bits for any number of threads.
-pub(in crate::integrate) fn restrict<T: Real>(
+pub(in crate::integrate) fn restrict(
     weights: &Weights,
-    b: &[T],
+    b: &[f32],
     coarse_reds: &mut [f32],
     coarse_blacks: &mut [f32],
 ) -> f64 {
@@ -45,36 +45,33 @@ pub(super) struct Restricting {
     vertical: Ring<f32>,
     horizontal: Ring<f32>,
     ties: Ring<f32>,
-    /// The right side of a row.
-    rounded: Vec<f32>,
     coarse: Vec<f32>,
 }
 
 impl Restricting {
     pub fn new(n: usize) -> Self {
         let [smooth, blacks, corners, centres, vertical, horizontal, ties] = std::array::from_fn(|_| Ring::new(n));
-        let [rounded, coarse] = std::array::from_fn(|_| vec![0.0; n]);
-        Self { smooth, blacks, corners, centres, vertical, horizontal, ties, rounded, coarse }
+        Self { smooth, blacks, corners, centres, vertical, horizontal, ties, coarse: vec![0.0; n] }
     }
 }
 
 /// [`restrict`] to the corners of the rows from `first_row` on; an energy for each band.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-pub(super) fn restrict_rows<T: Real>(
+pub(super) fn restrict_rows(
     weights: &Weights,
-    b: &[T],
+    b: &[f32],
     first_row: usize,
     rows: &mut Restricting,
     coarse: [&mut [f32]; 2],
     energies: &mut [f64],
 ) {
-    on_vectors!(weights.grid, [f32], restrict_rows_with::<T>(weights, b, first_row, rows, coarse, energies));
+    on_vectors!(weights.grid, [f32], restrict_rows_with(weights, b, first_row, rows, coarse, energies));
 }
 
 #[inline(always)]
-pub(super) fn restrict_rows_with<T: Real, V: Packed<Number = f32>>(
+pub(super) fn restrict_rows_with<V: Packed<Number = f32>>(
     weights: &Weights,
-    b: &[T],
+    b: &[f32],
     first_row: usize,
     rows: &mut Restricting,
     [coarse_reds, coarse_blacks]: [&mut [f32]; 2],
@@ -91,7 +88,7 @@ pub(super) fn restrict_rows_with<T: Real, V: Packed<Number = f32>>(
         }
     };
     for row in first - 3..=end + 1 {
-        count(row, smooth::<T, V>(weights, b, row, rows));
+        count(row, smooth::<V>(weights, b, row, rows));
 
         let row = row - 1;
         if row < first - 2 {
@@ -125,12 +122,12 @@ pub(super) fn restrict_rows_with<T: Real, V: Packed<Number = f32>>(
 
 /// `D^-1 b` of a row; returns `<b, D^-1 b>`.
 #[inline(always)]
-fn smooth<T: Real, V: Packed<Number = f32>>(weights: &Weights, b: &[T], row: isize, rows: &mut Restricting) -> f64 {
+fn smooth<V: Packed<Number = f32>>(weights: &Weights, b: &[f32], row: isize, rows: &mut Restricting) -> f64 {
     if !weights.grid.contains(row) {
         return 0.0;
     }
     let span = weights.spans.at(row);
-    let b = T::floats(&b[row as usize * weights.grid.half()..][span.range()], &mut rows.rounded);
+    let b = &b[row as usize * weights.grid.half()..][span.range()];
     let sides = weights.reds::<V>(row, span);
     let (b, out) = (V::chunks(b, sides.len()), V::chunks_mut(&mut rows.smooth.row_mut(row)[span.start..], sides.len()));
     let mut energy = V::splat(0.0);
