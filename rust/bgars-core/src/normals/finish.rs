@@ -6,13 +6,12 @@ use super::confidence::HALF_DEG;
 use super::cutoff::{LANES, Lanes};
 use super::lane_solve::Careful;
 use super::out::Out;
-use super::symmetric::dot;
 use crate::vector::Vector;
 
 /// `n_z` below which `f32` cannot say whether a facet faces the camera.
 const GRAZING: f32 = 1e-5;
 
-/// Least `(rho n_z)^2` that leaves residuals and inverses in the normal range of `f32`, and one over the largest `|rho n|^2`.
+/// Least `rho^2` that leaves residuals and inverses in the normal range of `f32`, and one over the largest `|rho n|^2`.
 const MIN_SQUARE: f32 = 1e-30;
 
 /// The smallest float above zero.
@@ -23,12 +22,22 @@ const LEAST: f32 = f32::from_bits(1);
 pub(super) struct Facets<V> {
     /// `g = rho n`, by component.
     pub scaled: [V; 3],
+    /// `|g|^2`.
+    pub square: V,
     /// With the [prior](super::confidence::PRIOR_RESIDUAL).
     pub squared_residuals: V,
     /// `|g|^2 tr C - g^T C g`, `C` the inverse in use.
     pub turning: V,
-    /// How many lights were kept.
-    pub kept: V,
+    /// From [`freedom`].
+    pub freedom: V,
+}
+
+/// Degrees of freedom of the residuals of so many kept lights (see [`super::confidence`]), by the square of its half-way point.
+#[inline(always)]
+pub(super) fn freedom<V: Vector>(kept: V) -> V {
+    /// The square of the half-way point, radians.
+    const HALF2: f64 = (HALF_DEG * std::f64::consts::PI / 180.0) * (HALF_DEG * std::f64::consts::PI / 180.0);
+    kept.times_minus(V::splat(HALF2 as f32), V::splat((2.0 * HALF2) as f32))
 }
 
 /// Where the results of a block go.
@@ -85,40 +94,40 @@ impl Finished {
     /// Writes the pixels from `at` on to their place; facets seen from the side, and values far from 1, are left to the careful kernel.
     #[inline(always)]
     pub fn write<V: Vector>(&mut self, at: usize, facets: &Facets<V>, per_full_scale: f32, place: &mut Place<'_>) {
-        /// The square of the half-way point, radians.
-        const HALF2: f64 = (HALF_DEG * std::f64::consts::PI / 180.0) * (HALF_DEG * std::f64::consts::PI / 180.0);
         let zero = V::splat(0.0);
-        let [x, y, z] = facets.scaled;
-        let square = dot(facets.scaled, facets.scaled);
-        // Not seen from the side, and of a size whose square is in the range of floats; false for NaN.
-        let least = (V::splat(GRAZING * GRAZING) * square).at_least(V::splat(MIN_SQUARE));
-        let sound = V::both((z * z).is_over(least), V::splat(1.0 / MIN_SQUARE).is_over(square));
-        let faces = z.is_over(zero);
-        let usual = V::all(V::both(sound, faces));
+        let Facets { scaled: [x, y, z], square, squared_residuals, turning, freedom } = *facets;
+        let in_range = V::both(square.is_over(V::splat(MIN_SQUARE)), V::splat(1.0 / MIN_SQUARE).is_over(square));
         let mut length = square.root();
+        let mut inverse = V::splat(1.0) / length;
+        let mut n_z = z * inverse;
+        // All seen from the front, and of a size whose square is in the range of floats; false for NaN.
+        let usual = V::all(V::both(in_range, n_z.is_over(V::splat(GRAZING))));
+        let mut valid = all_bits::<V>();
         if !usual {
             let size = x.at_least(zero - x) + y.at_least(zero - y) + z.at_least(zero - z);
             let is_zero = V::bits(V::splat(LEAST).is_over(size));
-            self.careful |= (all_bits::<V>() & !(V::bits(sound) | is_zero)) << at;
+            let sound = V::bits(V::both(in_range, n_z.at_least(zero - n_z).is_over(V::splat(GRAZING))));
+            self.careful |= (all_bits::<V>() & !(sound | is_zero)) << at;
             // NaN spreads into everything that is computed from it.
-            length = V::pick(faces, length, V::splat(f32::NAN));
+            let (faces, nan) = (z.is_over(zero), V::splat(f32::NAN));
+            (length, inverse, n_z) =
+                (V::pick(faces, length, nan), V::pick(faces, inverse, nan), V::pick(faces, n_z, nan));
+            valid = V::bits(faces);
         }
-        let inverse = V::splat(1.0) / length;
         let inverse2 = inverse * inverse;
         let streamed = place.streamed;
         let normals = &mut place.normals[3 * at..3 * (at + V::WIDTH)];
-        let [first, second, third] = V::interleaved([x * inverse, y * inverse, z * inverse]);
+        let [first, second, third] = V::interleaved([x * inverse, y * inverse, n_z]);
         put(first, normals, streamed);
         put(second, &mut normals[V::WIDTH..], streamed);
         put(third, &mut normals[2 * V::WIDTH..], streamed);
         put(length * V::splat(per_full_scale), &mut place.albedo[at..], streamed);
-        // See `confidence`: degrees of freedom by the squared half-way point, over themselves and the squared standard error.
-        let freedom = facets.kept.times_minus(V::splat(HALF2 as f32), V::splat((2.0 * HALF2) as f32));
-        let variance = facets.squared_residuals * inverse2;
-        let turning = facets.turning * inverse2;
-        let certainty = freedom / variance.times_plus(turning, freedom);
-        let (certainty, valid) =
-            if usual { (certainty, all_bits::<V>()) } else { (V::pick(faces, certainty, zero), V::bits(faces)) };
+        // See `confidence`: over themselves and the squared standard error.
+        let (variance, turning) = (squared_residuals * inverse2, turning * inverse2);
+        let mut certainty = freedom / variance.times_plus(turning, freedom);
+        if !usual {
+            certainty = V::pick(z.is_over(zero), certainty, zero);
+        }
         put(certainty, &mut place.confidence[at..], streamed);
         self.valid |= valid << at;
     }

@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::confidence::PRIOR_RESIDUAL;
 use super::cutoff::{LANES, Lanes, cutoffs};
-use super::finish::{Facets, Finished, Place, all_bits};
+use super::finish::{Facets, Finished, Place, all_bits, freedom};
 use super::kept::Kept;
 use super::robust_lanes::{self, RobustLanes};
 use super::symmetric::{ENTRIES, Form, Inverse, dot, form, inverse_row, outer};
@@ -166,10 +166,11 @@ fn solve_all<K: Pixel, V: Vector>(solver: &LaneSolver, readings: &Readings<'_, K
     };
     Facets {
         scaled,
+        square: dot(scaled, scaled),
         // |I|^2 - |L g|^2; what rounding leaves is far below the prior of 2 %.
         squared_residuals: solver.unexplained.added_to(squares, scaled),
         turning: solver.turning.added_to(V::splat(0.0), scaled),
-        kept: V::splat(readings.keys.len() as f32),
+        freedom: freedom(V::splat(readings.keys.len() as f32)),
     }
 }
 
@@ -232,10 +233,11 @@ fn solve_kept<K: Pixel, V: Vector>(
     let trace = inverse.entries[0] + inverse.entries[3] + inverse.entries[5];
     let facets = Facets {
         scaled,
+        square,
         squared_residuals: square
             .times_plus(V::splat((PRIOR_RESIDUAL * PRIOR_RESIDUAL) as f32), sums.squares - explained),
         turning: trace.times_minus(square, form(inverse.entries, scaled)),
-        kept: count,
+        freedom: freedom(count),
     };
     (facets, all_bits::<V>() & !usable)
 }
