@@ -38,7 +38,8 @@ def clearance_um(ball: bgars.Ball, point: np.ndarray, toward: np.ndarray) -> flo
     elevation_deg=st.floats(15.0, 85.0),
     azimuth_deg=st.floats(0.0, 360.0),
     near=st.booleans(),
-    height_um=st.floats(200.0, 580.0),
+    # The tallest ball of the least radius still stands on the board: 560 + 2.5 * 5 <= 2 * (300 - 2.5 * 5).
+    height_um=st.floats(200.0, 560.0),
 )
 def test_labels_heights_and_lit_masks(
     seed: int, rows: int, cols: int, elevation_deg: float, azimuth_deg: float, near: bool, height_um: float
