@@ -31,15 +31,15 @@ NORMAL_OPERATIONS = {
     "four sums over 8 lights": 64,
     "solution, its conditioning compared twice, squared residual": 15 + 2 + 5 + 3,
     "its square, a trace, a quadratic form, what turns the normal": 5 + 2 + 16 + 2,
-    "range, length, normal, albedo": 5 + 1 + 4 + 1,
+    "range, length, normal, albedo": 3 + 1 + 4 + 1,
     "confidence": 8,
 }
 """Of a pixel that loses a light; where a vector keeps all of them, the inverse falls away."""
 ITERATION_BYTES = {
-    "way up: weights, r, coarse solution and last p read, p and q written": 8 + 4 + 1 + 2 + 2 + 4,
-    "step of r, read and written, q read": 8 + 4,
+    "way up: weights, rounded r, coarse solution and last p read, p and q written": 8 + 2 + 1 + 2 + 2 + 4,
+    "step of r, read, written and written rounded, q read": 8 + 2 + 4,
     "every second time two steps of x, read and written, two p read": (8 + 2 + 2) // 2,
-    "restriction: weights and r read, coarse right side written": 8 + 4 + 1,
+    "restriction: weights and rounded r read, coarse right side written": 8 + 2 + 1,
     "coarser grids: 60 bytes for each of their pixels, a third as many": 20,
 }
 """Half the pixels are unknowns (float64: 4 bytes a pixel; float32: 2; the four float32 weights of an unknown: 8)."""

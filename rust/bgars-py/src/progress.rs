@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use pyo3::call::PyCallArgs;
 use pyo3::prelude::*;
+use rayon::{Scope, ThreadPool};
 
 use crate::errors::{InputError, to_python};
 
@@ -34,20 +35,16 @@ where
         *state.lock().unwrap_or_else(PoisonError::into_inner) = Some(arguments);
         if cancelled.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let mut raised = None;
-    let outcome = py.detach(|| {
-        std::thread::scope(|scope| {
+    let (mut raised, mut outcome) = (None, None);
+    py.detach(|| {
+        in_scope(pool.as_ref(), |scope| {
             let (sender, receiver) = channel();
-            let run = move || match &pool {
-                Some(pool) => pool.install(|| work(&mut report)),
-                // On a thread of the pool: from outside, each parallel loop would wake it up anew.
-                None => rayon::scope(|_| work(&mut report)),
-            };
-            let worker = scope.spawn(move || {
-                let outcome = run();
+            let outcome = &mut outcome;
+            // On a thread of the pool: from outside, each parallel loop would wake it up anew.
+            scope.spawn(move |_| {
+                *outcome = Some(work(&mut report));
                 // The receiver waits until the sender is gone, whatever it sent.
                 drop(sender);
-                outcome
             });
             while receiver.recv_timeout(INTERVAL) == Err::<(), _>(RecvTimeoutError::Timeout) {
                 let arguments = state.lock().unwrap_or_else(PoisonError::into_inner).take();
@@ -59,12 +56,12 @@ where
                     raised = Some(error);
                 }
             }
-            worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-        })
+        });
     });
     match raised {
         Some(error) => Err(error),
-        None => outcome.map_err(to_python),
+        // A panic of the work has gone on from its scope.
+        None => outcome.expect("the scope ends after the work").map_err(to_python),
     }
 }
 
@@ -77,7 +74,15 @@ pub fn on_threads<T: Send>(
     watched::<T, (f64,), _>(py, threads, None, |_| work())
 }
 
-fn pool(threads: i64) -> PyResult<rayon::ThreadPool> {
+/// Runs `op` on this thread, and what it spawns on threads of the pool, of the common one where there is none.
+fn in_scope<'scope>(pool: Option<&ThreadPool>, op: impl FnOnce(&Scope<'scope>) + 'scope) {
+    match pool {
+        Some(pool) => pool.in_place_scope(op),
+        None => rayon::in_place_scope(op),
+    }
+}
+
+fn pool(threads: i64) -> PyResult<ThreadPool> {
     let Some(count) = usize::try_from(threads).ok().filter(|&count| (1..=MAX_THREADS).contains(&count)) else {
         return Err(InputError::new_err(format!("threads: must be 1 to {MAX_THREADS}, got {threads}")));
     };

@@ -33,9 +33,9 @@ pub(super) fn settle(weights: &Weights, right: &Colours, reds: &[f64], blacks: &
         .enumerate()
         .map_init(rows, |rows, (band, (blacks, left))| {
             let span = weights.spans.band(band);
-            if span.end - span.start < half {
-                blacks.fill(0.0);
-                left.fill(0.0);
+            for row in blacks.chunks_mut(half).chain(left.chunks_mut(half)) {
+                row[..span.start].fill(0.0);
+                row[span.end..].fill(0.0);
             }
             settle_band(weights, right, reds, band, rows, [blacks, left])
         })

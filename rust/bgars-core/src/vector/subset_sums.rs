@@ -9,13 +9,18 @@ pub struct SubsetSums<const ENTRIES: usize> {
     /// For each three elements and each entry: the sums by the bits of the subset. A register of AVX2 holds such a table.
     pub(super) of_three: [[[f32; 8]; ENTRIES]; BYTE_BITS.div_ceil(3)],
     /// The same for each four elements; a register of AVX-512 holds such a table.
+    #[cfg(target_arch = "x86_64")]
     pub(super) of_four: [[[f32; 16]; ENTRIES]; BYTE_BITS / 4],
 }
 
 impl<const ENTRIES: usize> SubsetSums<ENTRIES> {
     /// Tables of up to eight elements.
     pub fn new(elements: &[[f32; ENTRIES]]) -> Self {
-        Self { of_three: tables(elements), of_four: tables(elements) }
+        Self {
+            of_three: tables(elements),
+            #[cfg(target_arch = "x86_64")]
+            of_four: tables(elements),
+        }
     }
 }
 
