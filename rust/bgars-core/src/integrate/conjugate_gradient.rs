@@ -3,8 +3,6 @@
 //! Written out here for its memory traffic: the sums ride along with the passes that make their vectors, and every pass runs on
 //! all threads. faer's solver, with which the tests compare it, does its vector work on one thread and in passes of its own.
 
-use std::ops::Range;
-
 use multiversion::multiversion;
 use rayon::prelude::*;
 
@@ -119,14 +117,14 @@ fn round(r: &[f64], rounded: &mut [f32]) {
 /// `r -= alpha q` along the spans of the grid, also rounded; returns `<r, r>`, each band summed by itself.
 fn subtract(weights: &Weights, (alpha, q): (f64, &[f64]), r: &mut [f64], rounded: &mut [f32]) -> f64 {
     let chunk = BAND_ROWS * weights.grid.half();
-    let bands =
-        (r.par_chunks_mut(chunk), rounded.par_chunks_mut(chunk), q.par_chunks(chunk)).into_par_iter().enumerate();
-    let of_band = |(band, (r, rounded, q)): (usize, (&mut [f64], &mut [f32], &[f64]))| -> f64 {
-        let part_of =
-            |part: Range<usize>| subtract_part((alpha, &q[part.clone()]), &mut r[part.clone()], &mut rounded[part]);
-        weights.spans.parts(band).map(part_of).sum()
-    };
-    let squares: Vec<f64> = bands.map(of_band).collect();
+    let squares: Vec<f64> = (r.par_chunks_mut(chunk), rounded.par_chunks_mut(chunk), q.par_chunks(chunk))
+        .into_par_iter()
+        .enumerate()
+        .map(|(band, (r, rounded, q))| {
+            let parts = weights.spans.parts(band);
+            parts.map(|part| subtract_part((alpha, &q[part.clone()]), &mut r[part.clone()], &mut rounded[part])).sum()
+        })
+        .collect();
     squares.iter().sum()
 }
 
