@@ -205,7 +205,7 @@ def integrate_normals(
         vectors, valid = normals.normals, normals.mask
         pixel_pitch_um = normals.pixel_pitch_um if pixel_pitch_um is None else pixel_pitch_um
     else:
-        vectors, valid = normal_array(normals, mask)
+        vectors, valid = normal_array(normals, mask, threads)
     check_pitch(pixel_pitch_um)
     use = used_pixels(valid, mask)
     trust = edge_trust(normals, weights, use)

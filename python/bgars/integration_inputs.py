@@ -92,7 +92,7 @@ def plain(values: ArrayLike, dtype: DTypeLike) -> NDArray[Any]:
     return np.require(values, dtype, ["C", "A"])
 
 
-def normal_array(normals: ArrayLike, mask: ArrayLike | None) -> tuple[FloatArray, BoolArray]:
+def normal_array(normals: ArrayLike, mask: ArrayLike | None, threads: int | None) -> tuple[FloatArray, BoolArray]:
     """Return plain normals and where they can be integrated: where the mask says, if there is one."""
     vectors = _numbers("normals", normals)
     if vectors.ndim != NORMALS_NDIM or vectors.shape[2] != NORMALS_NDIM:
@@ -100,7 +100,7 @@ def normal_array(normals: ArrayLike, mask: ArrayLike | None) -> tuple[FloatArray
         raise InputError(msg)
     if mask is not None:
         return vectors, _bool_mask(mask, vectors.shape[:2])
-    return vectors, _bgars.usable_normals(vectors)
+    return vectors, _bgars.usable_normals(vectors, threads=threads)
 
 
 def used_pixels(valid: BoolArray, mask: ArrayLike | None) -> BoolArray:

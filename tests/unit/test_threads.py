@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import subprocess
 import sys
@@ -128,6 +129,53 @@ def test_reading_and_triangulating_take_a_number_of_threads() -> None:
     surface = bgars.HeightMap.from_array(np.random.default_rng(3).normal(size=(90, 70)))
     one, two = (bgars.mesh_from_height(surface, threads=threads).faces for threads in (1, 2))
     np.testing.assert_array_equal(one, two)
+
+
+PLACES = """
+import json, os, subprocess, sys, threading, time
+import numpy as np, bgars
+
+def places():
+    return {int(task): os.sched_getaffinity(int(task)) for task in os.listdir("/proc/self/task")}
+
+def placed_by(call, seen):
+    call()
+    return [sorted(place) for task, place in places().items() if task not in seen]
+
+def facing(size):
+    return np.broadcast_to(np.float32([0, 0, 1]), (size, size, 3))
+
+seen = places()
+tried = 0
+while True:  # another process may want the processors just now
+    quiet = placed_by(lambda: bgars.integrate_normals(facing(16)), seen)
+    if len(set(map(tuple, quiet))) > 1 or tried == 100:
+        break
+    tried += 1
+    time.sleep(0.1)
+busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2 * os.cpu_count())]
+try:
+    crowded = placed_by(lambda: bgars.integrate_normals(facing(1500)), seen)
+finally:
+    for process in busy:
+        process.kill()
+print(json.dumps([quiet, crowded, sorted(os.sched_getaffinity(0))]))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux" or (os.cpu_count() or 1) < 2, reason="needs Linux and two processors")
+def test_threads_keep_to_processors_of_their_own_until_others_want_them() -> None:
+    run = subprocess.run(
+        [sys.executable, "-c", PLACES],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={name: value for name, value in os.environ.items() if name != "RAYON_NUM_THREADS"},
+    )
+    quiet, crowded, allowed = json.loads(run.stdout)
+    assert len(quiet) == len(allowed)
+    assert sorted(place for places in quiet for place in places) == allowed, "each processor is one thread's"
+    assert crowded == [allowed] * len(allowed)
 
 
 @pytest.mark.parametrize("threads", [0, -1, 1 << 40])

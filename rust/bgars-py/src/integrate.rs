@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 
 use crate::convert::{array2, slice_mut, slice2, slice3};
 use crate::errors::InputError;
-use crate::progress::watched;
+use crate::progress::{on_threads, watched};
 
 /// components (pixels, first row, first column), iterations, residual.
 type Found = (Vec<(usize, usize, usize)>, usize, f64);
@@ -53,13 +53,15 @@ pub fn integrate_normals<'py>(
 }
 
 #[pyfunction]
+#[pyo3(signature = (normals, *, threads))]
 #[allow(clippy::needless_pass_by_value)]
 pub fn usable_normals<'py>(
     py: Python<'py>,
     normals: PyReadonlyArray3<'py, f32>,
+    threads: Option<i64>,
 ) -> PyResult<Bound<'py, PyArray2<bool>>> {
     let shape = [normals.shape()[0], normals.shape()[1]];
     let normals = slice3(&normals, "normals")?;
-    let mask = py.detach(|| usable(normals));
+    let mask = on_threads(py, threads, || Ok(usable(normals)))?;
     array2(py, mask, shape)
 }

@@ -9,6 +9,9 @@ mod files;
 mod integrate;
 mod mesh;
 mod normals;
+#[cfg_attr(not(target_os = "linux"), path = "places_elsewhere.rs")]
+mod places;
+mod pool;
 mod progress;
 mod reflectance;
 mod rims;

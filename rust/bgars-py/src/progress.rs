@@ -8,15 +8,15 @@ use std::time::Duration;
 
 use pyo3::call::PyCallArgs;
 use pyo3::prelude::*;
-use rayon::{Scope, ThreadPool};
 
-use crate::errors::{InputError, to_python};
-
-/// Most threads that an argument may ask for.
-const MAX_THREADS: usize = 1024;
+use crate::errors::to_python;
+use crate::pool::Pool;
 
 /// Time between two looks at Python.
 const INTERVAL: Duration = Duration::from_millis(100);
+
+/// Time to the first look at where the threads run; each of the next ones comes after twice as long.
+const FIRST_WAIT: Duration = Duration::from_millis(2);
 
 /// Runs `work` without the GIL, on at most `threads` threads (`None`: as many as `RAYON_NUM_THREADS` says, else one a core).
 ///
@@ -28,7 +28,7 @@ where
     A: for<'py> PyCallArgs<'py> + Send,
     W: FnOnce(&mut dyn FnMut(A) -> ControlFlow<()>) -> bgars_core::Result<T> + Send,
 {
-    let pool = threads.map(pool).transpose()?;
+    let pool = Pool::new(threads)?;
     let cancelled = AtomicBool::new(false);
     let state = Mutex::new(None);
     let mut report = |arguments: A| {
@@ -37,7 +37,7 @@ where
     };
     let (mut raised, mut outcome) = (None, None);
     py.detach(|| {
-        in_scope(pool.as_ref(), |scope| {
+        pool.in_scope(|scope| {
             let (sender, receiver) = channel();
             let outcome = &mut outcome;
             // On a thread of the pool: from outside, each parallel loop would wake it up anew.
@@ -46,7 +46,14 @@ where
                 // The receiver waits until the sender is gone, whatever it sent.
                 drop(sender);
             });
-            while receiver.recv_timeout(INTERVAL) == Err::<(), _>(RecvTimeoutError::Timeout) {
+            let mut wait = FIRST_WAIT;
+            while receiver.recv_timeout(wait) == Err::<(), _>(RecvTimeoutError::Timeout) {
+                if wait < INTERVAL {
+                    pool.look();
+                    wait = (2 * wait).min(INTERVAL);
+                    continue;
+                }
+                pool.free();
                 let arguments = state.lock().unwrap_or_else(PoisonError::into_inner).take();
                 // After an exception the work only has to end: nobody is told of its progress any more.
                 if raised.is_none()
@@ -72,24 +79,6 @@ pub fn on_threads<T: Send>(
     work: impl FnOnce() -> bgars_core::Result<T> + Send,
 ) -> PyResult<T> {
     watched::<T, (f64,), _>(py, threads, None, |_| work())
-}
-
-/// Runs `op` on this thread, and what it spawns on threads of the pool, of the common one where there is none.
-fn in_scope<'scope>(pool: Option<&ThreadPool>, op: impl FnOnce(&Scope<'scope>) + 'scope) {
-    match pool {
-        Some(pool) => pool.in_place_scope(op),
-        None => rayon::in_place_scope(op),
-    }
-}
-
-fn pool(threads: i64) -> PyResult<ThreadPool> {
-    let Some(count) = usize::try_from(threads).ok().filter(|&count| (1..=MAX_THREADS).contains(&count)) else {
-        return Err(InputError::new_err(format!("threads: must be 1 to {MAX_THREADS}, got {threads}")));
-    };
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(count)
-        .build()
-        .map_err(|error| InputError::new_err(format!("threads: cannot start {threads} of them: {error}")))
 }
 
 fn look_at_python<A: for<'py> PyCallArgs<'py>>(callback: Option<&Py<PyAny>>, arguments: Option<A>) -> PyResult<()> {

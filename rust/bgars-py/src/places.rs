@@ -1,0 +1,141 @@
+//! On which processors the threads of a pool run.
+//!
+//! The kernel of a virtual machine may take processors that rest for some that its host has lent to others. Threads that wake
+//! up are put on one processor together then, and share it for a hundredth of a second: longer than most calls. So each is
+//! kept to processors of its own, until somebody else wants these too: a thread that waits for its turn on a processor
+//! holds up the others at every step.
+
+use std::fs;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use rustix::thread::{CpuSet, Pid, gettid, sched_getaffinity, sched_setaffinity};
+
+/// How long the threads run wherever they may after others have wanted their processors.
+const FREE: Duration = Duration::from_secs(1);
+
+/// Where the threads of a pool run.
+#[derive(Default)]
+pub struct Places(Mutex<State>);
+
+#[derive(Default)]
+struct State {
+    threads: Vec<Thread>,
+    /// Among how many the processors are shared out; `None` while every thread runs wherever it may.
+    shares: Option<usize>,
+    /// Whether the last look saw others that want the processors.
+    seen_crowded: bool,
+    /// When the threads were last let go for that.
+    crowded: Option<Instant>,
+}
+
+struct Thread {
+    id: Pid,
+    /// Its number in the pool.
+    index: usize,
+    /// While it is kept to a share of the processors: that share, and those that it may run on otherwise.
+    kept: Option<[CpuSet; 2]>,
+}
+
+impl Places {
+    /// To be called once by each thread of the pool, with its number.
+    pub fn enter(&self, index: usize) {
+        self.with(|state| {
+            let mut thread = Thread { id: gettid(), index, kept: None };
+            thread.place(state.shares);
+            state.threads.push(thread);
+        });
+    }
+
+    /// Keeps each of `count` threads to its share of the processors, unless others want these.
+    pub fn part(&self, count: usize) {
+        self.with(|state| {
+            let crowded = state.crowded.is_some_and(|seen| seen.elapsed() < FREE);
+            state.seen_crowded = false;
+            let apart = !crowded && (2..=allowed().count() as usize).contains(&count);
+            state.place(apart.then_some(count));
+        });
+    }
+
+    /// Lets the threads run wherever they may if others want their processors; to be called now and then while they work.
+    pub fn look(&self) {
+        // This thread, that runs only to look, is one of those that want one.
+        let crowded = running().is_some_and(|running| running > allowed().count() as usize + 1);
+        self.with(|state| {
+            // Once is nothing: whoever called may not have had the time yet to lie down.
+            if crowded && state.seen_crowded {
+                state.crowded = Some(Instant::now());
+                state.place(None);
+            }
+            state.seen_crowded = crowded;
+        });
+    }
+
+    /// Lets the threads run wherever they may.
+    pub fn free(&self) {
+        self.with(|state| state.place(None));
+    }
+
+    fn with(&self, act: impl FnOnce(&mut State)) {
+        act(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+}
+
+impl State {
+    fn place(&mut self, shares: Option<usize>) {
+        if self.shares != shares {
+            self.shares = shares;
+            self.threads.iter_mut().for_each(|thread| thread.place(shares));
+        }
+    }
+}
+
+impl Thread {
+    /// Where the system refuses, the thread stays as it is.
+    fn place(&mut self, shares: Option<usize>) {
+        match (shares, self.kept) {
+            (Some(shares), None) => {
+                if let Ok(allowed) = sched_getaffinity(Some(self.id)) {
+                    let share = share(&allowed, self.index, shares);
+                    self.kept = sched_setaffinity(Some(self.id), &share).is_ok().then_some([share, allowed]);
+                }
+            }
+            (None, Some([share, allowed])) => {
+                // Somebody else may have placed it meanwhile.
+                if sched_getaffinity(Some(self.id)).is_ok_and(|now| now == share) {
+                    let _ = sched_setaffinity(Some(self.id), &allowed);
+                }
+                self.kept = None;
+            }
+            // As it is already: the threads of a pool do not change in number.
+            (Some(_), Some(_)) | (None, None) => {}
+        }
+    }
+}
+
+/// Share `index` of so many: every so manieth of the processors.
+fn share(allowed: &CpuSet, index: usize, shares: usize) -> CpuSet {
+    let processors: Vec<usize> = numbers(allowed).collect();
+    let shares = shares.min(processors.len()).max(1);
+    let mut share = CpuSet::new();
+    for &processor in processors.iter().skip(index % shares).step_by(shares) {
+        share.set(processor);
+    }
+    share
+}
+
+/// How many threads of the machine run or want to; `None` where the system does not say.
+fn running() -> Option<usize> {
+    // The fourth word of "0.20 0.18 0.12 1/80 11206".
+    let load = fs::read_to_string("/proc/loadavg").ok()?;
+    load.split(' ').nth(3)?.split('/').next()?.parse().ok()
+}
+
+/// The processors that this thread may run on.
+fn allowed() -> CpuSet {
+    sched_getaffinity(None).unwrap_or_default()
+}
+
+fn numbers(processors: &CpuSet) -> impl Iterator<Item = usize> {
+    (0..CpuSet::MAX_CPU).filter(|&processor| processors.is_set(processor))
+}

@@ -1,0 +1,72 @@
+//! The threads that work: the common ones of the process, or those that a call asks for.
+
+use std::sync::{Arc, LazyLock, Once};
+
+use pyo3::prelude::*;
+use rayon::{Scope, ThreadPool, ThreadPoolBuilder};
+
+use crate::errors::InputError;
+use crate::places::Places;
+
+/// Most threads that an argument may ask for.
+const MAX_THREADS: usize = 1024;
+
+/// Threads for a call.
+pub struct Pool {
+    /// `None`: the common ones.
+    own: Option<ThreadPool>,
+    /// Where its threads run.
+    places: Arc<Places>,
+}
+
+impl Pool {
+    /// As many threads as asked for; `None`: the common ones, as many as `RAYON_NUM_THREADS` says, else one a core.
+    ///
+    /// # Errors
+    /// A number that cannot be had.
+    pub fn new(threads: Option<i64>) -> PyResult<Self> {
+        let Some(threads) = threads else { return Ok(Self::common()) };
+        let Some(count) = usize::try_from(threads).ok().filter(|count| (1..=MAX_THREADS).contains(count)) else {
+            return Err(InputError::new_err(format!("threads: must be 1 to {MAX_THREADS}, got {threads}")));
+        };
+        let places = Arc::default();
+        let own = builder(&places)
+            .num_threads(count)
+            .build()
+            .map_err(|error| InputError::new_err(format!("threads: cannot start {threads} of them: {error}")))?;
+        Ok(Self { own: Some(own), places })
+    }
+
+    fn common() -> Self {
+        static PLACES: LazyLock<Arc<Places>> = LazyLock::new(Arc::default);
+        static START: Once = Once::new();
+        START.call_once(|| drop(builder(&PLACES).build_global()));
+        Self { own: None, places: Arc::clone(&PLACES) }
+    }
+
+    /// Runs `op` on this thread, and what it spawns on threads of the pool, each on processors of its own unless others want these.
+    pub fn in_scope<'scope>(&self, op: impl FnOnce(&Scope<'scope>) + 'scope) {
+        let count = self.own.as_ref().map_or_else(rayon::current_num_threads, ThreadPool::current_num_threads);
+        self.places.part(count);
+        match &self.own {
+            Some(pool) => pool.in_place_scope(op),
+            None => rayon::in_place_scope(op),
+        }
+    }
+
+    /// Lets the threads run wherever they may if others want their processors; to be called now and then during a call.
+    pub fn look(&self) {
+        self.places.look();
+    }
+
+    /// Lets the threads run wherever they may, for the rest of a long call.
+    pub fn free(&self) {
+        self.places.free();
+    }
+}
+
+/// Of threads whose places are known.
+fn builder(places: &Arc<Places>) -> ThreadPoolBuilder {
+    let places = Arc::clone(places);
+    ThreadPoolBuilder::new().start_handler(move |index| places.enter(index))
+}
