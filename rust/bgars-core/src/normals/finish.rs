@@ -79,6 +79,9 @@ impl Spare {
 
 /// What is still to be written of a block of pixels.
 pub(super) struct Finished {
+    /// True where every pixel keeps all lights.
+    pub keep_all: bool,
+    /// How many lights each pixel keeps, where not all do.
     pub kept: Lanes<u16>,
     /// Bit k is set where pixel k has a solution.
     pub valid: u64,
@@ -88,7 +91,7 @@ pub(super) struct Finished {
 
 impl Finished {
     pub fn new() -> Self {
-        Self { kept: [0; LANES], valid: 0, careful: 0 }
+        Self { keep_all: true, kept: [0; LANES], valid: 0, careful: 0 }
     }
 
     /// Writes the pixels from `at` on to their place; facets seen from the side, and values far from 1, are left to the careful kernel.

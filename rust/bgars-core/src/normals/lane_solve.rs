@@ -109,9 +109,7 @@ pub(super) fn solve<K: Pixel, V: Vector>(
 ) {
     let Readings { keys, clipped, offset } = *readings;
     (out.careful, out.valid) = (0, 0);
-    out.kept = [keys.len() as u16; LANES];
-    // Whether every pixel of the block keeps all of them.
-    let mut all = true;
+    out.keep_all = true;
     match &solver.choice {
         Choice::All => {}
         Choice::UpToGap(gap) => {
@@ -120,7 +118,7 @@ pub(super) fn solve<K: Pixel, V: Vector>(
                 kept.keep_all();
             } else {
                 kept.choose(keys, &cutoffs.largest);
-                (out.kept, all) = (kept.counts(keys.len()), false);
+                (out.kept, out.keep_all) = (kept.counts(keys.len()), false);
             }
         }
         Choice::Window(robust) => {
@@ -133,12 +131,12 @@ pub(super) fn solve<K: Pixel, V: Vector>(
             }
             out.careful = robust_lanes::choose(robust, &solver.directions, &values, clipped, &mut bits);
             kept.choose_bits(keys, bits);
-            (out.kept, all) = (kept.counts(keys.len()), false);
+            (out.kept, out.keep_all) = (kept.counts(keys.len()), false);
         }
     }
     for step in 0..LANES / V::WIDTH {
         let at = step * V::WIDTH;
-        let facets = if all || kept.are_whole(keys.len(), at, V::WIDTH) {
+        let facets = if out.keep_all || kept.are_whole(keys.len(), at, V::WIDTH) {
             solve_all::<K, V>(solver, readings, at)
         } else {
             let count = V::from_words(&out.kept[at..]);

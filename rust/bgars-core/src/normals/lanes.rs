@@ -163,6 +163,7 @@ fn run_blocks_with<K: Pixel, V: Vector>(
     let mut offset = [0.0; LANES];
     let mut clipped = [0; LANES];
     let mut finished = Finished::new();
+    let all_lights = [lights as u16; LANES];
     let per_full_scale = 1.0 / full_scale;
     sink.out.streamed &= V::STREAMS;
     for (number, first) in pixels.clone().step_by(LANES).enumerate() {
@@ -211,7 +212,7 @@ fn run_blocks_with<K: Pixel, V: Vector>(
         if let Some(spare) = &spare {
             spare.copy_to(&span, sink.out);
         }
-        write(&finished, used, span.clone(), sink.out);
+        write(&finished, &all_lights, used, span.clone(), sink.out);
         if !sink.out.kept_sets.is_empty() {
             write_sets(&kept, used, span, sink.out);
         }
@@ -230,16 +231,20 @@ fn run_blocks_with<K: Pixel, V: Vector>(
 
 /// Mask and counts of a block, and what its unused pixels say.
 #[inline(always)]
-fn write(finished: &Finished, used: Option<&[bool]>, span: Range<usize>, out: &mut Out<'_>) {
+fn write(finished: &Finished, all_lights: &Lanes<u16>, used: Option<&[bool]>, span: Range<usize>, out: &mut Out<'_>) {
+    static ALL_VALID: Lanes<bool> = [true; LANES];
+    let spread;
     // Nearly always all of them, and then nothing has to be spread.
     let valid = if finished.valid == u64::MAX {
-        [true; LANES]
+        &ALL_VALID
     } else {
-        std::array::from_fn(|lane| finished.valid >> lane & 1 == 1)
+        spread = std::array::from_fn(|lane| finished.valid >> lane & 1 == 1);
+        &spread
     };
-    store(&finished.kept, &mut out.lights_kept[span.clone()], out.streamed);
-    store(&valid, &mut out.mask[span.clone()], out.streamed);
-    store(&valid, &mut out.measured[span.clone()], out.streamed);
+    let kept = if finished.keep_all { all_lights } else { &finished.kept };
+    store(kept, &mut out.lights_kept[span.clone()], out.streamed);
+    store(valid, &mut out.mask[span.clone()], out.streamed);
+    store(valid, &mut out.measured[span.clone()], out.streamed);
     if let Some(used) = used {
         for (lane, _) in used.iter().enumerate().filter(|(_, used)| !**used) {
             out.clear(span.start + lane..span.start + lane + 1);
