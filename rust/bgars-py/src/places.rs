@@ -59,8 +59,8 @@ impl Places {
 
     /// Lets the threads run wherever they may if others want their processors; to be called now and then while they work.
     pub fn look(&self) {
-        // This thread, that runs only to look, is one of those that want one.
-        let crowded = running().is_some_and(|running| running > allowed().count() as usize + 1);
+        // This thread, that runs only to look, is one of those that want one. Not to know is to be careful.
+        let crowded = running().is_none_or(|running| running > allowed().count() as usize + 1);
         self.with(|state| {
             // Once is nothing: whoever called may not have had the time yet to lie down.
             if crowded && state.seen_crowded {
