@@ -145,7 +145,7 @@ def placed_by(call, seen):
 def facing(size):
     return np.broadcast_to(np.float32([0, 0, 1]), (size, size, 3))
 
-seen = places()
+allowed, seen = sorted(os.sched_getaffinity(0)), places()
 tried = 0
 while True:  # another process may want the processors just now
     quiet = placed_by(lambda: bgars.integrate_normals(facing(16)), seen)
@@ -153,13 +153,18 @@ while True:  # another process may want the processors just now
         break
     tried += 1
     time.sleep(0.1)
+for task in places():  # as taskset -a does
+    os.sched_setaffinity(task, quiet[0])
+placed = placed_by(lambda: bgars.integrate_normals(facing(1500)), seen)
+for task in places():
+    os.sched_setaffinity(task, allowed)
 busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2 * os.cpu_count())]
 try:
     crowded = placed_by(lambda: bgars.integrate_normals(facing(1500)), seen)
 finally:
     for process in busy:
         process.kill()
-print(json.dumps([quiet, crowded, sorted(os.sched_getaffinity(0))]))
+print(json.dumps([quiet, placed, crowded, allowed]))
 """
 
 
@@ -174,8 +179,9 @@ def test_threads_keep_to_processors_of_their_own_until_others_want_them() -> Non
         check=True,
         env={name: value for name, value in os.environ.items() if name != "RAYON_NUM_THREADS"},
     )
-    quiet, crowded, allowed = json.loads(run.stdout)
+    quiet, placed, crowded, allowed = json.loads(run.stdout)
     assert sorted(place for places in quiet for place in places) == allowed, "each processor is one thread's"
+    assert placed == [quiet[0]] * len(quiet), "where somebody else has put them, they stay"
     assert crowded == [allowed] * len(quiet)
 
 

@@ -5,9 +5,9 @@
 //! kept to processors of its own, until somebody else wants these too: a thread that waits for its turn on a processor
 //! holds up the others at every step.
 
-use std::fs;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
+use std::{fs, process};
 
 use rustix::thread::{CpuSet, Pid, gettid, sched_getaffinity, sched_setaffinity};
 
@@ -21,6 +21,8 @@ pub struct Places(Mutex<State>);
 #[derive(Default)]
 struct State {
     threads: Vec<Thread>,
+    /// Whose threads they are: a fork has none of them.
+    process: Option<u32>,
     /// Among how many the processors are shared out; `None` while every thread runs wherever it may.
     shares: Option<usize>,
     /// Whether the last look saw others that want the processors.
@@ -42,7 +44,8 @@ impl Places {
     pub fn enter(&self, index: usize) {
         self.with(|state| {
             let mut thread = Thread { id: gettid(), index, kept: None };
-            thread.place(state.shares);
+            state.process = Some(process::id());
+            thread.keep(state.shares);
             state.threads.push(thread);
         });
     }
@@ -83,33 +86,37 @@ impl Places {
 
 impl State {
     fn place(&mut self, shares: Option<usize>) {
-        if self.shares != shares {
-            self.shares = shares;
-            self.threads.iter_mut().for_each(|thread| thread.place(shares));
+        if self.shares == shares || self.process.is_some_and(|owner| owner != process::id()) {
+            return;
+        }
+        self.shares = shares;
+        if shares.is_some() {
+            self.threads.iter_mut().for_each(|thread| thread.keep(shares));
+            return;
+        }
+        // Where somebody else has placed one of them meanwhile, that holds for all.
+        let all_kept = self.threads.iter().all(Thread::is_where_kept);
+        for thread in &mut self.threads {
+            if let Some([_, allowed]) = thread.kept.take()
+                && all_kept
+            {
+                let _ = sched_setaffinity(Some(thread.id), &allowed);
+            }
         }
     }
 }
 
 impl Thread {
-    /// Where the system refuses, the thread stays as it is.
-    fn place(&mut self, shares: Option<usize>) {
-        match (shares, self.kept) {
-            (Some(shares), None) => {
-                if let Ok(allowed) = sched_getaffinity(Some(self.id)) {
-                    let share = share(&allowed, self.index, shares);
-                    self.kept = sched_setaffinity(Some(self.id), &share).is_ok().then_some([share, allowed]);
-                }
-            }
-            (None, Some([share, allowed])) => {
-                // Somebody else may have placed it meanwhile.
-                if sched_getaffinity(Some(self.id)).is_ok_and(|now| now == share) {
-                    let _ = sched_setaffinity(Some(self.id), &allowed);
-                }
-                self.kept = None;
-            }
-            // As it is already: the threads of a pool do not change in number.
-            (Some(_), Some(_)) | (None, None) => {}
+    /// Keeps it to its share of so many; where the system refuses, it stays as it is.
+    fn keep(&mut self, shares: Option<usize>) {
+        if let (Some(shares), Ok(allowed)) = (shares, sched_getaffinity(Some(self.id))) {
+            let share = share(&allowed, self.index, shares);
+            self.kept = sched_setaffinity(Some(self.id), &share).is_ok().then_some([share, allowed]);
         }
+    }
+
+    fn is_where_kept(&self) -> bool {
+        self.kept.is_none_or(|[share, _]| sched_getaffinity(Some(self.id)).is_ok_and(|now| now == share))
     }
 }
 

@@ -1,9 +1,9 @@
 //! The threads that work: the common ones of the process, or those that a call asks for.
 
-use std::sync::{Arc, LazyLock, Once};
+use std::sync::{Arc, LazyLock};
 
 use pyo3::prelude::*;
-use rayon::{Scope, ThreadPool, ThreadPoolBuilder};
+use rayon::{Scope, ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use crate::errors::InputError;
 use crate::places::Places;
@@ -25,7 +25,7 @@ impl Pool {
     /// # Errors
     /// A number that cannot be had.
     pub fn new(threads: Option<i64>) -> PyResult<Self> {
-        let Some(threads) = threads else { return Ok(Self::common()) };
+        let Some(threads) = threads else { return Self::common() };
         let Some(count) = usize::try_from(threads).ok().filter(|count| (1..=MAX_THREADS).contains(count)) else {
             return Err(InputError::new_err(format!("threads: must be 1 to {MAX_THREADS}, got {threads}")));
         };
@@ -37,11 +37,13 @@ impl Pool {
         Ok(Self { own: Some(own), places })
     }
 
-    fn common() -> Self {
+    fn common() -> PyResult<Self> {
         static PLACES: LazyLock<Arc<Places>> = LazyLock::new(Arc::default);
-        static START: Once = Once::new();
-        START.call_once(|| drop(builder(&PLACES).build_global()));
-        Self { own: None, places: Arc::clone(&PLACES) }
+        static STARTED: LazyLock<Result<(), ThreadPoolBuildError>> = LazyLock::new(|| builder(&PLACES).build_global());
+        if let Err(error) = &*STARTED {
+            return Err(InputError::new_err(format!("RAYON_NUM_THREADS: cannot start so many threads: {error}")));
+        }
+        Ok(Self { own: None, places: Arc::clone(&PLACES) })
     }
 
     /// Runs `op` on this thread, and what it spawns on threads of the pool, each on processors of its own unless others want these.
