@@ -93,3 +93,21 @@ def test_normals_under_rings_are_those_of_f64_to_two_ten_thousandths_of_a_degree
     found = field.normals[field.mask].astype(np.float64)
     angles = np.arctan2(np.linalg.norm(np.cross(exact, found), axis=-1), (exact * found).sum(axis=-1))
     assert np.degrees(angles).max() < 2e-4
+
+
+@pytest.mark.parametrize("rows", [3, 1100])  # the larger image's results are written past the caches
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+def test_counts_are_those_of_the_sets_where_blocks_that_keep_all_lie_among_others(rows: int, dtype: type) -> None:
+    rng = np.random.default_rng(7)
+    full = 1.0 if dtype is np.float32 else float(np.iinfo(dtype).max)
+    images = np.full((8, rows, 1000), 0.2)
+    with_highlights = np.repeat(rng.random((rows, 20)) < 0.5, 50, axis=1)
+    images[3, with_highlights & (rng.random((rows, 1000)) < 0.3)] = 1.0
+    stack = (images * full).astype(dtype)
+    field = bgars.estimate_normals(stack, bgars.LightRig.ring(8).directions, method="specular-filter", keep_sets=True)
+    assert field.kept_sets is not None
+    assert set(np.unique(field.lights_kept)) == {7, 8}
+    np.testing.assert_array_equal(field.lights_kept, np.where(images[3] == 1.0, 7, 8))
+    np.testing.assert_array_equal(field.kept_sets.sum(axis=-1), field.lights_kept)
+    assert field.mask.all()
+    assert field.measured.all()

@@ -158,7 +158,7 @@ for task in places():  # as taskset -a does
 placed = placed_by(lambda: bgars.integrate_normals(facing(1500)), seen)
 for task in places():
     os.sched_setaffinity(task, allowed)
-busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2 * os.cpu_count())]
+busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2 * len(allowed))]
 try:
     crowded = placed_by(lambda: bgars.integrate_normals(facing(1500)), seen)
 finally:

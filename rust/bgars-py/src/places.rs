@@ -45,7 +45,9 @@ impl Places {
         self.with(|state| {
             let mut thread = Thread { id: gettid(), index, kept: None };
             state.process = Some(process::id());
-            thread.keep(state.shares);
+            if let Some(shares) = state.shares {
+                thread.keep(shares);
+            }
             state.threads.push(thread);
         });
     }
@@ -90,7 +92,7 @@ impl State {
             return;
         }
         self.shares = shares;
-        if shares.is_some() {
+        if let Some(shares) = shares {
             self.threads.iter_mut().for_each(|thread| thread.keep(shares));
             return;
         }
@@ -108,8 +110,8 @@ impl State {
 
 impl Thread {
     /// Keeps it to its share of so many; where the system refuses, it stays as it is.
-    fn keep(&mut self, shares: Option<usize>) {
-        if let (Some(shares), Ok(allowed)) = (shares, sched_getaffinity(Some(self.id))) {
+    fn keep(&mut self, shares: usize) {
+        if let Ok(allowed) = sched_getaffinity(Some(self.id)) {
             let share = share(&allowed, self.index, shares);
             self.kept = sched_setaffinity(Some(self.id), &share).is_ok().then_some([share, allowed]);
         }

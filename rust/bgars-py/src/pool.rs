@@ -41,7 +41,8 @@ impl Pool {
         static PLACES: LazyLock<Arc<Places>> = LazyLock::new(Arc::default);
         static STARTED: LazyLock<Result<(), ThreadPoolBuildError>> = LazyLock::new(|| builder(&PLACES).build_global());
         if let Err(error) = &*STARTED {
-            return Err(InputError::new_err(format!("RAYON_NUM_THREADS: cannot start so many threads: {error}")));
+            let rule = "as many as RAYON_NUM_THREADS says, else one a core";
+            return Err(InputError::new_err(format!("threads: cannot start the common ones ({rule}): {error}")));
         }
         Ok(Self { own: None, places: Arc::clone(&PLACES) })
     }
