@@ -1,11 +1,9 @@
 //! From the least squares of some pixels to what the result holds.
 
-use std::ops::Range;
-
 use super::confidence::HALF_DEG;
 use super::cutoff::{LANES, Lanes};
 use super::lane_solve::Careful;
-use super::out::Out;
+use super::out::Block;
 use crate::vector::Vector;
 
 /// `n_z` below which `f32` cannot say whether a facet faces the camera.
@@ -24,6 +22,10 @@ pub(super) struct Facets<V> {
     pub scaled: [V; 3],
     /// `|g|^2`.
     pub square: V,
+    /// `rho = |g|`.
+    pub length: V,
+    /// `1 / rho`.
+    pub inverse: V,
     /// With the [prior](super::confidence::PRIOR_RESIDUAL).
     pub squared_residuals: V,
     /// `|g|^2 tr C - g^T C g`, `C` the inverse in use.
@@ -38,43 +40,6 @@ pub(super) fn freedom<V: Vector>(kept: V) -> V {
     /// The square of the half-way point, radians.
     const HALF2: f64 = (HALF_DEG * std::f64::consts::PI / 180.0) * (HALF_DEG * std::f64::consts::PI / 180.0);
     kept.times_minus(V::splat(HALF2 as f32), V::splat((2.0 * HALF2) as f32))
-}
-
-/// Where the results of a block go.
-pub(super) struct Place<'a> {
-    /// Unit normals, x y z of each pixel; NaN without solution, like the albedo.
-    pub normals: &'a mut [f32; 3 * LANES],
-    pub albedo: &'a mut Lanes<f32>,
-    pub confidence: &'a mut Lanes<f32>,
-    /// Past the caches.
-    pub streamed: bool,
-}
-
-/// A place for a block that the image cuts off.
-#[repr(align(64))] // a cache line
-pub(super) struct Spare {
-    normals: [f32; 3 * LANES],
-    albedo: Lanes<f32>,
-    confidence: Lanes<f32>,
-}
-
-impl Spare {
-    pub fn new() -> Self {
-        Self { normals: [0.0; 3 * LANES], albedo: [0.0; LANES], confidence: [0.0; LANES] }
-    }
-
-    pub fn place(&mut self) -> Place<'_> {
-        let Self { normals, albedo, confidence } = self;
-        Place { normals, albedo, confidence, streamed: false }
-    }
-
-    /// Copies the pixels that the image has.
-    pub fn copy_to(&self, span: &Range<usize>, out: &mut Out<'_>) {
-        let count = span.len();
-        out.normals[3 * span.start..3 * span.end].copy_from_slice(&self.normals[..3 * count]);
-        out.albedo[span.clone()].copy_from_slice(&self.albedo[..count]);
-        out.confidence[span.clone()].copy_from_slice(&self.confidence[..count]);
-    }
 }
 
 /// What is still to be written of a block of pixels.
@@ -94,14 +59,13 @@ impl Finished {
         Self { keep_all: true, kept: [0; LANES], valid: 0, careful: 0 }
     }
 
-    /// Writes the pixels from `at` on to their place; facets seen from the side, and values far from 1, are left to the careful kernel.
+    /// Writes the pixels from `at` on to their block; facets seen from the side, and values far from 1, are left to the careful kernel.
     #[inline(always)]
-    pub fn write<V: Vector>(&mut self, at: usize, facets: &Facets<V>, per_full_scale: f32, place: &mut Place<'_>) {
+    pub fn write<V: Vector>(&mut self, at: usize, facets: &Facets<V>, per_full_scale: f32, block: &mut Block<'_>) {
         let zero = V::splat(0.0);
-        let Facets { scaled: [x, y, z], square, squared_residuals, turning, freedom } = *facets;
+        let Facets { scaled: [x, y, z], square, mut length, mut inverse, squared_residuals, turning, freedom } =
+            *facets;
         let in_range = V::both(square.is_over(V::splat(MIN_SQUARE)), V::splat(1.0 / MIN_SQUARE).is_over(square));
-        let mut length = square.root();
-        let mut inverse = V::splat(1.0) / length;
         let mut n_z = z * inverse;
         // All seen from the front, and of a size whose square is in the range of floats; false for NaN.
         let usual = V::all(V::both(in_range, n_z.is_over(V::splat(GRAZING))));
@@ -118,20 +82,20 @@ impl Finished {
             valid = V::bits(faces);
         }
         let inverse2 = inverse * inverse;
-        let streamed = place.streamed;
-        let normals = &mut place.normals[3 * at..3 * (at + V::WIDTH)];
+        let streamed = block.streamed;
+        let normals = &mut block.normals[3 * at..3 * (at + V::WIDTH)];
         let [first, second, third] = V::interleaved([x * inverse, y * inverse, n_z]);
         put(first, normals, streamed);
         put(second, &mut normals[V::WIDTH..], streamed);
         put(third, &mut normals[2 * V::WIDTH..], streamed);
-        put(length * V::splat(per_full_scale), &mut place.albedo[at..], streamed);
+        put(length * V::splat(per_full_scale), &mut block.albedo[at..], streamed);
         // See `confidence`: over themselves and the squared standard error.
         let (variance, turning) = (squared_residuals * inverse2, turning * inverse2);
         let mut certainty = freedom / variance.times_plus(turning, freedom);
         if !usual {
             certainty = V::pick(z.is_over(zero), certainty, zero);
         }
-        put(certainty, &mut place.confidence[at..], streamed);
+        put(certainty, &mut block.confidence[at..], streamed);
         self.valid |= valid << at;
     }
 }

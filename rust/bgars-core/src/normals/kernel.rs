@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::confidence::confidence;
+use super::cutoff::LANES;
 use super::lane_solve::{Choice, LaneSolver};
 use super::lanes::{self, Input, Sink};
 use super::out::{Out, TASK_PIXELS};
@@ -245,14 +246,14 @@ impl<'a, P: Pixel> Kernel<'a, P> {
     }
 
     /// Works on a range of pixels.
-    fn task(&self, pixels: Range<usize>, out: &mut Out<'_>, scratch: &mut Scratch) {
+    fn task(&self, mut pixels: Range<usize>, out: &mut Out<'_>, scratch: &mut Scratch) {
         let first = pixels.start;
         let careful = &mut |pixel: usize, out: &mut Out<'_>| self.pixel(pixel, pixel - first, out, scratch);
         if let Some(solver) = &self.lanes {
             let input =
                 Input { planes: &self.planes, radiometry: self.radiometry, scales: &self.scales, mask: self.mask };
-            lanes::run(solver, &input, pixels, &mut Sink { out, careful });
-            return;
+            lanes::run(solver, &input, pixels.clone(), &mut Sink { out, careful });
+            pixels.start = pixels.end - pixels.len() % LANES;
         }
         for pixel in pixels {
             if self.mask.is_none_or(|mask| mask[pixel]) {

@@ -8,10 +8,11 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::confidence::PRIOR_RESIDUAL;
 use super::cutoff::{LANES, Lanes, cutoffs};
-use super::finish::{Facets, Finished, Place, all_bits, freedom};
+use super::finish::{Facets, Finished, all_bits, freedom};
 use super::kept::Kept;
+use super::out::Block;
 use super::robust_lanes::{self, RobustLanes};
-use super::symmetric::{ENTRIES, Form, Inverse, dot, form, inverse_row, outer};
+use super::symmetric::{ENTRIES, Inverse, PrincipalAxes, dot, form, inverse_row, outer, spread};
 use crate::lights::conditioning;
 use crate::vector::spread::Spread;
 use crate::vector::subset_sums::SubsetSums;
@@ -50,12 +51,14 @@ pub(super) struct LaneSolver {
     directions: Vec<[f32; 3]>,
     /// The same, as whole vectors.
     spread_directions: Vec<[Spread; 3]>,
-    /// `(L^T L)^-1 L^T`, a column a light.
+    /// Of `L^T L` of all lights.
+    axes: PrincipalAxes,
+    /// `(L^T L)^-1 L^T` of all lights along these axes, a column a light.
     pseudo_inverse: Vec<[Spread; 3]>,
-    /// `-L^T L` of all lights, with the [prior](PRIOR_RESIDUAL) of the squared residuals.
-    unexplained: Form,
-    /// `(tr C) I - C` of all lights, `C = (L^T L)^-1`.
-    turning: Form,
+    /// What the square along each axis takes from the squared residuals: `-L^T L` with the [prior](PRIOR_RESIDUAL).
+    unexplained: [Spread; 3],
+    /// What it adds to the turning: `(tr C) I - C`, `C = (L^T L)^-1`.
+    turning: [Spread; 3],
     /// `(L^T L)^-1` of any of up to eight lights; `None` for more, and where all are kept.
     inverses: Option<RowTable>,
     /// `L^T L` of any lights, a table for every eight of them; for where there are no inverses.
@@ -68,7 +71,9 @@ impl LaneSolver {
         let Lights::Directional(directions) = lights else { return None };
         let gram = directions.iter().fold(Matrix3::zeros(), |gram, light| gram + light * light.transpose());
         let exact = gram.try_inverse().filter(|_| conditioning(&gram) >= MIN_LANE_CONDITIONING)?;
-        let pseudo_inverse = directions.iter().map(|light| single(&(exact * light)).map(Spread::new)).collect();
+        let axes = PrincipalAxes::of(&gram);
+        let column = |light| single(&axes.along(&(exact * light))).map(Spread::new);
+        let pseudo_inverse = directions.iter().map(column).collect();
         let chosen = !matches!(choice, Choice::All);
         let inverses = (chosen && directions.len() <= BYTE_LIGHTS).then(|| inverses_of(directions));
         let directions: Vec<[f32; 3]> = directions.iter().map(single).collect();
@@ -77,9 +82,19 @@ impl LaneSolver {
             .chunks(BYTE_LIGHTS)
             .map(|lights| SubsetSums::new(&lights.iter().map(outer).collect::<Vec<_>>()))
             .collect();
-        let unexplained = Form::new(&(Matrix3::from_diagonal_element(PRIOR_RESIDUAL * PRIOR_RESIDUAL) - gram));
-        let turning = Form::new(&(Matrix3::from_diagonal_element(exact.trace()) - exact));
-        Some(Self { choice, directions, spread_directions, pseudo_inverse, unexplained, turning, inverses, grams })
+        let unexplained = axes.values.map(|value| Spread::new((PRIOR_RESIDUAL * PRIOR_RESIDUAL - value) as f32));
+        let turning = axes.values.map(|value| Spread::new((exact.trace() - 1.0 / value) as f32));
+        Some(Self {
+            choice,
+            directions,
+            spread_directions,
+            axes,
+            pseudo_inverse,
+            unexplained,
+            turning,
+            inverses,
+            grams,
+        })
     }
 
     /// Their number.
@@ -105,7 +120,7 @@ pub(super) fn solve<K: Pixel, V: Vector>(
     kept: &mut Kept<K>,
     per_full_scale: f32,
     out: &mut Finished,
-    place: &mut Place<'_>,
+    block: &mut Block<'_>,
 ) {
     let Readings { keys, clipped, offset } = *readings;
     (out.careful, out.valid) = (0, 0);
@@ -144,7 +159,7 @@ pub(super) fn solve<K: Pixel, V: Vector>(
             out.careful |= unusable << at;
             facets
         };
-        out.write(at, &facets, per_full_scale, place);
+        out.write(at, &facets, per_full_scale, block);
     }
 }
 
@@ -153,7 +168,7 @@ pub(super) fn solve<K: Pixel, V: Vector>(
 /// Every light of every pixel is kept: one matrix for all.
 #[inline(always)]
 fn solve_all<K: Pixel, V: Vector>(solver: &LaneSolver, readings: &Readings<'_, K>, at: usize) -> Facets<V> {
-    let Sums { vector: scaled, squares } = if let Some(offset) = readings.offset {
+    let Sums { vector: along, squares } = if let Some(offset) = readings.offset {
         let (offset, mut sums) = (V::load(&offset[at..]), Sums::zero());
         for (key, column) in readings.keys.iter().zip(&solver.pseudo_inverse) {
             sums.add(K::load::<V>(&key[at..]) - offset, column);
@@ -162,12 +177,19 @@ fn solve_all<K: Pixel, V: Vector>(solver: &LaneSolver, readings: &Readings<'_, K
     } else {
         Sums::of(readings.keys, &solver.pseudo_inverse[..readings.keys.len()], at)
     };
+    let [x2, y2, z2] = [along[0] * along[0], along[1] * along[1], along[2] * along[2]];
+    // First what is waited for longest.
+    let square = (x2 + y2) + z2;
+    let length = square.root();
+    let inverse = V::splat(1.0) / length;
     Facets {
-        scaled,
-        square: dot(scaled, scaled),
+        scaled: solver.axes.back(along),
+        square,
+        length,
+        inverse,
         // |I|^2 - |L g|^2; what rounding leaves is far below the prior of 2 %.
-        squared_residuals: solver.unexplained.added_to(squares, scaled),
-        turning: solver.turning.added_to(V::splat(0.0), scaled),
+        squared_residuals: squares + dot(spread(&solver.unexplained), [x2, y2, z2]),
+        turning: dot(spread(&solver.turning), [x2, y2, z2]),
         freedom: freedom(V::splat(readings.keys.len() as f32)),
     }
 }
@@ -216,8 +238,7 @@ fn solve_kept<K: Pixel, V: Vector>(
             if let Some(offset) = offset {
                 value = value - V::load(&offset[at..]);
             }
-            let residual = value
-                - dot(scaled, [V::repeated(&direction[0]), V::repeated(&direction[1]), V::repeated(&direction[2])]);
+            let residual = value - dot(scaled, spread(direction));
             residuals.add(residual.where_bit(&kept.bits[light / BYTE_LIGHTS][at..], light % BYTE_LIGHTS), direction);
         }
         let correction = inverse.product(residuals.vector);
@@ -228,10 +249,13 @@ fn solve_kept<K: Pixel, V: Vector>(
     // Written so that NaN is unusable.
     let usable = V::bits(inverse.conditioning.is_over(V::splat(MIN_LANE_CONDITIONING as f32)));
     let square = dot(scaled, scaled);
+    let length = square.root();
     let trace = inverse.entries[0] + inverse.entries[3] + inverse.entries[5];
     let facets = Facets {
         scaled,
         square,
+        length,
+        inverse: V::splat(1.0) / length,
         squared_residuals: square
             .times_plus(V::splat((PRIOR_RESIDUAL * PRIOR_RESIDUAL) as f32), sums.squares - explained),
         turning: trace.times_minus(square, form(inverse.entries, scaled)),

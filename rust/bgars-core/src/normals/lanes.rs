@@ -8,17 +8,14 @@ use bytemuck::NoUninit;
 use multiversion::multiversion;
 
 use super::cutoff::{LANES, Lanes};
-use super::finish::{Finished, Spare};
+use super::finish::Finished;
 use super::kept::Kept;
-use super::lane_solve::{BYTE_LIGHTS, Choice, LaneSolver, Readings, solve};
-use super::out::Out;
+use super::lane_solve::{BYTE_LIGHTS, Careful, Choice, LaneSolver, Readings, solve};
+use super::out::{Block, Out};
 #[cfg(target_arch = "x86_64")]
 use crate::vector::{Avx2, Avx512, Pair};
 use crate::vector::{Portable, Vector};
 use crate::{Pixel, Radiometry, stream};
-
-/// How far ahead the images are fetched: as many streams as lights are more than processors follow by themselves.
-const BLOCKS_AHEAD: usize = 16;
 
 /// What every block reads.
 pub(super) struct Input<'a, P> {
@@ -60,11 +57,13 @@ type Clips<'a> = dyn Fn(&Range<usize>, &mut Lanes<u8>) + 'a;
 struct Common<'a> {
     mask: Option<&'a [bool]>,
     full_scale: f32,
+    /// `None` where nothing is subtracted.
+    offsets: Option<&'a Offsets<'a>>,
     /// `None` where clipped lights are as good as others.
     clips: Option<&'a Clips<'a>>,
 }
 
-/// Works on `pixels` (of the whole image).
+/// Works on the blocks of `pixels` (of the whole image); the pixels behind the last whole one are left.
 #[allow(clippy::float_cmp)] // intensities that are 1 by default
 pub(super) fn run<P: Pixel>(solver: &LaneSolver, input: &Input<'_, P>, pixels: Range<usize>, sink: &mut Sink<'_, '_>) {
     let Input { planes, radiometry, scales, mask } = *input;
@@ -84,10 +83,10 @@ pub(super) fn run<P: Pixel>(solver: &LaneSolver, input: &Input<'_, P>, pixels: R
         }
     };
     let clips: Option<&Clips<'_>> = if let Choice::Window(_) = solver.choice { Some(&mark_clipped) } else { None };
-    let common = Common { mask, full_scale: radiometry.full_scale, clips };
+    let offsets: Option<&Offsets<'_>> = if plain && has_offsets { Some(&load_offsets) } else { None };
+    let common = Common { mask, full_scale: radiometry.full_scale, offsets, clips };
     if plain {
-        let offsets: Option<&Offsets<'_>> = if has_offsets { Some(&load_offsets) } else { None };
-        run_blocks(solver, &Source::Images(planes), offsets, common, pixels, sink);
+        run_blocks(solver, &Source::Images(planes), common, pixels, sink);
     } else {
         let make = |block: &Range<usize>, keys: &mut [Lanes<f32>]| {
             let mut offsets = [0.0; LANES];
@@ -98,7 +97,7 @@ pub(super) fn run<P: Pixel>(solver: &LaneSolver, input: &Input<'_, P>, pixels: R
                 }
             }
         };
-        run_blocks(solver, &Source::Made(&make), None, common, pixels, sink);
+        run_blocks(solver, &Source::Made(&make), common, pixels, sink);
     }
 }
 
@@ -107,7 +106,6 @@ pub(super) fn run<P: Pixel>(solver: &LaneSolver, input: &Input<'_, P>, pixels: R
 fn run_blocks<K: Pixel>(
     solver: &LaneSolver,
     source: &Source<'_, K>,
-    offsets: Option<&Offsets<'_>>,
     common: Common<'_>,
     pixels: Range<usize>,
     sink: &mut Sink<'_, '_>,
@@ -115,123 +113,151 @@ fn run_blocks<K: Pixel>(
     #[cfg(target_arch = "x86_64")]
     {
         if multiversion::target::target_cfg_f!(target_feature = "avx512f") {
-            return run_lights::<K, Pair<Avx512>>(solver, source, offsets, common, pixels, sink);
+            return run_with::<K, Pair<Avx512>>(solver, source, common, pixels, sink);
         }
         if multiversion::target::target_cfg_f!(target_feature = "avx2") {
-            return run_lights::<K, Pair<Avx2>>(solver, source, offsets, common, pixels, sink);
+            return run_with::<K, Pair<Avx2>>(solver, source, common, pixels, sink);
         }
     }
-    run_lights::<K, Portable>(solver, source, offsets, common, pixels, sink);
+    run_with::<K, Portable>(solver, source, common, pixels, sink);
 }
 
-/// Compiled for eight lights once more: loops over lights are written out then.
 #[inline(always)]
-fn run_lights<K: Pixel, V: Vector>(
+fn run_with<K: Pixel, V: Vector>(
     solver: &LaneSolver,
     source: &Source<'_, K>,
-    offsets: Option<&Offsets<'_>>,
     common: Common<'_>,
     pixels: Range<usize>,
     sink: &mut Sink<'_, '_>,
 ) {
-    if solver.lights() == BYTE_LIGHTS {
-        run_blocks_with::<K, V>(solver, BYTE_LIGHTS, source, offsets, common, pixels, sink);
-    } else {
-        run_blocks_with::<K, V>(solver, solver.lights(), source, offsets, common, pixels, sink);
+    sink.out.streamed &= V::STREAMS;
+    let (blocks, sets) = sink.out.blocks();
+    let mut task = Task::new(solver, common, pixels.start, sets);
+    match source {
+        Source::Images(planes) => {
+            if let Ok(planes) = <&[&[K]; BYTE_LIGHTS]>::try_from(*planes) {
+                // Compiled for eight lights once more: loops over lights are written out then, and bounds are not asked for.
+                let [a, b, c, d, e, f, g, h] = planes.map(|plane| blocks_of(plane, &pixels));
+                let keys = a.iter().zip(b).zip(c).zip(d).zip(e).zip(f).zip(g).zip(h);
+                for (number, (out, (((((((a, b), c), d), e), f), g), h))) in blocks.zip(keys).enumerate() {
+                    task.block::<V>(number, &[a, b, c, d, e, f, g, h], out);
+                }
+            } else {
+                let images: Vec<&[Lanes<K>]> = planes.iter().map(|plane| blocks_of(plane, &pixels)).collect();
+                let mut keys = Vec::with_capacity(images.len());
+                for (number, out) in blocks.enumerate() {
+                    keys.clear();
+                    keys.extend(images.iter().map(|blocks| &blocks[number]));
+                    task.block::<V>(number, &keys, out);
+                }
+            }
+        }
+        Source::Made(make) => {
+            let mut made = vec![[K::ZERO; LANES]; solver.lights()];
+            for (number, out) in blocks.enumerate() {
+                make(&task.pixels(number), &mut made);
+                task.block::<V>(number, &made.iter().collect::<Vec<_>>(), out);
+            }
+        }
+    }
+    let careful = task.careful;
+    if sink.out.streamed {
+        stream::finish();
+    }
+    for (first, lanes) in careful {
+        for pixel in (first..first + LANES).filter(|pixel| lanes >> (pixel - first) & 1 == 1) {
+            if common.mask.is_none_or(|mask| mask[pixel]) {
+                (sink.careful)(pixel, sink.out);
+            }
+        }
     }
 }
 
-#[inline(always)]
-fn run_blocks_with<K: Pixel, V: Vector>(
-    solver: &LaneSolver,
-    lights: usize,
-    source: &Source<'_, K>,
-    offsets: Option<&Offsets<'_>>,
-    Common { mask, full_scale, clips }: Common<'_>,
-    pixels: Range<usize>,
-    sink: &mut Sink<'_, '_>,
-) {
-    let mut kept = Kept::new(lights);
-    let mut copies = vec![[K::ZERO; LANES]; lights];
-    let nothing = [K::ZERO; LANES];
-    let mut in_place = vec![&nothing; lights];
-    // The images in blocks from the task's first on: few bounds are left to be checked then.
-    let mut blocks: Vec<&[Lanes<K>]> = Vec::new();
-    if let Source::Images(planes) = source {
-        blocks.extend(planes.iter().map(|plane| plane[pixels.start..].as_chunks().0));
+/// The whole blocks of some pixels.
+fn blocks_of<'a, K>(plane: &'a [K], pixels: &Range<usize>) -> &'a [Lanes<K>] {
+    plane[pixels.clone()].as_chunks().0
+}
+
+/// What the blocks of a task share.
+struct Task<'a, K> {
+    solver: &'a LaneSolver,
+    common: Common<'a>,
+    first_pixel: usize,
+    per_full_scale: f32,
+    all_lights: Lanes<u16>,
+    offset: Lanes<f32>,
+    clipped: Lanes<u8>,
+    kept: Kept<K>,
+    finished: Finished,
+    /// The kept lights of all pixels, or none.
+    sets: &'a mut [bool],
+    /// Blocks that leave pixels to the careful kernel, by their first pixel, and which.
+    careful: Vec<(usize, Careful)>,
+}
+
+impl<'a, K: Pixel> Task<'a, K> {
+    fn new(solver: &'a LaneSolver, common: Common<'a>, first_pixel: usize, sets: &'a mut [bool]) -> Self {
+        Self {
+            solver,
+            common,
+            first_pixel,
+            per_full_scale: 1.0 / common.full_scale,
+            all_lights: [solver.lights() as u16; LANES],
+            offset: [0.0; LANES],
+            clipped: [0; LANES],
+            kept: Kept::new(solver.lights()),
+            finished: Finished::new(),
+            sets,
+            careful: Vec::new(),
+        }
     }
-    let mut offset = [0.0; LANES];
-    let mut clipped = [0; LANES];
-    let mut finished = Finished::new();
-    let all_lights = [lights as u16; LANES];
-    let per_full_scale = 1.0 / full_scale;
-    sink.out.streamed &= V::STREAMS;
-    for (number, first) in pixels.clone().step_by(LANES).enumerate() {
-        let block = first..(first + LANES).min(pixels.end);
-        let span = first - pixels.start..block.end - pixels.start;
-        let used = mask.map(|mask| &mask[block.clone()]);
+
+    /// The pixels of a block.
+    fn pixels(&self, number: usize) -> Range<usize> {
+        let first = self.first_pixel + number * LANES;
+        first..first + LANES
+    }
+
+    /// Works on a block.
+    #[inline(always)]
+    fn block<V: Vector>(&mut self, number: usize, keys: &[&Lanes<K>], mut out: Block<'_>) {
+        let pixels = self.pixels(number);
+        let used = self.common.mask.map(|mask| &mask[pixels.clone()]);
         // A block that is all in, or all out, needs no look at its pixels.
-        let count = used.map_or(block.len(), |used| used.iter().map(|&used| usize::from(used)).sum());
-        if count == 0 {
-            sink.out.clear(span);
-            continue;
-        }
-        let used = used.filter(|_| count < block.len());
-        let copied: Vec<&Lanes<K>>;
-        let keys = match source {
-            Source::Images(_) if block.len() == LANES => {
-                for (key, blocks) in in_place[..lights].iter_mut().zip(&blocks[..lights]) {
-                    *key = &blocks[number];
-                    stream::prefetch(key, BLOCKS_AHEAD);
-                }
-                &in_place
-            }
-            Source::Images(planes) => {
-                for (copy, plane) in copies.iter_mut().zip(*planes) {
-                    copy[..block.len()].copy_from_slice(&plane[block.clone()]);
-                }
-                copied = copies.iter().collect();
-                &copied
-            }
-            Source::Made(make) => {
-                make(&block, &mut copies);
-                copied = copies.iter().collect();
-                &copied
-            }
+        let count = used.map_or(LANES, |used| used.iter().map(|&used| usize::from(used)).sum());
+        let sets = if self.sets.is_empty() {
+            &mut []
+        } else {
+            &mut self.sets[number * LANES * keys.len()..][..LANES * keys.len()]
         };
-        if let Some(load) = offsets {
-            load(&block, &mut offset);
+        if count == 0 {
+            out.clear(0..LANES);
+            sets.fill(false);
+            return;
         }
-        if let Some(mark) = clips {
-            mark(&block, &mut clipped);
+        let used = used.filter(|_| count < LANES);
+        if let Some(load) = self.common.offsets {
+            load(&pixels, &mut self.offset);
         }
-        let readings = Readings { keys: &keys[..lights], clipped: &clipped, offset: offsets.map(|_| &offset) };
-        let mut spare = None;
-        let mut place = sink.out.place(&span).unwrap_or_else(|| spare.insert(Spare::new()).place());
-        solve::<K, V>(solver, &readings, &mut kept, per_full_scale, &mut finished, &mut place);
-        if let Some(spare) = &spare {
-            spare.copy_to(&span, sink.out);
+        if let Some(mark) = self.common.clips {
+            mark(&pixels, &mut self.clipped);
         }
-        write(&finished, &all_lights, used, span.clone(), sink.out);
-        if !sink.out.kept_sets.is_empty() {
-            write_sets(&kept, used, span, sink.out);
+        let offset = self.common.offsets.map(|_| &self.offset);
+        let readings = Readings { keys, clipped: &self.clipped, offset };
+        solve::<K, V>(self.solver, &readings, &mut self.kept, self.per_full_scale, &mut self.finished, &mut out);
+        write(&self.finished, &self.all_lights, used, &mut out);
+        if !sets.is_empty() {
+            write_sets(&self.kept, used, sets);
         }
-        if finished.careful != 0 {
-            for lane in (0..block.len()).filter(|lane| finished.careful >> lane & 1 == 1) {
-                if used.is_none_or(|used| used[lane]) {
-                    (sink.careful)(first + lane, sink.out);
-                }
-            }
+        if self.finished.careful != 0 {
+            self.careful.push((pixels.start, self.finished.careful));
         }
-    }
-    if sink.out.streamed {
-        stream::finish();
     }
 }
 
 /// Mask and counts of a block, and what its unused pixels say.
 #[inline(always)]
-fn write(finished: &Finished, all_lights: &Lanes<u16>, used: Option<&[bool]>, span: Range<usize>, out: &mut Out<'_>) {
+fn write(finished: &Finished, all_lights: &Lanes<u16>, used: Option<&[bool]>, out: &mut Block<'_>) {
     static ALL_VALID: Lanes<bool> = [true; LANES];
     let spread;
     // Nearly always all of them, and then nothing has to be spread.
@@ -242,33 +268,33 @@ fn write(finished: &Finished, all_lights: &Lanes<u16>, used: Option<&[bool]>, sp
         &spread
     };
     let kept = if finished.keep_all { all_lights } else { &finished.kept };
-    store(kept, &mut out.lights_kept[span.clone()], out.streamed);
-    store(valid, &mut out.mask[span.clone()], out.streamed);
-    store(valid, &mut out.measured[span.clone()], out.streamed);
+    store(kept, out.lights_kept, out.streamed);
+    store(valid, out.mask, out.streamed);
+    store(valid, out.measured, out.streamed);
     if let Some(used) = used {
         for (lane, _) in used.iter().enumerate().filter(|(_, used)| !**used) {
-            out.clear(span.start + lane..span.start + lane + 1);
+            out.clear(lane..lane + 1);
         }
     }
 }
 
-/// Copies as much of `block` as there is room for; a full block in one go.
+/// Copies a block, past the caches if they say so.
 #[inline(always)]
-fn store<T: NoUninit, const N: usize>(block: &[T; N], out: &mut [T], streamed: bool) {
-    match <&mut [T; N]>::try_from(&mut *out) {
-        Ok(full) if streamed => stream::copy(block, full),
-        Ok(full) => *full = *block,
-        Err(_) => out.copy_from_slice(&block[..out.len()]),
+fn store<T: NoUninit, const N: usize>(block: &[T; N], out: &mut [T; N], streamed: bool) {
+    if streamed {
+        stream::copy(block, out);
+    } else {
+        *out = *block;
     }
 }
 
 /// The kept lights themselves; asked for seldom.
 #[inline(never)]
-fn write_sets<K: Pixel>(kept: &Kept<K>, used: Option<&[bool]>, span: Range<usize>, out: &mut Out<'_>) {
-    let lights = out.kept_sets.len() / out.albedo.len();
-    for (lane, pixel) in span.enumerate() {
+fn write_sets<K: Pixel>(kept: &Kept<K>, used: Option<&[bool]>, sets: &mut [bool]) {
+    let lights = kept.keys.len();
+    for (lane, sets) in sets.chunks_exact_mut(lights).enumerate() {
         let here = used.is_none_or(|used| used[lane]);
-        for (light, set) in out.kept_sets[pixel * lights..(pixel + 1) * lights].iter_mut().enumerate() {
+        for (light, set) in sets.iter_mut().enumerate() {
             *set = here && kept.holds(light, lane);
         }
     }

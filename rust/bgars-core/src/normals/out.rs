@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::NormalMapMut;
-use super::finish::Place;
+use super::cutoff::{LANES, Lanes};
 use crate::stream;
 
 /// Pixels of one task.
@@ -54,14 +54,25 @@ impl<'a> Out<'a> {
         tasks
     }
 
-    /// Where a whole block goes; `None` for a part of one.
-    pub fn place(&mut self, span: &Range<usize>) -> Option<Place<'_>> {
-        Some(Place {
-            normals: self.normals[3 * span.start..3 * span.end].first_chunk_mut()?,
-            albedo: self.albedo[span.clone()].first_chunk_mut()?,
-            confidence: self.confidence[span.clone()].first_chunk_mut()?,
-            streamed: self.streamed,
-        })
+    /// The whole blocks, one after the other, and beside them the kept sets of all pixels.
+    pub fn blocks(&mut self) -> (impl Iterator<Item = Block<'_>>, &mut [bool]) {
+        let streamed = self.streamed;
+        let arrays = (self.normals.as_chunks_mut().0.iter_mut())
+            .zip(self.albedo.as_chunks_mut().0)
+            .zip(self.mask.as_chunks_mut().0)
+            .zip(self.confidence.as_chunks_mut().0)
+            .zip(self.measured.as_chunks_mut().0)
+            .zip(self.lights_kept.as_chunks_mut().0);
+        let blocks = arrays.map(move |(((((normals, albedo), mask), confidence), measured), lights_kept)| Block {
+            normals,
+            albedo,
+            mask,
+            confidence,
+            measured,
+            lights_kept,
+            streamed,
+        });
+        (blocks, self.kept_sets)
     }
 
     /// Marks pixels as not asked for.
@@ -79,5 +90,30 @@ impl<'a> Out<'a> {
         self.confidence[span.clone()].fill(0.0);
         self.mask[span.clone()].fill(false);
         self.measured[span].fill(false);
+    }
+}
+
+/// What is written of a block of pixels.
+pub(super) struct Block<'a> {
+    /// Unit normals, x y z of each pixel; NaN without solution, like the albedo.
+    pub normals: &'a mut [f32; 3 * LANES],
+    pub albedo: &'a mut Lanes<f32>,
+    pub mask: &'a mut Lanes<bool>,
+    pub confidence: &'a mut Lanes<f32>,
+    pub measured: &'a mut Lanes<bool>,
+    pub lights_kept: &'a mut Lanes<u16>,
+    /// Past the caches.
+    pub streamed: bool,
+}
+
+impl Block<'_> {
+    /// Marks pixels as not asked for.
+    pub fn clear(&mut self, span: Range<usize>) {
+        let Block { normals, albedo, mask, confidence, measured, lights_kept, streamed } = self;
+        let (normals, albedo, confidence) = (&mut normals[..], &mut albedo[..], &mut confidence[..]);
+        let (mask, measured, lights_kept) = (&mut mask[..], &mut measured[..], &mut lights_kept[..]);
+        let kept_sets = &mut [];
+        let streamed = *streamed;
+        Out { normals, albedo, mask, confidence, measured, lights_kept, kept_sets, streamed }.clear(span);
     }
 }

@@ -1,6 +1,6 @@
 //! Symmetric 3 x 3 matrices of many pixels at once, by the entries of the upper triangle: xx, xy, xz, yy, yz, zz.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 use crate::lights::conditioning;
 use crate::vector::spread::Spread;
@@ -31,27 +31,46 @@ pub(super) fn form<V: Vector>([xx, xy, xz, yy, yz, zz]: [V; ENTRIES], [x, y, z]:
     dot([x.times_plus(xx, of_x + of_x), y.times_plus(yy, of_y + of_y), z * zz], [x, y, z])
 }
 
-/// A quadratic form that is the same for all pixels: the factors of the squares and products of components, of products
-/// twice the entry.
+/// The principal axes of a Gram matrix: along them quadratic forms of it and its inverse are sums of three squares.
 #[derive(Debug)]
-pub(super) struct Form([Spread; ENTRIES]);
+pub(super) struct PrincipalAxes {
+    /// What the matrix is along each of them.
+    pub values: [f64; 3],
+    /// The axes, as columns.
+    columns: Matrix3<f64>,
+    /// The same by rows, for vectors; `None` where they are those of the camera, as for rings of evenly spaced lights.
+    rows: Option<[[Spread; 3]; 3]>,
+}
 
-impl Form {
-    /// `v^T A v`.
-    pub fn new(matrix: &Matrix3<f64>) -> Self {
-        let factors = matrix + matrix.transpose() - Matrix3::from_diagonal(&matrix.diagonal());
-        Self(UPPER.map(|entry| Spread::new(factors[entry] as f32)))
+impl PrincipalAxes {
+    pub fn of(gram: &Matrix3<f64>) -> Self {
+        let beside = gram - Matrix3::from_diagonal(&gram.diagonal());
+        // Below what `f32` can tell.
+        if beside.amax() <= f64::from(f32::EPSILON) * gram.trace() {
+            return Self { values: gram.diagonal().into(), columns: Matrix3::identity(), rows: None };
+        }
+        let SymmetricEigen { eigenvectors: columns, eigenvalues } = gram.symmetric_eigen();
+        let row = |row| std::array::from_fn(|axis| Spread::new(columns[(row, axis)] as f32));
+        Self { values: eigenvalues.into(), columns, rows: Some(std::array::from_fn(row)) }
     }
 
-    /// `start + v^T A v`.
+    /// A vector by its components along the axes.
+    pub fn along(&self, vector: &Vector3<f64>) -> Vector3<f64> {
+        self.columns.tr_mul(vector)
+    }
+
+    /// Back from [`Self::along`].
     #[inline(always)]
-    pub fn added_to<V: Vector>(&self, start: V, [x, y, z]: [V; 3]) -> V {
-        let Self([xx, xy, xz, yy, yz, zz]) = self;
-        let of_x = z.times_plus(V::repeated(xz), y.times_plus(V::repeated(xy), x * V::repeated(xx)));
-        let of_y = z.times_plus(V::repeated(yz), y * V::repeated(yy));
-        let of_z = z * V::repeated(zz);
-        z.times_plus(of_z, y.times_plus(of_y, x.times_plus(of_x, start)))
+    pub fn back<V: Vector>(&self, along: [V; 3]) -> [V; 3] {
+        let Some([x, y, z]) = &self.rows else { return along };
+        [dot(spread(x), along), dot(spread(y), along), dot(spread(z), along)]
     }
+}
+
+/// The same vector everywhere.
+#[inline(always)]
+pub(super) fn spread<V: Vector>([x, y, z]: &[Spread; 3]) -> [V; 3] {
+    [V::repeated(x), V::repeated(y), V::repeated(z)]
 }
 
 /// The inverse of a Gram matrix.
@@ -117,4 +136,41 @@ fn minor<V: Vector>(a: V, b: V, c: V, d: V) -> V {
 /// `l l^T`.
 pub(super) fn outer(&[x, y, z]: &[f32; 3]) -> [f32; ENTRIES] {
     [x * x, x * y, x * z, y * y, y * z, z * z]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vector::{Arithmetic, Portable};
+
+    /// A ring, whose axes are the camera's, and lights here and there.
+    #[test]
+    fn along_principal_axes_forms_are_sums_of_squares() {
+        let ring = |light: usize| {
+            let azimuth = light as f64 * std::f64::consts::FRAC_PI_4;
+            Vector3::new(azimuth.cos(), azimuth.sin(), 1.0).normalize()
+        };
+        let anywhere = |light: usize| {
+            let number = |seed: usize| (seed * 37 % 11) as f64 / 11.0;
+            Vector3::new(number(light + 1) - 0.4, number(light + 5) - 0.7, 0.5).normalize()
+        };
+        let vector = Vector3::new(0.3, -0.8, 0.6);
+        for (lights, turned) in [(&ring as &dyn Fn(usize) -> Vector3<f64>, false), (&anywhere, true)] {
+            let gram = (0..8).map(lights).fold(Matrix3::zeros(), |gram, light| gram + light * light.transpose());
+            let axes = PrincipalAxes::of(&gram);
+            assert_eq!(axes.rows.is_some(), turned);
+            let along = axes.along(&vector);
+            let of_squares = |values: [f64; 3]| along.component_mul(&along).dot(&Vector3::from(values));
+            approx::assert_relative_eq!(of_squares(axes.values), vector.dot(&(gram * vector)), epsilon = 1e-12);
+            let inverse = gram.try_inverse().unwrap();
+            let inverses = axes.values.map(f64::recip);
+            approx::assert_relative_eq!(of_squares(inverses), vector.dot(&(inverse * vector)), epsilon = 1e-12);
+            let back = axes.back([along.x, along.y, along.z].map(|component| Portable::splat(component as f32)));
+            for (found, expected) in back.into_iter().zip(&vector) {
+                let mut numbers = [0.0; Portable::WIDTH];
+                found.write(&mut numbers);
+                approx::assert_relative_eq!(f64::from(numbers[0]), *expected, epsilon = 1e-6);
+            }
+        }
+    }
 }
