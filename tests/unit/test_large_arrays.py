@@ -8,9 +8,9 @@ import bgars
 import numpy as np
 import pytest
 from bgars import large_arrays
-from bgars.large_arrays import MIN_BYTES, any_content
+from bgars.large_arrays import LARGE_BYTES, MIN_BYTES, any_content
 
-SHAPE = (MIN_BYTES // 4, 3)
+of_both_kinds = pytest.mark.parametrize("shape", [(MIN_BYTES // 4, 3), (LARGE_BYTES // 4, 3)])
 
 
 @pytest.fixture(autouse=True)
@@ -18,9 +18,10 @@ def no_pages_kept() -> None:
     large_arrays._free.clear()
 
 
-def test_an_array_starts_on_a_page_and_is_zero_at_first() -> None:
-    array = any_content(SHAPE, np.float32)
-    assert array.shape == SHAPE
+@of_both_kinds
+def test_an_array_starts_on_a_page_and_is_zero_at_first(shape: tuple[int, int]) -> None:
+    array = any_content(shape, np.float32)
+    assert array.shape == shape
     assert array.dtype == np.float32
     assert array.flags.c_contiguous
     assert array.flags.writeable
@@ -28,30 +29,33 @@ def test_an_array_starts_on_a_page_and_is_zero_at_first() -> None:
     assert not array.any()
 
 
-def test_pages_are_used_again_by_the_next_array_of_about_the_size() -> None:
-    array = any_content(SHAPE, np.float32)
+@of_both_kinds
+def test_pages_are_used_again_by_the_next_array_of_about_the_size(shape: tuple[int, int]) -> None:
+    array = any_content(shape, np.float32)
     place = array.ctypes.data
     array[:] = 1
     del array
-    other_size = any_content((2 * SHAPE[0], 3), np.float32)
+    other_size = any_content((2 * shape[0], 3), np.float32)
     assert other_size.ctypes.data != place
-    assert any_content((3, SHAPE[0] - 5), np.float32).ctypes.data == place  # as many large pages
+    assert any_content((3, shape[0] - 5), np.float32).ctypes.data == place  # as many pages
 
 
-def test_pages_hold_one_type_for_ever() -> None:
-    array = any_content(SHAPE, np.float32)
+@of_both_kinds
+def test_pages_hold_one_type_for_ever(shape: tuple[int, int]) -> None:
+    array = any_content(shape, np.float32)
     array[:] = 0.1
     del array
-    assert not any_content((SHAPE[0] * 4, 3), np.bool_).view(np.uint8).any()
+    assert not any_content((shape[0] * 4, 3), np.bool_).view(np.uint8).any()
 
 
-def test_a_view_keeps_its_pages() -> None:
-    array = any_content(SHAPE, np.float32)
+@of_both_kinds
+def test_a_view_keeps_its_pages(shape: tuple[int, int]) -> None:
+    array = any_content(shape, np.float32)
     array[:] = 7
     column = array[:, 1]
     del array
     gc.collect()
-    others = [any_content(SHAPE, np.float32) for _ in range(3)]
+    others = [any_content(shape, np.float32) for _ in range(3)]
     for other in others:
         assert not np.shares_memory(other, column)
         other[:] = 8
