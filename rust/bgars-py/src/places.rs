@@ -64,6 +64,9 @@ impl Places {
 
     /// Lets the threads run wherever they may if others want their processors; to be called now and then while they work.
     pub fn look(&self) {
+        if self.with(|state| state.shares.is_none()) {
+            return;
+        }
         // This thread, that runs only to look, is one of those that want one. Not to know is to be careful.
         let crowded = running().is_none_or(|running| running > allowed().count() as usize + 1);
         self.with(|state| {
@@ -81,8 +84,8 @@ impl Places {
         self.with(|state| state.place(None));
     }
 
-    fn with(&self, act: impl FnOnce(&mut State)) {
-        act(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner));
+    fn with<T>(&self, act: impl FnOnce(&mut State) -> T) -> T {
+        act(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 

@@ -9,7 +9,7 @@ use super::confidence::confidence;
 use super::cutoff::LANES;
 use super::lane_solve::{Choice, LaneSolver};
 use super::lanes::{self, Input, Sink};
-use super::out::{Out, TASK_PIXELS};
+use super::out::{Out, task_pixels};
 use super::robust::{self, RobustFilter, RobustScratch};
 use super::robust_lanes::RobustLanes;
 use super::solve::{Solution, SubsetSolver};
@@ -90,13 +90,14 @@ pub fn estimate_into<P: Pixel>(
     let kernel = Kernel::new(stack, lights, radiometry, mask, method);
     let pixels = stack.pixels();
     let band_pixels = if kernel.lanes.is_some() { LANE_BAND_PIXELS } else { BAND_PIXELS };
+    let task_pixels = task_pixels(pixels.min(band_pixels));
     for start in (0..pixels).step_by(band_pixels) {
         let band = start..(start + band_pixels).min(pixels);
-        let tasks = Out::split(&mut out, &band);
+        let tasks = Out::split(&mut out, &band, task_pixels);
         tasks.into_par_iter().enumerate().for_each_init(
             || Scratch::new(lights),
             |scratch, (task, mut out)| {
-                let first = start + task * TASK_PIXELS;
+                let first = start + task * task_pixels;
                 kernel.task(first..first + out.albedo.len(), &mut out, scratch);
             },
         );

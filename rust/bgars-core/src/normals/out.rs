@@ -6,8 +6,17 @@ use super::NormalMapMut;
 use super::cutoff::{LANES, Lanes};
 use crate::stream;
 
-/// Pixels of one task.
-pub(super) const TASK_PIXELS: usize = 1 << 13;
+/// Fewest and most pixels of one task: to begin one, and to wait for what it streamed, costs as long as 200 pixels.
+const TASK_PIXELS: [usize; 2] = [1 << 13, 1 << 16];
+
+/// Tasks for each thread: all are to end together.
+const TASKS: usize = 32;
+
+/// Pixels of one task of so many, whole blocks. What comes out is the same for any number.
+pub(super) fn task_pixels(pixels: usize) -> usize {
+    let [least, most] = TASK_PIXELS;
+    (pixels / (TASKS * rayon::current_num_threads())).clamp(least, most).next_multiple_of(LANES)
+}
 
 /// What a task writes: the pixels from its first one on.
 pub(super) struct Out<'a> {
@@ -24,19 +33,19 @@ pub(super) struct Out<'a> {
 }
 
 impl<'a> Out<'a> {
-    /// The tasks of a band of pixels.
-    pub fn split(map: &'a mut NormalMapMut<'_>, band: &Range<usize>) -> Vec<Self> {
+    /// A band of pixels as tasks of so many.
+    pub fn split(map: &'a mut NormalMapMut<'_>, band: &Range<usize>, task_pixels: usize) -> Vec<Self> {
         let streamed = map.albedo.len() >= stream::MIN_PIXELS;
         let set_lights = map.kept_sets.len() / map.albedo.len();
         let mut kept_sets = &mut map.kept_sets[band.start * set_lights..band.end * set_lights];
-        let mut tasks = Vec::with_capacity(band.len().div_ceil(TASK_PIXELS));
+        let mut tasks = Vec::with_capacity(band.len().div_ceil(task_pixels));
         let scalars = map.normals[band.start * 3..band.end * 3]
-            .chunks_mut(TASK_PIXELS * 3)
-            .zip(map.albedo[band.clone()].chunks_mut(TASK_PIXELS))
-            .zip(map.mask[band.clone()].chunks_mut(TASK_PIXELS))
-            .zip(map.confidence[band.clone()].chunks_mut(TASK_PIXELS))
-            .zip(map.measured[band.clone()].chunks_mut(TASK_PIXELS))
-            .zip(map.lights_kept[band.clone()].chunks_mut(TASK_PIXELS));
+            .chunks_mut(task_pixels * 3)
+            .zip(map.albedo[band.clone()].chunks_mut(task_pixels))
+            .zip(map.mask[band.clone()].chunks_mut(task_pixels))
+            .zip(map.confidence[band.clone()].chunks_mut(task_pixels))
+            .zip(map.measured[band.clone()].chunks_mut(task_pixels))
+            .zip(map.lights_kept[band.clone()].chunks_mut(task_pixels));
         for (((((normals, albedo), mask), confidence), measured), lights_kept) in scalars {
             let (task_sets, rest) = std::mem::take(&mut kept_sets).split_at_mut(albedo.len() * set_lights);
             kept_sets = rest;
