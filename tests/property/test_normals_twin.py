@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bgars
 import numpy as np
 import pytest
@@ -30,9 +32,10 @@ def slow_filter(values: NDArray[np.float64], gap: float) -> NDArray[np.bool_]:
 def test_fast_equals_slow(seed: int, lights: int, dtype: type, elevation_deg: float, method: str) -> None:
     rng = np.random.default_rng(seed)
     full = 1.0 if dtype is np.float32 else float(np.iinfo(dtype).max)
-    images = (rng.random((lights, 3, 4)) * full).astype(dtype)
+    shape = (6, 22)  # two blocks of the fast kernel, and four pixels for the careful one
+    images = (rng.random((lights, *shape)) * full).astype(dtype)
     images[0, 0, 0] = full  # float stacks: the largest value is full scale
-    mask = rng.random((3, 4)) > 0.3
+    mask = rng.random(shape) > 0.3
     mask[0, 0] = True
     directions = bgars.LightRig.ring(lights, elevation_deg=elevation_deg).directions
     field = bgars.estimate_normals(images, directions, mask=mask, method=method, keep_sets=True)  # type: ignore[arg-type]
@@ -93,6 +96,73 @@ def test_normals_under_rings_are_those_of_f64_to_two_ten_thousandths_of_a_degree
     found = field.normals[field.mask].astype(np.float64)
     angles = np.arctan2(np.linalg.norm(np.cross(exact, found), axis=-1), (exact * found).sum(axis=-1))
     assert np.degrees(angles).max() < 2e-4
+
+
+def careful_estimate(
+    capture: bgars.Capture, method: bgars.normals.Method, *, keep_sets: bool = False
+) -> bgars.NormalField:
+    """Estimate a row of pixels in parts shorter than a block of the fast kernel: all are left to the careful one."""
+    parts = []
+    for first in range(0, capture.mask.shape[1], 40):
+        cols = slice(first, first + 40)
+        dark = None if capture.dark is None else np.ascontiguousarray(capture.dark[:, cols])
+        images = np.ascontiguousarray(capture.images[:, :, cols])
+        part = replace(capture, images=images, mask=capture.mask[:, cols], dark=dark)
+        parts.append(bgars.estimate_normals(part, method=method, keep_sets=keep_sets))
+    arrays = {
+        name: np.concatenate([getattr(part, name) for part in parts], axis=1)
+        for name in ("normals", "albedo", "mask", "confidence", "measured", "lights_kept", "kept_sets")
+        if getattr(parts[0], name) is not None
+    }
+    return replace(parts[0], **arrays)
+
+
+def random_row(dtype: type, rig: bgars.LightRig, least: float, pixels: int = 640) -> bgars.Capture:
+    """Values between so much of full scale and all of it."""
+    full = 1.0 if dtype is np.float32 else float(np.iinfo(dtype).max)
+    images = (np.random.default_rng(7).uniform(least, 1.0, (len(rig), 1, pixels)) * full).astype(dtype)
+    mask = np.ones((1, pixels), np.bool_)
+    return bgars.Capture(images, rig, mask, saturation=2.0 * full, full_scale=full)
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.1])  # a ring, whose principal axes are the camera's, and lights whose are not
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+def test_where_all_lights_are_kept_all_is_as_the_careful_kernel_says(dtype: type, shift: float) -> None:
+    directions = bgars.LightRig.ring(8, elevation_deg=50.0).directions + np.array([shift, shift / 2, 0.0])
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    capture = random_row(dtype, bgars.LightRig.from_directions(directions), least=0.2)
+    fast = bgars.estimate_normals(capture, method="lambertian")
+    careful = careful_estimate(capture, "lambertian")
+    for name, atol in (("confidence", 1e-4), ("normals", 1e-6), ("albedo", 1e-6)):
+        np.testing.assert_allclose(getattr(fast, name), getattr(careful, name), rtol=0, atol=atol, err_msg=name)
+
+
+@pytest.mark.parametrize("lights", [5, 8, 9])
+@pytest.mark.parametrize("kind", ["dark frame", "black level", "intensities", "response", "mask"])
+@pytest.mark.parametrize("method", ["lambertian", "specular-filter", "robust-filter"])
+def test_both_kernels_read_a_capture_alike(method: bgars.normals.Method, kind: str, lights: int) -> None:
+    rng = np.random.default_rng(11)
+    gains = rng.uniform(0.5, 2.0, lights) if kind == "intensities" else None
+    capture = random_row(np.uint8, bgars.LightRig.ring(lights, elevation_deg=50.0, intensities=gains), least=0.1)
+    pixels = capture.mask.shape[1]
+    if kind == "dark frame":
+        capture = replace(capture, dark=rng.integers(0, 20, (1, pixels), dtype=np.uint8))
+    elif kind == "black level":
+        capture = replace(capture, black_level=13.0)
+    elif kind == "response":
+        capture = replace(capture, response=(np.arange(256) ** 1.3 / 255**0.3).astype(np.float32))
+    elif kind == "mask":
+        mask = rng.random((1, pixels)) < 0.7
+        mask[:, 128:192] = False  # a block of the fast kernel without a pixel
+        mask[:, 192:256] = True
+        capture = replace(capture, mask=mask)
+    fast = bgars.estimate_normals(capture, method=method, keep_sets=True)
+    careful = careful_estimate(capture, method, keep_sets=True)
+    for name in ("mask", "measured", "lights_kept", "kept_sets"):
+        np.testing.assert_array_equal(getattr(fast, name), getattr(careful, name), err_msg=name)
+    assert fast.mask.sum() > 300
+    np.testing.assert_allclose(fast.normals, careful.normals, rtol=0, atol=1e-5)
+    np.testing.assert_allclose(fast.albedo, careful.albedo, rtol=1e-4)
 
 
 @pytest.mark.parametrize("rows", [3, 1100])  # the larger image's results are written past the caches
