@@ -168,6 +168,20 @@ fn compare<P: Pixel>(images: &[P], directions: &[[f64; 3]], mask: &[bool], metho
     }
 }
 
+/// A block of the fast kernel, and as many pixels more for the careful one.
+const BOTH: [usize; 2] = [64, 6];
+const PIXELS: usize = BOTH[0] + BOTH[1];
+
+/// One pixel's values as those of [`PIXELS`] pixels.
+fn repeated<P: Copy>(values: &[P]) -> Vec<P> {
+    values.iter().flat_map(|&value| [value; PIXELS]).collect()
+}
+
+/// The normals of the first pixel of each kernel.
+fn of_both(map: &NormalMap) -> [nalgebra::Vector3<f64>; 2] {
+    [0, BOTH[0]].map(|pixel| nalgebra::Vector3::from_column_slice(&map.normals[3 * pixel..3 * pixel + 3]).cast())
+}
+
 const METHODS: [Method; 3] =
     [Method::Lambertian, Method::SpecularFilter { threshold: 50.0 }, Method::RobustFilter(RobustParams::DEFAULT)];
 
@@ -177,7 +191,7 @@ proptest! {
     #[test]
     fn u8_stacks_equal_the_twin(
         (count, values, mask) in (3usize..=16).prop_flat_map(|count| (
-            Just(count), prop::collection::vec(any::<u8>(), count * 6), prop::collection::vec(any::<bool>(), 6),
+            Just(count), prop::collection::vec(any::<u8>(), count * PIXELS), prop::collection::vec(any::<bool>(), PIXELS),
         )),
         elevation_deg in 20.0..60.0,
     ) {
@@ -190,24 +204,24 @@ proptest! {
     #[test]
     fn u16_stacks_equal_the_twin(
         (count, values) in (3usize..=16).prop_flat_map(|count| (
-            Just(count), prop::collection::vec(any::<u16>(), count * 6),
+            Just(count), prop::collection::vec(any::<u16>(), count * PIXELS),
         )),
         elevation_deg in 20.0..60.0,
     ) {
         for method in METHODS {
-            compare(&values, &ring(count, elevation_deg), &[true; 6], method, 65535.0);
+            compare(&values, &ring(count, elevation_deg), &[true; PIXELS], method, 65535.0);
         }
     }
 
     #[test]
     fn f32_stacks_equal_the_twin(
         (count, values) in (3usize..=16).prop_flat_map(|count| (
-            Just(count), prop::collection::vec(0.0f32..1.0, count * 6),
+            Just(count), prop::collection::vec(0.0f32..1.0, count * PIXELS),
         )),
         elevation_deg in 20.0..60.0,
     ) {
         for method in METHODS {
-            compare(&values, &ring(count, elevation_deg), &[true; 6], method, 1.0);
+            compare(&values, &ring(count, elevation_deg), &[true; PIXELS], method, 1.0);
         }
     }
 
@@ -222,9 +236,10 @@ proptest! {
         prop_assume!(values.iter().all(|&value| value > 0.05));
         let lights = Lights::directional(&directions).unwrap();
         for method in [Method::Lambertian, Method::RobustFilter(RobustParams::DEFAULT)] {
-            let map = run(&values, &lights, None, method, 1.0);
-            let found = nalgebra::Vector3::new(map.normals[0], map.normals[1], map.normals[2]).cast::<f64>();
-            prop_assert!((found - normal).norm().to_degrees() < 1e-3, "{method:?}: {found} is not {normal}");
+            let map = run(&repeated(&values), &lights, None, method, 1.0);
+            for found in of_both(&map) {
+                prop_assert!((found - normal).norm().to_degrees() < 1e-3, "{method:?}: {found} is not {normal}");
+            }
         }
     }
 }
@@ -253,8 +268,8 @@ fn the_bits_are_the_same_for_one_and_two_threads() {
 
 #[test]
 fn an_image_over_the_size_that_is_streamed_equals_its_two_halves() {
-    // Over a megapixel results are written past the caches; half of it, and a rest of no full block, are not.
-    let (count, half) = (4, (1 << 19) + 37);
+    // Over a megapixel results are written past the caches; half of it is not.
+    let (count, half) = (4, 1 << 19);
     let images: Vec<u8> = (0..count * 2 * half).map(|index| ((index * 2_654_435_761) >> 13) as u8).collect();
     let lights = Lights::directional(&ring(count, 40.0)).unwrap();
     let mask: Vec<bool> = (0..2 * half).map(|pixel| pixel % 1001 > 3).collect();
@@ -317,16 +332,19 @@ fn dark_frame_response_and_intensities_are_undone() {
         .zip(&intensities)
         .map(|(&light, e)| encode(dark_level + 30_000.0 * e * nalgebra::Vector3::from(light).dot(&normal)))
         .collect();
-    let dark = [encode(dark_level)];
-    let stack = ImageStack::new(&images, 6, 1, 1).unwrap();
+    let (images, dark) = (repeated(&images), [encode(dark_level); PIXELS]);
+    let stack = ImageStack::new(&images, 6, 1, PIXELS).unwrap();
     let radiometry =
         Radiometry { response: Some(&response), dark: Some(&dark), intensities, ..Radiometry::linear(6, 65535.0) };
     let map =
         estimate(&stack, &lights, &radiometry, None, Method::Lambertian, false, &mut |_| ControlFlow::Continue(()))
             .unwrap();
-    let found = nalgebra::Vector3::new(map.normals[0], map.normals[1], map.normals[2]).cast::<f64>();
-    assert!((found - normal).norm().to_degrees() < 0.01, "{found}");
-    approx::assert_relative_eq!(map.albedo[0], 30_000.0 / 65535.0, max_relative = 1e-3);
+    for found in of_both(&map) {
+        assert!((found - normal).norm().to_degrees() < 0.01, "{found}");
+    }
+    for albedo in [map.albedo[0], map.albedo[BOTH[0]]] {
+        approx::assert_relative_eq!(albedo, 30_000.0 / 65535.0, max_relative = 1e-3);
+    }
 }
 
 #[test]
@@ -334,11 +352,12 @@ fn a_black_pixel_and_a_coplanar_kept_set_have_no_normal() {
     let s = 0.5f64.sqrt();
     // Lights 0, 1, 2 are coplanar; the filter keeps just these when 3 and 4 are highlights.
     let lights = Lights::directional(&[[s, 0.0, s], [0.0, 0.0, 1.0], [-s, 0.0, s], [0.0, s, s], [0.0, -s, s]]).unwrap();
-    let images: [u8; 10] = [0, 10, 0, 12, 0, 11, 0, 200, 0, 201];
-    let map = run(&images, &lights, None, Method::SpecularFilter { threshold: 50.0 }, 255.0);
-    assert_eq!(map.mask, [false, false]);
-    assert!(map.normals.iter().all(|value| value.is_nan()));
-    assert_eq!(map.lights_kept, [5, 3]);
+    for (values, kept) in [([0; 5], 5), ([10, 12, 11, 200, 201], 3)] {
+        let map = run(&repeated::<u8>(&values), &lights, None, Method::SpecularFilter { threshold: 50.0 }, 255.0);
+        assert_eq!(map.mask, [false; PIXELS]);
+        assert!(map.normals.iter().all(|value| value.is_nan()));
+        assert_eq!(map.lights_kept, [kept; PIXELS]);
+    }
 }
 
 #[test]
