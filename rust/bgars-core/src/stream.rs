@@ -61,6 +61,27 @@ copy_by!(copy_avx, "avx", __m256i, _mm256_loadu_si256, _mm256_stream_si256);
 #[cfg(target_arch = "x86_64")]
 copy_by!(copy_sse2, "sse2", __m128i, _mm_loadu_si128, _mm_stream_si128);
 
+/// Has the processor fetch the array that lies so many arrays further on, if there is one, while it works on something else.
+#[inline(always)]
+pub(crate) fn prefetch<T, const N: usize>(values: &[T; N], arrays: usize) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        /// Bytes of a cache line.
+        const LINE: usize = 64;
+        let ahead = std::ptr::from_ref(values).wrapping_add(arrays).cast::<i8>();
+        for line in 0..size_of::<[T; N]>().div_ceil(LINE) {
+            // SAFETY: a hint, which may name any address and reads nothing into the program. SSE is part of x86_64.
+            #[allow(unsafe_code, unused_unsafe)]
+            unsafe {
+                _mm_prefetch::<_MM_HINT_T0>(ahead.wrapping_add(line * LINE));
+            }
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (values, arrays);
+}
+
 /// Makes streamed writes visible to other threads in order.
 #[inline]
 pub(crate) fn finish() {

@@ -17,6 +17,9 @@ use crate::vector::{Avx2, Avx512, Pair};
 use crate::vector::{Portable, Vector};
 use crate::{Pixel, Radiometry, stream};
 
+/// How far ahead the images are fetched: as many streams as lights, of wide pixels, are more than processors follow.
+const BLOCKS_AHEAD: usize = 16;
+
 /// What every block reads.
 pub(super) struct Input<'a, P> {
     /// The images.
@@ -140,7 +143,11 @@ fn run_with<K: Pixel, V: Vector>(
                 let [a, b, c, d, e, f, g, h] = planes.map(|plane| blocks_of(plane, &pixels));
                 let keys = a.iter().zip(b).zip(c).zip(d).zip(e).zip(f).zip(g).zip(h);
                 for (number, (out, (((((((a, b), c), d), e), f), g), h))) in blocks.zip(keys).enumerate() {
-                    task.block::<V>(number, &[a, b, c, d, e, f, g, h], out);
+                    let keys = [a, b, c, d, e, f, g, h];
+                    for key in keys {
+                        stream::prefetch(key, BLOCKS_AHEAD);
+                    }
+                    task.block::<V>(number, &keys, out);
                 }
             } else {
                 let images: Vec<&[Lanes<K>]> = planes.iter().map(|plane| blocks_of(plane, &pixels)).collect();
