@@ -17,7 +17,7 @@ use crate::vector::{Avx2, Avx512, Pair};
 use crate::vector::{Portable, Vector};
 use crate::{Pixel, Radiometry, stream};
 
-/// How far ahead the images are fetched: as many streams as lights, of wide pixels, are more than processors follow.
+/// How far ahead the images are fetched: streams of floats, or of many lights, are more than processors follow by themselves.
 const BLOCKS_AHEAD: usize = 16;
 
 /// What every block reads.
@@ -144,9 +144,7 @@ fn run_with<K: Pixel, V: Vector>(
                 let keys = a.iter().zip(b).zip(c).zip(d).zip(e).zip(f).zip(g).zip(h);
                 for (number, (out, (((((((a, b), c), d), e), f), g), h))) in blocks.zip(keys).enumerate() {
                     let keys = [a, b, c, d, e, f, g, h];
-                    for key in keys {
-                        stream::prefetch(key, BLOCKS_AHEAD);
-                    }
+                    fetch_ahead(&keys);
                     task.block::<V>(number, &keys, out);
                 }
             } else {
@@ -155,6 +153,7 @@ fn run_with<K: Pixel, V: Vector>(
                 for (number, out) in blocks.enumerate() {
                     keys.clear();
                     keys.extend(images.iter().map(|blocks| &blocks[number]));
+                    fetch_ahead(&keys);
                     task.block::<V>(number, &keys, out);
                 }
             }
@@ -177,6 +176,14 @@ fn run_with<K: Pixel, V: Vector>(
                 (sink.careful)(pixel, sink.out);
             }
         }
+    }
+}
+
+/// Has the processor fetch the blocks that come a little later.
+#[inline(always)]
+fn fetch_ahead<K>(keys: &[&Lanes<K>]) {
+    for key in keys {
+        stream::prefetch(*key, BLOCKS_AHEAD);
     }
 }
 
