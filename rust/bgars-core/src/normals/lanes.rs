@@ -183,7 +183,7 @@ fn run_with<K: Pixel, V: Vector>(
 #[inline(always)]
 fn fetch_ahead<K>(keys: &[&Lanes<K>]) {
     for key in keys {
-        stream::prefetch(*key, BLOCKS_AHEAD);
+        stream::prefetch(key, BLOCKS_AHEAD);
     }
 }
 
