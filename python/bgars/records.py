@@ -50,7 +50,10 @@ def integer_full_scale(pixels: PixelArray) -> float | None:
 
 def float_full_scale(pixels: PixelArray) -> float:
     """Return the largest finite value of float pixels: their full scale, where no saturation level is known."""
-    return max(float(np.max(pixels, initial=0.0, where=np.isfinite(pixels))), TINY)
+    largest = float(np.max(pixels, initial=0.0))
+    if not math.isfinite(largest):  # seldom, and to ask for it beforehand takes longer than the normals
+        largest = float(np.max(pixels, initial=0.0, where=np.isfinite(pixels)))
+    return max(largest, TINY)
 
 
 @dataclass(frozen=True, eq=False)
