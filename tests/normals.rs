@@ -287,6 +287,76 @@ fn an_image_over_the_size_that_is_streamed_equals_its_two_halves() {
 }
 
 #[test]
+fn images_a_power_of_two_apart_give_the_same_bits() {
+    const PIXELS: usize = 4096;
+    let stack = |apart: usize| -> Vec<f32> {
+        let pixel =
+            |at: usize| if at % apart < PIXELS { ((at / apart * 37 + at % apart * 101) % 251) as f32 } else { 0.0 };
+        (0..24 * apart).map(pixel).collect()
+    };
+    let lights = Lights::directional(&ring(24, 40.0)).unwrap();
+    let (crowded, spread) = (stack(PIXELS), stack(PIXELS + 64));
+    for method in [Method::Lambertian, Method::SpecularFilter { threshold: 20.0 }] {
+        let crowded = run(&crowded, &lights, None, method, 255.0);
+        let spread = run(&spread, &lights, None, method, 255.0);
+        assert!(crowded.mask.iter().any(|&solved| solved));
+        let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&crowded.normals), bits(&spread.normals[..3 * PIXELS]));
+        assert_eq!(bits(&crowded.albedo), bits(&spread.albedo[..PIXELS]));
+        assert_eq!(bits(&crowded.confidence), bits(&spread.confidence[..PIXELS]));
+        assert_eq!(crowded.mask, spread.mask[..PIXELS]);
+        assert_eq!(crowded.lights_kept, spread.lights_kept[..PIXELS]);
+    }
+}
+
+#[test]
+fn a_value_that_is_not_finite_is_found_wherever_it_is_and_harms_no_other_pixel() {
+    let proceed = &mut |_| ControlFlow::Continue(());
+    // Two whole blocks of the fast kernel and some pixels behind them.
+    let pixels = 2 * 64 + 7;
+    for count in [4, 8, 24] {
+        let directions = ring(count, 40.0);
+        let positions: Vec<[f64; 3]> = directions.iter().map(|light| light.map(|along| 5000.0 * along)).collect();
+        let images: Vec<f32> = (0..count * pixels).map(|at| (10 + at * 37 % 251) as f32).collect();
+        for lights in
+            [Lights::directional(&directions).unwrap(), Lights::near(&positions, &vec![5000.0; count]).unwrap()]
+        {
+            for method in [
+                Method::Lambertian,
+                Method::SpecularFilter { threshold: 20.0 },
+                Method::RobustFilter(RobustParams::DEFAULT),
+            ] {
+                let clean = run(&images, &lights, None, method, 255.0);
+                for (bad, value) in [(0, f32::NAN), (63, f32::INFINITY), (100, f32::NEG_INFINITY), (130, f32::NAN)] {
+                    let mut images = images.clone();
+                    images[(count - 1) * pixels + bad] = value;
+                    let stack = ImageStack::new(&images, count, 1, pixels).unwrap();
+                    let radiometry = Radiometry::linear(count, 255.0);
+                    let error = estimate(&stack, &lights, &radiometry, None, method, false, proceed).unwrap_err();
+                    assert!(
+                        matches!(error, Error::NonFinitePixel { image, row: 0, col, count: 1 } if (image, col) == (count - 1, bad)),
+                        "{count} lights, {method:?}, pixel {bad}: {error}"
+                    );
+                    let mask: Vec<bool> = (0..pixels).map(|pixel| pixel != bad).collect();
+                    let masked = run(&images, &lights, Some(&mask), method, 255.0);
+                    assert!(!masked.mask[bad]);
+                    let normals = |map: &NormalMap, pixel: usize| {
+                        map.normals[3 * pixel..][..3].iter().map(|v| v.to_bits()).collect::<Vec<_>>()
+                    };
+                    for pixel in (0..pixels).filter(|&pixel| pixel != bad) {
+                        assert_eq!(
+                            normals(&masked, pixel),
+                            normals(&clean, pixel),
+                            "{count} lights, {method:?}, pixel {pixel}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn near_lights_give_back_the_normal_of_a_board_point_off_the_centre() {
     let positions: Vec<[f64; 3]> = ring(8, 45.0).iter().map(|direction| direction.map(|v| v * 300.0)).collect();
     let reference: Vec<f64> = vec![300.0; 8];

@@ -1,12 +1,12 @@
 //! The loop over pixels: radiometry, choice of lights, least squares.
 
-use std::ops::{ControlFlow, Range};
+use std::ops::{BitAnd, ControlFlow, Range};
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::confidence::confidence;
-use super::cutoff::LANES;
+use super::cutoff::{LANES, Lanes};
 use super::lane_solve::{Choice, LaneSolver};
 use super::lanes::{self, Input, Sink};
 use super::out::{Out, task_pixels};
@@ -91,16 +91,23 @@ pub fn estimate_into<P: Pixel>(
     let pixels = stack.pixels();
     let band_pixels = if kernel.lanes.is_some() { LANE_BAND_PIXELS } else { BAND_PIXELS };
     let task_pixels = task_pixels(pixels.min(band_pixels));
+    let mut checked = P::CODES.is_some();
     for start in (0..pixels).step_by(band_pixels) {
         let band = start..(start + band_pixels).min(pixels);
         let tasks = Out::split(&mut out, &band, task_pixels);
-        tasks.into_par_iter().enumerate().for_each_init(
-            || Scratch::new(lights),
-            |scratch, (task, mut out)| {
+        let tasks = tasks.into_par_iter().enumerate().map_init(
+            || (Scratch::new(lights), Vec::new()),
+            |(scratch, memory), (task, mut out)| {
                 let first = start + task * task_pixels;
-                kernel.task(first..first + out.albedo.len(), &mut out, scratch);
+                kernel.task(first..first + out.albedo.len(), &mut out, scratch, memory)
             },
         );
+        let finite = tasks.reduce(|| true, BitAnd::bitand);
+        if !finite && !checked {
+            // Perhaps nothing is wrong inside the mask.
+            check_finite(stack, mask)?;
+            checked = true;
+        }
         if progress(band.end as f64 / pixels as f64).is_break() {
             return Err(Error::Cancelled);
         }
@@ -145,9 +152,6 @@ fn check<P: Pixel>(
             }
         }
         Method::RobustFilter(params) => params.check()?,
-    }
-    if P::CODES.is_none() {
-        check_finite(stack, mask)?;
     }
     Ok(())
 }
@@ -246,23 +250,32 @@ impl<'a, P: Pixel> Kernel<'a, P> {
         Self { stack, lights, radiometry, mask, method, robust, solver, lanes, planes, scales, full_scale }
     }
 
-    /// Works on a range of pixels.
-    fn task(&self, mut pixels: Range<usize>, out: &mut Out<'_>, scratch: &mut Scratch) {
+    /// Works on a range of pixels; true where all that was read is finite.
+    fn task(
+        &self,
+        mut pixels: Range<usize>,
+        out: &mut Out<'_>,
+        scratch: &mut Scratch,
+        memory: &mut Vec<Lanes<P>>,
+    ) -> bool {
         let first = pixels.start;
+        let mut finite = true;
         let careful = &mut |pixel: usize, out: &mut Out<'_>| self.pixel(pixel, pixel - first, out, scratch);
         if let Some(solver) = &self.lanes {
             let input =
                 Input { planes: &self.planes, radiometry: self.radiometry, scales: &self.scales, mask: self.mask };
-            lanes::run(solver, &input, pixels.clone(), &mut Sink { out, careful });
+            finite = lanes::run(solver, &input, pixels.clone(), &mut Sink { out, careful }, memory);
             pixels.start = pixels.end - pixels.len() % LANES;
         }
         for pixel in pixels {
             if self.mask.is_none_or(|mask| mask[pixel]) {
+                finite &= P::CODES.is_some() || self.planes.iter().all(|plane| plane[pixel].to_f32().is_finite());
                 careful(pixel, out);
             } else {
                 out.clear(pixel - first..pixel - first + 1);
             }
         }
+        finite
     }
 
     /// The careful kernel: one pixel in `f64`, written to place `at`.

@@ -17,7 +17,7 @@ use crate::lights::conditioning;
 use crate::vector::spread::Spread;
 use crate::vector::subset_sums::SubsetSums;
 use crate::vector::{RowTable, Vector};
-use crate::{Lights, Pixel};
+use crate::{Lights, Pixel, stream};
 
 /// Subsets of lights below this [`conditioning`] are solved in `f64`: one refinement in `f32` no longer makes up for rounding.
 const MIN_LANE_CONDITIONING: f64 = 1e-3;
@@ -106,10 +106,23 @@ impl LaneSolver {
 /// What a block of pixels reads.
 pub(super) struct Readings<'a, K> {
     pub keys: &'a [&'a Lanes<K>],
+    /// Those of them whose successors in memory are to be fetched meanwhile.
+    pub ahead: &'a [&'a Lanes<K>],
     /// A bit a light.
     pub clipped: &'a Lanes<u8>,
     /// To be subtracted from every key.
     pub offset: Option<&'a Lanes<f32>>,
+}
+
+/// How far ahead the images are fetched: streams of floats, or of many lights, are more than processors follow by themselves.
+const BLOCKS_AHEAD: usize = 16;
+
+/// Has the processor fetch a part of what comes a little later: of many reads at once the last ones wait, and the work with them.
+#[inline(always)]
+fn fetch<K>(ahead: &[&Lanes<K>], part: usize, parts: usize) {
+    for key in &ahead[part * ahead.len() / parts..(part + 1) * ahead.len() / parts] {
+        stream::prefetch(key, BLOCKS_AHEAD);
+    }
 }
 
 /// Chooses and solves.
@@ -122,9 +135,11 @@ pub(super) fn solve<K: Pixel, V: Vector>(
     out: &mut Finished,
     block: &mut Block<'_>,
 ) {
-    let Readings { keys, clipped, offset } = *readings;
+    let Readings { keys, ahead, clipped, offset } = *readings;
     (out.careful, out.valid) = (0, 0);
     out.keep_all = true;
+    let parts = 2 + LANES / V::WIDTH;
+    fetch(ahead, 0, parts);
     match &solver.choice {
         Choice::All => {}
         Choice::UpToGap(gap) => {
@@ -149,8 +164,10 @@ pub(super) fn solve<K: Pixel, V: Vector>(
             (out.kept, out.keep_all) = (kept.counts(keys.len()), false);
         }
     }
+    fetch(ahead, 1, parts);
     for step in 0..LANES / V::WIDTH {
         let at = step * V::WIDTH;
+        fetch(ahead, 2 + step, parts);
         let facets = if out.keep_all || kept.are_whole(keys.len(), at, V::WIDTH) {
             solve_all::<K, V>(solver, readings, at)
         } else {

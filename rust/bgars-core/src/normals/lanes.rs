@@ -9,6 +9,7 @@ use multiversion::multiversion;
 
 use super::cutoff::{LANES, Lanes};
 use super::finish::Finished;
+use super::gather::{are_crowded, bring, stretch_blocks};
 use super::kept::Kept;
 use super::lane_solve::{BYTE_LIGHTS, Careful, Choice, LaneSolver, Readings, solve};
 use super::out::{Block, Out};
@@ -16,9 +17,6 @@ use super::out::{Block, Out};
 use crate::vector::{Avx2, Avx512, Pair};
 use crate::vector::{Portable, Vector};
 use crate::{Pixel, Radiometry, stream};
-
-/// How far ahead the images are fetched: streams of floats, or of many lights, are more than processors follow by themselves.
-const BLOCKS_AHEAD: usize = 16;
 
 /// What every block reads.
 pub(super) struct Input<'a, P> {
@@ -40,8 +38,8 @@ pub(super) struct Sink<'a, 'b> {
 
 /// Where the keys of a block come from.
 enum Source<'a, K> {
-    /// The images as they are.
-    Images(&'a [&'a [K]]),
+    /// The images as they are, and where they are brought together if they crowd.
+    Images(&'a [&'a [K]], &'a mut Vec<Lanes<K>>),
     /// Computed from them.
     Made(&'a Make<'a, K>),
 }
@@ -66,9 +64,16 @@ struct Common<'a> {
     clips: Option<&'a Clips<'a>>,
 }
 
-/// Works on the blocks of `pixels` (of the whole image); the pixels behind the last whole one are left.
+/// Works on the blocks of `pixels` (of the whole image); the pixels behind the last whole one are left. True where all that
+/// was read is finite.
 #[allow(clippy::float_cmp)] // intensities that are 1 by default
-pub(super) fn run<P: Pixel>(solver: &LaneSolver, input: &Input<'_, P>, pixels: Range<usize>, sink: &mut Sink<'_, '_>) {
+pub(super) fn run<P: Pixel>(
+    solver: &LaneSolver,
+    input: &Input<'_, P>,
+    pixels: Range<usize>,
+    sink: &mut Sink<'_, '_>,
+    memory: &mut Vec<Lanes<P>>,
+) -> bool {
     let Input { planes, radiometry, scales, mask } = *input;
     let plain = radiometry.response.is_none() && scales.iter().all(|&scale| scale == 1.0);
     let has_offsets = radiometry.dark.is_some() || radiometry.black_level != 0.0;
@@ -89,7 +94,7 @@ pub(super) fn run<P: Pixel>(solver: &LaneSolver, input: &Input<'_, P>, pixels: R
     let offsets: Option<&Offsets<'_>> = if plain && has_offsets { Some(&load_offsets) } else { None };
     let common = Common { mask, full_scale: radiometry.full_scale, offsets, clips };
     if plain {
-        run_blocks(solver, &Source::Images(planes), common, pixels, sink);
+        run_blocks(solver, &mut Source::Images(planes, memory), common, pixels, sink)
     } else {
         let make = |block: &Range<usize>, keys: &mut [Lanes<f32>]| {
             let mut offsets = [0.0; LANES];
@@ -100,7 +105,7 @@ pub(super) fn run<P: Pixel>(solver: &LaneSolver, input: &Input<'_, P>, pixels: R
                 }
             }
         };
-        run_blocks(solver, &Source::Made(&make), common, pixels, sink);
+        run_blocks(solver, &mut Source::Made(&make), common, pixels, sink)
     }
 }
 
@@ -108,11 +113,11 @@ pub(super) fn run<P: Pixel>(solver: &LaneSolver, input: &Input<'_, P>, pixels: R
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl+avx512dq+fma", "x86_64+avx2+fma"))]
 fn run_blocks<K: Pixel>(
     solver: &LaneSolver,
-    source: &Source<'_, K>,
+    source: &mut Source<'_, K>,
     common: Common<'_>,
     pixels: Range<usize>,
     sink: &mut Sink<'_, '_>,
-) {
+) -> bool {
     #[cfg(target_arch = "x86_64")]
     {
         if multiversion::target::target_cfg_f!(target_feature = "avx512f") {
@@ -122,39 +127,45 @@ fn run_blocks<K: Pixel>(
             return run_with::<K, Pair<Avx2>>(solver, source, common, pixels, sink);
         }
     }
-    run_with::<K, Portable>(solver, source, common, pixels, sink);
+    run_with::<K, Portable>(solver, source, common, pixels, sink)
 }
 
 #[inline(always)]
 fn run_with<K: Pixel, V: Vector>(
     solver: &LaneSolver,
-    source: &Source<'_, K>,
+    source: &mut Source<'_, K>,
     common: Common<'_>,
     pixels: Range<usize>,
     sink: &mut Sink<'_, '_>,
-) {
+) -> bool {
     sink.out.streamed &= V::STREAMS;
     let (blocks, sets) = sink.out.blocks();
     let mut task = Task::new(solver, common, pixels.start, sets);
     match source {
-        Source::Images(planes) => {
+        Source::Images(planes, memory) => {
             if let Ok(planes) = <&[&[K]; BYTE_LIGHTS]>::try_from(*planes) {
                 // Compiled for eight lights once more: loops over lights are written out then, and bounds are not asked for.
                 let [a, b, c, d, e, f, g, h] = planes.map(|plane| blocks_of(plane, &pixels));
                 let keys = a.iter().zip(b).zip(c).zip(d).zip(e).zip(f).zip(g).zip(h);
                 for (number, (out, (((((((a, b), c), d), e), f), g), h))) in blocks.zip(keys).enumerate() {
                     let keys = [a, b, c, d, e, f, g, h];
-                    fetch_ahead(&keys);
-                    task.block::<V>(number, &keys, out);
+                    task.block::<V>(number, &keys, &keys, out);
                 }
             } else {
                 let images: Vec<&[Lanes<K>]> = planes.iter().map(|plane| blocks_of(plane, &pixels)).collect();
-                let mut keys = Vec::with_capacity(images.len());
-                for (number, out) in blocks.enumerate() {
-                    keys.clear();
-                    keys.extend(images.iter().map(|blocks| &blocks[number]));
-                    fetch_ahead(&keys);
-                    task.block::<V>(number, &keys, out);
+                let mut blocks = blocks;
+                let crowded = are_crowded(planes);
+                let run = if crowded { stretch_blocks::<K>(images.len()) } else { images[0].len() };
+                for first in (0..images[0].len()).step_by(run.max(1)) {
+                    let brought = crowded.then(|| bring(&images, first, run, memory));
+                    let images = brought.as_ref().unwrap_or(&images);
+                    let mut keys = Vec::with_capacity(images.len());
+                    for (at, out) in (0..images[0].len()).zip(blocks.by_ref()) {
+                        keys.clear();
+                        keys.extend(images.iter().map(|blocks| &blocks[at]));
+                        let ahead = if crowded { &[][..] } else { &keys };
+                        task.block::<V>(first + at, &keys, ahead, out);
+                    }
                 }
             }
         }
@@ -162,11 +173,11 @@ fn run_with<K: Pixel, V: Vector>(
             let mut made = vec![[K::ZERO; LANES]; solver.lights()];
             for (number, out) in blocks.enumerate() {
                 make(&task.pixels(number), &mut made);
-                task.block::<V>(number, &made.iter().collect::<Vec<_>>(), out);
+                task.block::<V>(number, &made.iter().collect::<Vec<_>>(), &[], out);
             }
         }
     }
-    let careful = task.careful;
+    let Task { careful, finite, .. } = task;
     if sink.out.streamed {
         stream::finish();
     }
@@ -177,14 +188,7 @@ fn run_with<K: Pixel, V: Vector>(
             }
         }
     }
-}
-
-/// Has the processor fetch the blocks that come a little later.
-#[inline(always)]
-fn fetch_ahead<K>(keys: &[&Lanes<K>]) {
-    for key in keys {
-        stream::prefetch(key, BLOCKS_AHEAD);
-    }
+    finite
 }
 
 /// The whole blocks of some pixels.
@@ -205,6 +209,8 @@ struct Task<'a, K> {
     finished: Finished,
     /// The kept lights of all pixels, or none.
     sets: &'a mut [bool],
+    /// True while no value was NaN or infinite.
+    finite: bool,
     /// Blocks that leave pixels to the careful kernel, by their first pixel, and which.
     careful: Vec<(usize, Careful)>,
 }
@@ -222,6 +228,7 @@ impl<'a, K: Pixel> Task<'a, K> {
             kept: Kept::new(solver.lights()),
             finished: Finished::new(),
             sets,
+            finite: true,
             careful: Vec::new(),
         }
     }
@@ -234,7 +241,7 @@ impl<'a, K: Pixel> Task<'a, K> {
 
     /// Works on a block.
     #[inline(always)]
-    fn block<V: Vector>(&mut self, number: usize, keys: &[&Lanes<K>], mut out: Block<'_>) {
+    fn block<V: Vector>(&mut self, number: usize, keys: &[&Lanes<K>], ahead: &[&Lanes<K>], mut out: Block<'_>) {
         let pixels = self.pixels(number);
         let used = self.common.mask.map(|mask| &mask[pixels.clone()]);
         // A block that is all in, or all out, needs no look at its pixels.
@@ -250,6 +257,9 @@ impl<'a, K: Pixel> Task<'a, K> {
             return;
         }
         let used = used.filter(|_| count < LANES);
+        if K::CODES.is_none() {
+            self.finite &= are_finite::<K, V>(keys);
+        }
         if let Some(load) = self.common.offsets {
             load(&pixels, &mut self.offset);
         }
@@ -257,7 +267,7 @@ impl<'a, K: Pixel> Task<'a, K> {
             mark(&pixels, &mut self.clipped);
         }
         let offset = self.common.offsets.map(|_| &self.offset);
-        let readings = Readings { keys, clipped: &self.clipped, offset };
+        let readings = Readings { keys, ahead, clipped: &self.clipped, offset };
         solve::<K, V>(self.solver, &readings, &mut self.kept, self.per_full_scale, &mut self.finished, &mut out);
         write(&self.finished, &self.all_lights, used, &mut out);
         if !sets.is_empty() {
@@ -267,6 +277,20 @@ impl<'a, K: Pixel> Task<'a, K> {
             self.careful.push((pixels.start, self.finished.careful));
         }
     }
+}
+
+/// False where a value is NaN or infinite. Asked here, where the values are at hand: a search of its own reads the images twice.
+#[inline(always)]
+fn are_finite<K: Pixel, V: Vector>(keys: &[&Lanes<K>]) -> bool {
+    let zero = V::splat(0.0);
+    let mut sums = zero;
+    for key in keys {
+        for step in 0..LANES / V::WIDTH {
+            // 0 times something finite is 0, else NaN.
+            sums = K::load::<V>(&key[step * V::WIDTH..]).times_plus(zero, sums);
+        }
+    }
+    V::all(sums.is_over(V::splat(-1.0)))
 }
 
 /// Mask and counts of a block, and what its unused pixels say.

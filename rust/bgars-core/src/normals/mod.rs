@@ -8,6 +8,7 @@ mod confidence;
 mod cutoff;
 mod finish;
 mod fused;
+mod gather;
 mod kept;
 mod kernel;
 mod lane_solve;
