@@ -45,6 +45,8 @@ def tasks(*, quick: bool) -> list[Task]:
 def _normals(*, quick: bool) -> list[Task]:
     sizes = [("4", "2000", "2000")] if quick else [("4", "2000", "2000"), ("20", "4000", "5000")]
     found = [Task("normals", "normals.py", size, threads) for size in sizes for threads in THREADS]
+    # The second side puts all images a power of two apart.
+    found += [Task("normals", "pixel_types.py", (side,)) for side in (("512",) if quick else ("1500", "1536"))]
     return found + [Task("normals", "roofline.py", ("normals", *sizes[-1][1:]), threads) for threads in THREADS]
 
 

@@ -10,6 +10,8 @@ import bgars
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
 LIGHTS = 8
@@ -43,12 +45,21 @@ def make_stack(rows: int, cols: int) -> Stack:
             if tile.dtype == np.uint8 and len(tile) == LIGHTS:
                 return Stack(_tiled(tile, rows, cols), capture.rig.directions, f"scene {name}, tiled and mirrored")
     directions = bgars.LightRig.ring(LIGHTS).directions
-    return Stack(_tiled(_spheres(directions), rows, cols), directions, "spheres with a highlight and noise, tiled")
+    images = sphere_stack(directions, np.dtype(np.uint8), rows, cols)
+    return Stack(images, directions, "spheres with a highlight and noise, tiled")
 
 
-def _tiled(tile: NDArray[np.uint8], rows: int, cols: int) -> NDArray[np.uint8]:
+def sphere_stack(directions: NDArray[np.float64], dtype: np.dtype, rows: int, cols: int) -> NDArray[np.generic]:
+    """Rendered spheres, tiled: images (L, H, W) of any pixel type, floats up to 1, and any number of lights."""
+    is_integer = dtype.kind == "u"
+    per_level = (np.iinfo(dtype).max if is_integer else 1.0) / 255.0
+    tile = np.stack([image * per_level for image in _spheres(directions)])
+    return _tiled((tile.round() if is_integer else tile).astype(dtype), rows, cols)
+
+
+def _tiled(tile: NDArray[np.generic], rows: int, cols: int) -> NDArray[np.generic]:
     height, width = tile.shape[1:]
-    images = np.zeros((len(tile), rows, cols), dtype=np.uint8)
+    images = np.zeros((len(tile), rows, cols), dtype=tile.dtype)
     for i, top in enumerate(range(0, rows, height)):
         for j, left in enumerate(range(0, cols, width)):
             part = tile[:, :: -1 if i % 2 else 1, :: -1 if j % 2 else 1][:, : rows - top, : cols - left]
@@ -56,8 +67,8 @@ def _tiled(tile: NDArray[np.uint8], rows: int, cols: int) -> NDArray[np.uint8]:
     return images
 
 
-def _spheres(directions: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Spheres of different sizes on a plane: diffuse plus a Blinn-Phong lobe, attached shadows, noise, clipping."""
+def _spheres(directions: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
+    """Spheres of different sizes on a plane, 0 to 255: diffuse plus a Blinn-Phong lobe, attached shadows, noise."""
     random = np.random.default_rng(7)
     y, x = np.mgrid[0:TILE_PX, 0:TILE_PX].astype(np.float64)
     normals = np.zeros((TILE_PX, TILE_PX, 3))
@@ -68,10 +79,8 @@ def _spheres(directions: NDArray[np.float64]) -> NDArray[np.uint8]:
             u, v = (x - col) / radius_px, (row - y) / radius_px
             inside = u * u + v * v < 0.98
             normals[inside] = np.stack([u, v, np.sqrt(np.maximum(1.0 - u * u - v * v, 0.0))], axis=-1)[inside]
-    images = np.zeros((len(directions), TILE_PX, TILE_PX), dtype=np.uint8)
-    for image, light in zip(images, directions, strict=True):
+    for light in directions:
         half = light + np.array([0.0, 0.0, 1.0])
         half /= np.linalg.norm(half)
         grey = 110.0 * np.maximum(normals @ light, 0.0) + 220.0 * np.maximum(normals @ half, 0.0) ** 60
-        image[:] = np.clip(grey + random.normal(2.0, 1.5, grey.shape), 0.0, 255.0).round()
-    return images
+        yield np.clip(grey + random.normal(2.0, 1.5, grey.shape), 0.0, 255.0)
