@@ -3,6 +3,8 @@
 //! A cache looks for a line in the few places that the line's address allows. Where images lie a power of two apart, the same pixel
 //! of all of them wants the same places, and each image drives out another before it is read again.
 
+use std::ops::Range;
+
 use super::cutoff::{LANES, Lanes};
 use crate::Pixel;
 use crate::stream;
@@ -34,29 +36,26 @@ pub(super) fn stretch_blocks<K>(lights: usize) -> usize {
     (MOST_RUN_BYTES.min(MOST_BYTES / lights) / size_of::<Lanes<K>>()).max(1)
 }
 
-/// Brings a stretch of the images together: from block `first` on so many, or fewer at the end.
+/// Brings a stretch of blocks of the images together.
 pub(super) fn bring<'a, K: Pixel>(
     images: &[&[Lanes<K>]],
-    first: usize,
-    blocks: usize,
+    stretch: &Range<usize>,
     memory: &'a mut Vec<Lanes<K>>,
 ) -> Vec<&'a [Lanes<K>]> {
     // One block more than needed, so that these lie no power of two apart.
-    let stride = blocks + 1;
+    let stride = stretch.len() + 1;
     memory.resize(stride * images.len(), [K::ZERO; LANES]);
     let mut brought = Vec::with_capacity(images.len());
     for (light, to) in memory.chunks_exact_mut(stride).enumerate() {
-        let run = |image: &[Lanes<K>]| first..image.len().min(first + blocks);
-        let from = &images[light][run(images[light])];
-        let next = images.get(light + 1).map_or(&[][..], |image| &image[run(image)]);
-        for (number, (to, from)) in to.iter_mut().zip(from).enumerate() {
+        let next = images.get(light + 1).map_or(&[][..], |image| &image[stretch.clone()]);
+        for (number, (to, from)) in to.iter_mut().zip(&images[light][stretch.clone()]).enumerate() {
             // While one image is copied, the next one is fetched.
             if let Some(next) = next.get(number) {
                 stream::prefetch(next, 0);
             }
             *to = *from;
         }
-        brought.push(&to[..from.len()]);
+        brought.push(&to[..stretch.len()]);
     }
     brought
 }
@@ -79,12 +78,9 @@ mod tests {
             let images: Vec<&[Lanes<u16>]> = images.iter().map(Vec::as_slice).collect();
             let run = stretch_blocks::<u16>(lights);
             for first in (0..blocks).step_by(run) {
-                let expected: Vec<_> = images.iter().map(|image| &image[first..blocks.min(first + run)]).collect();
-                assert_eq!(
-                    bring(&images, first, run, &mut memory),
-                    expected,
-                    "{lights} lights, {blocks} blocks, from {first}"
-                );
+                let stretch = first..blocks.min(first + run);
+                let expected: Vec<_> = images.iter().map(|image| &image[stretch.clone()]).collect();
+                assert_eq!(bring(&images, &stretch, &mut memory), expected, "{lights} lights, {stretch:?} of {blocks}");
             }
         }
     }

@@ -154,13 +154,17 @@ fn run_with<K: Pixel, V: Vector>(
             } else {
                 let images: Vec<&[Lanes<K>]> = planes.iter().map(|plane| blocks_of(plane, &pixels)).collect();
                 let mut blocks = blocks;
-                let crowded = are_crowded(planes);
-                let run = if crowded { stretch_blocks::<K>(images.len()) } else { images[0].len() };
-                for first in (0..images[0].len()).step_by(run.max(1)) {
-                    let brought = crowded.then(|| bring(&images, first, run, memory));
-                    let images = brought.as_ref().unwrap_or(&images);
+                let (count, crowded) = (pixels.len() / LANES, are_crowded(planes));
+                let run = if crowded { stretch_blocks::<K>(images.len()) } else { count.max(1) };
+                for first in (0..count).step_by(run) {
+                    let stretch = first..count.min(first + run);
+                    let images = if crowded && task.uses(&stretch) {
+                        bring(&images, &stretch, memory)
+                    } else {
+                        images.iter().map(|blocks| &blocks[stretch.clone()]).collect()
+                    };
                     let mut keys = Vec::with_capacity(images.len());
-                    for (at, out) in (0..images[0].len()).zip(blocks.by_ref()) {
+                    for (at, out) in (0..stretch.len()).zip(blocks.by_ref()) {
                         keys.clear();
                         keys.extend(images.iter().map(|blocks| &blocks[at]));
                         let ahead = if crowded { &[][..] } else { &keys };
@@ -237,6 +241,12 @@ impl<'a, K: Pixel> Task<'a, K> {
     fn pixels(&self, number: usize) -> Range<usize> {
         let first = self.first_pixel + number * LANES;
         first..first + LANES
+    }
+
+    /// True where some pixel of a stretch of blocks is asked for.
+    fn uses(&self, stretch: &Range<usize>) -> bool {
+        let pixels = self.pixels(stretch.start).start..self.pixels(stretch.end).start;
+        self.common.mask.is_none_or(|mask| mask[pixels].contains(&true))
     }
 
     /// Works on a block.
