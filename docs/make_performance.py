@@ -32,7 +32,7 @@ PLOT = ROOT / "docs" / "images" / "scaling.png"
 START, END = "<!-- tables: make performance -->", "<!-- end of tables -->"
 COMMAND = "python benches/peers/compare.py"
 TITLES = {
-    "normals": "Normals: 8 lights of 8 bit, published filter",
+    "normals": "Normals: published filter, 8 lights of 8 bit; other pixel types and numbers of lights",
     "glossy": "Normals of glossy balls: 8 lights of 8 bit, I_d 0.25",
     "integrate": "Integration to a relative residual of 1e-6",
     "bilateral": "Bilateral integration, the same inner tolerance on both sides",

@@ -5,26 +5,9 @@ use std::ops::ControlFlow;
 
 use bgars_core::normals::{Method, NormalMap, RobustParams, estimate};
 use bgars_core::{Error, ImageStack, Lights, Pixel, Radiometry};
+use bgars_suite::stacks::{estimate_row, tilted_ring};
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
-
-/// Unit vectors on a ring, tilted a little from light to light so that no two subsets are alike.
-fn ring(count: usize, elevation_deg: f64) -> Vec<[f64; 3]> {
-    (0..count)
-        .map(|light| {
-            let azimuth = 2.0 * std::f64::consts::PI * light as f64 / count as f64;
-            let elevation = (elevation_deg + 7.0 * ((light * light) % 3) as f64).to_radians();
-            [elevation.cos() * azimuth.cos(), elevation.cos() * azimuth.sin(), elevation.sin()]
-        })
-        .collect()
-}
-
-fn run<P: Pixel>(images: &[P], lights: &Lights, mask: Option<&[bool]>, method: Method, full_scale: f32) -> NormalMap {
-    let width = images.len() / lights.len();
-    let stack = ImageStack::new(images, lights.len(), 1, width).unwrap();
-    let radiometry = Radiometry::linear(lights.len(), full_scale);
-    estimate(&stack, lights, &radiometry, mask, method, true, &mut |_| ControlFlow::Continue(())).unwrap()
-}
 
 /// The published filter, word for word: sort, walk up from the third value, cut at the first gap over the threshold.
 fn slow_specular_filter(values: &[f32], gap: f32) -> Vec<bool> {
@@ -138,7 +121,7 @@ fn slow_kept(method: Method, values: &[f32], directions: &[[f64; 3]], full_scale
 
 fn compare<P: Pixel>(images: &[P], directions: &[[f64; 3]], mask: &[bool], method: Method, full_scale: f32) {
     let lights = Lights::directional(directions).unwrap();
-    let map = run(images, &lights, Some(mask), method, full_scale);
+    let map = estimate_row(images, &lights, Some(mask), method, full_scale);
     let pixels = mask.len();
     for pixel in 0..pixels {
         if !mask[pixel] {
@@ -197,7 +180,7 @@ proptest! {
     ) {
         prop_assume!(mask.contains(&true));
         for method in METHODS {
-            compare(&values, &ring(count, elevation_deg), &mask, method, 255.0);
+            compare(&values, &tilted_ring(count, elevation_deg), &mask, method, 255.0);
         }
     }
 
@@ -209,7 +192,7 @@ proptest! {
         elevation_deg in 20.0..60.0,
     ) {
         for method in METHODS {
-            compare(&values, &ring(count, elevation_deg), &[true; PIXELS], method, 65535.0);
+            compare(&values, &tilted_ring(count, elevation_deg), &[true; PIXELS], method, 65535.0);
         }
     }
 
@@ -221,7 +204,7 @@ proptest! {
         elevation_deg in 20.0..60.0,
     ) {
         for method in METHODS {
-            compare(&values, &ring(count, elevation_deg), &[true; PIXELS], method, 1.0);
+            compare(&values, &tilted_ring(count, elevation_deg), &[true; PIXELS], method, 1.0);
         }
     }
 
@@ -230,13 +213,13 @@ proptest! {
         count in 4usize..=16, x in -0.4f64..0.4, y in -0.4f64..0.4, albedo in 0.2f64..0.9,
     ) {
         let normal = nalgebra::Vector3::new(x, y, 1.0).normalize();
-        let directions = ring(count, 45.0);
+        let directions = tilted_ring(count, 45.0);
         let values: Vec<f32> =
             directions.iter().map(|&light| (albedo * nalgebra::Vector3::from(light).dot(&normal)) as f32).collect();
         prop_assume!(values.iter().all(|&value| value > 0.05));
         let lights = Lights::directional(&directions).unwrap();
         for method in [Method::Lambertian, Method::RobustFilter(RobustParams::DEFAULT)] {
-            let map = run(&repeated(&values), &lights, None, method, 1.0);
+            let map = estimate_row(&repeated(&values), &lights, None, method, 1.0);
             for found in of_both(&map) {
                 prop_assert!((found - normal).norm().to_degrees() < 1e-3, "{method:?}: {found} is not {normal}");
             }
@@ -245,122 +228,8 @@ proptest! {
 }
 
 #[test]
-fn the_bits_are_the_same_for_one_and_two_threads() {
-    let (count, height, width) = (8, 61, 97);
-    let images: Vec<u8> = (0..count * height * width).map(|index| ((index * 2_654_435_761) >> 13) as u8).collect();
-    let lights = Lights::directional(&ring(count, 40.0)).unwrap();
-    let stack = ImageStack::new(&images, count, height, width).unwrap();
-    let on_threads = |threads, method| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let radiometry = Radiometry::linear(count, 255.0);
-        let map = pool.install(|| {
-            estimate(&stack, &lights, &radiometry, None, method, true, &mut |_| ControlFlow::Continue(())).unwrap()
-        });
-        let bits: Vec<u32> = map.normals.iter().chain(&map.confidence).map(|value| value.to_bits()).collect();
-        (bits, map.kept_sets)
-    };
-    for method in
-        [Method::Lambertian, Method::SpecularFilter { threshold: 50.0 }, Method::RobustFilter(RobustParams::DEFAULT)]
-    {
-        assert_eq!(on_threads(1, method), on_threads(2, method));
-    }
-}
-
-#[test]
-fn an_image_over_the_size_that_is_streamed_equals_its_two_halves() {
-    // Over a megapixel results are written past the caches; half of it is not.
-    let (count, half) = (4, 1 << 19);
-    let images: Vec<u8> = (0..count * 2 * half).map(|index| ((index * 2_654_435_761) >> 13) as u8).collect();
-    let lights = Lights::directional(&ring(count, 40.0)).unwrap();
-    let mask: Vec<bool> = (0..2 * half).map(|pixel| pixel % 1001 > 3).collect();
-    let method = Method::SpecularFilter { threshold: 50.0 };
-    let whole = run(&images, &lights, Some(&mask), method, 255.0);
-    for part in [0..half, half..2 * half] {
-        let planes = images.chunks_exact(2 * half).flat_map(|plane| plane[part.clone()].to_vec());
-        let map = run(&planes.collect::<Vec<u8>>(), &lights, Some(&mask[part.clone()]), method, 255.0);
-        let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<u32>>();
-        assert!(bits(&map.normals) == bits(&whole.normals[3 * part.start..3 * part.end]));
-        assert!(bits(&map.albedo) == bits(&whole.albedo[part.clone()]));
-        assert!(bits(&map.confidence) == bits(&whole.confidence[part.clone()]));
-        assert!(map.mask == whole.mask[part.clone()] && map.lights_kept == whole.lights_kept[part]);
-    }
-}
-
-#[test]
-fn images_a_power_of_two_apart_give_the_same_bits() {
-    const PIXELS: usize = 4096;
-    let stack = |apart: usize| -> Vec<f32> {
-        let pixel =
-            |at: usize| if at % apart < PIXELS { ((at / apart * 37 + at % apart * 101) % 251) as f32 } else { 0.0 };
-        (0..24 * apart).map(pixel).collect()
-    };
-    let lights = Lights::directional(&ring(24, 40.0)).unwrap();
-    let (crowded, spread) = (stack(PIXELS), stack(PIXELS + 64));
-    let middle: Vec<bool> = (0..PIXELS + 64).map(|pixel| (2000..2100).contains(&pixel)).collect();
-    let method = Method::SpecularFilter { threshold: 20.0 };
-    for (method, mask) in [(Method::Lambertian, None), (method, None), (method, Some(&middle[..]))] {
-        let crowded = run(&crowded, &lights, mask.map(|mask| &mask[..PIXELS]), method, 255.0);
-        let spread = run(&spread, &lights, mask, method, 255.0);
-        assert!(crowded.mask.iter().any(|&solved| solved));
-        let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
-        assert_eq!(bits(&crowded.normals), bits(&spread.normals[..3 * PIXELS]));
-        assert_eq!(bits(&crowded.albedo), bits(&spread.albedo[..PIXELS]));
-        assert_eq!(bits(&crowded.confidence), bits(&spread.confidence[..PIXELS]));
-        assert_eq!(crowded.mask, spread.mask[..PIXELS]);
-        assert_eq!(crowded.lights_kept, spread.lights_kept[..PIXELS]);
-    }
-}
-
-#[test]
-fn a_value_that_is_not_finite_is_found_wherever_it_is_and_harms_no_other_pixel() {
-    let proceed = &mut |_| ControlFlow::Continue(());
-    // Two whole blocks of the fast kernel and some pixels behind them.
-    let pixels = 2 * 64 + 7;
-    for count in [4, 8, 24] {
-        let directions = ring(count, 40.0);
-        let positions: Vec<[f64; 3]> = directions.iter().map(|light| light.map(|along| 5000.0 * along)).collect();
-        let images: Vec<f32> = (0..count * pixels).map(|at| (10 + at * 37 % 251) as f32).collect();
-        for lights in
-            [Lights::directional(&directions).unwrap(), Lights::near(&positions, &vec![5000.0; count]).unwrap()]
-        {
-            for method in [
-                Method::Lambertian,
-                Method::SpecularFilter { threshold: 20.0 },
-                Method::RobustFilter(RobustParams::DEFAULT),
-            ] {
-                let clean = run(&images, &lights, None, method, 255.0);
-                for (bad, value) in [(0, f32::NAN), (63, f32::INFINITY), (100, f32::NEG_INFINITY), (130, f32::NAN)] {
-                    let mut images = images.clone();
-                    images[(count - 1) * pixels + bad] = value;
-                    let stack = ImageStack::new(&images, count, 1, pixels).unwrap();
-                    let radiometry = Radiometry::linear(count, 255.0);
-                    let error = estimate(&stack, &lights, &radiometry, None, method, false, proceed).unwrap_err();
-                    assert!(
-                        matches!(error, Error::NonFinitePixel { image, row: 0, col, count: 1 } if (image, col) == (count - 1, bad)),
-                        "{count} lights, {method:?}, pixel {bad}: {error}"
-                    );
-                    let mask: Vec<bool> = (0..pixels).map(|pixel| pixel != bad).collect();
-                    let masked = run(&images, &lights, Some(&mask), method, 255.0);
-                    assert!(!masked.mask[bad]);
-                    let normals = |map: &NormalMap, pixel: usize| {
-                        map.normals[3 * pixel..][..3].iter().map(|v| v.to_bits()).collect::<Vec<_>>()
-                    };
-                    for pixel in (0..pixels).filter(|&pixel| pixel != bad) {
-                        assert_eq!(
-                            normals(&masked, pixel),
-                            normals(&clean, pixel),
-                            "{count} lights, {method:?}, pixel {pixel}"
-                        );
-                    }
-                }
-            }
-        }
-    }
-}
-
-#[test]
 fn near_lights_give_back_the_normal_of_a_board_point_off_the_centre() {
-    let positions: Vec<[f64; 3]> = ring(8, 45.0).iter().map(|direction| direction.map(|v| v * 300.0)).collect();
+    let positions: Vec<[f64; 3]> = tilted_ring(8, 45.0).iter().map(|direction| direction.map(|v| v * 300.0)).collect();
     let reference: Vec<f64> = vec![300.0; 8];
     let lights = Lights::near(&positions, &reference).unwrap();
     let (height, width) = (40, 60);
@@ -391,7 +260,7 @@ fn near_lights_give_back_the_normal_of_a_board_point_off_the_centre() {
 
 #[test]
 fn dark_frame_response_and_intensities_are_undone() {
-    let directions = ring(6, 45.0);
+    let directions = tilted_ring(6, 45.0);
     let lights = Lights::directional(&directions).unwrap();
     let normal = nalgebra::Vector3::new(0.2, 0.1, 1.0).normalize();
     let intensities = vec![1.0, 0.8, 1.2, 0.9, 1.1, 0.7];
@@ -425,7 +294,8 @@ fn a_black_pixel_and_a_coplanar_kept_set_have_no_normal() {
     // Lights 0, 1, 2 are coplanar; the filter keeps just these when 3 and 4 are highlights.
     let lights = Lights::directional(&[[s, 0.0, s], [0.0, 0.0, 1.0], [-s, 0.0, s], [0.0, s, s], [0.0, -s, s]]).unwrap();
     for (values, kept) in [([0; 5], 5), ([10, 12, 11, 200, 201], 3)] {
-        let map = run(&repeated::<u8>(&values), &lights, None, Method::SpecularFilter { threshold: 50.0 }, 255.0);
+        let map =
+            estimate_row(&repeated::<u8>(&values), &lights, None, Method::SpecularFilter { threshold: 50.0 }, 255.0);
         assert_eq!(map.mask, [false; PIXELS]);
         assert!(map.normals.iter().all(|value| value.is_nan()));
         assert_eq!(map.lights_kept, [kept; PIXELS]);
@@ -434,7 +304,7 @@ fn a_black_pixel_and_a_coplanar_kept_set_have_no_normal() {
 
 #[test]
 fn bad_input_is_named() {
-    let lights = Lights::directional(&ring(4, 45.0)).unwrap();
+    let lights = Lights::directional(&tilted_ring(4, 45.0)).unwrap();
     let proceed = &mut |_| ControlFlow::Continue(());
     let images = [0f32; 8];
     let radiometry = Radiometry::linear(4, 1.0);

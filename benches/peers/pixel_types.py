@@ -12,19 +12,18 @@ from typing import TYPE_CHECKING
 import bgars
 import numpy as np
 from light_stack import LIGHTS, sphere_stack
+from normals import GROUP, THRESHOLD
 from process import own_threads
+from roofline import NORMAL_WRITTEN_BYTES
 from rows import emit_check
 from timing import alternate
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-GROUP = "normals"
 DTYPES = tuple(np.dtype(name) for name in ("uint8", "uint16", "float32"))
 COUNTS = (LIGHTS, 16, 24, 96)
-WRITTEN_BYTES = 24
-"""What bgars writes of a pixel: normals, albedo, confidence, two masks, the number of lights kept."""
-THRESHOLD = 50.0
+WRITTEN_BYTES = sum(NORMAL_WRITTEN_BYTES.values())
 LEAST_SHARE = 0.5
 
 

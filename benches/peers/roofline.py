@@ -17,12 +17,12 @@ from process import own_threads
 from rows import Roofline, emit
 from timing import alternate, median_seconds
 
-NORMAL_BYTES = {
-    "8 values read": 8,
+NORMAL_WRITTEN_BYTES = {
     "normal written": 12,
     "albedo written": 4,
     "mask, measured, confidence, number of lights written": 1 + 1 + 4 + 2,
 }
+NORMAL_BYTES = {"8 values read": 8, **NORMAL_WRITTEN_BYTES}
 NORMAL_OPERATIONS = {
     "sorting network, 19 exchanges of a least and a greatest": 38,
     "cut-off, 5 gaps of a difference, a comparison, a choice": 15,

@@ -1,6 +1,9 @@
 //! Light stacks to estimate normals from.
 
-use bgars_core::Lights;
+use std::ops::ControlFlow;
+
+use bgars_core::normals::{Method, NormalMap, estimate};
+use bgars_core::{ImageStack, Lights, Pixel, Radiometry};
 
 /// Images of a wavy Lambertian surface with a highlight, one after the other, and the ring of lights they were made with.
 ///
@@ -28,4 +31,31 @@ pub fn wavy<P>(lights: usize, side: usize, convert: impl Fn(f32) -> P) -> (Vec<P
         }
     }
     (images, Lights::directional(&directions).unwrap())
+}
+
+/// Unit vectors on a ring, tilted a little from light to light so that no two subsets are alike.
+#[must_use]
+pub fn tilted_ring(count: usize, elevation_deg: f64) -> Vec<[f64; 3]> {
+    (0..count)
+        .map(|light| {
+            let azimuth = std::f64::consts::TAU * light as f64 / count as f64;
+            let elevation = (elevation_deg + 7.0 * ((light * light) % 3) as f64).to_radians();
+            [elevation.cos() * azimuth.cos(), elevation.cos() * azimuth.sin(), elevation.sin()]
+        })
+        .collect()
+}
+
+/// Normals of images of one row, of a linear camera, with the kept lights.
+#[must_use]
+pub fn estimate_row<P: Pixel>(
+    images: &[P],
+    lights: &Lights,
+    mask: Option<&[bool]>,
+    method: Method,
+    full_scale: f32,
+) -> NormalMap {
+    let width = images.len() / lights.len();
+    let stack = ImageStack::new(images, lights.len(), 1, width).unwrap();
+    let radiometry = Radiometry::linear(lights.len(), full_scale);
+    estimate(&stack, lights, &radiometry, mask, method, true, &mut |_| ControlFlow::Continue(())).unwrap()
 }

@@ -152,25 +152,7 @@ fn run_with<K: Pixel, V: Vector>(
                     task.block::<V>(number, &keys, &keys, out);
                 }
             } else {
-                let images: Vec<&[Lanes<K>]> = planes.iter().map(|plane| blocks_of(plane, &pixels)).collect();
-                let mut blocks = blocks;
-                let (count, crowded) = (pixels.len() / LANES, are_crowded(planes));
-                let run = if crowded { stretch_blocks::<K>(images.len()) } else { count.max(1) };
-                for first in (0..count).step_by(run) {
-                    let stretch = first..count.min(first + run);
-                    let images = if crowded && task.uses(&stretch) {
-                        bring(&images, &stretch, memory)
-                    } else {
-                        images.iter().map(|blocks| &blocks[stretch.clone()]).collect()
-                    };
-                    let mut keys = Vec::with_capacity(images.len());
-                    for (at, out) in (0..stretch.len()).zip(blocks.by_ref()) {
-                        keys.clear();
-                        keys.extend(images.iter().map(|blocks| &blocks[at]));
-                        let ahead = if crowded { &[][..] } else { &keys };
-                        task.block::<V>(first + at, &keys, ahead, out);
-                    }
-                }
+                run_images::<K, V>(&mut task, planes, &pixels, blocks, memory);
             }
         }
         Source::Made(make) => {
@@ -193,6 +175,36 @@ fn run_with<K: Pixel, V: Vector>(
         }
     }
     finite
+}
+
+/// Works on the blocks of any number of images.
+#[inline(always)]
+fn run_images<'a, K: Pixel, V: Vector>(
+    task: &mut Task<'_, K>,
+    planes: &[&[K]],
+    pixels: &Range<usize>,
+    mut blocks: impl Iterator<Item = Block<'a>>,
+    memory: &mut Vec<Lanes<K>>,
+) {
+    let images: Vec<&[Lanes<K>]> = planes.iter().map(|plane| blocks_of(plane, pixels)).collect();
+    let (count, crowded) = (pixels.len() / LANES, are_crowded(planes));
+    let at_once = if crowded { stretch_blocks::<K>(images.len()) } else { count.max(1) };
+    for first in (0..count).step_by(at_once) {
+        let stretch = first..count.min(first + at_once);
+        let images = if crowded && task.uses(&stretch) {
+            bring(&images, &stretch, memory)
+        } else {
+            images.iter().map(|blocks| &blocks[stretch.clone()]).collect()
+        };
+        let mut keys = Vec::with_capacity(images.len());
+        for (at, out) in (0..stretch.len()).zip(blocks.by_ref()) {
+            keys.clear();
+            keys.extend(images.iter().map(|blocks| &blocks[at]));
+            // What is brought has no successors.
+            let ahead = if crowded { &[][..] } else { &keys };
+            task.block::<V>(first + at, &keys, ahead, out);
+        }
+    }
 }
 
 /// The whole blocks of some pixels.

@@ -1,0 +1,122 @@
+//! Normals are the same wherever a pixel lies: on any thread, in any block, beside anything.
+#![allow(clippy::unwrap_used, missing_docs)]
+
+use std::ops::ControlFlow;
+
+use bgars_core::normals::{Method, NormalMap, RobustParams, estimate};
+use bgars_core::{Error, ImageStack, Lights, Radiometry};
+use bgars_suite::stacks::{estimate_row, tilted_ring};
+
+#[test]
+fn the_bits_are_the_same_for_one_and_two_threads() {
+    let (count, height, width) = (8, 61, 97);
+    let images: Vec<u8> = (0..count * height * width).map(|index| ((index * 2_654_435_761) >> 13) as u8).collect();
+    let lights = Lights::directional(&tilted_ring(count, 40.0)).unwrap();
+    let stack = ImageStack::new(&images, count, height, width).unwrap();
+    let on_threads = |threads, method| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let radiometry = Radiometry::linear(count, 255.0);
+        let map = pool.install(|| {
+            estimate(&stack, &lights, &radiometry, None, method, true, &mut |_| ControlFlow::Continue(())).unwrap()
+        });
+        let bits: Vec<u32> = map.normals.iter().chain(&map.confidence).map(|value| value.to_bits()).collect();
+        (bits, map.kept_sets)
+    };
+    for method in
+        [Method::Lambertian, Method::SpecularFilter { threshold: 50.0 }, Method::RobustFilter(RobustParams::DEFAULT)]
+    {
+        assert_eq!(on_threads(1, method), on_threads(2, method));
+    }
+}
+
+#[test]
+fn an_image_over_the_size_that_is_streamed_equals_its_two_halves() {
+    // Over a megapixel results are written past the caches; half of it is not.
+    let (count, half) = (4, 1 << 19);
+    let images: Vec<u8> = (0..count * 2 * half).map(|index| ((index * 2_654_435_761) >> 13) as u8).collect();
+    let lights = Lights::directional(&tilted_ring(count, 40.0)).unwrap();
+    let mask: Vec<bool> = (0..2 * half).map(|pixel| pixel % 1001 > 3).collect();
+    let method = Method::SpecularFilter { threshold: 50.0 };
+    let whole = estimate_row(&images, &lights, Some(&mask), method, 255.0);
+    for part in [0..half, half..2 * half] {
+        let planes = images.chunks_exact(2 * half).flat_map(|plane| plane[part.clone()].to_vec());
+        let map = estimate_row(&planes.collect::<Vec<u8>>(), &lights, Some(&mask[part.clone()]), method, 255.0);
+        let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<u32>>();
+        assert!(bits(&map.normals) == bits(&whole.normals[3 * part.start..3 * part.end]));
+        assert!(bits(&map.albedo) == bits(&whole.albedo[part.clone()]));
+        assert!(bits(&map.confidence) == bits(&whole.confidence[part.clone()]));
+        assert!(map.mask == whole.mask[part.clone()] && map.lights_kept == whole.lights_kept[part]);
+    }
+}
+
+#[test]
+fn images_a_power_of_two_apart_give_the_same_bits() {
+    const PIXELS: usize = 4096;
+    let stack = |apart: usize| -> Vec<f32> {
+        let pixel =
+            |at: usize| if at % apart < PIXELS { ((at / apart * 37 + at % apart * 101) % 251) as f32 } else { 0.0 };
+        (0..24 * apart).map(pixel).collect()
+    };
+    let lights = Lights::directional(&tilted_ring(24, 40.0)).unwrap();
+    let (crowded, spread) = (stack(PIXELS), stack(PIXELS + 64));
+    let middle: Vec<bool> = (0..PIXELS + 64).map(|pixel| (2000..2100).contains(&pixel)).collect();
+    let method = Method::SpecularFilter { threshold: 20.0 };
+    for (method, mask) in [(Method::Lambertian, None), (method, None), (method, Some(&middle[..]))] {
+        let crowded = estimate_row(&crowded, &lights, mask.map(|mask| &mask[..PIXELS]), method, 255.0);
+        let spread = estimate_row(&spread, &lights, mask, method, 255.0);
+        assert!(crowded.mask.iter().any(|&solved| solved));
+        let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&crowded.normals), bits(&spread.normals[..3 * PIXELS]));
+        assert_eq!(bits(&crowded.albedo), bits(&spread.albedo[..PIXELS]));
+        assert_eq!(bits(&crowded.confidence), bits(&spread.confidence[..PIXELS]));
+        assert_eq!(crowded.mask, spread.mask[..PIXELS]);
+        assert_eq!(crowded.lights_kept, spread.lights_kept[..PIXELS]);
+    }
+}
+
+#[test]
+fn a_value_that_is_not_finite_is_found_wherever_it_is_and_harms_no_other_pixel() {
+    let proceed = &mut |_| ControlFlow::Continue(());
+    // Two whole blocks of the fast kernel and some pixels behind them.
+    let pixels = 2 * 64 + 7;
+    for count in [4, 8, 24] {
+        let directions = tilted_ring(count, 40.0);
+        let positions: Vec<[f64; 3]> = directions.iter().map(|light| light.map(|along| 5000.0 * along)).collect();
+        let images: Vec<f32> = (0..count * pixels).map(|at| (10 + at * 37 % 251) as f32).collect();
+        for lights in
+            [Lights::directional(&directions).unwrap(), Lights::near(&positions, &vec![5000.0; count]).unwrap()]
+        {
+            for method in [
+                Method::Lambertian,
+                Method::SpecularFilter { threshold: 20.0 },
+                Method::RobustFilter(RobustParams::DEFAULT),
+            ] {
+                let clean = estimate_row(&images, &lights, None, method, 255.0);
+                for (bad, value) in [(0, f32::NAN), (63, f32::INFINITY), (100, f32::NEG_INFINITY), (130, f32::NAN)] {
+                    let mut images = images.clone();
+                    images[(count - 1) * pixels + bad] = value;
+                    let stack = ImageStack::new(&images, count, 1, pixels).unwrap();
+                    let radiometry = Radiometry::linear(count, 255.0);
+                    let error = estimate(&stack, &lights, &radiometry, None, method, false, proceed).unwrap_err();
+                    assert!(
+                        matches!(error, Error::NonFinitePixel { image, row: 0, col, count: 1 } if (image, col) == (count - 1, bad)),
+                        "{count} lights, {method:?}, pixel {bad}: {error}"
+                    );
+                    let mask: Vec<bool> = (0..pixels).map(|pixel| pixel != bad).collect();
+                    let masked = estimate_row(&images, &lights, Some(&mask), method, 255.0);
+                    assert!(!masked.mask[bad]);
+                    let normals = |map: &NormalMap, pixel: usize| {
+                        map.normals[3 * pixel..][..3].iter().map(|v| v.to_bits()).collect::<Vec<_>>()
+                    };
+                    for pixel in (0..pixels).filter(|&pixel| pixel != bad) {
+                        assert_eq!(
+                            normals(&masked, pixel),
+                            normals(&clean, pixel),
+                            "{count} lights, {method:?}, pixel {pixel}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
