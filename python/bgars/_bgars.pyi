@@ -26,6 +26,7 @@ __all__ = [
     "estimate_reflectance",
     "integrate_bilateral",
     "integrate_normals",
+    "largest_finite",
     "measure_edges",
     "read_rgb16",
     "rim_bands",
@@ -123,6 +124,7 @@ def integrate_normals(
     threads: int | None,
     progress: Callable[[int, float], object] | None,
 ) -> tuple[list[tuple[int, int, int]], int, float]: ...
+def largest_finite(pixels: NDArray[np.float32], *, threads: int | None) -> float: ...
 def measure_edges(
     capture: KernelCapture,
     casters: Casters,

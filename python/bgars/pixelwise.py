@@ -94,6 +94,7 @@ def capture_of(
     light_directions: ArrayLike | None,
     light_intensities: ArrayLike | None,
     saturation: float | None,
+    threads: int | None,
 ) -> Capture:
     """Return the capture, or one made of plain arrays; arguments as of :func:`bgars.estimate_normals`."""
     if isinstance(images, Capture):
@@ -118,7 +119,7 @@ def capture_of(
     if full_scale is not None:
         clip = full_scale if saturation is None else saturation
     else:
-        full_scale = saturation or float_full_scale(stack)
+        full_scale = saturation or float_full_scale(stack, threads)
         clip = float("inf") if saturation is None else saturation
     return Capture(
         images=stack,

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars import _bgars
 from bgars.errors import InputError
 from bgars.scalar_checks import check_pitch
 
@@ -48,12 +49,9 @@ def integer_full_scale(pixels: PixelArray) -> float | None:
     return float((1 << 8 * pixels.dtype.itemsize) - 1) if pixels.dtype.kind == "u" else None
 
 
-def float_full_scale(pixels: PixelArray) -> float:
+def float_full_scale(pixels: PixelArray, threads: int | None) -> float:
     """Return the largest finite value of float pixels: their full scale, where no saturation level is known."""
-    largest = float(np.max(pixels, initial=0.0))
-    if not math.isfinite(largest):  # seldom, and to ask for it beforehand takes longer than the normals
-        largest = float(np.max(pixels, initial=0.0, where=np.isfinite(pixels)))
-    return max(largest, TINY)
+    return max(_bgars.largest_finite(pixels.astype(np.float32, copy=False), threads=threads), TINY)
 
 
 @dataclass(frozen=True, eq=False)

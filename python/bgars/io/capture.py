@@ -119,7 +119,7 @@ def _load(
     mask = np.broadcast_to(np.True_, shape) if recipe.mask is None else read_mask(folder / recipe.mask, shape)
     _refuse_nan(images, mask, paths)
 
-    levels = _levels(folder, recipe, images, code_scale)
+    levels = _levels(folder, recipe, images, code_scale, threads)
     dark_path = None if recipe.dark is None else folder / recipe.dark
     in_values = linear and gains is not None
     dark = None
@@ -189,7 +189,9 @@ def _one_intensity(intensities: NDArray[np.float64], channel: ChannelName) -> ND
     return combined
 
 
-def _levels(folder: Path, recipe: CaptureRecipe, images: PixelArray, code_scale: float | None) -> _Radiometry:
+def _levels(
+    folder: Path, recipe: CaptureRecipe, images: PixelArray, code_scale: float | None, threads: int | None
+) -> _Radiometry:
     """Full scale of the files, clip and black level in the grey levels of the files."""
     if code_scale is not None:
         full_scale = code_scale
@@ -197,7 +199,7 @@ def _levels(folder: Path, recipe: CaptureRecipe, images: PixelArray, code_scale:
     elif recipe.saturation is not None:
         full_scale = saturation = recipe.saturation
     else:
-        full_scale, saturation = float_full_scale(images), float("inf")
+        full_scale, saturation = float_full_scale(images, threads), float("inf")
     if not recipe.black_level < min(full_scale, saturation):
         msg = (
             f"{folder / RECIPE_NAME}: black_level: must be below the saturation level "

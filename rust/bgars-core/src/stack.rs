@@ -1,5 +1,8 @@
 //! A stack of images, one a light, borrowed as it lies in memory.
 
+use multiversion::multiversion;
+use rayon::prelude::*;
+
 use crate::{Error, Pixel, Result};
 
 /// `lights` planes of `height * width` pixels, row-major, plane after plane.
@@ -64,5 +67,69 @@ impl<'a, P: Pixel> ImageStack<'a, P> {
     pub fn plane(&self, light: usize) -> &'a [P] {
         let pixels = self.pixels();
         &self.data[light * pixels..(light + 1) * pixels]
+    }
+}
+
+impl ImageStack<'_, f32> {
+    /// The largest value that is finite, 0 where none is above; of many values ([`Self::is_large`]) each thread looks through a part.
+    ///
+    /// # Examples
+    /// ```
+    /// let stack = bgars_core::ImageStack::new(&[0.5, f32::NAN, f32::INFINITY, -3.0], 1, 2, 2)?;
+    /// assert_eq!(stack.largest_finite(), 0.5);
+    /// # Ok::<(), bgars_core::Error>(())
+    /// ```
+    #[must_use]
+    pub fn largest_finite(&self) -> f32 {
+        if !self.is_large() {
+            return largest_finite(self.data);
+        }
+        self.data.par_chunks(FEW_VALUES).map(largest_finite).reduce(|| 0.0, f32::max)
+    }
+
+    /// True where it pays to share the search for the largest value among threads.
+    #[must_use]
+    pub fn is_large(&self) -> bool {
+        self.data.len() > FEW_VALUES
+    }
+}
+
+/// Values that one thread has seen before others are awake.
+const FEW_VALUES: usize = 1 << 19;
+
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn largest_finite(values: &[f32]) -> f32 {
+    /// Enough for several vectors of any processor.
+    const LANES: usize = 64;
+    let mut largest = [0.0f32; LANES];
+    // Neither comparison is true of NaN.
+    let larger = |a: f32, b: f32| if b > a && b < f32::INFINITY { b } else { a };
+    let (blocks, rest) = values.as_chunks::<LANES>();
+    for block in blocks {
+        for (largest, &value) in largest.iter_mut().zip(block) {
+            *largest = larger(*largest, value);
+        }
+    }
+    largest.iter().chain(rest).fold(0.0, |a, &b| larger(a, b))
+}
+
+#[cfg(test)]
+#[allow(clippy::float_cmp)]
+mod tests {
+    use super::*;
+
+    /// In blocks of vectors and in what is left of them, among several tasks.
+    #[test]
+    fn the_largest_is_found_wherever_it_lies() {
+        for count in [203, 2 * FEW_VALUES + 3] {
+            let mut values = vec![-1.0; count];
+            let largest = |values: &[f32]| ImageStack::new(values, 1, 1, count).unwrap().largest_finite();
+            assert_eq!(largest(&values), 0.0);
+            for (rank, place) in [0, 77, 127, 128, count / 2, count - 1].into_iter().enumerate() {
+                values[place] = 1.0 + rank as f32;
+                values[(place + 9) % count] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY][rank % 3];
+                assert_eq!(largest(&values), 1.0 + rank as f32, "{place} of {count}");
+            }
+        }
     }
 }

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 
 use crate::convert::{Stack, slice2, slice3, triples};
 use crate::errors::to_python;
-use crate::progress::watched;
+use crate::progress::{on_threads, watched};
 
 /// The attributes of `bgars.kernel_capture.KernelCapture`.
 #[derive(FromPyObject)]
@@ -88,5 +88,19 @@ impl Capture<'_> {
             let stack = ImageStack::new(images, count, height, width)?;
             work.run(&stack, &lights, &radiometry, &mut |done| report((done,)))
         })
+    }
+}
+
+#[pyfunction]
+#[pyo3(signature = (pixels, *, threads))]
+#[allow(clippy::needless_pass_by_value)]
+pub fn largest_finite(py: Python<'_>, pixels: PyReadonlyArray3<'_, f32>, threads: Option<i64>) -> PyResult<f32> {
+    let &[count, height, width] = pixels.shape() else { unreachable!("a stack has three axes") };
+    let pixels = slice3(&pixels, "pixels")?;
+    let stack = ImageStack::new(pixels, count, height, width).map_err(to_python)?;
+    if stack.is_large() {
+        on_threads(py, threads, || Ok(stack.largest_finite()))
+    } else {
+        Ok(py.detach(|| stack.largest_finite()))
     }
 }

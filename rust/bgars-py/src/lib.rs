@@ -27,6 +27,8 @@ mod _bgars {
     #[pymodule_export]
     use crate::bilateral::integrate_bilateral;
     #[pymodule_export]
+    use crate::capture::largest_finite;
+    #[pymodule_export]
     use crate::files::decode_stack;
     #[pymodule_export]
     use crate::files::read_rgb16;

@@ -28,28 +28,31 @@ pub(super) struct Solution {
     pub solved: bool,
 }
 
-/// Solves for the reds, from `x`, until the norm of what the system leaves is at most the tolerance times `scale`; the blacks
-/// follow from them.
+/// Solves for the reds, from `start` or from zero, until the norm of what the system leaves is at most the tolerance times `scale`;
+/// the blacks follow from them.
 ///
 /// The residual that the iteration carries along drifts from the true one by rounding: when it says done, the true one is
-/// computed, and if it does not agree the iteration starts again from there.
+/// computed, and if it does not agree the iteration starts again from there. It is kept in `f64`: what rounding adds to the sum of
+/// a component's residuals no step can take away, and the preconditioner makes the most of it.
 pub(super) fn conjugate_gradients(
     weights: &Weights,
     right: &Colours,
-    mut x: Aligned<f64>,
+    start: Option<Aligned<f64>>,
     scale: f64,
     params: &Params,
     on_progress: OnProgress<'_>,
 ) -> Result<Solution> {
-    let size = x.len();
+    let size = weights.grid.half_pixels();
     let target = (params.relative_tolerance * scale).max(params.absolute_tolerance * (2.0 * size as f64).sqrt());
-    // Between the steps the blacks lie in q.
+    // After the steps the blacks lie in q.
     let [mut q, mut r] = [Aligned::<f64>::any(size), Aligned::any(size)];
-    let mut norm = settle(weights, right, &x, &mut q, &mut r).sqrt();
+    let mut norm = settle(weights, right, start.as_deref(), None, &mut r).sqrt();
+    let mut x = Steps::from(start, size);
     let (mut iterations, mut solved) = (0, true);
     if norm <= target {
         let residual = if norm > 0.0 { norm / scale } else { 0.0 };
-        return Ok(Solution { reds: x, blacks: q, iterations, residual, solved });
+        settle(weights, right, Some(x.end(weights, &[])), Some(&mut q), &mut r);
+        return Ok(Solution { reds: x.x, blacks: q, iterations, residual, solved });
     }
     let preconditioner = Multigrid::new(weights);
     let mut vectors = preconditioner.vectors();
@@ -60,8 +63,6 @@ pub(super) fn conjugate_gradients(
     loop {
         round(&r, &mut rounded);
         let mut r_z_before = None;
-        // A step that x has not taken yet: two at once touch its memory half as often.
-        let mut waiting = None;
         // Written so that NaN goes on, to be found below.
         while !(norm <= target) {
             solved = iterations < params.max_iters;
@@ -83,24 +84,15 @@ pub(super) fn conjugate_gradients(
             }
             let alpha = r_z / p_q;
             norm = subtract(weights, (alpha, &q), &mut r, &mut rounded).sqrt();
-            waiting = match waiting {
-                Some(before) => {
-                    take_steps(weights, [(before, &previous), (alpha, &p)], &mut x);
-                    None
-                }
-                None => Some(alpha),
-            };
+            x.step(weights, alpha, [&previous, &p]);
             iterations += 1;
             if on_progress(Progress { iteration: iterations, residual: norm / scale }).is_break() {
                 return Err(Error::Cancelled);
             }
         }
-        if let Some(alpha) = waiting {
-            take_steps(weights, [(alpha, &p), (0.0, &p)], &mut x);
-        }
-        norm = settle(weights, right, &x, &mut q, &mut r).sqrt();
+        norm = settle(weights, right, Some(x.end(weights, &p)), Some(&mut q), &mut r).sqrt();
         if !solved || norm <= target {
-            return Ok(Solution { reds: x, blacks: q, iterations, residual: norm / scale, solved });
+            return Ok(Solution { reds: x.x, blacks: q, iterations, residual: norm / scale, solved });
         }
     }
 }
@@ -141,21 +133,60 @@ fn subtract_part((alpha, q): (f64, &[f64]), r: &mut [f64], rounded: &mut [f32]) 
 /// A step, and the direction it is taken along.
 type Step<'a> = (f64, &'a [f32]);
 
-/// `x` takes two steps, one after the other, along the spans of the grid.
-fn take_steps(weights: &Weights, [(alpha, p), (beta, q)]: [Step<'_>; 2], x: &mut [f64]) {
-    let chunk = BAND_ROWS * weights.grid.half();
-    (x.par_chunks_mut(chunk), p.par_chunks(chunk), q.par_chunks(chunk)).into_par_iter().enumerate().for_each(
-        |(band, (x, p, q))| {
-            for part in weights.spans.parts(band) {
-                take_steps_of_part([(alpha, &p[part.clone()]), (beta, &q[part.clone()])], &mut x[part]);
-            }
-        },
-    );
+/// The sum of all steps.
+struct Steps {
+    x: Aligned<f64>,
+    /// Nothing was written to `x` yet.
+    is_blank: bool,
+    /// A step that `x` has not taken yet: two at once touch its memory half as often.
+    waiting: Option<f64>,
 }
 
-/// [`take_steps`] in a part of a band.
+impl Steps {
+    fn from(start: Option<Aligned<f64>>, size: usize) -> Self {
+        let is_blank = start.is_none();
+        Self { x: start.unwrap_or_else(|| Aligned::any(size)), is_blank, waiting: None }
+    }
+
+    /// A step along the second direction; along the first there was the one before.
+    fn step(&mut self, weights: &Weights, alpha: f64, [previous, p]: [&[f32]; 2]) {
+        match self.waiting.take() {
+            Some(before) => self.take(weights, [(before, previous), (alpha, p)]),
+            None => self.waiting = Some(alpha),
+        }
+    }
+
+    /// Where they lead, all of them; the last was along `p`.
+    fn end(&mut self, weights: &Weights, p: &[f32]) -> &[f64] {
+        if let Some(alpha) = self.waiting.take() {
+            self.take(weights, [(alpha, p), (0.0, p)]);
+        }
+        if std::mem::take(&mut self.is_blank) {
+            self.x.fill(0.0);
+        }
+        &self.x
+    }
+
+    /// Takes two steps, one after the other, along the spans of the grid.
+    fn take(&mut self, weights: &Weights, [(alpha, p), (beta, q)]: [Step<'_>; 2]) {
+        let chunk = BAND_ROWS * weights.grid.half();
+        let is_blank = std::mem::take(&mut self.is_blank);
+        (self.x.par_chunks_mut(chunk), p.par_chunks(chunk), q.par_chunks(chunk)).into_par_iter().enumerate().for_each(
+            |(band, (x, p, q))| {
+                if is_blank {
+                    x.fill(0.0);
+                }
+                for part in weights.spans.parts(band) {
+                    take_steps([(alpha, &p[part.clone()]), (beta, &q[part.clone()])], &mut x[part]);
+                }
+            },
+        );
+    }
+}
+
+/// [`Steps::take`] in a part of a band.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn take_steps_of_part([(alpha, p), (beta, q)]: [Step<'_>; 2], x: &mut [f64]) {
+fn take_steps([(alpha, p), (beta, q)]: [Step<'_>; 2], x: &mut [f64]) {
     for ((x, &p), &q) in x.iter_mut().zip(p).zip(q) {
         *x = (*x + alpha * f64::from(p)) + beta * f64::from(q);
     }

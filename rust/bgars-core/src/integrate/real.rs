@@ -2,6 +2,7 @@
 
 use std::ops::{Add, Mul};
 
+use super::checkerboard::LANES;
 use crate::memory::Reused;
 
 use crate::vector::{One, Packed};
@@ -55,6 +56,14 @@ pub(super) fn lesser<T: PartialOrd>(a: T, b: T) -> T {
 #[inline(always)]
 pub(super) fn greater<T: PartialOrd>(a: T, b: T) -> T {
     if a > b { a } else { b }
+}
+
+/// Sum of a vector's numbers.
+#[inline(always)]
+pub(super) fn sum_of<V: Packed<Number: Real>>(vector: V) -> f64 {
+    let mut numbers = [V::Number::default(); LANES];
+    vector.write(&mut numbers);
+    numbers.iter().map(|&number| number.to_f64()).sum()
 }
 
 /// Calls `function::<.., V>(..)` with the vectors `V` of a type of numbers in brackets, or of several that the enclosing

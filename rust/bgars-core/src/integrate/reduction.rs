@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::checkerboard::{BAND_ROWS, Grid, Weights, join_row};
 use super::edges::Colours;
-use super::real::{Real, on_vectors};
+use super::real::{Real, on_vectors, sum_of};
 use super::ring::Ring;
 use super::spans::Span;
 use crate::vector::Packed;
@@ -23,22 +23,25 @@ pub(super) fn multiply<T: Real>(weights: &Weights, x: &[T], out: &mut [f64]) -> 
 /// `blacks = D_black^-1 (right.blacks + W^T reds)`, and what the system leaves at the reds: `left = right.reds + W blacks - D_red reds`.
 /// Returns the square sum of `left`. Both are zero beside the spans of the grid.
 ///
-/// From no reds, `left` is the right side of the reduced system; from a solution, `blacks` are the rest of it.
-pub(super) fn settle(weights: &Weights, right: &Colours, reds: &[f64], blacks: &mut [f64], left: &mut [f64]) -> f64 {
+/// From no reds, `left` is the right side of the reduced system; from a solution, `blacks`, where asked for, are the rest of it.
+pub(super) fn settle(
+    weights: &Weights,
+    right: &Colours,
+    reds: Option<&[f64]>,
+    blacks: Option<&mut [f64]>,
+    left: &mut [f64],
+) -> f64 {
     let half = weights.grid.half();
     let chunk = BAND_ROWS * half;
+    let blacks: Vec<_> = match blacks {
+        Some(blacks) => blacks.chunks_mut(chunk).map(Some).collect(),
+        None => left.chunks(chunk).map(|_| None).collect(),
+    };
     let rows = || [Ring::new(half), Ring::new(half)];
-    let squares: Vec<f64> = (blacks.par_chunks_mut(chunk), left.par_chunks_mut(chunk))
+    let squares: Vec<f64> = (blacks, left.par_chunks_mut(chunk))
         .into_par_iter()
         .enumerate()
-        .map_init(rows, |rows, (band, (blacks, left))| {
-            let span = weights.spans.band(band);
-            for row in blacks.chunks_mut(half).chain(left.chunks_mut(half)) {
-                row[..span.start].fill(0.0);
-                row[span.end..].fill(0.0);
-            }
-            settle_band(weights, right, reds, band, rows, [blacks, left])
-        })
+        .map_init(rows, |rows, (band, out)| settle_band(weights, right, reds, band, rows, out))
         .collect();
     squares.iter().sum()
 }
@@ -154,23 +157,30 @@ pub(super) fn multiply_row<V: Packed<Number = f64>>(
     [reds, blacks]: [&Ring<f64>; 2],
     out: &mut [f64],
 ) -> f64 {
-    let x = &reds.row(row)[1..][span.range()];
     let stencil = weights.red_stencil::<V>(row, span, blacks.around(row));
-    let (values, products) = (V::chunks(x, stencil.len()), V::chunks_mut(out, stencil.len()));
+    let values = V::chunks(&reds.row(row)[1 + span.start..], stencil.len());
+    let products = V::chunks_mut(out, stencil.len());
+    let mut energy = V::splat(V::Number::default());
     for k in 0..stencil.len() {
-        (stencil.diagonal(k) * V::read(&values[k]) - stencil.sum(k)).put(&mut products[k]);
+        let x = V::read(&values[k]);
+        let product = stencil.diagonal(k) * x - stencil.sum(k);
+        product.put(&mut products[k]);
+        energy = x.times_plus(product, energy);
     }
-    dot(x, out)
+    sum_of(energy)
 }
+
+/// The rows of a band to write: of the blacks, where they are asked for, and of what is left.
+type Settled<'a> = (Option<&'a mut [f64]>, &'a mut [f64]);
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 fn settle_band(
     weights: &Weights,
     right: &Colours,
-    reds: &[f64],
+    reds: Option<&[f64]>,
     band: usize,
     rows: &mut [Ring<f64>; 2],
-    out: [&mut [f64]; 2],
+    out: Settled<'_>,
 ) -> f64 {
     on_vectors!(weights.grid, [f64], settle_band_with(weights, right, reds, band, rows, out))
 }
@@ -179,18 +189,25 @@ fn settle_band(
 fn settle_band_with<V: Packed<Number = f64>>(
     weights: &Weights,
     right: &Colours,
-    reds: &[f64],
+    reds: Option<&[f64]>,
     band: usize,
     [here, solved]: &mut [Ring<f64>; 2],
-    [blacks, left]: [&mut [f64]; 2],
+    (mut blacks, left): Settled<'_>,
 ) -> f64 {
     let n = weights.grid.half();
     let first = (band * BAND_ROWS) as isize;
     let end = first + (left.len() / n) as isize;
     let span = weights.spans.band(band);
+    if let Some(blacks) = &mut blacks {
+        clear_beside(span, n, blacks);
+    }
+    clear_beside(span, n, left);
     let mut squares = 0.0;
     for row in first - 2..=end + 1 {
-        load(weights.grid, reds, row, span, here.row_mut(row), |value| value);
+        // Without any, the rows stay zero.
+        if let Some(reds) = reds {
+            load(weights.grid, reds, row, span, here.row_mut(row), |value| value);
+        }
         let row = row - 1;
         if row >= first - 1 && weights.grid.contains(row) {
             let stencil = weights.black_stencil::<V>(row, span, here.around(row));
@@ -199,7 +216,9 @@ fn settle_band_with<V: Packed<Number = f64>>(
             for k in 0..stencil.len() {
                 ((V::read(&given[k]) + stencil.sum(k)) * stencil.diagonal(k).inverse()).put(&mut out[k]);
             }
-            if (first..end).contains(&row) {
+            if let Some(blacks) = &mut blacks
+                && (first..end).contains(&row)
+            {
                 let solved = &solved.row(row)[1..][span.range()];
                 blacks[(row - first) as usize * n..][span.range()].copy_from_slice(solved);
             }
@@ -211,14 +230,24 @@ fn settle_band_with<V: Packed<Number = f64>>(
         let stencil = weights.red_stencil::<V>(row, span, solved.around(row));
         let given = V::chunks(&right.reds[row as usize * n..][span.range()], stencil.len());
         let own = V::chunks(&here.row(row)[1 + span.start..], stencil.len());
-        let left = &mut left[(row - first) as usize * n..][span.range()];
-        let out = V::chunks_mut(left, stencil.len());
+        let out = V::chunks_mut(&mut left[(row - first) as usize * n..][span.range()], stencil.len());
+        let mut square = V::splat(V::Number::default());
         for k in 0..stencil.len() {
-            ((V::read(&given[k]) + stencil.sum(k)) - stencil.diagonal(k) * V::read(&own[k])).put(&mut out[k]);
+            let rest = (V::read(&given[k]) + stencil.sum(k)) - stencil.diagonal(k) * V::read(&own[k]);
+            rest.put(&mut out[k]);
+            square = rest.times_plus(rest, square);
         }
-        squares += dot(left, left);
+        squares += sum_of(square);
     }
     squares
+}
+
+/// Zeros beside a span in all rows of a band.
+fn clear_beside(span: Span, half: usize, band: &mut [f64]) {
+    for row in band.chunks_mut(half) {
+        row[..span.start].fill(0.0);
+        row[span.end..].fill(0.0);
+    }
 }
 
 /// Sum in eight lanes, so that it vectorises and has one order.
@@ -270,13 +299,16 @@ fn eliminate_band_with<V: Packed<Number: Real>>(
         if weights.grid.contains(row) {
             let sides = weights.blacks::<V>(row, span);
             let out = V::chunks_mut(&mut scaled.row_mut(row)[span.start..], sides.len());
-            let blacks = &blacks[row as usize * n..][span.range()];
-            let values = V::chunks(blacks, sides.len());
+            let blacks = V::chunks(&blacks[row as usize * n..][span.range()], sides.len());
+            let mut of_row = V::splat(V::Number::default());
             for k in 0..sides.len() {
-                (V::read(&values[k]) * sides.diagonal(k).inverse()).put(&mut out[k]);
+                let black = V::read(&blacks[k]);
+                let solved = black * sides.diagonal(k).inverse();
+                solved.put(&mut out[k]);
+                of_row = black.times_plus(solved, of_row);
             }
             if (first..end).contains(&row) {
-                energy += dot(blacks, &scaled.row(row)[1..][span.range()]);
+                energy += sum_of(of_row);
             }
         }
         let row = row - 1;
@@ -355,7 +387,7 @@ mod tests {
             *red = number(place);
             (right.reds[place], right.blacks[place]) = (number(place + 9_999), number(place + 77_777));
         }
-        let squares = settle(&weights, &right, &reds, &mut blacks, &mut left);
+        let squares = settle(&weights, &right, Some(&reds), Some(&mut blacks), &mut left);
         let (mut expected, mut beside) = (0.0, 0);
         for row in 0..grid.height {
             let span = weights.spans.at(row as isize);

@@ -11,7 +11,7 @@ use super::conjugate_gradient::{Solution, conjugate_gradients, square_sum};
 use super::fill::fill_corners;
 use super::operator::{Field, assemble};
 use super::{Fit, OnProgress, Params, Surface};
-use crate::memory::{Aligned, zeros};
+use crate::memory::zeros;
 use crate::{Error, Result};
 
 /// Shortest and longest normal that is taken for one of length 1: interpolation and 8 bits shorten them, garbage is far off.
@@ -107,9 +107,8 @@ pub fn integrate_into(
     let (mut weights, right) = assemble(field, params.difference);
     fill_corners(&mut weights);
     let scale = (square_sum(&right.reds) + square_sum(&right.blacks)).sqrt();
-    let start = Aligned::zeros(right.reds.len());
     let Solution { reds, blacks, iterations, residual, solved } =
-        conjugate_gradients(&weights, &right, start, scale, params, on_progress)?;
+        conjugate_gradients(&weights, &right, None, scale, params, on_progress)?;
     if !solved {
         return Err(Error::NoConvergence { iterations, residual, tolerance: params.relative_tolerance });
     }

@@ -122,15 +122,11 @@ fn turn_row<V: Packed<Number = f32>, D: Packed<Number = f64>>(
     let (half, span) = (weights.grid.half(), weights.spans.at(row));
     let Advancing { up, beside, reds, .. } = rows;
     let p = own.unwrap_or(beside);
-    finish_row::<V>(weights, b, row, up, p);
+    let before = V::chunks(&previous[row as usize * half..][span.range()], span.vectors::<V>());
+    let beta = V::splat(beta);
+    finish_row::<V>(weights, b, row, up, &mut p[span.range()], |k, z| beta.times_plus(V::read(&before[k]), z));
     changes.add_to(row as usize * half, p);
-    let p = &mut p[span.range()];
-    let n = span.vectors::<V>();
-    let previous = V::chunks(&previous[row as usize * half..][span.range()], n);
-    let turned = V::chunks_mut(p, n);
-    for k in 0..n {
-        V::splat(beta).times_plus(V::read(&previous[k]), V::read(&turned[k])).put(&mut turned[k]);
-    }
+    let p = &p[span.range()];
     let n = span.vectors::<D>();
     let floats = D::floats(p, n);
     let numbers = D::chunks_mut(&mut reds.row_mut(row)[span.start..], n);

@@ -65,7 +65,8 @@ pub(super) fn prolong_rows_with<V: Packed<Number = f32>>(
     for row in first - LEAD..end {
         go_ahead::<V>(weights, b, coarse, row, rows);
         if row >= first {
-            finish_row::<V>(weights, b, row, rows, &mut x[(row - first) as usize * n..][..n]);
+            let x = &mut x[(row - first) as usize * n..][weights.spans.at(row).range()];
+            finish_row::<V>(weights, b, row, rows, x, |_, value| value);
         }
     }
 }
@@ -90,7 +91,7 @@ pub(super) fn go_ahead<V: Packed<Number = f32>>(
     }
 }
 
-/// `D^-1 (b + N y)` of a row, `y` what [`smooth_and_correct`] left.
+/// `D^-1 (b + N y)` of a row along its span, `y` what [`smooth_and_correct`] left; `then` makes of vector `k` what is written.
 #[inline(always)]
 pub(super) fn finish_row<V: Packed<Number = f32>>(
     weights: &Weights,
@@ -98,15 +99,13 @@ pub(super) fn finish_row<V: Packed<Number = f32>>(
     row: isize,
     rows: &mut Prolonging,
     x: &mut [f32],
+    then: impl Fn(usize, V) -> V,
 ) {
     let (half, span) = (weights.grid.half(), weights.spans.at(row));
     let stencil = weights.red_stencil::<V>(row, span, rows.blacks.around(row));
-    let (b, x) = (
-        V::chunks(&b[row as usize * half..][span.range()], stencil.len()),
-        V::chunks_mut(&mut x[span.range()], stencil.len()),
-    );
+    let (b, x) = (V::chunks(&b[row as usize * half..][span.range()], stencil.len()), V::chunks_mut(x, stencil.len()));
     for k in 0..stencil.len() {
-        ((V::read(&b[k]) + stencil.sum(k)) * stencil.diagonal(k).inverse()).put(&mut x[k]);
+        then(k, (V::read(&b[k]) + stencil.sum(k)) * stencil.diagonal(k).inverse()).put(&mut x[k]);
     }
 }
 

@@ -4,8 +4,8 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::{CentreTies, corner_ties};
-use crate::integrate::checkerboard::{BAND_ROWS, LANES, Weights, split_row};
-use crate::integrate::real::{Real, on_vectors};
+use crate::integrate::checkerboard::{BAND_ROWS, Weights, split_row};
+use crate::integrate::real::{Real, on_vectors, sum_of};
 use crate::integrate::ring::Ring;
 use crate::vector::Packed;
 
@@ -162,14 +162,6 @@ fn solve_and_tie_blacks<V: Packed<Number = f32>>(weights: &Weights, row: isize, 
         (V::widen(&first[k]).magnitude() + V::widen(&second[k]).magnitude()).put(&mut ties[k]);
     }
     sum_of(energy)
-}
-
-/// Sum of a vector's numbers.
-#[inline(always)]
-fn sum_of<V: Packed<Number = f32>>(vector: V) -> f64 {
-    let mut numbers = [0.0; LANES];
-    vector.write(&mut numbers);
-    numbers.iter().map(|&number| f64::from(number)).sum()
 }
 
 /// The residual of a row: `D - N` applied to `D^-1 b` leaves `N D^-1 b`. At centres, over their ties.
