@@ -1,5 +1,7 @@
 //! Connected parts of a mask: each keeps its own unknown constant.
 
+use std::ops::Range;
+
 use memchr::memchr;
 use rayon::prelude::*;
 
@@ -17,13 +19,18 @@ pub struct Component {
     pub first_col: usize,
 }
 
-/// Pixels of the mask that follow each other in a row.
+/// Pixels of the mask that follow each other in a row: from a column up to another. Images of 2^31 pixels are refused where
+/// they are read.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Run {
-    pub row: usize,
-    pub start: usize,
-    pub end: usize,
-    pub component: usize,
+struct Run {
+    start: u32,
+    end: u32,
+}
+
+impl Run {
+    fn cols(self) -> Range<usize> {
+        self.start as usize..self.end as usize
+    }
 }
 
 /// A mask as runs in reading order (each within one region), and the components that they form.
@@ -31,6 +38,8 @@ pub(super) struct Run {
 pub(super) struct Runs {
     width: usize,
     all: Vec<Run>,
+    /// The component of each run.
+    component_of: Vec<u32>,
     /// First run of each row, and the end.
     row_starts: Vec<usize>,
     pub components: Vec<Component>,
@@ -41,56 +50,59 @@ impl Runs {
     /// Linear in the number of pixels, in parallel, and nearly linear in the number of runs (union-find).
     pub fn new(mask: &[bool], regions: Option<&[i32]>, width: usize) -> Self {
         let height = mask.len() / width;
-        let region = |row: usize, col: usize| regions.map_or(0, |regions| regions[row * width + col]);
+        let region = |row: usize, run: Run| regions.map_or(0, |regions| regions[row * width + run.start as usize]);
         let row_runs = |(row, mask)| {
             let regions = regions.map(|regions| &regions[row * width..(row + 1) * width]);
-            RowRuns { row, mask: bytemuck::must_cast_slice::<bool, u8>(mask), regions, col: 0 }
+            RowRuns { mask: bytemuck::must_cast_slice::<bool, u8>(mask), regions, col: 0 }.collect()
         };
-        let mut runs: Vec<Run> = mask.par_chunks(width).enumerate().flat_map_iter(row_runs).collect();
+        let rows: Vec<Vec<Run>> = mask.par_chunks(width).enumerate().map(row_runs).collect();
+        let all = rows.concat();
         let mut row_starts = vec![0; height + 1];
-        for run in &runs {
-            row_starts[run.row + 1] += 1;
+        for (row, runs) in rows.iter().enumerate() {
+            row_starts[row + 1] = row_starts[row] + runs.len();
         }
-        for row in 0..height {
-            row_starts[row + 1] += row_starts[row];
-        }
-        let mut parents: Vec<usize> = (0..runs.len()).collect();
+        drop(rows);
+        let mut parents: Vec<u32> = (0..all.len() as u32).collect();
         for row in 1..height {
             let (mut above, end_above) = (row_starts[row - 1], row_starts[row]);
             for run in row_starts[row]..row_starts[row + 1] {
-                while above < end_above && runs[above].end <= runs[run].start {
+                while above < end_above && all[above].end <= all[run].start {
                     above += 1;
                 }
                 // The last run above may reach over the next one here, too.
                 let mut touching = above;
-                while touching < end_above && runs[touching].start < runs[run].end {
-                    if region(row, runs[run].start) == region(row - 1, runs[touching].start) {
+                while touching < end_above && all[touching].start < all[run].end {
+                    if region(row, all[run]) == region(row - 1, all[touching]) {
                         unite(&mut parents, run, touching);
                     }
                     touching += 1;
                 }
             }
         }
-        let mut components = Vec::new();
-        for index in 0..runs.len() {
-            let root = find(&mut parents, index);
-            let Run { row, start, end, .. } = runs[index];
-            // The root is the first run of its component: it has its number already.
-            let component = if root == index {
-                components.push(Component { pixels: 0, first_row: row, first_col: start });
-                components.len() - 1
-            } else {
-                runs[root].component
-            };
-            runs[index].component = component;
-            components[component].pixels += end - start;
+        let mut components: Vec<Component> = Vec::new();
+        let mut component_of = parents;
+        for row in 0..height {
+            for index in row_starts[row]..row_starts[row + 1] {
+                let run = all[index];
+                // A parent comes before its runs and is in their component: it has its number already.
+                let parent = component_of[index] as usize;
+                if parent == index {
+                    component_of[index] = components.len() as u32;
+                    components.push(Component { pixels: 0, first_row: row, first_col: run.start as usize });
+                } else {
+                    component_of[index] = component_of[parent];
+                }
+                components[component_of[index] as usize].pixels += run.cols().len();
+            }
         }
-        Self { width, all: runs, row_starts, components }
+        Self { width, all, component_of, row_starts, components }
     }
 
-    /// The runs of a row.
-    pub fn row(&self, row: usize) -> &[Run] {
-        &self.all[self.row_starts[row]..self.row_starts[row + 1]]
+    /// The columns of the runs of a row, and the component of each.
+    pub fn row(&self, row: usize) -> impl Iterator<Item = (Range<usize>, usize)> {
+        let runs = self.row_starts[row]..self.row_starts[row + 1];
+        let cols = self.all[runs.clone()].iter().map(|run| run.cols());
+        cols.zip(self.component_of[runs].iter().map(|&component| component as usize))
     }
 
     /// Index of each pixel's component, row-major; -1 outside the mask.
@@ -104,9 +116,8 @@ impl Runs {
     pub fn write_labels(&self, labels: &mut [i32]) {
         labels.par_chunks_mut(self.width).enumerate().for_each(|(row, labels)| {
             labels.fill(-1);
-            for run in self.row(row) {
-                // At most one component a pixel, and images of 2^31 pixels are refused where they are read.
-                labels[run.start..run.end].fill(run.component as i32);
+            for (cols, component) in self.row(row) {
+                labels[cols].fill(component as i32);
             }
         });
     }
@@ -116,17 +127,16 @@ impl Runs {
     /// Summed in an order that does not depend on the threads.
     pub fn means(&self, fill: impl Fn(usize, &mut [f64]) + Sync) -> Vec<f64> {
         let row_sums = |values: &mut Vec<f64>, row: usize| -> Vec<f64> {
-            let runs = self.row(row);
-            if !runs.is_empty() {
+            if self.row_starts[row] < self.row_starts[row + 1] {
                 fill(row, values);
             }
-            runs.iter().map(|run| sum(&values[run.start..run.end])).collect()
+            self.row(row).map(|(cols, _)| sum(&values[cols])).collect()
         };
         let rows = (0..self.row_starts.len() - 1).into_par_iter();
-        let run_sums: Vec<f64> = rows.map_init(|| vec![0.0; self.width], row_sums).flatten_iter().collect();
+        let run_sums: Vec<Vec<f64>> = rows.map_init(|| vec![0.0; self.width], row_sums).collect();
         let mut means = vec![0.0; self.components.len()];
-        for (run, sum) in self.all.iter().zip(run_sums) {
-            means[run.component] += sum;
+        for (&component, sum) in self.component_of.iter().zip(run_sums.iter().flatten()) {
+            means[component as usize] += sum;
         }
         for (mean, component) in means.iter_mut().zip(&self.components) {
             *mean /= component.pixels as f64;
@@ -137,7 +147,6 @@ impl Runs {
 
 /// The runs of one row of a mask.
 struct RowRuns<'a> {
-    row: usize,
     /// 0 or 1 a pixel.
     mask: &'a [u8],
     regions: Option<&'a [i32]>,
@@ -156,22 +165,22 @@ impl Iterator for RowRuns<'_> {
             end = start + rest.iter().position(|&region| region != rest[0]).unwrap_or(rest.len());
         }
         self.col = end;
-        Some(Run { row: self.row, start, end, component: 0 })
+        Some(Run { start: start as u32, end: end as u32 })
     }
 }
 
 /// The first run of the component of `run`.
-fn find(parents: &mut [usize], mut run: usize) -> usize {
-    while parents[run] != run {
-        parents[run] = parents[parents[run]];
-        run = parents[run];
+fn find(parents: &mut [u32], mut run: usize) -> usize {
+    while parents[run] as usize != run {
+        parents[run] = parents[parents[run] as usize];
+        run = parents[run] as usize;
     }
     run
 }
 
-fn unite(parents: &mut [usize], a: usize, b: usize) {
+fn unite(parents: &mut [u32], a: usize, b: usize) {
     let (a, b) = (find(parents, a), find(parents, b));
-    parents[a.max(b)] = a.min(b);
+    parents[a.max(b)] = a.min(b) as u32;
 }
 
 #[cfg(test)]

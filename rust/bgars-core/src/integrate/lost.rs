@@ -7,30 +7,34 @@ use super::checkerboard::{Grid, Weights};
 use super::detours::Window;
 use super::places::{Place, above_zero, blacks_around, diagonal};
 use super::real::{greater, lesser};
-use super::strays::is_alone;
+use super::strays::{is_alone, place};
+
+/// The centres that tie together what has no coarse edge along the rim of their cell: indices among the reds, ascending. The
+/// coarser grid serves them badly or not at all.
+pub(super) fn doubtful_centres(weights: &Weights) -> Vec<u32> {
+    let half = weights.grid.half();
+    let rows = (0..weights.grid.height / 2).into_par_iter().map(|cell_row| 2 * cell_row + 1);
+    let found = rows
+        .flat_map_iter(|row| doubtful_in_row(weights, row as isize).into_iter().map(move |k| (row * half + k) as u32));
+    found.collect()
+}
 
 /// The reds that get lost: indices in ascending order.
 #[derive(Debug)]
 pub(super) struct Lost {
     pub reds: Vec<u32>,
-    /// Centres that the coarser grid serves badly or not at all.
-    pub doubtful: usize,
 }
 
 impl Lost {
-    /// The centres that get lost: those that tie together what the `coarser` grid does not join nearby, or that have no corner
-    /// at all.
-    pub fn centres(weights: &Weights, coarser: &Weights) -> Self {
+    /// The centres that get lost: those of the `doubtful` that tie together what the `coarser` grid does not join nearby, or
+    /// that have no corner at all.
+    pub fn centres(doubtful: &[u32], weights: &Weights, coarser: &Weights) -> Self {
         let half = weights.grid.half();
-        let rows = (0..weights.grid.height / 2).into_par_iter();
-        let doubtful: Vec<(usize, usize)> = rows
-            .flat_map_iter(|cell_row| {
-                let row = 2 * cell_row + 1;
-                doubtful_in_row(weights, row as isize).into_iter().map(move |k| (row, k))
-            })
-            .collect();
-        let lost = doubtful.par_iter().filter(|&&(row, k)| !has_detour(weights, coarser, row as isize, k));
-        Self { reds: lost.map(|&(row, k)| (row * half + k) as u32).collect(), doubtful: doubtful.len() }
+        let is_lost = |&&red: &&u32| {
+            let (row, k) = place(red, half);
+            !has_detour(weights, coarser, row, k)
+        };
+        Self { reds: doubtful.par_iter().filter(is_lost).copied().collect() }
     }
 
     /// Adds the corners without edges on the `coarser` grid, and the centres tied to them.

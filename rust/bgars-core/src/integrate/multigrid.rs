@@ -9,7 +9,7 @@ use super::checkerboard::{Grid, Weights};
 use super::coarsen::coarsen;
 use super::fill::fill_corners;
 use super::graph::{GraphCycle, GraphVectors};
-use super::lost::Lost;
+use super::lost::{Lost, doubtful_centres};
 use super::reduction::{eliminate_blacks, fill_and_join, multiply};
 use super::strays::{Changes, Strays};
 use super::transfer::{Below, advance, prolong, restrict};
@@ -74,16 +74,19 @@ impl<'a> Multigrid<'a> {
             if pixels <= DIRECT_PIXELS {
                 break;
             }
-            let mut coarser = coarsen(weights);
-            let mut lost = Lost::centres(weights, &coarser);
+            let doubtful = doubtful_centres(weights);
             // Where detours are the rule, they are no longer short and wide.
-            let hopeless = lost.doubtful > pixels / HOPELESS;
-            if hopeless || is_too_coarse([stray_count, lost.reds.len()], levels.len(), finest.grid) {
+            if doubtful.len() > pixels / HOPELESS {
                 // A grid that is nearly all lanes is no good neighbour for the strays of the one before.
-                if hopeless && strays.last().is_some_and(|strays: &Strays| strays.len() > 0) {
+                if strays.last().is_some_and(|strays: &Strays| strays.len() > 0) {
                     levels.pop();
                     strays.pop();
                 }
+                break;
+            }
+            let mut coarser = coarsen(weights);
+            let mut lost = Lost::centres(&doubtful, weights, &coarser);
+            if is_too_coarse([stray_count, lost.reds.len()], levels.len(), finest.grid) {
                 break;
             }
             stray_count += lost.reds.len();

@@ -123,9 +123,9 @@ pub fn integrate_into(
         |values, (row, height_px)| {
             fill(row, values);
             height_px.fill(f32::NAN);
-            for run in runs.row(row) {
-                let mean = means[run.component];
-                for (height_px, value) in height_px[run.start..run.end].iter_mut().zip(&values[run.start..run.end]) {
+            for (cols, component) in runs.row(row) {
+                let mean = means[component];
+                for (height_px, value) in height_px[cols.clone()].iter_mut().zip(&values[cols]) {
                     *height_px = (value - mean) as f32;
                 }
             }

@@ -1,7 +1,7 @@
 //! The strays of the grids, tied to the graph.
 
 use super::matrix::Rows;
-use super::reduced::Nodes;
+use super::reduced::{Edge, Nodes};
 use crate::integrate::checkerboard::Weights;
 use crate::integrate::places::{Place, diagonal, reds_around, ties};
 use crate::integrate::strays::{Strays, coarse_shares, place};
@@ -17,15 +17,16 @@ pub(super) struct Grids<'a> {
 }
 
 impl Grids<'_> {
-    /// The graph with the strays as further nodes: those of the finest grid first.
+    /// The edges of the strays, which are the nodes after the others, those of the finest grid first; ascending.
     ///
     /// An edge from a stray to a red that is none goes to the nodes that hold this red, in proportion to their shares.
-    pub fn attach_strays(&self, graph: Rows) -> Rows {
-        let count = self.first_node(self.strays.len());
-        if count == graph.len() {
-            return graph;
-        }
-        let mut edges: Vec<(u32, u32, f64)> = Vec::new();
+    pub fn edges_of_strays(&self) -> Vec<Edge> {
+        let mut edges = Vec::new();
+        let mut add = |from: u32, to: u32, weight: f64| {
+            if from != to {
+                edges.push(Edge { from, to, weight });
+            }
+        };
         let mut found = Vec::new();
         for (level, strays) in self.strays.iter().enumerate() {
             let weights = self.weights[level];
@@ -36,31 +37,31 @@ impl Grids<'_> {
                 ties(weights, here, &mut found);
                 for &((row, k), weight) in found.iter().filter(|tie| tie.0 != here) {
                     if let Some(other) = strays.find(row as usize * half + k) {
-                        edges.push((node, (self.first_node(level) + other) as u32, weight));
+                        add(node, (self.first_node(level) + other) as u32, weight);
                         continue;
                     }
                     // w (v - c_1 v_1 - c_2 v_2 ...)^2 as edges: w c_i to each, -w c_i c_j between them.
                     let standins = self.standins(level, (row, k));
                     for &(other, share) in &standins {
-                        edges.push((node, other, weight * share));
-                        edges.push((other, node, weight * share));
-                        let between = standins.iter().filter(|standin| standin.0 != other);
-                        edges.extend(between.map(|&(third, part)| (other, third, -weight * share * part)));
+                        add(node, other, weight * share);
+                        add(other, node, weight * share);
+                        for &(third, part) in standins.iter().filter(|standin| standin.0 != other) {
+                            add(other, third, -weight * share * part);
+                        }
                     }
                 }
             }
         }
-        edges.retain(|edge| edge.0 != edge.1);
         // Stable, and so are the sums.
-        edges.sort_by_key(|edge| (edge.0, edge.1));
+        edges.sort_by_key(|edge| (edge.from, edge.to));
         edges.dedup_by(|next, kept| {
-            let same = (next.0, next.1) == (kept.0, kept.1);
+            let same = (next.from, next.to) == (kept.from, kept.to);
             if same {
-                kept.2 += next.2;
+                kept.weight += next.weight;
             }
             same
         });
-        graph.with_edges(&edges, count)
+        edges
     }
 
     /// The node of the first stray of a grid.

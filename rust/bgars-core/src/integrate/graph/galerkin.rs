@@ -1,9 +1,6 @@
 //! The edges of the next coarser graph: `P^T L P` for the Laplacian `L` of a graph.
 
-use rayon::prelude::*;
-
-use super::SETUP_CHUNK;
-use super::matrix::{Part, Rows};
+use super::matrix::Rows;
 
 /// A sparse row that is added up entry by entry.
 struct SparseSum {
@@ -39,33 +36,19 @@ impl SparseSum {
 /// The coarser graph. Its Laplacian's rows add up to zero as those of `L` do, so the diagonal need not be kept.
 pub(super) fn coarser_graph(graph: &Rows, prolongation: &Rows, restriction: &Rows) -> Rows {
     let n = restriction.len();
-    let parts = (0..n.div_ceil(SETUP_CHUNK))
-        .into_par_iter()
-        .map_init(
-            || (SparseSum::new(graph.len()), SparseSum::new(n)),
-            |(fine_row, coarse_row), chunk| {
-                let mut part = Part::default();
-                for coarse in chunk * SETUP_CHUNK..((chunk + 1) * SETUP_CHUNK).min(n) {
-                    // -P^T L first: its columns are fewer than its terms.
-                    for (fine, share) in restriction.pairs(coarse) {
-                        let share = f64::from(share);
-                        graph.pairs(fine).for_each(|(other, weight)| fine_row.add(other, share * f64::from(weight)));
-                        fine_row.add(fine, -share * graph.sum(fine));
-                    }
-                    for (fine, value) in fine_row.drain() {
-                        prolongation.pairs(fine).for_each(|(to, share)| coarse_row.add(to, value * f64::from(share)));
-                    }
-                    let before = part.columns.len();
-                    for (other, weight) in
-                        coarse_row.drain().filter(|&(other, weight)| other != coarse && weight != 0.0)
-                    {
-                        part.push(other as u32, weight as f32);
-                    }
-                    part.end_row(before);
-                }
-                part
-            },
-        )
-        .collect();
-    Rows::join(parts, n)
+    let memory = || (SparseSum::new(graph.len()), SparseSum::new(n));
+    Rows::build(n, n, memory, |(fine_row, coarse_row), coarse, row| {
+        // -P^T L first: its columns are fewer than its terms.
+        for (fine, share) in restriction.pairs(coarse) {
+            let share = f64::from(share);
+            graph.pairs(fine).for_each(|(other, weight)| fine_row.add(other, share * f64::from(weight)));
+            fine_row.add(fine, -share * graph.sum(fine));
+        }
+        for (fine, value) in fine_row.drain() {
+            prolongation.pairs(fine).for_each(|(to, share)| coarse_row.add(to, value * f64::from(share)));
+        }
+        for (other, weight) in coarse_row.drain().filter(|&(other, weight)| other != coarse && weight != 0.0) {
+            row.push(other as u32, weight as f32);
+        }
+    })
 }

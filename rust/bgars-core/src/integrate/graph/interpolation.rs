@@ -1,9 +1,6 @@
 //! Values of a graph from those of the next coarser one.
 
-use rayon::prelude::*;
-
-use super::SETUP_CHUNK;
-use super::matrix::{Part, Rows};
+use super::matrix::Rows;
 use super::splitting::{FINE, strong_limits};
 
 /// Most coarse nodes that a node takes its value from.
@@ -19,31 +16,19 @@ const NONE: u32 = u32::MAX;
 /// one. Of many sources the largest are kept.
 pub(super) fn interpolation(graph: &Rows, coarse_of: &[u32]) -> Rows {
     let limits = strong_limits(graph);
-    let parts = (0..graph.len().div_ceil(SETUP_CHUNK))
-        .into_par_iter()
-        .map_init(
-            || Sources { graph, coarse_of, limits: &limits, shares: Vec::new(), place: vec![NONE; graph.len()] },
-            |sources, chunk| {
-                let mut part = Part::default();
-                for node in chunk * SETUP_CHUNK..((chunk + 1) * SETUP_CHUNK).min(graph.len()) {
-                    let before = part.columns.len();
-                    if coarse_of[node] == FINE {
-                        let shares = sources.of(node);
-                        let sum: f64 = shares.iter().map(|source| source.1).sum();
-                        for &(source, share) in shares {
-                            part.push(coarse_of[source as usize], (share / sum) as f32);
-                        }
-                    } else {
-                        part.push(coarse_of[node], 1.0);
-                    }
-                    part.end_row(before);
-                }
-                part
-            },
-        )
-        .collect();
     let coarse_nodes = coarse_of.iter().filter(|&&coarse| coarse != FINE).count();
-    Rows::join(parts, coarse_nodes)
+    let memory = || Sources { graph, coarse_of, limits: &limits, shares: Vec::new(), place: vec![NONE; graph.len()] };
+    Rows::build(graph.len(), coarse_nodes, memory, |sources, node, row| {
+        if coarse_of[node] != FINE {
+            row.push(coarse_of[node], 1.0);
+            return;
+        }
+        let shares = sources.of(node);
+        let sum: f64 = shares.iter().map(|source| source.1).sum();
+        for &(source, share) in shares {
+            row.push(coarse_of[source as usize], (share / sum) as f32);
+        }
+    })
 }
 
 /// Finds the sources of one node after another.

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::CHUNK;
+use super::{CHUNK, SETUP_CHUNK};
 
 /// A sparse matrix by rows. As a graph: row i holds the neighbours of node i and the weights of the edges to them; the
 /// diagonal of its Laplacian is the sum of a row.
@@ -15,87 +15,85 @@ pub(in crate::integrate) struct Rows {
     width: usize,
 }
 
-/// The rows of one task, to be joined.
+/// The rows of one task.
 #[derive(Debug, Default)]
 pub(super) struct Part {
-    pub lengths: Vec<u32>,
-    pub columns: Vec<u32>,
-    pub values: Vec<f32>,
+    lengths: Vec<u32>,
+    columns: Vec<u32>,
+    values: Vec<f32>,
+    /// Where the row begins that is being filled in.
+    row_start: usize,
 }
 
 impl Part {
-    /// Ends the row that began where the last one ended.
-    pub fn end_row(&mut self, before: usize) {
-        self.lengths.push((self.columns.len() - before) as u32);
-    }
-
+    /// A further entry of the row.
     pub fn push(&mut self, column: u32, value: f32) {
         self.columns.push(column);
         self.values.push(value);
     }
+
+    /// Adds to the row's entry in a column, which may be a further one.
+    pub fn add(&mut self, column: u32, value: f32) {
+        match self.columns[self.row_start..].iter().position(|&known| known == column) {
+            Some(at) => self.values[self.row_start + at] += value,
+            None => self.push(column, value),
+        }
+    }
+
+    fn end_row(&mut self) {
+        self.lengths.push((self.columns.len() - self.row_start) as u32);
+        self.row_start = self.columns.len();
+    }
 }
 
 impl Rows {
-    /// Joins the rows of all tasks, in order.
-    pub(super) fn join(parts: Vec<Part>, width: usize) -> Self {
-        let rows: usize = parts.iter().map(|part| part.lengths.len()).sum();
-        let entries: usize = parts.iter().map(|part| part.columns.len()).sum();
-        let mut starts = Vec::with_capacity(rows + 1);
-        let mut columns = Vec::with_capacity(entries);
-        let mut values = Vec::with_capacity(entries);
-        let mut end = 0;
-        starts.push(0);
+    /// `count` rows, each filled in by `fill` with a task's own memory.
+    pub(super) fn build<M>(
+        count: usize,
+        width: usize,
+        memory: impl Fn() -> M + Send + Sync,
+        fill: impl Fn(&mut M, usize, &mut Part) + Send + Sync,
+    ) -> Self {
+        let parts: Vec<Part> = (0..count.div_ceil(SETUP_CHUNK))
+            .into_par_iter()
+            .map_init(memory, |memory, chunk| {
+                let mut part = Part::default();
+                for row in chunk * SETUP_CHUNK..((chunk + 1) * SETUP_CHUNK).min(count) {
+                    fill(memory, row, &mut part);
+                    part.end_row();
+                }
+                part
+            })
+            .collect();
+        let mut rows = Self::empty(count, width, parts.iter().map(|part| part.columns.len()).sum());
         for part in parts {
-            starts.extend(part.lengths.iter().map(|length| {
+            let mut end = rows.columns.len() as u32;
+            rows.starts.extend(part.lengths.iter().map(|length| {
                 end += length;
                 end
             }));
-            columns.extend_from_slice(&part.columns);
-            values.extend_from_slice(&part.values);
+            rows.columns.extend_from_slice(&part.columns);
+            rows.values.extend_from_slice(&part.values);
         }
-        Self { starts, columns, values, width }
+        rows
+    }
+
+    /// No rows yet, and room for as many.
+    fn empty(rows: usize, width: usize, entries: usize) -> Self {
+        let mut starts = Vec::with_capacity(rows + 1);
+        starts.push(0);
+        Self { starts, columns: Vec::with_capacity(entries), values: Vec::with_capacity(entries), width }
     }
 
     /// A matrix from the entries of each row.
     pub fn from_lists(rows: &[Vec<(usize, f64)>], width: usize) -> Self {
-        let mut part = Part::default();
+        let mut found = Self::empty(rows.len(), width, rows.iter().map(Vec::len).sum());
         for row in rows {
-            let before = part.columns.len();
-            for &(column, value) in row {
-                part.push(column as u32, value as f32);
-            }
-            part.end_row(before);
+            found.columns.extend(row.iter().map(|entry| entry.0 as u32));
+            found.values.extend(row.iter().map(|entry| entry.1 as f32));
+            found.starts.push(found.columns.len() as u32);
         }
-        Self::join(vec![part], width)
-    }
-
-    /// The graph with further `edges` (from, to, weight; ascending), and nodes up to `len`.
-    pub fn with_edges(self, edges: &[(u32, u32, f64)], len: usize) -> Self {
-        let most = self.entries() + edges.len();
-        let mut starts = Vec::with_capacity(len + 1);
-        let mut columns: Vec<u32> = Vec::with_capacity(most);
-        let mut values: Vec<f32> = Vec::with_capacity(most);
-        starts.push(0);
-        let mut rest = edges;
-        for row in 0..len {
-            let before = columns.len();
-            if row < self.len() {
-                let (own_columns, own_values) = self.row(row);
-                columns.extend_from_slice(own_columns);
-                values.extend_from_slice(own_values);
-            }
-            while let Some((&(_, to, weight), later)) = rest.split_first().filter(|(edge, _)| edge.0 as usize == row) {
-                if let Some(place) = columns[before..].iter().position(|&column| column == to) {
-                    values[before + place] += weight as f32;
-                } else {
-                    columns.push(to);
-                    values.push(weight as f32);
-                }
-                rest = later;
-            }
-            starts.push(columns.len() as u32);
-        }
-        Self { starts, columns, values, width: len }
+        found
     }
 
     /// Number of rows.

@@ -76,10 +76,11 @@ pub(super) struct GraphVectors {
 impl GraphCycle {
     /// The hierarchy below the reds of the last of `weights` and the strays of the others.
     pub fn new(weights: &[&Weights], strays: &[Strays]) -> Self {
-        let (nodes, graph) = reduced_graph(weights[strays.len()]);
+        let last = weights[strays.len()];
+        let nodes = Nodes::new(last);
         let grids = Grids { weights, strays, nodes: &nodes };
         let bases = grids.bases();
-        let mut graph = grids.attach_strays(graph);
+        let mut graph = reduced_graph(last, &nodes, bases.len(), &grids.edges_of_strays());
         let mut levels = Vec::new();
         while graph.rows_with_entries() > DIRECT_NODES && levels.len() < MAX_LEVELS {
             let coarse_of = split(&graph);

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::matrix::{Part, Rows};
-use super::{CHUNK, SETUP_CHUNK};
+use super::CHUNK;
+use super::matrix::Rows;
 use crate::integrate::checkerboard::Weights;
 use crate::integrate::places::ties;
 
@@ -12,6 +12,17 @@ use crate::integrate::places::ties;
 pub(super) struct Nodes(Vec<u32>);
 
 impl Nodes {
+    pub fn new(weights: &Weights) -> Self {
+        let half = weights.grid.half();
+        let rows = (0..weights.grid.height).into_par_iter();
+        let found = rows.flat_map_iter(|row| {
+            let sides = weights.row(row as isize);
+            let used = move |k: &usize| sides.iter().any(|side| side[k + 1] > 0.0);
+            (0..half).filter(used).map(move |k| (row * half + k) as u32)
+        });
+        Self(found.collect())
+    }
+
     pub fn len(&self) -> usize {
         self.0.len()
     }
@@ -43,39 +54,33 @@ impl Nodes {
     }
 }
 
-/// The graph of the reds.
-pub(super) fn reduced_graph(weights: &Weights) -> (Nodes, Rows) {
-    let grid = weights.grid;
-    let half = grid.half();
-    let nodes: Vec<u32> = (0..grid.height)
-        .into_par_iter()
-        .flat_map_iter(|row| {
-            let sides = weights.row(row as isize);
-            let used = move |k: &usize| sides.iter().any(|side| side[k + 1] > 0.0);
-            (0..half).filter(used).map(move |k| (row * half + k) as u32)
-        })
-        .collect();
-    let mut node_of = vec![u32::MAX; grid.half_pixels()];
-    for (node, &place) in nodes.iter().enumerate() {
+/// The graph of the reds, and of `strays` more nodes, with further `edges` (ascending; what ties a pair already grows).
+pub(super) fn reduced_graph(weights: &Weights, nodes: &Nodes, strays: usize, edges: &[Edge]) -> Rows {
+    let half = weights.grid.half();
+    let mut node_of = vec![u32::MAX; weights.grid.half_pixels()];
+    for (node, &place) in nodes.0.iter().enumerate() {
         node_of[place as usize] = node as u32;
     }
-    let parts = nodes
-        .par_chunks(SETUP_CHUNK)
-        .map(|nodes| {
-            let mut part = Part::default();
-            let mut found = Vec::new();
-            for &place in nodes {
-                let red = ((place as usize / half) as isize, place as usize % half);
-                ties(weights, red, &mut found);
-                let before = part.columns.len();
-                for &((row, k), weight) in found.iter().filter(|tie| tie.0 != red) {
-                    part.push(node_of[row as usize * half + k], weight as f32);
-                }
-                part.end_row(before);
+    let count = nodes.len() + strays;
+    Rows::build(count, count, Vec::new, |found, node, row| {
+        if let Some(&place) = nodes.0.get(node) {
+            let red = ((place as usize / half) as isize, place as usize % half);
+            ties(weights, red, found);
+            for &((line, k), weight) in found.iter().filter(|tie| tie.0 != red) {
+                row.push(node_of[line as usize * half + k], weight as f32);
             }
-            part
-        })
-        .collect();
-    let count = nodes.len();
-    (Nodes(nodes), Rows::join(parts, count))
+        }
+        let first = edges.partition_point(|edge| (edge.from as usize) < node);
+        for edge in edges[first..].iter().take_while(|edge| edge.from as usize == node) {
+            row.add(edge.to, edge.weight as f32);
+        }
+    })
+}
+
+/// An edge of a graph, from one of its ends.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Edge {
+    pub from: u32,
+    pub to: u32,
+    pub weight: f64,
 }
