@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 from bilateral import MAPS
 from machine import describe
+from normal_fields import MASKS
 from process import run_script
 from table import group_lines, machine_line
 
@@ -61,8 +62,9 @@ def _integrate(*, quick: bool) -> list[Task]:
         found += [Task("integrate", "integrate.py", ("dct", str(side)), threads) for side in _sides(1024, largest)]
     found += [Task("integrate", "integrate.py", ("cg", str(side))) for side in _sides(512, 512 if quick else 1024)]
     found += [Task("integrate", "integrate.py", ("amg", str(side))) for side in _sides(512, 512 if quick else 2048)]
-    for shape in ("rectangle", "disc with holes"):
+    for shape in MASKS:
         found.append(Task("integrate", "memory.py", (shape, str(1024 if quick else 4096)), 2))
+    for shape in ("rectangle", "disc with holes"):
         # The script itself runs bgars in two processes, on one thread and on two.
         sides = _sides(512, 2048 if quick else 8192)
         found += [Task("integrate", "scaling.py", (shape, str(side))) for side in sides]
