@@ -25,6 +25,7 @@ mod places;
 mod real;
 mod reduction;
 mod ring;
+mod settle;
 mod solve;
 mod spans;
 mod stencil;

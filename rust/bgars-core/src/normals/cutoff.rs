@@ -160,8 +160,10 @@ mod tests {
                 assert_eq!(keep_all, !dropped, "{lights} lights, gap {gap}");
                 let wide: Vec<Lanes<u16>> = keys.iter().map(|key| key.map(u16::from)).collect();
                 let float: Vec<Lanes<f32>> = keys.iter().map(|key| key.map(f32::from)).collect();
-                assert_eq!(cutoffs(&wide.iter().collect::<Vec<_>>(), u16::from(gap)).largest, found.map(u16::from));
-                assert_eq!(cutoffs(&float.iter().collect::<Vec<_>>(), f32::from(gap)).largest, found.map(f32::from));
+                let of_words = cutoffs(&wide.iter().collect::<Vec<_>>(), u16::from(gap));
+                assert_eq!((of_words.largest, of_words.keep_all), (found.map(u16::from), keep_all));
+                let of_floats = cutoffs(&float.iter().collect::<Vec<_>>(), f32::from(gap));
+                assert_eq!((of_floats.largest, of_floats.keep_all), (found.map(f32::from), keep_all));
                 for lane in 0..LANES {
                     let values: Vec<u8> = keys.iter().map(|key| key[lane]).collect();
                     assert_eq!(found[lane], slow_cutoff(&values, gap), "{values:?}, gap {gap}");

@@ -1,0 +1,177 @@
+//! The blacks that follow from reds, and what the system leaves: the right side of the reduced system, its true residual, and the
+//! end of a solution.
+
+use multiversion::multiversion;
+use rayon::prelude::*;
+
+use super::checkerboard::{BAND_ROWS, Weights};
+use super::edges::Colours;
+use super::real::{Real, on_vectors, sum_of};
+use super::reduction::load;
+use super::ring::Ring;
+use super::spans::Span;
+use crate::vector::Packed;
+
+/// `blacks = D_black^-1 (right.blacks + W^T reds)`, and what the system leaves at the reds: `left = right.reds + W blacks - D_red reds`.
+/// Returns the square sum of `left`. Both are zero beside the spans of the grid.
+///
+/// From no reds, `left` is the right side of the reduced system; from a solution, `blacks`, where asked for, are the rest of it.
+pub(super) fn settle(
+    weights: &Weights,
+    right: &Colours,
+    reds: Option<&[f64]>,
+    blacks: Option<&mut [f64]>,
+    left: &mut [f64],
+) -> f64 {
+    let half = weights.grid.half();
+    let chunk = BAND_ROWS * half;
+    let blacks: Vec<_> = match blacks {
+        Some(blacks) => blacks.chunks_mut(chunk).map(Some).collect(),
+        None => left.chunks(chunk).map(|_| None).collect(),
+    };
+    let rows = || [Ring::new(half), Ring::new(half)];
+    let squares: Vec<f64> = (blacks, left.par_chunks_mut(chunk))
+        .into_par_iter()
+        .enumerate()
+        .map_init(rows, |rows, (band, out)| settle_band(weights, right, reds, band, rows, out))
+        .collect();
+    squares.iter().sum()
+}
+
+/// The rows of a band to write: of the blacks, where they are asked for, and of what is left.
+type Settled<'a> = (Option<&'a mut [f64]>, &'a mut [f64]);
+
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn settle_band(
+    weights: &Weights,
+    right: &Colours,
+    reds: Option<&[f64]>,
+    band: usize,
+    rows: &mut [Ring<f64>; 2],
+    out: Settled<'_>,
+) -> f64 {
+    on_vectors!(weights.grid, [f64], settle_band_with(weights, right, reds, band, rows, out))
+}
+
+#[inline(always)]
+fn settle_band_with<V: Packed<Number = f64>>(
+    weights: &Weights,
+    right: &Colours,
+    reds: Option<&[f64]>,
+    band: usize,
+    [here, solved]: &mut [Ring<f64>; 2],
+    (mut blacks, left): Settled<'_>,
+) -> f64 {
+    let n = weights.grid.half();
+    let first = (band * BAND_ROWS) as isize;
+    let end = first + (left.len() / n) as isize;
+    let span = weights.spans.band(band);
+    if let Some(blacks) = &mut blacks {
+        clear_beside(span, n, blacks);
+    }
+    clear_beside(span, n, left);
+    let mut squares = 0.0;
+    for row in first - 2..=end + 1 {
+        // Without any, the rows stay zero.
+        if let Some(reds) = reds {
+            load(weights.grid, reds, row, span, here.row_mut(row), |value| value);
+        }
+        let row = row - 1;
+        if row >= first - 1 && weights.grid.contains(row) {
+            let stencil = weights.black_stencil::<V>(row, span, here.around(row));
+            let given = V::chunks(&right.blacks[row as usize * n..][span.range()], stencil.len());
+            let out = V::chunks_mut(&mut solved.row_mut(row)[span.start..], stencil.len());
+            for k in 0..stencil.len() {
+                ((V::read(&given[k]) + stencil.sum(k)) * stencil.diagonal(k).inverse()).put(&mut out[k]);
+            }
+            if let Some(blacks) = &mut blacks
+                && (first..end).contains(&row)
+            {
+                let solved = &solved.row(row)[1..][span.range()];
+                blacks[(row - first) as usize * n..][span.range()].copy_from_slice(solved);
+            }
+        }
+        let row = row - 1;
+        if row < first {
+            continue;
+        }
+        let stencil = weights.red_stencil::<V>(row, span, solved.around(row));
+        let given = V::chunks(&right.reds[row as usize * n..][span.range()], stencil.len());
+        let own = V::chunks(&here.row(row)[1 + span.start..], stencil.len());
+        let out = V::chunks_mut(&mut left[(row - first) as usize * n..][span.range()], stencil.len());
+        let mut square = V::splat(V::Number::default());
+        for k in 0..stencil.len() {
+            let rest = (V::read(&given[k]) + stencil.sum(k)) - stencil.diagonal(k) * V::read(&own[k]);
+            rest.put(&mut out[k]);
+            square = rest.times_plus(rest, square);
+        }
+        squares += sum_of(square);
+    }
+    squares
+}
+
+/// Zeros beside a span in all rows of a band.
+fn clear_beside(span: Span, half: usize, band: &mut [f64]) {
+    for row in band.chunks_mut(half) {
+        row[..span.start].fill(0.0);
+        row[span.end..].fill(0.0);
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::float_cmp)]
+mod tests {
+    use super::*;
+    use crate::integrate::places::{Place, blacks_around, diagonal, reds_around};
+    use crate::memory::Aligned;
+
+    /// Sum of weights times values at the far ends of a pixel's edges.
+    fn sum_around(edges: [(Place, f64); 4], half: usize, values: &[f64]) -> f64 {
+        let real = edges.into_iter().filter(|edge| edge.1 > 0.0);
+        real.map(|((row, k), weight)| weight * values[row as usize * half + k]).sum()
+    }
+
+    /// One pixel at a time; what is beside the spans is zero, whatever the memory held.
+    #[test]
+    fn blacks_follow_from_reds_and_the_rest_is_left() {
+        let mut weights = Weights::ragged([0.0, 0.3, 1.0, 0.7, -0.5, 0.0]);
+        // Nothing to the right of two whole vectors.
+        for row in 0..weights.grid.height {
+            (31..weights.grid.half()).for_each(|k| weights.set_red(row, k, [0.0; 4]));
+        }
+        weights.find_spans();
+        let (grid, half) = (weights.grid, weights.grid.half());
+        let number = |seed: usize| ((seed * 2_654_435_761) >> 7) as f64 % 1000.0 / 1000.0 - 0.5;
+        let mut right =
+            Colours { reds: Aligned::zeros(grid.half_pixels()), blacks: Aligned::zeros(grid.half_pixels()) };
+        let mut reds = vec![0.0; grid.half_pixels()];
+        let (mut blacks, mut left) = (vec![7.0; reds.len()], vec![7.0; reds.len()]);
+        for (place, red) in reds.iter_mut().enumerate() {
+            *red = number(place);
+            (right.reds[place], right.blacks[place]) = (number(place + 9_999), number(place + 77_777));
+        }
+        let squares = settle(&weights, &right, Some(&reds), Some(&mut blacks), &mut left);
+        let (mut expected, mut beside) = (0.0, 0);
+        for row in 0..grid.height {
+            let span = weights.spans.at(row as isize);
+            for k in 0..half {
+                let (at, place) = (row * half + k, (row as isize, k));
+                if !span.range().contains(&k) {
+                    assert!(blacks[at] == 0.0 && left[at] == 0.0, "beside: {k} of row {row}");
+                    beside += 1;
+                    continue;
+                }
+                let edges = reds_around(&weights, place);
+                let sum = diagonal(edges);
+                let black = if sum > 0.0 { (right.blacks[at] + sum_around(edges, half, &reds)) / sum } else { 0.0 };
+                assert!((blacks[at] - black).abs() < 1e-12, "black {k} of row {row}");
+                let edges = blacks_around(&weights, place);
+                let rest = right.reds[at] + sum_around(edges, half, &blacks) - diagonal(edges) * reds[at];
+                assert!((left[at] - rest).abs() < 1e-12, "red {k} of row {row}");
+                expected += rest * rest;
+            }
+        }
+        assert!(beside > 0);
+        assert!((squares - expected).abs() < 1e-12 * expected && expected > 1.0, "{squares} for {expected}");
+    }
+}
