@@ -222,6 +222,52 @@ mod tests {
         assert_eq!(sizes, [3, 3, 2]);
     }
 
+    /// Word for word: from each pixel without a number to all that it is joined to.
+    fn flooded(mask: &[bool], regions: &[i32], width: usize) -> Vec<i32> {
+        let mut labels = vec![-1; mask.len()];
+        let mut count = 0;
+        for first in 0..mask.len() {
+            if !mask[first] || labels[first] >= 0 {
+                continue;
+            }
+            let mut reached = vec![first];
+            labels[first] = count;
+            while let Some(pixel) = reached.pop() {
+                let col = pixel % width;
+                let beside = [(col > 0, 1_usize.wrapping_neg()), (col + 1 < width, 1)];
+                for (there, step) in beside.into_iter().chain([(true, width.wrapping_neg()), (true, width)]) {
+                    let next = pixel.wrapping_add(step);
+                    let is_joined = there && next < mask.len() && mask[next] && regions[next] == regions[pixel];
+                    if is_joined && labels[next] < 0 {
+                        labels[next] = count;
+                        reached.push(next);
+                    }
+                }
+            }
+            count += 1;
+        }
+        labels
+    }
+
+    #[test]
+    fn labels_are_those_of_flooding() {
+        let mut state = 1_u32;
+        let mut next = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            state >> 24
+        };
+        for (width, height, used, kinds) in [(37, 41, 150, 1), (64, 30, 170, 2), (1, 50, 128, 1), (50, 1, 200, 3)] {
+            let mask: Vec<bool> = (0..width * height).map(|_| next() < used).collect();
+            let regions: Vec<i32> = (0..width * height).map(|_| (next() % kinds) as i32).collect();
+            let runs = Runs::new(&mask, Some(&regions), width);
+            let expected = flooded(&mask, &regions, width);
+            assert_eq!(runs.labels(), expected, "{width} x {height}");
+            for (number, component) in runs.components.iter().enumerate() {
+                assert_eq!(component.pixels, expected.iter().filter(|&&label| label == number as i32).count());
+            }
+        }
+    }
+
     #[test]
     fn means_are_taken_a_component() {
         let mask = [true, true, false, true, false, false];
