@@ -90,6 +90,9 @@ fn grow_by<K: Key, const N: usize>(keys: &[&Lanes<K>], gap: K) -> Cutoffs<K> {
 /// until nothing is.
 #[inline(always)]
 fn grow<K: Key, const N: usize>(keys: &[&Lanes<K>], part: usize, gap: K, largest: &mut [K; N]) -> bool {
+    /// Lights that are compared with the same cutoff: what they reach serves the next ones in the same round. With every light
+    /// for itself, each would wait for the one before.
+    const AT_ONCE: usize = 8;
     let [mut first, mut second, mut third] = [[K::LARGEST; N]; 3];
     let mut brightest = [K::LEAST; N];
     for key in keys {
@@ -108,17 +111,20 @@ fn grow<K: Key, const N: usize>(keys: &[&Lanes<K>], part: usize, gap: K, largest
         if !is_over_any(&brightest, largest) {
             return true;
         }
-        let cutoffs = *largest;
-        let mut next = cutoffs;
-        for key in keys {
-            let key = key.as_chunks::<N>().0[part];
-            for lane in 0..N {
-                let reached = if key[lane].is_over(cutoffs[lane], gap) { K::LEAST } else { key[lane] };
-                next[lane] = next[lane].largest(reached);
+        let before = *largest;
+        let mut next = before;
+        for keys in keys.chunks(AT_ONCE) {
+            let cutoffs = next;
+            for key in keys {
+                let key = key.as_chunks::<N>().0[part];
+                for lane in 0..N {
+                    let reached = if key[lane].is_over(cutoffs[lane], gap) { K::LEAST } else { key[lane] };
+                    next[lane] = next[lane].largest(reached);
+                }
             }
         }
         // Not a question of equality: NaN outside the mask must not go round for ever.
-        if !is_over_any(&next, &cutoffs) {
+        if !is_over_any(&next, &before) {
             break;
         }
         *largest = next;
