@@ -156,6 +156,28 @@ mod tests {
         (0..lights).map(|_| std::array::from_fn(|_| next())).collect()
     }
 
+    /// Stairs of steps as high as the gap, each pixel's begun at another light: darkest first one round takes them all, darkest
+    /// last each round takes one.
+    #[test]
+    fn stairs_are_climbed_in_any_order_of_the_lights() {
+        const GAP: u8 = 1;
+        for lights in [9, 24, 96] {
+            for (descends, step) in [(false, GAP), (true, GAP), (false, GAP + 1), (true, GAP + 1)] {
+                let level = |light: usize, lane: usize| {
+                    let place = (light + lane) % lights;
+                    step * (if descends { lights - 1 - place } else { place }) as u8
+                };
+                let keys: Vec<Lanes<u8>> =
+                    (0..lights).map(|light| std::array::from_fn(|lane| level(light, lane))).collect();
+                let found = cutoffs(&keys.iter().collect::<Vec<_>>(), GAP).largest;
+                for lane in 0..LANES {
+                    let values: Vec<u8> = keys.iter().map(|key| key[lane]).collect();
+                    assert_eq!(found[lane], slow_cutoff(&values, GAP), "{values:?}");
+                }
+            }
+        }
+    }
+
     #[test]
     fn cutoffs_are_those_of_a_sorted_list() {
         for (lights, gap) in [(3, 0), (4, 20), (5, 50), (8, 0), (8, 50), (8, 255), (9, 30), (24, 10), (96, 3)] {
