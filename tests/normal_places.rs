@@ -92,14 +92,20 @@ fn a_value_that_is_not_finite_is_found_wherever_it_is_and_harms_no_other_pixel()
                 Method::RobustFilter(RobustParams::DEFAULT),
             ] {
                 let clean = estimate_row(&images, &lights, None, method, 255.0);
-                for (bad, value) in [(0, f32::NAN), (63, f32::INFINITY), (100, f32::NEG_INFINITY), (130, f32::NAN)] {
+                for (bad, value, bad_image) in [
+                    (0, f32::NAN, count - 1),
+                    (63, f32::INFINITY, 0),
+                    (99, f32::INFINITY, count / 2),
+                    (100, f32::NEG_INFINITY, 1),
+                    (130, f32::NAN, count - 1),
+                ] {
                     let mut images = images.clone();
-                    images[(count - 1) * pixels + bad] = value;
+                    images[bad_image * pixels + bad] = value;
                     let stack = ImageStack::new(&images, count, 1, pixels).unwrap();
                     let radiometry = Radiometry::linear(count, 255.0);
                     let error = estimate(&stack, &lights, &radiometry, None, method, false, proceed).unwrap_err();
                     assert!(
-                        matches!(error, Error::NonFinitePixel { image, row: 0, col, count: 1 } if (image, col) == (count - 1, bad)),
+                        matches!(error, Error::NonFinitePixel { image, row: 0, col, count: 1 } if (image, col) == (bad_image, bad)),
                         "{count} lights, {method:?}, pixel {bad}: {error}"
                     );
                     let mask: Vec<bool> = (0..pixels).map(|pixel| pixel != bad).collect();

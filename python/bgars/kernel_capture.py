@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -30,6 +31,8 @@ class KernelCapture:
         For positions, the distances at which the intensities hold; else empty.
     intensities : list of float
         Relative intensities.
+    full_scale : float or None
+        None: the kernels look for the largest value of the images.
     """
 
     images: PixelArray
@@ -41,7 +44,7 @@ class KernelCapture:
     dark: PixelArray | None
     black_level: float
     saturation: float
-    full_scale: float
+    full_scale: float | None
 
 
 def kernel_capture(capture: Capture) -> KernelCapture:
@@ -71,5 +74,5 @@ def kernel_capture(capture: Capture) -> KernelCapture:
         dark=capture.dark,
         black_level=capture.black_level,
         saturation=capture.saturation,
-        full_scale=capture.full_scale,
+        full_scale=None if math.isnan(capture.full_scale) else capture.full_scale,
     )

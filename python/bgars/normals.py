@@ -141,7 +141,9 @@ def estimate_normals(
         if value is not None and method != user:
             msg = f"{name}: only the method {user} uses it, got method {method!r}"
             raise InputError(msg)
-    capture = capture_of(images, light_directions, light_intensities, saturation, threads)
+    capture = capture_of(
+        images, light_directions, light_intensities, saturation, threads, needs_full_scale=method == "reflectance"
+    )
     use = combined_mask(capture, mask)
     part = _part_of(progress, method == "reflectance")
 

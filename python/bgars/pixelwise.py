@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
@@ -95,8 +96,14 @@ def capture_of(
     light_intensities: ArrayLike | None,
     saturation: float | None,
     threads: int | None,
+    *,
+    needs_full_scale: bool,
 ) -> Capture:
-    """Return the capture, or one made of plain arrays; arguments as of :func:`bgars.estimate_normals`."""
+    """Return the capture, or one made of plain arrays; arguments as of :func:`bgars.estimate_normals`.
+
+    Full scale of plain floats is their largest value. Where only kernels need it, these look for it: they read the
+    images anyway.
+    """
     if isinstance(images, Capture):
         for name, value in (
             ("light_directions", light_directions),
@@ -119,7 +126,8 @@ def capture_of(
     if full_scale is not None:
         clip = full_scale if saturation is None else saturation
     else:
-        full_scale = saturation or float_full_scale(stack, threads)
+        # Not for a saturation of 0, which is refused later.
+        full_scale = saturation or (float_full_scale(stack, threads) if needs_full_scale else math.nan)
         clip = float("inf") if saturation is None else saturation
     return Capture(
         images=stack,

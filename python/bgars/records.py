@@ -77,7 +77,7 @@ class Capture:
     saturation : float
         Grey level at and above which a pixel counts as clipped.
     full_scale : float
-        Grey level of full scale; thresholds "of 255" scale with it and albedo 1 means it.
+        Grey level of full scale; thresholds "of 255" scale with it and albedo 1 means it. NaN: the kernels find it.
     files : tuple of Path
         The image files, for messages and reports.
     folder : Path or None

@@ -127,8 +127,9 @@ def random_row(dtype: type, rig: bgars.LightRig, least: float, pixels: int = 640
 
 @pytest.mark.parametrize("shift", [0.0, 0.1])  # a ring, whose principal axes are the camera's, and lights whose are not
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
-def test_where_all_lights_are_kept_all_is_as_the_careful_kernel_says(dtype: type, shift: float) -> None:
-    directions = bgars.LightRig.ring(8, elevation_deg=50.0).directions + np.array([shift, shift / 2, 0.0])
+@pytest.mark.parametrize("lights", [5, 8, 9, 15, 40])  # above eight they are summed up by eights, fours and ones
+def test_where_all_lights_are_kept_all_is_as_the_careful_kernel_says(lights: int, dtype: type, shift: float) -> None:
+    directions = bgars.LightRig.ring(lights, elevation_deg=50.0).directions + np.array([shift, shift / 2, 0.0])
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     capture = random_row(dtype, bgars.LightRig.from_directions(directions), least=0.2)
     fast = bgars.estimate_normals(capture, method="lambertian")
@@ -181,3 +182,30 @@ def test_counts_are_those_of_the_sets_where_blocks_that_keep_all_lie_among_other
     np.testing.assert_array_equal(field.kept_sets.sum(axis=-1), field.lights_kept)
     assert field.mask.all()
     assert field.measured.all()
+
+
+@pytest.mark.parametrize("masked", [False, True])
+@pytest.mark.parametrize(
+    ("method", "size"),
+    [
+        *((method, (4, 60)) for method in (*bgars.normals.METHODS, "blind")),
+        # So many values are not searched first, but while the kernel works.
+        *((method, (300, 300)) for method in ("lambertian", "specular-filter", "robust-filter")),
+    ],
+)
+def test_full_scale_of_plain_floats_is_their_largest_value(
+    method: bgars.normals.Method, size: tuple[int, int], masked: bool
+) -> None:
+    rng = np.random.default_rng(3)
+    rig = bgars.LightRig.ring(8, elevation_deg=50.0)
+    images = rng.uniform(0.1, 0.7, (8, *size)).astype(np.float32)
+    mask = rng.random(size) < (0.8 if masked else 2.0)
+    images[2, 1, 7] = 1.7
+    mask[1, 7] = False  # outside the mask it counts all the same
+    found = bgars.estimate_normals(images, rig.directions, method=method, mask=mask if masked else None)
+    given_mask = mask if masked else np.ones(size, np.bool_)
+    told = bgars.Capture(images, rig, given_mask, full_scale=float(images.max()))
+    expected = bgars.estimate_normals(told, method=method)
+    for name in ("normals", "albedo", "mask", "confidence", "measured", "lights_kept"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), err_msg=name)
+    assert found.choice == expected.choice

@@ -15,8 +15,9 @@ pub struct Radiometry<'a, P> {
     pub black_level: f32,
     /// Grey level at and above which a pixel counts as clipped; infinity when nothing clips.
     pub saturation: f32,
-    /// Grey level of full scale: thresholds given "of 255" scale with it, albedo 1 is this level.
-    pub full_scale: f32,
+    /// Grey level of full scale: thresholds given "of 255" scale with it, albedo 1 is this level; `None`: what
+    /// [`Self::full_scale_of`] finds.
+    pub full_scale: Option<f32>,
     /// Relative intensity of each light; one entry a light.
     pub intensities: Vec<f64>,
 }
@@ -30,7 +31,7 @@ impl<P: Pixel> Radiometry<'_, P> {
             dark: None,
             black_level: 0.0,
             saturation: full_scale,
-            full_scale,
+            full_scale: Some(full_scale),
             intensities: vec![1.0; lights],
         }
     }
@@ -63,14 +64,17 @@ impl<P: Pixel> Radiometry<'_, P> {
                 return Err(Error::BadIntensity { index, value });
             }
         }
-        if !(self.full_scale.is_finite() && self.full_scale > 0.0) {
+        if let Some(full_scale) = self.full_scale
+            && !(full_scale.is_finite() && full_scale > 0.0)
+        {
             return Err(Error::OutOfRange {
                 argument: "full_scale",
                 rule: "finite and above 0",
-                value: f64::from(self.full_scale),
+                value: f64::from(full_scale),
             });
         }
-        if !(self.black_level.is_finite() && self.black_level >= 0.0 && self.black_level < self.full_scale) {
+        let full_scale = self.full_scale.unwrap_or(f32::INFINITY);
+        if !(self.black_level.is_finite() && self.black_level >= 0.0 && self.black_level < full_scale) {
             return Err(Error::OutOfRange {
                 argument: "black_level",
                 rule: "at least 0 and below full scale",
@@ -85,6 +89,35 @@ impl<P: Pixel> Radiometry<'_, P> {
             });
         }
         Ok(())
+    }
+
+    /// Grey level of full scale: the one given, else the largest code of integers, and of floats the largest finite value, which
+    /// takes a look at all of them.
+    ///
+    /// # Examples
+    /// ```
+    /// use bgars_core::{ImageStack, Radiometry};
+    /// let radiometry = Radiometry { full_scale: None, ..Radiometry::linear(1, 1.0) };
+    /// assert_eq!(radiometry.full_scale_of(&ImageStack::new(&[0.25, 0.5], 1, 1, 2)?), 0.5);
+    /// # Ok::<(), bgars_core::Error>(())
+    /// ```
+    #[must_use]
+    pub fn full_scale_of(&self, stack: &ImageStack<'_, P>) -> f32 {
+        self.full_scale.unwrap_or_else(|| match P::CODES {
+            Some(codes) => (codes - 1) as f32,
+            None => full_scale_from(stack.largest_finite()),
+        })
+    }
+
+    /// True where the values of the images are in proportion to light, but for an offset.
+    #[allow(clippy::float_cmp)] // intensities that are 1 by default
+    pub(crate) fn is_plain(&self) -> bool {
+        self.response.is_none() && self.intensities.iter().all(|&intensity| (1.0 / intensity) as f32 == 1.0)
+    }
+
+    /// True where something is subtracted from the values of the images.
+    pub(crate) fn has_offsets(&self) -> bool {
+        self.dark.is_some() || self.black_level != 0.0
     }
 
     /// Linear grey levels of one code, the offset still in.
@@ -105,6 +138,13 @@ impl<P: Pixel> Radiometry<'_, P> {
             (None, Some(table)) => interpolate(table, self.black_level),
         }
     }
+}
+
+/// Full scale of floats whose largest finite value is this.
+pub(crate) fn full_scale_from(largest: f32) -> f32 {
+    /// Of images without light.
+    const LEAST: f32 = 1e-30;
+    largest.max(LEAST)
 }
 
 /// The response table at a grey level between two codes.

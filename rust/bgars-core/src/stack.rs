@@ -70,7 +70,7 @@ impl<'a, P: Pixel> ImageStack<'a, P> {
     }
 }
 
-impl ImageStack<'_, f32> {
+impl<P: Pixel> ImageStack<'_, P> {
     /// The largest value that is finite, 0 where none is above; of many values ([`Self::is_large`]) each thread looks through a part.
     ///
     /// # Examples
@@ -98,7 +98,7 @@ impl ImageStack<'_, f32> {
 const FEW_VALUES: usize = 1 << 19;
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn largest_finite(values: &[f32]) -> f32 {
+fn largest_finite<P: Pixel>(values: &[P]) -> f32 {
     /// Enough for several vectors of any processor.
     const LANES: usize = 64;
     let mut largest = [0.0f32; LANES];
@@ -106,11 +106,11 @@ fn largest_finite(values: &[f32]) -> f32 {
     let larger = |a: f32, b: f32| if b > a && b < f32::INFINITY { b } else { a };
     let (blocks, rest) = values.as_chunks::<LANES>();
     for block in blocks {
-        for (largest, &value) in largest.iter_mut().zip(block) {
-            *largest = larger(*largest, value);
+        for (largest, value) in largest.iter_mut().zip(block) {
+            *largest = larger(*largest, value.to_f32());
         }
     }
-    largest.iter().chain(rest).fold(0.0, |a, &b| larger(a, b))
+    rest.iter().map(|value| value.to_f32()).chain(largest).fold(0.0, larger)
 }
 
 #[cfg(test)]

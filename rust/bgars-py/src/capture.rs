@@ -22,7 +22,7 @@ pub struct Capture<'py> {
     dark: Option<Bound<'py, PyAny>>,
     black_level: f32,
     saturation: f32,
-    full_scale: f32,
+    full_scale: Option<f32>,
 }
 
 /// Work on a capture of any dtype; the argument of `report` is the fraction done.

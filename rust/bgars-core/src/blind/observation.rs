@@ -92,7 +92,7 @@ impl<'a, P: Pixel> Reader<'a, P> {
     pub fn new(stack: &'a ImageStack<'a, P>, lights: &'a Lights, radiometry: &'a Radiometry<'a, P>) -> Self {
         let inverse: Vec<f64> = radiometry.intensities.iter().map(|intensity| 1.0 / intensity).collect();
         let albedo_scale = inverse.iter().sum::<f64>() / inverse.len() as f64;
-        let unit = albedo_scale * f64::from(radiometry.full_scale);
+        let unit = albedo_scale * f64::from(radiometry.full_scale_of(stack));
         let scales = inverse.iter().map(|scale| scale / unit).collect();
         Self { stack, lights, radiometry, scales, albedo_scale, noise: NOISE }
     }

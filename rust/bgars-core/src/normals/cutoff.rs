@@ -2,6 +2,7 @@
 //!
 //! Values up to the cutoff are kept. Ties need no care: a gap over the threshold lies between different values.
 
+use crate::Pixel;
 use crate::key::Key;
 
 /// Pixels worked on at once.
@@ -14,8 +15,27 @@ pub(super) type Lanes<T> = [T; LANES];
 pub(super) struct Cutoffs<K> {
     /// The largest kept key: from the darkest up, the one below the first step over the gap that leaves at least 3.
     pub largest: Lanes<K>,
+    /// The largest key.
+    pub brightest: Lanes<K>,
     /// True where it is known that no pixel drops a key.
     pub keep_all: bool,
+}
+
+impl<K: Pixel> Cutoffs<K> {
+    /// The smallest step from a cutoff to the next key, over the pixels; infinite where none drops a key.
+    #[inline(always)]
+    pub fn least_cut(&self, keys: &[&Lanes<K>]) -> f32 {
+        let mut next = [K::LARGEST; LANES];
+        for &&key in keys {
+            for lane in 0..LANES {
+                let is_dropped = key[lane].is_over(self.largest[lane], K::gap(0.0));
+                next[lane] = if is_dropped { next[lane].least(key[lane]) } else { next[lane] };
+            }
+        }
+        next.iter()
+            .zip(&self.largest)
+            .fold(f32::INFINITY, |cut, (next, largest)| cut.min(next.to_f32() - largest.to_f32()))
+    }
 }
 
 /// The cutoffs of keys, one entry a light, at least 3.
@@ -56,7 +76,7 @@ fn sorted_cutoffs<K: Key>(keys: &[&Lanes<K>; 8], gap: K) -> Cutoffs<K> {
         }
         (largest[lane], brightest[lane]) = (cutoff, s[7]);
     }
-    Cutoffs { largest, keep_all: !is_over_any(&brightest, &largest) }
+    Cutoffs { largest, brightest, keep_all: !is_over_any(&brightest, &largest) }
 }
 
 /// True where a key of the first is over that of the second.
@@ -79,17 +99,25 @@ fn grown_cutoffs<K: Key>(keys: &[&Lanes<K>], gap: K) -> Cutoffs<K> {
 /// `N` pixels at a time.
 #[inline(always)]
 fn grow_by<K: Key, const N: usize>(keys: &[&Lanes<K>], gap: K) -> Cutoffs<K> {
-    let mut cutoffs = Cutoffs { largest: [K::LARGEST; LANES], keep_all: true };
-    for (part, largest) in cutoffs.largest.as_chunks_mut::<N>().0.iter_mut().enumerate() {
-        cutoffs.keep_all &= grow(keys, part, gap, largest);
+    let [mut largest, mut brightest] = [[K::LARGEST; LANES]; 2];
+    let parts = largest.as_chunks_mut::<N>().0.iter_mut().zip(brightest.as_chunks_mut::<N>().0);
+    let mut keep_all = true;
+    for (part, (largest, brightest)) in parts.enumerate() {
+        keep_all &= grow(keys, part, gap, largest, brightest);
     }
-    cutoffs
+    Cutoffs { largest, brightest, keep_all }
 }
 
 /// The cutoffs of a part of a block; true where it keeps all. Start at the third darkest, and take in what is within the gap
 /// until nothing is.
 #[inline(always)]
-fn grow<K: Key, const N: usize>(keys: &[&Lanes<K>], part: usize, gap: K, largest: &mut [K; N]) -> bool {
+fn grow<K: Key, const N: usize>(
+    keys: &[&Lanes<K>],
+    part: usize,
+    gap: K,
+    largest: &mut [K; N],
+    all_brightest: &mut [K; N],
+) -> bool {
     /// Lights that are compared with the same cutoff: what they reach serves the next ones in the same round. With every light
     /// for itself, each would wait for the one before.
     const AT_ONCE: usize = 8;
@@ -105,7 +133,7 @@ fn grow<K: Key, const N: usize>(keys: &[&Lanes<K>], part: usize, gap: K, largest
             brightest[lane] = brightest[lane].largest(key[lane]);
         }
     }
-    *largest = third;
+    (*largest, *all_brightest) = (third, brightest);
     // Each round reaches further in at least one pixel, or is the last.
     for _ in 3..=keys.len() {
         if !is_over_any(&brightest, largest) {
@@ -183,7 +211,7 @@ mod tests {
         for (lights, gap) in [(3, 0), (4, 20), (5, 50), (8, 0), (8, 50), (8, 255), (9, 30), (24, 10), (96, 3)] {
             for seed in 0..50 {
                 let keys = random_keys(lights, seed);
-                let Cutoffs { largest: found, keep_all } = cutoffs(&keys.iter().collect::<Vec<_>>(), gap);
+                let Cutoffs { largest: found, keep_all, .. } = cutoffs(&keys.iter().collect::<Vec<_>>(), gap);
                 let dropped = (0..LANES).any(|lane| keys.iter().any(|key| key[lane] > found[lane]));
                 assert_eq!(keep_all, !dropped, "{lights} lights, gap {gap}");
                 let wide: Vec<Lanes<u16>> = keys.iter().map(|key| key.map(u16::from)).collect();

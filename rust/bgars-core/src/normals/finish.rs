@@ -1,9 +1,12 @@
 //! From the least squares of some pixels to what the result holds.
 
+use bytemuck::NoUninit;
+
 use super::confidence::HALF_DEG;
 use super::cutoff::{LANES, Lanes};
 use super::lane_solve::Careful;
 use super::out::Block;
+use crate::stream;
 use crate::vector::Vector;
 
 /// `n_z` below which `f32` cannot say whether a facet faces the camera.
@@ -20,6 +23,8 @@ const LEAST: f32 = f32::from_bits(1);
 pub(super) struct Facets<V> {
     /// `g = rho n`, by component.
     pub scaled: [V; 3],
+    /// `|I|^2`.
+    pub values_square: V,
     /// `|g|^2`.
     pub square: V,
     /// `rho = |g|`.
@@ -52,18 +57,22 @@ pub(super) struct Finished {
     pub valid: u64,
     /// Bit k is set where pixel k wants the careful kernel.
     pub careful: Careful,
+    /// False where a value is NaN or infinite, and perhaps where squares leave the range of floats.
+    pub finite: bool,
+    /// The smallest step from a kept value to the next one, over the pixels, where it is sought and not all are kept.
+    pub least_cut: f32,
 }
 
 impl Finished {
     pub fn new() -> Self {
-        Self { keep_all: true, kept: [0; LANES], valid: 0, careful: 0 }
+        Self { keep_all: true, kept: [0; LANES], valid: 0, careful: 0, finite: true, least_cut: 0.0 }
     }
 
     /// Writes the pixels from `at` on to their block; facets seen from the side, and values far from 1, are left to the careful kernel.
     #[inline(always)]
     pub fn write<V: Vector>(&mut self, at: usize, facets: &Facets<V>, per_full_scale: f32, block: &mut Block<'_>) {
         let zero = V::splat(0.0);
-        let Facets { scaled: [x, y, z], square, mut length, mut inverse, squared_residuals, turning, freedom } =
+        let Facets { scaled: [x, y, z], square, mut length, mut inverse, squared_residuals, turning, freedom, .. } =
             *facets;
         let in_range = V::both(square.is_over(V::splat(MIN_SQUARE)), V::splat(1.0 / MIN_SQUARE).is_over(square));
         let mut n_z = z * inverse;
@@ -97,6 +106,38 @@ impl Finished {
         }
         put(certainty, &mut block.confidence[at..], streamed);
         self.valid |= valid << at;
+    }
+    /// Mask and counts of a block, and what its unused pixels say.
+    #[inline(always)]
+    pub fn write_counts(&self, all_lights: &Lanes<u16>, used: Option<&[bool]>, out: &mut Block<'_>) {
+        static ALL_VALID: Lanes<bool> = [true; LANES];
+        let spread;
+        // Nearly always all of them, and then nothing has to be spread.
+        let valid = if self.valid == u64::MAX {
+            &ALL_VALID
+        } else {
+            spread = std::array::from_fn(|lane| self.valid >> lane & 1 == 1);
+            &spread
+        };
+        let kept = if self.keep_all { all_lights } else { &self.kept };
+        store(kept, out.lights_kept, out.streamed);
+        store(valid, out.mask, out.streamed);
+        store(valid, out.measured, out.streamed);
+        if let Some(used) = used {
+            for (lane, _) in used.iter().enumerate().filter(|(_, used)| !**used) {
+                out.clear(lane..lane + 1);
+            }
+        }
+    }
+}
+
+/// Copies a block, past the caches if they say so.
+#[inline(always)]
+fn store<T: NoUninit, const N: usize>(block: &[T; N], out: &mut [T; N], streamed: bool) {
+    if streamed {
+        stream::copy(block, out);
+    } else {
+        *out = *block;
     }
 }
 

@@ -1,30 +1,22 @@
 //! The loop over pixels: radiometry, choice of lights, least squares.
 
-use std::ops::{BitAnd, ControlFlow, Range};
+use std::ops::{ControlFlow, Range};
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
+use super::checks::{check, check_finite};
 use super::confidence::confidence;
 use super::cutoff::{LANES, Lanes};
 use super::lane_solve::{Choice, LaneSolver};
-use super::lanes::{self, Input, Sink};
+use super::lanes::{self, Input, Left};
 use super::out::{Out, task_pixels};
 use super::robust::{self, RobustFilter, RobustScratch};
 use super::robust_lanes::RobustLanes;
 use super::solve::{Solution, SubsetSolver};
 use super::specular::specular_filter;
-use super::{Method, NormalMap, NormalMapMut};
+use super::{Method, NormalMap, NormalMapMut, own_scale};
 use crate::{Error, ImageStack, Lights, Pixel, Radiometry, Result};
-
-/// Pixels between two calls of the progress callback.
-const BAND_PIXELS: usize = 1 << 19;
-
-/// The same for the fast kernel.
-const LANE_BAND_PIXELS: usize = 1 << 22;
-
-/// Pixels that are looked through for NaN at a time.
-const FINITE_BLOCK: usize = 1 << 14;
 
 /// Estimates the normal of every pixel that `mask` allows.
 ///
@@ -83,105 +75,50 @@ pub fn estimate_into<P: Pixel>(
     mask: Option<&[bool]>,
     method: Method,
     progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
-    mut out: NormalMapMut<'_>,
+    out: NormalMapMut<'_>,
 ) -> Result<()> {
     check(stack, lights, radiometry, mask, method)?;
     out.check(stack.pixels(), stack.lights())?;
-    let kernel = Kernel::new(stack, lights, radiometry, mask, method);
-    let pixels = stack.pixels();
-    let band_pixels = if kernel.lanes.is_some() { LANE_BAND_PIXELS } else { BAND_PIXELS };
-    let task_pixels = task_pixels(pixels.min(band_pixels));
+    let out = Out::of(out);
+    if own_scale::serves(stack, radiometry, mask, method) {
+        let draft = Kernel::new(stack, lights, radiometry, own_scale::sampled(stack), mask, method);
+        if draft.lanes.is_some() {
+            return own_scale::estimate(draft, out, progress);
+        }
+    }
+    let kernel = Kernel::new(stack, lights, radiometry, radiometry.full_scale_of(stack), mask, method);
     let mut checked = P::CODES.is_some();
-    for start in (0..pixels).step_by(band_pixels) {
-        let band = start..(start + band_pixels).min(pixels);
-        let tasks = Out::split(&mut out, &band, task_pixels);
-        let tasks = tasks.into_par_iter().enumerate().map_init(
-            || (Scratch::new(lights), Vec::new()),
-            |(scratch, memory), (task, mut out)| {
-                let first = start + task * task_pixels;
-                kernel.task(first..first + out.albedo.len(), &mut out, scratch, memory)
-            },
-        );
-        let finite = tasks.reduce(|| true, BitAnd::bitand);
-        if !finite && !checked {
+    let work = |(first, out): &mut (usize, Out<'_>), scratch: &mut Scratch<P>| {
+        let left = kernel.lanes(*first, out, scratch);
+        kernel.rest(*first, &left, out, scratch);
+        left.finite
+    };
+    kernel.in_bands(&mut kernel.tasks(out), &work, &mut |finite, done| {
+        if !checked && finite.contains(&false) {
             // Perhaps nothing is wrong inside the mask.
             check_finite(stack, mask)?;
             checked = true;
         }
-        if progress(band.end as f64 / pixels as f64).is_break() {
-            return Err(Error::Cancelled);
-        }
-    }
-    Ok(())
+        if progress(done).is_break() { Err(Error::Cancelled) } else { Ok(()) }
+    })
 }
 
 /// A gap in the grey levels of the images from one in grey levels of 255.
-fn gap(threshold: f32, full_scale: f32) -> f32 {
+pub(super) fn gap(threshold: f32, full_scale: f32) -> f32 {
     threshold * full_scale / 255.0
 }
 
-/// Refuses what the kernel cannot work on.
-fn check<P: Pixel>(
-    stack: &ImageStack<'_, P>,
-    lights: &Lights,
-    radiometry: &Radiometry<'_, P>,
-    mask: Option<&[bool]>,
-    method: Method,
-) -> Result<()> {
-    if lights.len() != stack.lights() {
-        return Err(Error::LightCountMismatch { images: stack.lights(), lights: lights.len() });
-    }
-    radiometry.check(stack)?;
-    if let Some(mask) = mask
-        && mask.len() != stack.pixels()
-    {
-        return Err(Error::LengthMismatch { argument: "mask", expected: stack.pixels(), actual: mask.len() });
-    }
-    if stack.pixels() == 0 || mask.is_some_and(|mask| !mask.contains(&true)) {
-        return Err(Error::EmptyMask);
-    }
-    match method {
-        Method::Lambertian => {}
-        Method::SpecularFilter { threshold } => {
-            if !(threshold.is_finite() && threshold > 0.0) {
-                return Err(Error::OutOfRange {
-                    argument: "threshold",
-                    rule: "finite and above 0 (grey levels of 255)",
-                    value: f64::from(threshold),
-                });
-            }
-        }
-        Method::RobustFilter(params) => params.check()?,
-    }
-    Ok(())
-}
-
-/// Refuses NaN and infinity in pixels that are to be used.
-pub(crate) fn check_finite<P: Pixel>(stack: &ImageStack<'_, P>, mask: Option<&[bool]>) -> Result<()> {
-    for image in 0..stack.lights() {
-        let plane = stack.plane(image);
-        // Nearly always all is well, and that shows quickly.
-        let all_finite = |block: &[P]| block.iter().fold(true, |finite, pixel| finite & pixel.to_f32().is_finite());
-        if plane.par_chunks(FINITE_BLOCK).all(all_finite) {
-            continue;
-        }
-        let bad = |&pixel: &usize| !plane[pixel].to_f32().is_finite() && mask.is_none_or(|mask| mask[pixel]);
-        let count = (0..plane.len()).into_par_iter().filter(bad).count();
-        if let Some(first) = if count > 0 { (0..plane.len()).find(bad) } else { None } {
-            let (row, col) = (first / stack.width(), first % stack.width());
-            return Err(Error::NonFinitePixel { image, row, col, count });
-        }
-    }
-    Ok(())
-}
-
 /// Everything a pixel's work reads.
-struct Kernel<'a, P> {
-    stack: &'a ImageStack<'a, P>,
-    lights: &'a Lights,
-    radiometry: &'a Radiometry<'a, P>,
+pub(super) struct Kernel<'a, P> {
+    pub stack: &'a ImageStack<'a, P>,
+    pub lights: &'a Lights,
+    pub radiometry: &'a Radiometry<'a, P>,
+    /// In grey levels.
+    pub full_scale: f32,
     mask: Option<&'a [bool]>,
-    method: Method,
+    pub method: Method,
+    /// Whether `full_scale` is not known yet, only that it is not less: the albedo stays in grey levels.
+    pub is_draft: bool,
     robust: Option<RobustFilter>,
     solver: SubsetSolver,
     /// The fast kernel, where it can serve.
@@ -191,11 +128,13 @@ struct Kernel<'a, P> {
     /// 1 / intensity of each light.
     scales: Vec<f32>,
     /// Full scale in the unit of the scaled values: its mean over the lights.
-    full_scale: f64,
+    scaled_full_scale: f64,
 }
 
 /// Memory of one thread, reused from pixel to pixel.
-struct Scratch {
+pub(super) struct Scratch<P> {
+    /// Images that are brought together.
+    memory: Vec<Lanes<P>>,
     values: Vec<f32>,
     clipped: Vec<bool>,
     kept: Vec<bool>,
@@ -204,10 +143,11 @@ struct Scratch {
     robust: RobustScratch,
 }
 
-impl Scratch {
+impl<P> Scratch<P> {
     fn new(lights: &Lights) -> Self {
         let count = lights.len();
         Self {
+            memory: Vec::new(),
             values: vec![0.0; count],
             clipped: vec![false; count],
             kept: vec![false; count],
@@ -219,10 +159,11 @@ impl Scratch {
 }
 
 impl<'a, P: Pixel> Kernel<'a, P> {
-    fn new(
+    pub fn new(
         stack: &'a ImageStack<'a, P>,
         lights: &'a Lights,
         radiometry: &'a Radiometry<'a, P>,
+        full_scale: f32,
         mask: Option<&'a [bool]>,
         method: Method,
     ) -> Self {
@@ -236,50 +177,119 @@ impl<'a, P: Pixel> Kernel<'a, P> {
         };
         let scales: Vec<f32> = radiometry.intensities.iter().map(|intensity| (1.0 / intensity) as f32).collect();
         let mean_scale = scales.iter().map(|&scale| f64::from(scale)).sum::<f64>() / scales.len() as f64;
-        let full_scale = f64::from(radiometry.full_scale) * mean_scale;
+        let scaled_full_scale = f64::from(full_scale) * mean_scale;
         let choice = match method {
             Method::Lambertian => Some(Choice::All),
-            Method::SpecularFilter { threshold } => Some(Choice::UpToGap(gap(threshold, radiometry.full_scale))),
+            Method::SpecularFilter { threshold } => Some(Choice::UpToGap(gap(threshold, full_scale))),
             Method::RobustFilter(_) => robust
                 .as_ref()
-                .and_then(|robust| RobustLanes::new(robust, lights.len(), full_scale))
+                .and_then(|robust| RobustLanes::new(robust, lights.len(), scaled_full_scale))
                 .map(Choice::Window),
         };
         let lanes = choice.and_then(|choice| LaneSolver::new(lights, choice));
         let planes = (0..stack.lights()).map(|light| stack.plane(light)).collect();
-        Self { stack, lights, radiometry, mask, method, robust, solver, lanes, planes, scales, full_scale }
+        Self {
+            stack,
+            lights,
+            radiometry,
+            full_scale,
+            mask,
+            method,
+            is_draft: false,
+            robust,
+            solver,
+            lanes,
+            planes,
+            scales,
+            scaled_full_scale,
+        }
     }
 
-    /// Works on a range of pixels; true where all that was read is finite.
-    fn task(
+    /// The result as tasks, by their first pixel.
+    pub fn tasks<'o>(&self, out: Out<'o>) -> Vec<(usize, Out<'o>)> {
+        let task_pixels = task_pixels(self.stack.pixels().min(self.band_pixels()));
+        (0..).step_by(task_pixels).zip(out.split(task_pixels)).collect()
+    }
+
+    /// Works on tasks in parallel, band by band; `done` gets what a band gave and the fraction done, and can end it all.
+    pub fn in_bands<T: Send, R: Send>(
         &self,
-        mut pixels: Range<usize>,
-        out: &mut Out<'_>,
-        scratch: &mut Scratch,
-        memory: &mut Vec<Lanes<P>>,
-    ) -> bool {
-        let first = pixels.start;
-        let mut finite = true;
-        let careful = &mut |pixel: usize, out: &mut Out<'_>| self.pixel(pixel, pixel - first, out, scratch);
-        if let Some(solver) = &self.lanes {
-            let input =
-                Input { planes: &self.planes, radiometry: self.radiometry, scales: &self.scales, mask: self.mask };
-            finite = lanes::run(solver, &input, pixels.clone(), &mut Sink { out, careful }, memory);
-            pixels.start = pixels.end - pixels.len() % LANES;
+        tasks: &mut [T],
+        work: &(impl Fn(&mut T, &mut Scratch<P>) -> R + Sync),
+        done: &mut dyn FnMut(Vec<R>, f64) -> Result<()>,
+    ) -> Result<()> {
+        let bands = self.stack.pixels().div_ceil(self.band_pixels());
+        let (count, mut begun) = (tasks.len(), 0);
+        for tasks in tasks.chunks_mut(count.div_ceil(bands)) {
+            begun += tasks.len();
+            let tasks = tasks.par_iter_mut();
+            let given = tasks.map_init(|| Scratch::new(self.lights), |scratch, task| work(task, scratch)).collect();
+            done(given, begun as f64 / count as f64)?;
         }
-        for pixel in pixels {
-            if self.mask.is_none_or(|mask| mask[pixel]) {
-                finite &= P::CODES.is_some() || self.planes.iter().all(|plane| plane[pixel].to_f32().is_finite());
-                careful(pixel, out);
+        Ok(())
+    }
+
+    /// Pixels between two calls of the progress callback.
+    fn band_pixels(&self) -> usize {
+        /// Of the careful kernel.
+        const CAREFUL: usize = 1 << 19;
+        /// Of the fast one.
+        const LANES: usize = 1 << 22;
+        if self.lanes.is_some() { LANES } else { CAREFUL }
+    }
+
+    /// The fast kernel on the pixels of `out`, of which `first` is the first one's number.
+    pub fn lanes(&self, first: usize, out: &mut Out<'_>, scratch: &mut Scratch<P>) -> Left {
+        let pixels = first..first + out.albedo.len();
+        let mut left = Left::nothing();
+        if let Some(solver) = &self.lanes {
+            let input = Input {
+                planes: &self.planes,
+                radiometry: self.radiometry,
+                scales: &self.scales,
+                mask: self.mask,
+                per_full_scale: if self.is_draft { 1.0 } else { 1.0 / self.full_scale },
+                is_draft: self.is_draft,
+            };
+            left = lanes::run(solver, &input, pixels.clone(), out, &mut scratch.memory);
+        }
+        if P::CODES.is_none() {
+            for pixel in self.behind_the_lanes(pixels).filter(|&pixel| self.uses(pixel)) {
+                for value in self.planes.iter().map(|plane| plane[pixel].to_f32()) {
+                    left.finite &= value.is_finite();
+                    left.largest = left.largest.max(value);
+                }
+            }
+        }
+        left
+    }
+
+    /// What the fast kernel has left, by the careful one.
+    pub fn rest(&self, first: usize, left: &Left, out: &mut Out<'_>, scratch: &mut Scratch<P>) {
+        for pixel in left.careful_pixels().filter(|&pixel| self.uses(pixel)) {
+            self.pixel(pixel, pixel - first, out, scratch);
+        }
+        for pixel in self.behind_the_lanes(first..first + out.albedo.len()) {
+            if self.uses(pixel) {
+                self.pixel(pixel, pixel - first, out, scratch);
             } else {
                 out.clear(pixel - first..pixel - first + 1);
             }
         }
-        finite
+    }
+
+    /// The pixels behind the last whole block; all of them where the fast kernel does not serve.
+    fn behind_the_lanes(&self, pixels: Range<usize>) -> Range<usize> {
+        let count = if self.lanes.is_some() { pixels.len() % LANES } else { pixels.len() };
+        pixels.end - count..pixels.end
+    }
+
+    fn uses(&self, pixel: usize) -> bool {
+        self.mask.is_none_or(|mask| mask[pixel])
     }
 
     /// The careful kernel: one pixel in `f64`, written to place `at`.
-    fn pixel(&self, pixel: usize, at: usize, out: &mut Out<'_>, scratch: &mut Scratch) {
+    fn pixel(&self, pixel: usize, at: usize, out: &mut Out<'_>, scratch: &mut Scratch<P>) {
         let lights = self.stack.lights();
         self.load(pixel, scratch);
         self.choose(scratch);
@@ -304,7 +314,7 @@ impl<'a, P: Pixel> Kernel<'a, P> {
             .sum();
         let normal = scaled / albedo;
         out.normals[at * 3..at * 3 + 3].copy_from_slice(&[normal.x as f32, normal.y as f32, normal.z as f32]);
-        out.albedo[at] = (albedo / f64::from(self.radiometry.full_scale)) as f32;
+        out.albedo[at] = (albedo / f64::from(self.full_scale)) as f32;
         out.confidence[at] =
             confidence(&scaled, &solution.inverse, squared_residuals, usize::from(out.lights_kept[at]));
         out.mask[at] = true;
@@ -312,7 +322,7 @@ impl<'a, P: Pixel> Kernel<'a, P> {
     }
 
     /// The pixel's values in linear grey levels at unit light intensity, its clipped lights, and near lights' directions.
-    fn load(&self, pixel: usize, scratch: &mut Scratch) {
+    fn load(&self, pixel: usize, scratch: &mut Scratch<P>) {
         let offset = self.radiometry.offset(pixel);
         for light in 0..self.stack.lights() {
             let code = self.planes[light][pixel];
@@ -331,10 +341,10 @@ impl<'a, P: Pixel> Kernel<'a, P> {
         }
     }
 
-    fn choose(&self, scratch: &mut Scratch) {
+    fn choose(&self, scratch: &mut Scratch<P>) {
         match (self.method, &self.robust) {
             (Method::SpecularFilter { threshold }, _) => {
-                let gap = gap(threshold, self.radiometry.full_scale);
+                let gap = gap(threshold, self.full_scale);
                 specular_filter(&scratch.values, gap, &mut scratch.order, &mut scratch.kept);
             }
             (Method::RobustFilter(_), Some(filter)) => {
@@ -342,7 +352,7 @@ impl<'a, P: Pixel> Kernel<'a, P> {
                     values: &scratch.values,
                     clipped: &scratch.clipped,
                     directions: &scratch.directions,
-                    full_scale: self.full_scale,
+                    full_scale: self.scaled_full_scale,
                 };
                 filter.choose(&pixel, &self.solver, &mut scratch.robust, &mut scratch.kept);
             }

@@ -2,8 +2,6 @@
 //!
 //! A subset of lights whose equations are too badly conditioned for `f32` is left to the careful kernel, pixel by pixel.
 
-use std::borrow::Borrow;
-
 use nalgebra::{Matrix3, Vector3};
 
 use super::confidence::PRIOR_RESIDUAL;
@@ -12,6 +10,7 @@ use super::finish::{Facets, Finished, all_bits, freedom};
 use super::kept::Kept;
 use super::out::Block;
 use super::robust_lanes::{self, RobustLanes};
+use super::sums::{BlockSums, Sums};
 use super::symmetric::{ENTRIES, Inverse, PrincipalAxes, dot, form, inverse_row, outer, spread};
 use crate::lights::conditioning;
 use crate::vector::spread::Spread;
@@ -54,7 +53,7 @@ pub(super) struct LaneSolver {
     /// Of `L^T L` of all lights.
     axes: PrincipalAxes,
     /// `(L^T L)^-1 L^T` of all lights along these axes, a column a light.
-    pseudo_inverse: Vec<[Spread; 3]>,
+    pub pseudo_inverse: Vec<[Spread; 3]>,
     /// What the square along each axis takes from the squared residuals: `-L^T L` with the [prior](PRIOR_RESIDUAL).
     unexplained: [Spread; 3],
     /// What it adds to the turning: `(tr C) I - C`, `C = (L^T L)^-1`.
@@ -112,6 +111,8 @@ pub(super) struct Readings<'a, K> {
     pub clipped: &'a Lanes<u8>,
     /// To be subtracted from every key.
     pub offset: Option<&'a Lanes<f32>>,
+    /// To be raised to the keys, where their largest is wanted.
+    pub largest: Option<&'a mut Lanes<f32>>,
 }
 
 /// How far ahead the images are fetched: streams of floats, or of many lights, are more than processors follow by themselves.
@@ -129,25 +130,45 @@ fn fetch<K>(ahead: &[&Lanes<K>], part: usize, parts: usize) {
 #[inline(always)]
 pub(super) fn solve<K: Pixel, V: Vector>(
     solver: &LaneSolver,
-    readings: &Readings<'_, K>,
+    readings: Readings<'_, K>,
     kept: &mut Kept<K>,
     per_full_scale: f32,
     out: &mut Finished,
     block: &mut Block<'_>,
 ) {
-    let Readings { keys, ahead, clipped, offset } = *readings;
+    let Readings { keys, ahead, clipped, offset, largest } = readings;
     (out.careful, out.valid) = (0, 0);
-    out.keep_all = true;
+    (out.keep_all, out.finite) = (true, true);
     let parts = 2 + LANES / V::WIDTH;
     fetch(ahead, 0, parts);
+    if K::CODES.is_none() && (keys.len() > BYTE_LIGHTS || matches!(solver.choice, Choice::Window(_))) {
+        out.finite = are_finite::<K, V>(keys);
+    }
     match &solver.choice {
-        Choice::All => {}
+        Choice::All => {
+            if let Some(largest) = largest {
+                for key in keys {
+                    raise(largest, key);
+                }
+            }
+        }
         Choice::UpToGap(gap) => {
             let cutoffs = cutoffs(keys, K::gap(*gap));
+            if K::CODES.is_none() {
+                // No sum holds a light that is dropped.
+                out.finite &= cutoffs.brightest.iter().all(|key| key.to_f32() < f32::INFINITY);
+            }
+            let is_draft = largest.is_some();
+            if let Some(largest) = largest {
+                raise(largest, &cutoffs.brightest);
+            }
             if cutoffs.keep_all {
                 kept.keep_all();
             } else {
                 kept.choose(keys, &cutoffs.largest);
+                if is_draft {
+                    out.least_cut = cutoffs.least_cut(keys);
+                }
                 (out.kept, out.keep_all) = (kept.counts(keys.len()), false);
             }
         }
@@ -165,35 +186,111 @@ pub(super) fn solve<K: Pixel, V: Vector>(
         }
     }
     fetch(ahead, 1, parts);
+    let mut squares = V::splat(0.0);
     for step in 0..LANES / V::WIDTH {
         let at = step * V::WIDTH;
         fetch(ahead, 2 + step, parts);
         let facets = if out.keep_all || kept.are_whole(keys.len(), at, V::WIDTH) {
-            solve_all::<K, V>(solver, readings, at)
+            solve_all(solver, sum_all::<K, V>(solver, keys, offset, at))
         } else {
             let count = V::from_words(&out.kept[at..]);
             let (facets, unusable) = solve_kept::<K, V>(solver, kept, keys.len(), offset, at, count);
             out.careful |= unusable << at;
             facets
         };
+        squares = facets.values_square + squares;
         out.write(at, &facets, per_full_scale, block);
+    }
+    out.finite &= K::CODES.is_some() || is_finite(squares);
+}
+
+/// Solves where every light of every pixel is kept and summed up.
+#[inline(always)]
+pub(super) fn solve_sums<V: Vector>(
+    solver: &LaneSolver,
+    sums: &BlockSums,
+    per_full_scale: f32,
+    out: &mut Finished,
+    block: &mut Block<'_>,
+) {
+    (out.careful, out.valid) = (0, 0);
+    out.keep_all = true;
+    let mut squares = V::splat(0.0);
+    for step in 0..LANES / V::WIDTH {
+        let at = step * V::WIDTH;
+        let facets = solve_all(solver, sums.load::<V>(at));
+        squares = facets.values_square + squares;
+        out.write(at, &facets, per_full_scale, block);
+    }
+    out.finite = is_finite(squares);
+}
+
+/// False where a value is NaN or infinite. Asked here, where the values are at hand: a search of its own reads the images twice.
+/// Of many images this light pass also has them in the first cache sooner than the work itself.
+#[inline(always)]
+fn are_finite<K: Pixel, V: Vector>(keys: &[&Lanes<K>]) -> bool {
+    /// Sums that need not wait for one another.
+    const SUMS: usize = 4;
+    let zero = V::splat(0.0);
+    let mut sums = [zero; SUMS];
+    let (whole, rest) = keys.as_chunks::<SUMS>();
+    for step in 0..LANES / V::WIDTH {
+        for key in rest {
+            // 0 times something finite is 0, else NaN.
+            sums[0] = K::load::<V>(&key[step * V::WIDTH..]).times_plus(zero, sums[0]);
+        }
+    }
+    for keys in whole {
+        for light in 0..SUMS {
+            for step in 0..LANES / V::WIDTH {
+                sums[light] = K::load::<V>(&keys[light][step * V::WIDTH..]).times_plus(zero, sums[light]);
+            }
+        }
+    }
+    let [a, b, c, d] = sums;
+    is_finite((a + b) + (c + d))
+}
+
+/// False where one of the values is not.
+#[inline(always)]
+fn is_finite<V: Vector>(values: V) -> bool {
+    V::all((values * V::splat(0.0)).is_over(V::splat(-1.0)))
+}
+
+/// Raises the largest values so far to these.
+#[inline(always)]
+pub(super) fn raise<K: Pixel>(largest: &mut Lanes<f32>, values: &Lanes<K>) {
+    for lane in 0..LANES {
+        let value = values[lane].to_f32();
+        largest[lane] = if value > largest[lane] { value } else { largest[lane] };
     }
 }
 
 // Below, arrays are spelled out and nothing is a closure: a compiler does not inline these into code for other instructions.
 
-/// Every light of every pixel is kept: one matrix for all.
+/// Sums over every light, which fit [`solve_all`].
 #[inline(always)]
-fn solve_all<K: Pixel, V: Vector>(solver: &LaneSolver, readings: &Readings<'_, K>, at: usize) -> Facets<V> {
-    let Sums { vector: along, squares } = if let Some(offset) = readings.offset {
+fn sum_all<K: Pixel, V: Vector>(
+    solver: &LaneSolver,
+    keys: &[&Lanes<K>],
+    offset: Option<&Lanes<f32>>,
+    at: usize,
+) -> Sums<V> {
+    if let Some(offset) = offset {
         let (offset, mut sums) = (V::load(&offset[at..]), Sums::zero());
-        for (key, column) in readings.keys.iter().zip(&solver.pseudo_inverse) {
+        for (key, column) in keys.iter().zip(&solver.pseudo_inverse) {
             sums.add(K::load::<V>(&key[at..]) - offset, column);
         }
         sums
     } else {
-        Sums::of(readings.keys, &solver.pseudo_inverse[..readings.keys.len()], at)
-    };
+        Sums::of(keys, &solver.pseudo_inverse[..keys.len()], at)
+    }
+}
+
+/// Every light of every pixel is kept: one matrix for all.
+#[inline(always)]
+fn solve_all<V: Vector>(solver: &LaneSolver, sums: Sums<V>) -> Facets<V> {
+    let Sums { vector: along, squares } = sums;
     let [x2, y2, z2] = [along[0] * along[0], along[1] * along[1], along[2] * along[2]];
     // First what is waited for longest.
     let square = (x2 + y2) + z2;
@@ -201,13 +298,14 @@ fn solve_all<K: Pixel, V: Vector>(solver: &LaneSolver, readings: &Readings<'_, K
     let inverse = V::splat(1.0) / length;
     Facets {
         scaled: solver.axes.back(along),
+        values_square: squares,
         square,
         length,
         inverse,
         // |I|^2 - |L g|^2; what rounding leaves is far below the prior of 2 %.
         squared_residuals: squares + dot(spread(&solver.unexplained), [x2, y2, z2]),
         turning: dot(spread(&solver.turning), [x2, y2, z2]),
-        freedom: freedom(V::splat(readings.keys.len() as f32)),
+        freedom: freedom(V::splat(solver.lights() as f32)),
     }
 }
 
@@ -270,6 +368,7 @@ fn solve_kept<K: Pixel, V: Vector>(
     let trace = inverse.entries[0] + inverse.entries[3] + inverse.entries[5];
     let facets = Facets {
         scaled,
+        values_square: sums.squares,
         square,
         length,
         inverse: V::splat(1.0) / length,
@@ -279,48 +378,6 @@ fn solve_kept<K: Pixel, V: Vector>(
         freedom: freedom(count),
     };
     (facets, all_bits::<V>() & !usable)
-}
-
-/// Sums over the lights.
-struct Sums<V> {
-    /// Of `vector * value`.
-    vector: [V; 3],
-    /// Of `value^2`.
-    squares: V,
-}
-
-impl<V: Vector> Sums<V> {
-    #[inline(always)]
-    fn zero() -> Self {
-        Self { vector: [V::splat(0.0); 3], squares: V::splat(0.0) }
-    }
-
-    /// Of the keys as they are.
-    #[inline(always)]
-    fn of<K: Pixel, B: Borrow<Lanes<K>>>(keys: &[B], vectors: &[[Spread; 3]], at: usize) -> Self {
-        /// Lights whose sums are written out: of 16 instructions a light (AVX2), a loop over single ones takes 7 for itself.
-        const AT_ONCE: usize = 4;
-        let mut sums = Self::zero();
-        let (keys, last_keys) = keys.as_chunks::<AT_ONCE>();
-        let (vectors, last_vectors) = vectors.as_chunks::<AT_ONCE>();
-        for (keys, vectors) in keys.iter().zip(vectors) {
-            for light in 0..AT_ONCE {
-                sums.add(K::load::<V>(&keys[light].borrow()[at..]), &vectors[light]);
-            }
-        }
-        for (key, vector) in last_keys.iter().zip(last_vectors) {
-            sums.add(K::load::<V>(&key.borrow()[at..]), vector);
-        }
-        sums
-    }
-
-    #[inline(always)]
-    fn add(&mut self, value: V, vector: &[Spread; 3]) {
-        for (sum, factor) in self.vector.iter_mut().zip(vector) {
-            *sum = value.times_plus(V::repeated(factor), *sum);
-        }
-        self.squares = value.times_plus(value, self.squares);
-    }
 }
 
 /// The inverses of all subsets of up to eight lights.

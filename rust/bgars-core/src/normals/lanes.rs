@@ -4,15 +4,15 @@
 
 use std::ops::Range;
 
-use bytemuck::NoUninit;
 use multiversion::multiversion;
 
 use super::cutoff::{LANES, Lanes};
 use super::finish::Finished;
 use super::gather::{are_crowded, bring, stretch_blocks};
 use super::kept::Kept;
-use super::lane_solve::{BYTE_LIGHTS, Careful, Choice, LaneSolver, Readings, solve};
+use super::lane_solve::{BYTE_LIGHTS, Careful, Choice, LaneSolver, Readings, raise, solve, solve_sums};
 use super::out::{Block, Out};
+use super::sums::BlockSums;
 #[cfg(target_arch = "x86_64")]
 use crate::vector::{Avx2, Avx512, Pair};
 use crate::vector::{Portable, Vector};
@@ -26,14 +26,35 @@ pub(super) struct Input<'a, P> {
     /// 1 / intensity of each light.
     pub scales: &'a [f32],
     pub mask: Option<&'a [bool]>,
+    /// What the albedo is multiplied by.
+    pub per_full_scale: f32,
+    /// Whether to collect what a later full scale is to be judged by: [`Left::largest`] and [`Left::cuts`].
+    pub is_draft: bool,
 }
 
-/// What every block writes to, and who does what the lanes leave over.
-pub(super) struct Sink<'a, 'b> {
-    /// The pixels of the task alone.
-    pub out: &'a mut Out<'b>,
-    /// Called with a pixel of the image; must write all of it.
-    pub careful: &'a mut dyn FnMut(usize, &mut Out<'b>),
+/// What the lanes found, and what they leave to others.
+pub(super) struct Left {
+    /// True where all that was read is finite.
+    pub finite: bool,
+    /// Blocks that leave pixels to the careful kernel, by their first pixel of the image, and which.
+    pub careful: Vec<(usize, Careful)>,
+    /// The largest value, 0 where none is above; of a draft.
+    pub largest: f32,
+    /// Blocks that cut between sorted values, by their first pixel of the image, and the smallest step that was cut; of a draft.
+    pub cuts: Vec<(usize, f32)>,
+}
+
+impl Left {
+    pub fn nothing() -> Self {
+        Self { finite: true, careful: Vec::new(), largest: 0.0, cuts: Vec::new() }
+    }
+
+    /// The pixels of [`Self::careful`].
+    pub fn careful_pixels(&self) -> impl Iterator<Item = usize> {
+        self.careful
+            .iter()
+            .flat_map(|&(first, lanes)| (first..first + LANES).filter(move |pixel| lanes >> (pixel - first) & 1 == 1))
+    }
 }
 
 /// Where the keys of a block come from.
@@ -57,26 +78,24 @@ type Clips<'a> = dyn Fn(&Range<usize>, &mut Lanes<u8>) + 'a;
 #[derive(Clone, Copy)]
 struct Common<'a> {
     mask: Option<&'a [bool]>,
-    full_scale: f32,
+    per_full_scale: f32,
+    is_draft: bool,
     /// `None` where nothing is subtracted.
     offsets: Option<&'a Offsets<'a>>,
     /// `None` where clipped lights are as good as others.
     clips: Option<&'a Clips<'a>>,
 }
 
-/// Works on the blocks of `pixels` (of the whole image); the pixels behind the last whole one are left. True where all that
-/// was read is finite.
-#[allow(clippy::float_cmp)] // intensities that are 1 by default
+/// Works on the blocks of `pixels` (of the whole image), to which `out` belongs; the pixels behind the last whole one are left.
 pub(super) fn run<P: Pixel>(
     solver: &LaneSolver,
     input: &Input<'_, P>,
     pixels: Range<usize>,
-    sink: &mut Sink<'_, '_>,
+    out: &mut Out<'_>,
     memory: &mut Vec<Lanes<P>>,
-) -> bool {
-    let Input { planes, radiometry, scales, mask } = *input;
-    let plain = radiometry.response.is_none() && scales.iter().all(|&scale| scale == 1.0);
-    let has_offsets = radiometry.dark.is_some() || radiometry.black_level != 0.0;
+) -> Left {
+    let Input { planes, radiometry, scales, mask, per_full_scale, is_draft } = *input;
+    let plain = radiometry.is_plain();
     let load_offsets = |block: &Range<usize>, offsets: &mut Lanes<f32>| {
         for (offset, pixel) in offsets.iter_mut().zip(block.clone()) {
             *offset = radiometry.offset(pixel);
@@ -91,10 +110,10 @@ pub(super) fn run<P: Pixel>(
         }
     };
     let clips: Option<&Clips<'_>> = if let Choice::Window(_) = solver.choice { Some(&mark_clipped) } else { None };
-    let offsets: Option<&Offsets<'_>> = if plain && has_offsets { Some(&load_offsets) } else { None };
-    let common = Common { mask, full_scale: radiometry.full_scale, offsets, clips };
+    let offsets: Option<&Offsets<'_>> = if plain && radiometry.has_offsets() { Some(&load_offsets) } else { None };
+    let common = Common { mask, per_full_scale, is_draft, offsets, clips };
     if plain {
-        run_blocks(solver, &mut Source::Images(planes, memory), common, pixels, sink)
+        run_blocks(solver, &mut Source::Images(planes, memory), common, pixels, out)
     } else {
         let make = |block: &Range<usize>, keys: &mut [Lanes<f32>]| {
             let mut offsets = [0.0; LANES];
@@ -105,7 +124,7 @@ pub(super) fn run<P: Pixel>(
                 }
             }
         };
-        run_blocks(solver, &mut Source::Made(&make), common, pixels, sink)
+        run_blocks(solver, &mut Source::Made(&make), common, pixels, out)
     }
 }
 
@@ -116,18 +135,18 @@ fn run_blocks<K: Pixel>(
     source: &mut Source<'_, K>,
     common: Common<'_>,
     pixels: Range<usize>,
-    sink: &mut Sink<'_, '_>,
-) -> bool {
+    out: &mut Out<'_>,
+) -> Left {
     #[cfg(target_arch = "x86_64")]
     {
         if multiversion::target::target_cfg_f!(target_feature = "avx512f") {
-            return run_with::<K, Pair<Avx512>>(solver, source, common, pixels, sink);
+            return run_with::<K, Pair<Avx512>>(solver, source, common, pixels, out);
         }
         if multiversion::target::target_cfg_f!(target_feature = "avx2") {
-            return run_with::<K, Pair<Avx2>>(solver, source, common, pixels, sink);
+            return run_with::<K, Pair<Avx2>>(solver, source, common, pixels, out);
         }
     }
-    run_with::<K, Portable>(solver, source, common, pixels, sink)
+    run_with::<K, Portable>(solver, source, common, pixels, out)
 }
 
 #[inline(always)]
@@ -136,10 +155,10 @@ fn run_with<K: Pixel, V: Vector>(
     source: &mut Source<'_, K>,
     common: Common<'_>,
     pixels: Range<usize>,
-    sink: &mut Sink<'_, '_>,
-) -> bool {
-    sink.out.streamed &= V::STREAMS;
-    let (blocks, sets) = sink.out.blocks();
+    out: &mut Out<'_>,
+) -> Left {
+    out.streamed &= V::STREAMS;
+    let (blocks, sets) = out.blocks();
     let mut task = Task::new(solver, common, pixels.start, sets);
     match source {
         Source::Images(planes, memory) => {
@@ -149,8 +168,10 @@ fn run_with<K: Pixel, V: Vector>(
                 let keys = a.iter().zip(b).zip(c).zip(d).zip(e).zip(f).zip(g).zip(h);
                 for (number, (out, (((((((a, b), c), d), e), f), g), h))) in blocks.zip(keys).enumerate() {
                     let keys = [a, b, c, d, e, f, g, h];
-                    task.block::<V>(number, &keys, &keys, out);
+                    task.block::<V>(number, &Reads::Keys { keys: &keys, ahead: &keys }, out);
                 }
+            } else if planes.len() > BYTE_LIGHTS && matches!(solver.choice, Choice::All) && common.offsets.is_none() {
+                run_sums::<K, V>(&mut task, planes, &pixels, blocks);
             } else {
                 run_images::<K, V>(&mut task, planes, &pixels, blocks, memory);
             }
@@ -159,22 +180,38 @@ fn run_with<K: Pixel, V: Vector>(
             let mut made = vec![[K::ZERO; LANES]; solver.lights()];
             for (number, out) in blocks.enumerate() {
                 make(&task.pixels(number), &mut made);
-                task.block::<V>(number, &made.iter().collect::<Vec<_>>(), &[], out);
+                let keys: Vec<_> = made.iter().collect();
+                task.block::<V>(number, &Reads::Keys { keys: &keys, ahead: &[] }, out);
             }
         }
     }
-    let Task { careful, finite, .. } = task;
-    if sink.out.streamed {
+    let Task { mut left, largest, .. } = task;
+    left.largest = largest.into_iter().fold(0.0, f32::max);
+    if out.streamed {
         stream::finish();
     }
-    for (first, lanes) in careful {
-        for pixel in (first..first + LANES).filter(|pixel| lanes >> (pixel - first) & 1 == 1) {
-            if common.mask.is_none_or(|mask| mask[pixel]) {
-                (sink.careful)(pixel, sink.out);
-            }
+    left
+}
+
+/// Works on the blocks of many images of which all lights are kept.
+#[inline(always)]
+fn run_sums<'a, K: Pixel, V: Vector>(
+    task: &mut Task<'_, K>,
+    planes: &[&[K]],
+    pixels: &Range<usize>,
+    mut blocks: impl Iterator<Item = Block<'a>>,
+) {
+    let images: Vec<&[Lanes<K>]> = planes.iter().map(|plane| blocks_of(plane, pixels)).collect();
+    let (count, mut sums) = (pixels.len() / LANES, BlockSums::room::<K>());
+    for first in (0..count).step_by(sums.len()) {
+        let stretch = first..count.min(first + sums.len());
+        if task.uses(&stretch) {
+            BlockSums::sum_up::<K, V>(&mut sums, &images, &task.solver.pseudo_inverse, &stretch);
+        }
+        for ((number, sums), out) in stretch.zip(&sums).zip(blocks.by_ref()) {
+            task.block::<V>(number, &Reads::Sums(sums), out);
         }
     }
-    finite
 }
 
 /// Works on the blocks of any number of images.
@@ -202,7 +239,7 @@ fn run_images<'a, K: Pixel, V: Vector>(
             keys.extend(images.iter().map(|blocks| &blocks[at]));
             // What is brought has no successors.
             let ahead = if crowded { &[][..] } else { &keys };
-            task.block::<V>(first + at, &keys, ahead, out);
+            task.block::<V>(first + at, &Reads::Keys { keys: &keys, ahead }, out);
         }
     }
 }
@@ -212,12 +249,19 @@ fn blocks_of<'a, K>(plane: &'a [K], pixels: &Range<usize>) -> &'a [Lanes<K>] {
     plane[pixels.clone()].as_chunks().0
 }
 
+/// What a block reads.
+enum Reads<'a, K> {
+    /// Its pixels in every image, and those of them whose successors in memory are to be fetched meanwhile.
+    Keys { keys: &'a [&'a Lanes<K>], ahead: &'a [&'a Lanes<K>] },
+    /// What was summed up over all of them.
+    Sums(&'a BlockSums),
+}
+
 /// What the blocks of a task share.
 struct Task<'a, K> {
     solver: &'a LaneSolver,
     common: Common<'a>,
     first_pixel: usize,
-    per_full_scale: f32,
     all_lights: Lanes<u16>,
     offset: Lanes<f32>,
     clipped: Lanes<u8>,
@@ -225,10 +269,9 @@ struct Task<'a, K> {
     finished: Finished,
     /// The kept lights of all pixels, or none.
     sets: &'a mut [bool],
-    /// True while no value was NaN or infinite.
-    finite: bool,
-    /// Blocks that leave pixels to the careful kernel, by their first pixel, and which.
-    careful: Vec<(usize, Careful)>,
+    /// Lane by lane.
+    largest: Lanes<f32>,
+    left: Left,
 }
 
 impl<'a, K: Pixel> Task<'a, K> {
@@ -237,15 +280,14 @@ impl<'a, K: Pixel> Task<'a, K> {
             solver,
             common,
             first_pixel,
-            per_full_scale: 1.0 / common.full_scale,
             all_lights: [solver.lights() as u16; LANES],
             offset: [0.0; LANES],
             clipped: [0; LANES],
             kept: Kept::new(solver.lights()),
             finished: Finished::new(),
             sets,
-            finite: true,
-            careful: Vec::new(),
+            largest: [0.0; LANES],
+            left: Left::nothing(),
         }
     }
 
@@ -263,7 +305,7 @@ impl<'a, K: Pixel> Task<'a, K> {
 
     /// Works on a block.
     #[inline(always)]
-    fn block<V: Vector>(&mut self, number: usize, keys: &[&Lanes<K>], ahead: &[&Lanes<K>], mut out: Block<'_>) {
+    fn block<V: Vector>(&mut self, number: usize, reads: &Reads<'_, K>, mut out: Block<'_>) {
         let pixels = self.pixels(number);
         let used = self.common.mask.map(|mask| &mask[pixels.clone()]);
         // A block that is all in, or all out, needs no look at its pixels.
@@ -271,7 +313,8 @@ impl<'a, K: Pixel> Task<'a, K> {
         let sets = if self.sets.is_empty() {
             &mut []
         } else {
-            &mut self.sets[number * LANES * keys.len()..][..LANES * keys.len()]
+            let lights = self.solver.lights();
+            &mut self.sets[number * LANES * lights..][..LANES * lights]
         };
         if count == 0 {
             out.clear(0..LANES);
@@ -279,9 +322,6 @@ impl<'a, K: Pixel> Task<'a, K> {
             return;
         }
         let used = used.filter(|_| count < LANES);
-        if K::CODES.is_none() {
-            self.finite &= are_finite::<K, V>(keys);
-        }
         if let Some(load) = self.common.offsets {
             load(&pixels, &mut self.offset);
         }
@@ -289,62 +329,31 @@ impl<'a, K: Pixel> Task<'a, K> {
             mark(&pixels, &mut self.clipped);
         }
         let offset = self.common.offsets.map(|_| &self.offset);
-        let readings = Readings { keys, ahead, clipped: &self.clipped, offset };
-        solve::<K, V>(self.solver, &readings, &mut self.kept, self.per_full_scale, &mut self.finished, &mut out);
-        write(&self.finished, &self.all_lights, used, &mut out);
+        let largest = (K::CODES.is_none() && self.common.is_draft).then_some(&mut self.largest);
+        let (per_full_scale, finished) = (self.common.per_full_scale, &mut self.finished);
+        match *reads {
+            Reads::Keys { keys, ahead } => {
+                let readings = Readings { keys, ahead, clipped: &self.clipped, offset, largest };
+                solve::<K, V>(self.solver, readings, &mut self.kept, per_full_scale, finished, &mut out);
+            }
+            Reads::Sums(sums) => {
+                solve_sums::<V>(self.solver, sums, per_full_scale, finished, &mut out);
+                if let Some(largest) = largest {
+                    raise(largest, &sums.largest);
+                }
+            }
+        }
+        self.left.finite &= self.finished.finite;
+        self.finished.write_counts(&self.all_lights, used, &mut out);
         if !sets.is_empty() {
             write_sets(&self.kept, used, sets);
         }
         if self.finished.careful != 0 {
-            self.careful.push((pixels.start, self.finished.careful));
+            self.left.careful.push((pixels.start, self.finished.careful));
         }
-    }
-}
-
-/// False where a value is NaN or infinite. Asked here, where the values are at hand: a search of its own reads the images twice.
-#[inline(always)]
-fn are_finite<K: Pixel, V: Vector>(keys: &[&Lanes<K>]) -> bool {
-    let zero = V::splat(0.0);
-    let mut sums = zero;
-    for key in keys {
-        for step in 0..LANES / V::WIDTH {
-            // 0 times something finite is 0, else NaN.
-            sums = K::load::<V>(&key[step * V::WIDTH..]).times_plus(zero, sums);
+        if K::CODES.is_none() && self.common.is_draft && !self.finished.keep_all {
+            self.left.cuts.push((pixels.start, self.finished.least_cut));
         }
-    }
-    V::all(sums.is_over(V::splat(-1.0)))
-}
-
-/// Mask and counts of a block, and what its unused pixels say.
-#[inline(always)]
-fn write(finished: &Finished, all_lights: &Lanes<u16>, used: Option<&[bool]>, out: &mut Block<'_>) {
-    static ALL_VALID: Lanes<bool> = [true; LANES];
-    let spread;
-    // Nearly always all of them, and then nothing has to be spread.
-    let valid = if finished.valid == u64::MAX {
-        &ALL_VALID
-    } else {
-        spread = std::array::from_fn(|lane| finished.valid >> lane & 1 == 1);
-        &spread
-    };
-    let kept = if finished.keep_all { all_lights } else { &finished.kept };
-    store(kept, out.lights_kept, out.streamed);
-    store(valid, out.mask, out.streamed);
-    store(valid, out.measured, out.streamed);
-    if let Some(used) = used {
-        for (lane, _) in used.iter().enumerate().filter(|(_, used)| !**used) {
-            out.clear(lane..lane + 1);
-        }
-    }
-}
-
-/// Copies a block, past the caches if they say so.
-#[inline(always)]
-fn store<T: NoUninit, const N: usize>(block: &[T; N], out: &mut [T; N], streamed: bool) {
-    if streamed {
-        stream::copy(block, out);
-    } else {
-        *out = *block;
     }
 }
 

@@ -4,6 +4,7 @@
 //! all lights ([`Method::Lambertian`]), the sorted-gap filter ([`Method::SpecularFilter`]), or the best window of sorted
 //! values ([`Method::RobustFilter`]).
 
+mod checks;
 mod confidence;
 mod cutoff;
 mod finish;
@@ -14,18 +15,20 @@ mod kernel;
 mod lane_solve;
 mod lanes;
 mod out;
+mod own_scale;
 mod ranked;
 mod robust;
 mod robust_lanes;
 mod solve;
 mod specular;
+mod sums;
 mod symmetric;
 
 use crate::memory::zeros;
 use crate::{Error, Result};
 
+pub(crate) use checks::check_finite;
 pub(crate) use confidence::confidence_of;
-pub(crate) use kernel::check_finite;
 pub use kernel::{estimate, estimate_into};
 pub use robust::{RobustParams, robust_filter};
 pub use specular::specular_filter;

@@ -33,34 +33,46 @@ pub(super) struct Out<'a> {
 }
 
 impl<'a> Out<'a> {
-    /// A band of pixels as tasks of so many.
-    pub fn split(map: &'a mut NormalMapMut<'_>, band: &Range<usize>, task_pixels: usize) -> Vec<Self> {
+    /// All of a result.
+    pub fn of(map: NormalMapMut<'a>) -> Self {
         let streamed = map.albedo.len() >= stream::MIN_PIXELS;
-        let set_lights = map.kept_sets.len() / map.albedo.len();
-        let mut kept_sets = &mut map.kept_sets[band.start * set_lights..band.end * set_lights];
-        let mut tasks = Vec::with_capacity(band.len().div_ceil(task_pixels));
-        let scalars = map.normals[band.start * 3..band.end * 3]
-            .chunks_mut(task_pixels * 3)
-            .zip(map.albedo[band.clone()].chunks_mut(task_pixels))
-            .zip(map.mask[band.clone()].chunks_mut(task_pixels))
-            .zip(map.confidence[band.clone()].chunks_mut(task_pixels))
-            .zip(map.measured[band.clone()].chunks_mut(task_pixels))
-            .zip(map.lights_kept[band.clone()].chunks_mut(task_pixels));
-        for (((((normals, albedo), mask), confidence), measured), lights_kept) in scalars {
-            let (task_sets, rest) = std::mem::take(&mut kept_sets).split_at_mut(albedo.len() * set_lights);
-            kept_sets = rest;
-            tasks.push(Self {
-                normals,
-                albedo,
-                mask,
-                confidence,
-                measured,
-                lights_kept,
-                kept_sets: task_sets,
-                streamed,
-            });
+        let NormalMapMut { normals, albedo, mask, confidence, measured, lights_kept, kept_sets } = map;
+        Self { normals, albedo, mask, confidence, measured, lights_kept, kept_sets, streamed }
+    }
+
+    /// As tasks of so many pixels.
+    pub fn split(mut self, task_pixels: usize) -> Vec<Self> {
+        let mut tasks = Vec::with_capacity(self.albedo.len().div_ceil(task_pixels));
+        while !self.albedo.is_empty() {
+            tasks.push(self.take(task_pixels.min(self.albedo.len())));
         }
         tasks
+    }
+
+    /// The same, borrowed for less long.
+    pub fn reborrow(&mut self) -> Out<'_> {
+        let Self { normals, albedo, mask, confidence, measured, lights_kept, kept_sets, streamed } = self;
+        Out { normals, albedo, mask, confidence, measured, lights_kept, kept_sets, streamed: *streamed }
+    }
+
+    /// The first pixels, so many of them; the others stay.
+    pub fn take(&mut self, pixels: usize) -> Self {
+        macro_rules! first {
+            ($array:ident, $count:expr) => {
+                self.$array.split_off_mut(..$count).expect("no more than there are")
+            };
+        }
+        let set_lights = self.kept_sets.len() / self.albedo.len();
+        Self {
+            normals: first!(normals, pixels * 3),
+            albedo: first!(albedo, pixels),
+            mask: first!(mask, pixels),
+            confidence: first!(confidence, pixels),
+            measured: first!(measured, pixels),
+            lights_kept: first!(lights_kept, pixels),
+            kept_sets: first!(kept_sets, pixels * set_lights),
+            streamed: self.streamed,
+        }
     }
 
     /// The whole blocks, one after the other, and beside them the kept sets of all pixels.

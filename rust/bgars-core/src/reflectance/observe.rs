@@ -24,8 +24,8 @@ pub struct Reader<'a, 'b, P> {
 impl<'a, 'b, P: Pixel> Reader<'a, 'b, P> {
     /// A reader for a stack and its radiometry.
     pub fn new(stack: &'a ImageStack<'b, P>, radiometry: &'a Radiometry<'b, P>) -> Self {
-        let scales =
-            radiometry.intensities.iter().map(|&i| (255.0 / (f64::from(radiometry.full_scale) * i)) as f32).collect();
+        let full_scale = f64::from(radiometry.full_scale_of(stack));
+        let scales = radiometry.intensities.iter().map(|&i| (255.0 / (full_scale * i)) as f32).collect();
         let clip_level = match radiometry.response {
             Some(table) if radiometry.saturation.is_finite() => {
                 table[(radiometry.saturation as usize).min(table.len() - 1)]
