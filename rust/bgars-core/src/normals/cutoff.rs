@@ -108,6 +108,10 @@ fn grow_by<K: Key, const N: usize>(keys: &[&Lanes<K>], gap: K) -> Cutoffs<K> {
     Cutoffs { largest, brightest, keep_all }
 }
 
+/// Lights that are looked at together, in code written out. In a round they are compared with the same cutoff: what they reach
+/// serves the next ones. With every light for itself, each would wait for the one before.
+const AT_ONCE: usize = 8;
+
 /// The cutoffs of a part of a block; true where it keeps all. Start at the third darkest, and take in what is within the gap
 /// until nothing is.
 #[inline(always)]
@@ -116,48 +120,92 @@ fn grow<K: Key, const N: usize>(
     part: usize,
     gap: K,
     largest: &mut [K; N],
-    all_brightest: &mut [K; N],
+    brightest: &mut [K; N],
 ) -> bool {
-    /// Lights that are compared with the same cutoff: what they reach serves the next ones in the same round. With every light
-    /// for itself, each would wait for the one before.
-    const AT_ONCE: usize = 8;
-    let [mut first, mut second, mut third] = [[K::LARGEST; N]; 3];
-    let mut brightest = [K::LEAST; N];
-    for key in keys {
-        let key = key.as_chunks::<N>().0[part];
-        for lane in 0..N {
-            let mut rest = first[lane].largest(key[lane]);
-            first[lane] = first[lane].least(key[lane]);
-            (second[lane], rest) = (second[lane].least(rest), second[lane].largest(rest));
-            third[lane] = third[lane].least(rest);
-            brightest[lane] = brightest[lane].largest(key[lane]);
-        }
+    let (many, others) = keys.as_chunks::<AT_ONCE>();
+    let mut extremes = Extremes { darkest: [[K::LARGEST; N]; 3], brightest: [K::LEAST; N] };
+    for keys in many {
+        extremes.see(&parts(keys, part));
     }
-    (*largest, *all_brightest) = (third, brightest);
+    for &key in others {
+        extremes.see(&parts(&[key], part));
+    }
+    let Extremes { darkest: [_, _, third], brightest: most } = extremes;
+    (*largest, *brightest) = (third, most);
     // Each round reaches further in at least one pixel, or is the last.
     for _ in 3..=keys.len() {
-        if !is_over_any(&brightest, largest) {
+        if !is_over_any(brightest, largest) {
             return true;
         }
-        let before = *largest;
-        let mut next = before;
-        for keys in keys.chunks(AT_ONCE) {
-            let cutoffs = next;
-            for key in keys {
-                let key = key.as_chunks::<N>().0[part];
-                for lane in 0..N {
-                    let reached = if key[lane].is_over(cutoffs[lane], gap) { K::LEAST } else { key[lane] };
-                    next[lane] = next[lane].largest(reached);
-                }
-            }
+        let mut next = *largest;
+        for keys in many {
+            reach(&parts(keys, part), gap, &mut next);
+        }
+        for &key in others {
+            reach(&parts(&[key], part), gap, &mut next);
         }
         // Not a question of equality: NaN outside the mask must not go round for ever.
-        if !is_over_any(&next, &before) {
+        if !is_over_any(&next, largest) {
             break;
         }
         *largest = next;
     }
     false
+}
+
+/// A part of blocks.
+#[inline(always)]
+fn parts<K: Key, const N: usize, const COUNT: usize>(keys: &[&Lanes<K>; COUNT], part: usize) -> [[K; N]; COUNT] {
+    keys.map(|key| key.as_chunks::<N>().0[part])
+}
+
+/// The ends of sorted lists that are not sorted.
+struct Extremes<K, const N: usize> {
+    /// The darkest keys, in order.
+    darkest: [[K; N]; 3],
+    brightest: [K; N],
+}
+
+impl<K: Key, const N: usize> Extremes<K, N> {
+    #[inline(always)]
+    fn see<const COUNT: usize>(&mut self, keys: &[[K; N]; COUNT]) {
+        let [first, second, third] = &mut self.darkest;
+        for lane in 0..N {
+            // Single values, or the compiler does not keep them in registers.
+            let (mut a, mut b, mut c, mut most) = (first[lane], second[lane], third[lane], self.brightest[lane]);
+            for light in 0..COUNT {
+                let key = keys[light][lane];
+                let over_a = a.largest(key);
+                a = a.least(key);
+                let over_b = b.largest(over_a);
+                b = b.least(over_a);
+                c = c.least(over_b);
+                most = most.largest(key);
+            }
+            (first[lane], second[lane], third[lane], self.brightest[lane]) = (a, b, c, most);
+        }
+    }
+}
+
+/// Raises the cutoffs to the largest keys within the gap; of 1, 2, 4 or 8 lights.
+#[inline(always)]
+fn reach<K: Key, const N: usize, const COUNT: usize>(keys: &[[K; N]; COUNT], gap: K, cutoffs: &mut [K; N]) {
+    for lane in 0..N {
+        let cutoff = cutoffs[lane];
+        let mut reached: [K; COUNT] = std::array::from_fn(|light| {
+            let key = keys[light][lane];
+            if key.is_over(cutoff, gap) { K::LEAST } else { key }
+        });
+        // Pair by pair, not one after the other: none waits for long.
+        for half in [4, 2, 1] {
+            if half < COUNT {
+                for light in 0..half {
+                    reached[light] = reached[light].largest(reached[light + half]);
+                }
+            }
+        }
+        cutoffs[lane] = cutoff.largest(reached[0]);
+    }
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use multiversion::multiversion;
 
 use super::cutoff::{LANES, Lanes};
 use super::finish::Finished;
-use super::gather::{are_crowded, bring, stretch_blocks};
+use super::gather::{bring, should_bring, stretch_blocks};
 use super::kept::Kept;
 use super::lane_solve::{BYTE_LIGHTS, Careful, Choice, LaneSolver, Readings, raise, solve, solve_sums};
 use super::out::{Block, Out};
@@ -59,7 +59,7 @@ impl Left {
 
 /// Where the keys of a block come from.
 enum Source<'a, K> {
-    /// The images as they are, and where they are brought together if they crowd.
+    /// The images as they are, and where they are brought together if that pays.
     Images(&'a [&'a [K]], &'a mut Vec<Lanes<K>>),
     /// Computed from them.
     Made(&'a Make<'a, K>),
@@ -224,22 +224,25 @@ fn run_images<'a, K: Pixel, V: Vector>(
     memory: &mut Vec<Lanes<K>>,
 ) {
     let images: Vec<&[Lanes<K>]> = planes.iter().map(|plane| blocks_of(plane, pixels)).collect();
-    let (count, crowded) = (pixels.len() / LANES, are_crowded(planes));
-    let at_once = if crowded { stretch_blocks::<K>(images.len()) } else { count.max(1) };
+    let (count, lights, brings) = (pixels.len() / LANES, images.len(), should_bring(planes));
+    let at_once = if brings { stretch_blocks::<K>(lights) } else { count.max(1) };
     for first in (0..count).step_by(at_once) {
         let stretch = first..count.min(first + at_once);
-        let images = if crowded && task.uses(&stretch) {
-            bring(&images, &stretch, memory)
-        } else {
-            images.iter().map(|blocks| &blocks[stretch.clone()]).collect()
-        };
-        let mut keys = Vec::with_capacity(images.len());
-        for (at, out) in (0..stretch.len()).zip(blocks.by_ref()) {
+        let is_brought = brings && task.uses(&stretch);
+        if is_brought {
+            bring(&images, &stretch, memory);
+        }
+        let mut keys: Vec<&Lanes<K>> = Vec::with_capacity(lights);
+        for (number, out) in stretch.zip(blocks.by_ref()) {
             keys.clear();
-            keys.extend(images.iter().map(|blocks| &blocks[at]));
+            if is_brought {
+                keys.extend(&memory[(number - first) * lights..][..lights]);
+            } else {
+                keys.extend(images.iter().map(|blocks| &blocks[number]));
+            }
             // What is brought has no successors.
-            let ahead = if crowded { &[][..] } else { &keys };
-            task.block::<V>(first + at, &Reads::Keys { keys: &keys, ahead }, out);
+            let ahead = if brings { &[][..] } else { &keys };
+            task.block::<V>(number, &Reads::Keys { keys: &keys, ahead }, out);
         }
     }
 }
