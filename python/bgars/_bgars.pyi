@@ -24,9 +24,9 @@ __all__ = [
     "eliminate_rims",
     "estimate_normals",
     "estimate_reflectance",
+    "float_full_scale",
     "integrate_bilateral",
     "integrate_normals",
-    "largest_finite",
     "measure_edges",
     "read_rgb16",
     "rim_bands",
@@ -94,6 +94,7 @@ def estimate_reflectance(
     out: NormalField,
 ) -> dict[str, Any]: ...
 def usable_normals(normals: NDArray[np.float32], *, threads: int | None) -> NDArray[np.bool_]: ...
+def float_full_scale(pixels: NDArray[np.float32], *, threads: int | None) -> float: ...
 def integrate_bilateral(
     normals: NDArray[np.float32],
     mask: NDArray[np.bool_],
@@ -124,7 +125,6 @@ def integrate_normals(
     threads: int | None,
     progress: Callable[[int, float], object] | None,
 ) -> tuple[list[tuple[int, int, int]], int, float]: ...
-def largest_finite(pixels: NDArray[np.float32], *, threads: int | None) -> float: ...
 def measure_edges(
     capture: KernelCapture,
     casters: Casters,

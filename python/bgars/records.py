@@ -40,7 +40,6 @@ __all__ = [
 
 PixelArray = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32]
 FloatArray = NDArray[np.float32]
-TINY = 1e-30
 BoolArray = NDArray[np.bool_]
 
 
@@ -51,7 +50,7 @@ def integer_full_scale(pixels: PixelArray) -> float | None:
 
 def float_full_scale(pixels: PixelArray, threads: int | None) -> float:
     """Return the largest finite value of float pixels: their full scale, where no saturation level is known."""
-    return max(_bgars.largest_finite(pixels.astype(np.float32, copy=False), threads=threads), TINY)
+    return _bgars.float_full_scale(pixels.astype(np.float32, copy=False), threads=threads)
 
 
 @dataclass(frozen=True, eq=False)

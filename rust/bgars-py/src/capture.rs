@@ -94,13 +94,14 @@ impl Capture<'_> {
 #[pyfunction]
 #[pyo3(signature = (pixels, *, threads))]
 #[allow(clippy::needless_pass_by_value)]
-pub fn largest_finite(py: Python<'_>, pixels: PyReadonlyArray3<'_, f32>, threads: Option<i64>) -> PyResult<f32> {
+pub fn float_full_scale(py: Python<'_>, pixels: PyReadonlyArray3<'_, f32>, threads: Option<i64>) -> PyResult<f32> {
     let &[count, height, width] = pixels.shape() else { unreachable!("a stack has three axes") };
     let pixels = slice3(&pixels, "pixels")?;
     let stack = ImageStack::new(pixels, count, height, width).map_err(to_python)?;
+    let unknown = Radiometry { full_scale: None, ..Radiometry::linear(count, f32::INFINITY) };
     if stack.is_large() {
-        on_threads(py, threads, || Ok(stack.largest_finite()))
+        on_threads(py, threads, || Ok(unknown.full_scale_of(&stack)))
     } else {
-        Ok(py.detach(|| stack.largest_finite()))
+        Ok(py.detach(|| unknown.full_scale_of(&stack)))
     }
 }

@@ -27,7 +27,7 @@ mod _bgars {
     #[pymodule_export]
     use crate::bilateral::integrate_bilateral;
     #[pymodule_export]
-    use crate::capture::largest_finite;
+    use crate::capture::float_full_scale;
     #[pymodule_export]
     use crate::files::decode_stack;
     #[pymodule_export]
