@@ -116,7 +116,7 @@ impl Finished {
         let valid = if self.valid == u64::MAX {
             &ALL_VALID
         } else {
-            spread = std::array::from_fn(|lane| self.valid >> lane & 1 == 1);
+            spread = flags(self.valid);
             &spread
         };
         let kept = if self.keep_all { all_lights } else { &self.kept };
@@ -151,8 +151,40 @@ fn put<V: Vector>(vector: V, to: &mut [f32], streamed: bool) {
     }
 }
 
+/// A flag for every bit, from the lowest on; by eights, as a shift of its own for each of 64 is what vector instructions are slow at.
+#[inline(always)]
+fn flags(bits: u64) -> Lanes<bool> {
+    /// The lowest bit of every byte.
+    const LOWEST: u64 = u64::from_ne_bytes([1; 8]);
+    /// Bit k of byte k.
+    const OWN: u64 = u64::from_le_bytes([1, 2, 4, 8, 16, 32, 64, 128]);
+    let mut eights = [[0; 8]; LANES / 8];
+    for (eight, byte) in eights.iter_mut().zip(bits.to_le_bytes()) {
+        // In every byte a bit of its own, then carried to the highest place, then moved to the lowest.
+        let own = u64::from(byte) * LOWEST & OWN;
+        *eight = ((own + (128 * LOWEST - OWN)) >> 7 & LOWEST).to_le_bytes();
+    }
+    let bytes: Lanes<u8> = bytemuck::must_cast(eights);
+    bytes.map(|byte| byte != 0)
+}
+
 /// A bit for every value of a vector.
 #[inline(always)]
 pub(super) fn all_bits<V: Vector>() -> u64 {
     (1 << V::WIDTH) - 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn flags_are_the_bits() {
+        let bytes = (0..=u8::MAX).map(|byte| u64::from(byte) * 0x0101_0101_0101_0101);
+        for bits in bytes.chain((0..64).map(|bit| 1 << bit)).chain([0x0123_4567_89ab_cdef, !0x0123_4567_89ab_cdef]) {
+            for (lane, flag) in flags(bits).into_iter().enumerate() {
+                assert_eq!(flag, bits >> lane & 1 == 1, "bit {lane} of {bits:#x}");
+            }
+        }
+    }
 }

@@ -294,8 +294,7 @@ fn solve_all<V: Vector>(solver: &LaneSolver, sums: Sums<V>) -> Facets<V> {
     let [x2, y2, z2] = [along[0] * along[0], along[1] * along[1], along[2] * along[2]];
     // First what is waited for longest.
     let square = (x2 + y2) + z2;
-    let length = square.root();
-    let inverse = V::splat(1.0) / length;
+    let (length, inverse) = square.root_and_inverse();
     Facets {
         scaled: solver.axes.back(along),
         values_square: squares,
@@ -364,14 +363,14 @@ fn solve_kept<K: Pixel, V: Vector>(
     // Written so that NaN is unusable.
     let usable = V::bits(inverse.conditioning.is_over(V::splat(MIN_LANE_CONDITIONING as f32)));
     let square = dot(scaled, scaled);
-    let length = square.root();
+    let (length, inverse_length) = square.root_and_inverse();
     let trace = inverse.entries[0] + inverse.entries[3] + inverse.entries[5];
     let facets = Facets {
         scaled,
         values_square: sums.squares,
         square,
         length,
-        inverse: V::splat(1.0) / length,
+        inverse: inverse_length,
         squared_residuals: square
             .times_plus(V::splat((PRIOR_RESIDUAL * PRIOR_RESIDUAL) as f32), sums.squares - explained),
         turning: trace.times_minus(square, form(inverse.entries, scaled)),

@@ -168,7 +168,8 @@ fn run_with<K: Pixel, V: Vector>(
                 let keys = a.iter().zip(b).zip(c).zip(d).zip(e).zip(f).zip(g).zip(h);
                 for (number, (out, (((((((a, b), c), d), e), f), g), h))) in blocks.zip(keys).enumerate() {
                     let keys = [a, b, c, d, e, f, g, h];
-                    task.block::<V>(number, &Reads::Keys { keys: &keys, ahead: &keys }, out);
+                    let ahead = if K::CODES.is_none() { &keys[..] } else { &[] };
+                    task.block::<V>(number, &Reads::Keys { keys: &keys, ahead }, out);
                 }
             } else if planes.len() > BYTE_LIGHTS && matches!(solver.choice, Choice::All) && common.offsets.is_none() {
                 run_sums::<K, V>(&mut task, planes, &pixels, blocks);
@@ -261,6 +262,10 @@ enum Reads<'a, K> {
 }
 
 /// What the blocks of a task share.
+///
+/// Aligned, and with it the stack of the loop that it lives in: vectors that go there for want of registers would lie across
+/// cache lines, and across pages, whose crossing costs hundreds of instructions.
+#[repr(align(64))]
 struct Task<'a, K> {
     solver: &'a LaneSolver,
     common: Common<'a>,

@@ -3,10 +3,10 @@
 use std::arch::x86_64::{
     __m512, __m512i, _CMP_GT_OQ, _mm512_abs_ps, _mm512_add_ps, _mm512_alignr_epi32, _mm512_castps128_ps512,
     _mm512_cmp_ps_mask, _mm512_cvtepi32_ps, _mm512_cvtepu8_epi32, _mm512_cvtepu16_epi32, _mm512_div_ps,
-    _mm512_fmadd_ps, _mm512_fmsub_ps, _mm512_insertf32x4, _mm512_mask_blend_ps, _mm512_maskz_div_ps,
+    _mm512_fmadd_ps, _mm512_fmsub_ps, _mm512_fnmadd_ps, _mm512_insertf32x4, _mm512_mask_blend_ps, _mm512_maskz_div_ps,
     _mm512_maskz_mov_ps, _mm512_max_ps, _mm512_mul_ps, _mm512_permutex2var_ps, _mm512_permutexvar_ps,
-    _mm512_set1_epi32, _mm512_set1_ps, _mm512_setzero_ps, _mm512_shuffle_ps, _mm512_sqrt_ps, _mm512_srli_epi32,
-    _mm512_stream_ps, _mm512_sub_ps, _mm512_test_epi32_mask, _mm512_unpackhi_ps, _mm512_unpacklo_ps,
+    _mm512_rsqrt14_ps, _mm512_set1_epi32, _mm512_set1_ps, _mm512_setzero_ps, _mm512_shuffle_ps, _mm512_sqrt_ps,
+    _mm512_srli_epi32, _mm512_stream_ps, _mm512_sub_ps, _mm512_test_epi32_mask, _mm512_unpackhi_ps, _mm512_unpacklo_ps,
 };
 
 use super::packed::chunked;
@@ -150,6 +150,15 @@ impl Vector for Avx512 {
     #[inline(always)]
     fn root(self) -> Self {
         Self(here!(_mm512_sqrt_ps(self.0)))
+    }
+
+    /// By a rough inverse of 14 bits and a step of Newton's method: roots and divisions are slow, and all else waits for them.
+    #[inline(always)]
+    fn root_and_inverse(self) -> (Self, Self) {
+        let inverse = Self(here!(_mm512_rsqrt14_ps(self.0)));
+        let root = self * inverse;
+        let half_error = Self(here!(_mm512_fnmadd_ps(root.0, inverse.0, _mm512_set1_ps(1.0)))) * Self::splat(0.5);
+        (root.times_plus(half_error, root), inverse.times_plus(half_error, inverse))
     }
 
     #[inline(always)]

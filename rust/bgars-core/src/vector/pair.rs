@@ -98,6 +98,12 @@ impl<V: Vector> Vector for Pair<V> {
     }
 
     #[inline(always)]
+    fn root_and_inverse(self) -> (Self, Self) {
+        let ((first, first_inverse), (second, second_inverse)) = (self.0.root_and_inverse(), self.1.root_and_inverse());
+        (Self(first, second), Self(first_inverse, second_inverse))
+    }
+
+    #[inline(always)]
     fn is_over(self, other: Self) -> Self::Mask {
         (self.0.is_over(other.0), self.1.is_over(other.1))
     }

@@ -33,6 +33,7 @@ fn check<V: Vector>() {
     assert_values(x.times_minus(w, x), |lane| a[lane] * c[lane] - a[lane]); // exact for these values
     assert_values((x * x).root(), |lane| a[lane].abs());
     assert_values(V::splat(-1.0).root(), |_| f32::NAN);
+    check_roots::<V>();
     assert_values(V::pick(x.is_over(y), x, V::splat(0.0)), |lane| if a[lane] > b[lane] { a[lane] } else { 0.0 });
     assert_values(y.at_least(V::splat(0.0)), |lane| if b[lane] > 0.0 { b[lane] } else { 0.0 });
     let both = V::both(x.is_over(y), x.is_over(V::splat(4.0)));
@@ -49,6 +50,20 @@ fn check<V: Vector>() {
     assert_values(V::from_words(&words), |lane| f32::from(words[lane]));
     for bit in 0..8 {
         assert_values(x.where_bit(&bytes, bit), |lane| if bytes[lane] >> bit & 1 == 1 { a[lane] } else { 0.0 });
+    }
+}
+
+fn check_roots<V: Vector>() {
+    const UNITS: f64 = 2.0 * f32::EPSILON as f64;
+    for exponent in -99..=99 {
+        let squares: [f32; VALUES] =
+            std::array::from_fn(|lane| (1.0 + lane as f32 / VALUES as f32) * f32::powi(2.0, exponent));
+        let (root, inverse) = V::load(&squares).root_and_inverse();
+        for ((root, inverse), square) in values(root).into_iter().zip(values(inverse)).zip(squares) {
+            let exact = f64::from(square).sqrt();
+            assert!((f64::from(root) / exact - 1.0).abs() < UNITS, "root of {square}: {root}");
+            assert!((f64::from(inverse) * exact - 1.0).abs() < UNITS, "one over the root of {square}: {inverse}");
+        }
     }
 }
 
