@@ -151,7 +151,9 @@ fn put<V: Vector>(vector: V, to: &mut [f32], streamed: bool) {
     }
 }
 
-/// A flag for every bit, from the lowest on; by eights, as a shift of its own for each of 64 is what vector instructions are slow at.
+/// A flag for every bit, from the lowest on.
+///
+/// By eights: to shift each of 64 by a number of its own, and to pack what comes out, is what vector instructions are slow at.
 #[inline(always)]
 fn flags(bits: u64) -> Lanes<bool> {
     /// The lowest bit of every byte.
