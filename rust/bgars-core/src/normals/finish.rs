@@ -163,8 +163,8 @@ fn flags(bits: u64) -> Lanes<bool> {
     let mut eights = [[0; 8]; LANES / 8];
     for (eight, byte) in eights.iter_mut().zip(bits.to_le_bytes()) {
         // In every byte a bit of its own, then carried to the highest place, then moved to the lowest.
-        let own = u64::from(byte) * LOWEST & OWN;
-        *eight = ((own + (128 * LOWEST - OWN)) >> 7 & LOWEST).to_le_bytes();
+        let own = (u64::from(byte) * LOWEST) & OWN;
+        *eight = (((own + (128 * LOWEST - OWN)) >> 7) & LOWEST).to_le_bytes();
     }
     let bytes: Lanes<u8> = bytemuck::must_cast(eights);
     bytes.map(|byte| byte != 0)
