@@ -264,7 +264,7 @@ enum Reads<'a, K> {
 /// What the blocks of a task share.
 ///
 /// Aligned, and with it the stack of the loop that it lives in: vectors that go there for want of registers would lie across
-/// cache lines, and across pages, whose crossing costs hundreds of instructions.
+/// cache lines and pages, which is slow (`benches/results.tsv`).
 #[repr(align(64))]
 struct Task<'a, K> {
     solver: &'a LaneSolver,

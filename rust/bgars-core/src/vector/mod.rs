@@ -92,7 +92,7 @@ pub trait Vector: Arithmetic<Number = f32> + Div<Output = Self> {
     fn times_minus(self, factor: Self, term: Self) -> Self;
     /// Square root.
     fn root(self) -> Self;
-    /// Square root and one over it, within two units in the last place; of numbers from 1e-30 to 1e30.
+    /// Square root and one over it, each within `2^-22` of its size; of numbers from 1e-30 to 1e30.
     #[inline(always)]
     fn root_and_inverse(self) -> (Self, Self) {
         let root = self.root();

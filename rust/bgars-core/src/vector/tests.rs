@@ -54,15 +54,15 @@ fn check<V: Vector>() {
 }
 
 fn check_roots<V: Vector>() {
-    const UNITS: f64 = 2.0 * f32::EPSILON as f64;
+    const ERROR: f64 = 2.0 * f32::EPSILON as f64;
     for exponent in -99..=99 {
         let squares: [f32; VALUES] =
             std::array::from_fn(|lane| (1.0 + lane as f32 / VALUES as f32) * f32::powi(2.0, exponent));
         let (root, inverse) = V::load(&squares).root_and_inverse();
         for ((root, inverse), square) in values(root).into_iter().zip(values(inverse)).zip(squares) {
             let exact = f64::from(square).sqrt();
-            assert!((f64::from(root) / exact - 1.0).abs() < UNITS, "root of {square}: {root}");
-            assert!((f64::from(inverse) * exact - 1.0).abs() < UNITS, "one over the root of {square}: {inverse}");
+            assert!((f64::from(root) / exact - 1.0).abs() < ERROR, "root of {square}: {root}");
+            assert!((f64::from(inverse) * exact - 1.0).abs() < ERROR, "one over the root of {square}: {inverse}");
         }
     }
 }
