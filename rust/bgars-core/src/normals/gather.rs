@@ -21,6 +21,9 @@ const MOST_IN_PLACE: usize = 12;
 /// Bytes of a block that are written at a time while others wait.
 const FEW_BYTES: usize = 1 << 9;
 
+/// How far ahead an image is fetched: of images in the same places a first cache holds few blocks.
+const BLOCKS_AHEAD: usize = 2;
+
 /// True where it pays to bring images together: where they crowd, or a block of all of them takes much of the first cache.
 pub(super) fn should_bring<K>(images: &[&[K]]) -> bool {
     /// Measured, like the next one: from 80 images of 16 bit and 64 of floats on it pays.
@@ -54,11 +57,9 @@ pub(super) fn bring<K: Pixel>(images: &[&[Lanes<K>]], stretch: &Range<usize>, me
     memory.resize(stretch.len() * images.len(), [K::ZERO; LANES]);
     for (part, now) in images.chunks(few).enumerate() {
         let first = part * few;
-        let next = &images[first + now.len()..images.len().min(first + 2 * few)];
         for (block, all) in stretch.clone().zip(memory.chunks_exact_mut(images.len())) {
-            // While some images are copied, the next ones are fetched.
-            for image in next {
-                stream::prefetch(&image[block], 0);
+            for image in now {
+                stream::prefetch(&image[block], BLOCKS_AHEAD);
             }
             for (to, image) in all[first..].iter_mut().zip(now) {
                 *to = image[block];

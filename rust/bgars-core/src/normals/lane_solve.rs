@@ -115,14 +115,19 @@ pub(super) struct Readings<'a, K> {
     pub largest: Option<&'a mut Lanes<f32>>,
 }
 
-/// How far ahead the images are fetched: streams of floats, or of many lights, are more than processors follow by themselves.
-const BLOCKS_AHEAD: usize = 16;
+/// How far ahead so many images are fetched: streams of floats, or of many lights, are more than processors follow by themselves.
+fn blocks_ahead<K>(images: usize) -> usize {
+    /// Half of a first cache: what is fetched farther ahead is driven out again before it is read.
+    const MOST_BYTES: usize = 1 << 14;
+    const MOST_BLOCKS: usize = 16;
+    (MOST_BYTES / (images * size_of::<Lanes<K>>()).max(1)).clamp(1, MOST_BLOCKS)
+}
 
-/// Has the processor fetch a part of what comes a little later: of many reads at once the last ones wait, and the work with them.
+/// Has the processor fetch a part of what comes some blocks later: of many reads at once the last ones wait, and the work with them.
 #[inline(always)]
-fn fetch<K>(ahead: &[&Lanes<K>], part: usize, parts: usize) {
+fn fetch<K>(ahead: &[&Lanes<K>], blocks: usize, part: usize, parts: usize) {
     for key in &ahead[part * ahead.len() / parts..(part + 1) * ahead.len() / parts] {
-        stream::prefetch(key, BLOCKS_AHEAD);
+        stream::prefetch(key, blocks);
     }
 }
 
@@ -139,8 +144,8 @@ pub(super) fn solve<K: Pixel, V: Vector>(
     let Readings { keys, ahead, clipped, offset, largest } = readings;
     (out.careful, out.valid) = (0, 0);
     (out.keep_all, out.finite) = (true, true);
-    let parts = 2 + LANES / V::WIDTH;
-    fetch(ahead, 0, parts);
+    let (blocks_on, parts) = (blocks_ahead::<K>(ahead.len()), 2 + LANES / V::WIDTH);
+    fetch(ahead, blocks_on, 0, parts);
     if K::CODES.is_none() && (keys.len() > BYTE_LIGHTS || matches!(solver.choice, Choice::Window(_))) {
         out.finite = are_finite::<K, V>(keys);
     }
@@ -185,11 +190,11 @@ pub(super) fn solve<K: Pixel, V: Vector>(
             (out.kept, out.keep_all) = (kept.counts(keys.len()), false);
         }
     }
-    fetch(ahead, 1, parts);
+    fetch(ahead, blocks_on, 1, parts);
     let mut squares = V::splat(0.0);
     for step in 0..LANES / V::WIDTH {
         let at = step * V::WIDTH;
-        fetch(ahead, 2 + step, parts);
+        fetch(ahead, blocks_on, 2 + step, parts);
         let facets = if out.keep_all || kept.are_whole(keys.len(), at, V::WIDTH) {
             solve_all(solver, sum_all::<K, V>(solver, keys, offset, at))
         } else {
