@@ -13,6 +13,9 @@ pub(super) type Row<T> = [T; WIDTH];
 pub(super) const CLIPPED: u32 = 1 << 8;
 
 /// The lights of some pixels by their rank: the clipped last, else the darker first, of equal values the lower number.
+///
+/// Aligned, and with it the stack that it lives on, for vectors that go there for want of registers (as in `lanes::Task`).
+#[repr(align(64))]
 pub(super) struct Ranked {
     pub lights: usize,
     pub values: [Row<f32>; BYTE_LIGHTS],
