@@ -8,7 +8,7 @@ use multiversion::multiversion;
 
 use super::cutoff::{LANES, Lanes};
 use super::finish::Finished;
-use super::gather::{bring, should_bring, stretch_blocks};
+use super::gather::{are_crowded, bring, should_bring, stretch_blocks};
 use super::kept::Kept;
 use super::lane_solve::{BYTE_LIGHTS, Careful, Choice, LaneSolver, Readings, raise, solve, solve_sums};
 use super::out::{Block, Out};
@@ -203,11 +203,11 @@ fn run_sums<'a, K: Pixel, V: Vector>(
     mut blocks: impl Iterator<Item = Block<'a>>,
 ) {
     let images: Vec<&[Lanes<K>]> = planes.iter().map(|plane| blocks_of(plane, pixels)).collect();
-    let (count, mut sums) = (pixels.len() / LANES, BlockSums::room::<K>());
+    let (count, mut sums, is_crowded) = (pixels.len() / LANES, BlockSums::room::<K>(), are_crowded(planes));
     for first in (0..count).step_by(sums.len()) {
         let stretch = first..count.min(first + sums.len());
         if task.uses(&stretch) {
-            BlockSums::sum_up::<K, V>(&mut sums, &images, &task.solver.pseudo_inverse, &stretch);
+            BlockSums::sum_up::<K, V>(&mut sums, &images, &task.solver.pseudo_inverse, &stretch, is_crowded);
         }
         for ((number, sums), out) in stretch.zip(&sums).zip(blocks.by_ref()) {
             task.block::<V>(number, &Reads::Sums(sums), out);

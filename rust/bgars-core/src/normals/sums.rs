@@ -4,6 +4,7 @@ use std::borrow::Borrow;
 use std::ops::Range;
 
 use super::cutoff::{LANES, Lanes};
+use super::gather::CROWDED_BLOCKS_AHEAD;
 use crate::vector::Vector;
 use crate::vector::spread::Spread;
 use crate::{Pixel, stream};
@@ -71,14 +72,16 @@ impl BlockSums {
         vec![Self { vector: [zero; 3], squares: zero, largest: zero }; Self::RUN_BYTES / size_of::<Lanes<K>>()]
     }
 
-    /// Sums up a stretch of blocks, at most as many as there are sums: a few images at a time, the next ones fetched meanwhile.
-    /// Block by block, all images would be many short reads, and memory is slow at these.
+    /// Sums up a stretch of blocks, at most as many as there are sums: a few images at a time, the next ones fetched meanwhile, or
+    /// their own next blocks where images crowd (see [`super::gather`]). Block by block, all images would be many short reads, and
+    /// memory is slow at these.
     #[inline(always)]
     pub fn sum_up<K: Pixel, V: Vector>(
         sums: &mut [Self],
         images: &[&[Lanes<K>]],
         vectors: &[[Spread; 3]],
         stretch: &Range<usize>,
+        is_crowded: bool,
     ) {
         for sums in &mut *sums {
             let zero = [0.0; LANES];
@@ -89,8 +92,13 @@ impl BlockSums {
             let end = first + part(images.len() - first);
             // Behind the last images come the first ones of the next stretch.
             let (next, blocks_on) = if end < images.len() { (end, 0) } else { (0, sums.len()) };
-            let ahead = Ahead { images: &images[next..next + part(images.len() - next)], blocks_on };
+            let next = &images[next..next + part(images.len() - next)];
             let (images, vectors) = (&images[first..end], &vectors[first..end]);
+            let ahead = if is_crowded {
+                Ahead { images, blocks_on: CROWDED_BLOCKS_AHEAD }
+            } else {
+                Ahead { images: next, blocks_on }
+            };
             match end - first {
                 8 => Self::add::<K, V, 8>(sums, images, vectors, stretch, &ahead),
                 4 => Self::add::<K, V, 4>(sums, images, vectors, stretch, &ahead),
