@@ -218,7 +218,7 @@ fn is_too_coarse([earlier, new]: [usize; 2], level: usize, finest: Grid) -> bool
     let at_least = match level {
         0 => pixels / HOPELESS,
         1 | 2 if is_fading => (pixels / 1_024).max(64),
-        1 => (pixels / 16_384).max(16),
+        1 => (pixels / 65_536).max(16),
         2 => 8,
         _ => 0,
     };
