@@ -292,6 +292,18 @@ fn a_millionth_takes_fifteen_iterations_on_thin_slits_of_any_kind() {
     }
 }
 
+/// How many strays a graph may wait for shows in large images alone.
+#[test]
+fn a_millionth_takes_fifteen_iterations_on_a_large_image_of_slits() {
+    let size = 1500;
+    let normals = wavy_normals(size, size, 4);
+    for (name, mask) in [("dense cuts", slits::dense_cuts(size)), ("dense slanted cuts", slits::slanted_cuts(size))] {
+        let surface = solve(&normals, &mask, size, 1e-6);
+        assert!(surface.residual <= 1e-6);
+        assert!(surface.iterations <= 15, "{name}: {} iterations", surface.iterations);
+    }
+}
+
 #[test]
 fn scattered_holes_stay_on_grids_and_mazes_do_not() {
     let size = 512;

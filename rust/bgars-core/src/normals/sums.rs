@@ -4,7 +4,7 @@ use std::borrow::Borrow;
 use std::ops::Range;
 
 use super::cutoff::{LANES, Lanes};
-use super::gather::CROWDED_BLOCKS_AHEAD;
+use super::gather::FEW_BLOCKS_AHEAD;
 use crate::vector::Vector;
 use crate::vector::spread::Spread;
 use crate::{Pixel, stream};
@@ -95,7 +95,7 @@ impl BlockSums {
             let next = &images[next..next + part(images.len() - next)];
             let (images, vectors) = (&images[first..end], &vectors[first..end]);
             let ahead = if is_crowded {
-                Ahead { images, blocks_on: CROWDED_BLOCKS_AHEAD }
+                Ahead { images, blocks_on: FEW_BLOCKS_AHEAD }
             } else {
                 Ahead { images: next, blocks_on }
             };
