@@ -56,6 +56,14 @@ impl<T: Reused> Aligned<T> {
         Self::new(len).0
     }
 
+    /// Gives it up, and its pages to the system at once.
+    pub fn release(mut self) {
+        #[cfg(target_os = "linux")]
+        advise(&mut self.memory, libc::MADV_DONTNEED);
+        #[cfg(not(target_os = "linux"))]
+        std::mem::take(&mut self.memory);
+    }
+
     /// An array, and whether it holds zeros.
     fn new(len: usize) -> (Self, bool) {
         /// Bytes.
@@ -180,8 +188,8 @@ fn advise<T>(memory: &mut [T], advice: libc::c_int) -> bool {
     if end <= first_page {
         return false;
     }
-    // SAFETY: the pages lie inside an array that is borrowed mutably. `MADV_HUGEPAGE` changes no content; `MADV_FREE` may turn
-    // it into zeros, which `lend_pages` asks for with numbers that may be zero alone.
+    // SAFETY: the pages lie inside an array that is borrowed mutably. `MADV_HUGEPAGE` changes no content; `MADV_FREE` and
+    // `MADV_DONTNEED` turn it into zeros, which is asked for numbers that may be zero alone.
     #[allow(unsafe_code)]
     let answer = unsafe { libc::madvise(first_page as *mut libc::c_void, end - first_page, advice) };
     answer == 0

@@ -7,16 +7,19 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::checkerboard::{BAND_ROWS, Weights};
-use super::edges::Colours;
 use super::multigrid::Multigrid;
 use super::reduction::dot;
-use super::settle::settle;
+use super::settle::{Right, settle};
 use super::{OnProgress, Params, Progress};
 use crate::memory::{self, Aligned};
 use crate::{Error, Result};
 
 /// Elements of a vector that one task copies or adds up.
 const BLOCK: usize = 1 << 14;
+
+/// A graph of one node for so many reds needs much of the memory; to make the right side again then takes a hundredth of the
+/// time.
+const LARGE_GRAPH: usize = 16;
 
 /// What [`conjugate_gradients`] found.
 pub(super) struct Solution {
@@ -37,7 +40,7 @@ pub(super) struct Solution {
 /// a component's residuals no step can take away, and the preconditioner makes the most of it.
 pub(super) fn conjugate_gradients(
     weights: &Weights,
-    right: &Colours,
+    mut right: Right<'_>,
     start: Option<Aligned<f64>>,
     scale: f64,
     params: &Params,
@@ -47,15 +50,19 @@ pub(super) fn conjugate_gradients(
     let target = (params.relative_tolerance * scale).max(params.absolute_tolerance * (2.0 * size as f64).sqrt());
     // After the steps the blacks lie in q.
     let [mut q, mut r] = [Aligned::<f64>::any(size), Aligned::any(size)];
-    let mut norm = settle(weights, right, start.as_deref(), None, &mut r).sqrt();
+    let mut norm = settle(weights, &right, start.as_deref(), None, &mut r).sqrt();
     let mut x = Steps::from(start, size);
     let (mut iterations, mut solved) = (0, true);
     if norm <= target {
         let residual = if norm > 0.0 { norm / scale } else { 0.0 };
-        settle(weights, right, Some(x.end(weights, &[])), Some(&mut q), &mut r);
+        settle(weights, &right, Some(x.end(weights, &[])), Some(&mut q), &mut r);
         return Ok(Solution { reds: x.x, blacks: q, iterations, residual, solved });
     }
     let preconditioner = Multigrid::new(weights);
+    let is_large = preconditioner.graph_unknowns() > size / LARGE_GRAPH;
+    if is_large {
+        right.release();
+    }
     let mut vectors = preconditioner.vectors();
     // A direction may be any; what x and r take along it agrees in `f64`.
     let [mut p, mut previous] = [Aligned::<f32>::any(size), Aligned::any(size)];
@@ -91,8 +98,11 @@ pub(super) fn conjugate_gradients(
                 return Err(Error::Cancelled);
             }
         }
-        norm = settle(weights, right, Some(x.end(weights, &p)), Some(&mut q), &mut r).sqrt();
+        norm = settle(weights, &right, Some(x.end(weights, &p)), Some(&mut q), &mut r).sqrt();
         if !solved || norm <= target {
+            if is_large {
+                [p, previous, rounded].into_iter().for_each(Aligned::release);
+            }
             return Ok(Solution { reds: x.x, blacks: q, iterations, residual: norm / scale, solved });
         }
     }

@@ -1,5 +1,7 @@
 //! A 5-point system from its edges: the one frame of least squares and bilateral integration.
 
+use std::ops::Range;
+
 use multiversion::multiversion;
 use rayon::prelude::*;
 
@@ -49,7 +51,7 @@ pub(super) fn from_edges<Join>(grid: Grid, joiner: impl Fn() -> Join + Sync) -> 
 where
     Join: FnMut(Axis, usize, &mut EdgeRow),
 {
-    let (width, half) = (grid.width, grid.half());
+    let half = grid.half();
     let mut weights = Weights::unset(grid);
     let mut right = Colours { reds: Aligned::any(grid.half_pixels()), blacks: Aligned::any(grid.half_pixels()) };
     let bands = weights
@@ -57,28 +59,60 @@ where
         .zip(right.reds.par_chunks_mut(BAND_ROWS * half))
         .zip(right.blacks.par_chunks_mut(BAND_ROWS * half));
     bands.for_each(|((mut weights, reds), blacks)| {
-        let mut join = joiner();
-        let [mut above, mut along, mut below] = std::array::from_fn(|_| EdgeRow::zeros(width));
-        if let Some(row) = weights.rows.start.checked_sub(1) {
-            join(Axis::Below, row, &mut above);
-        }
-        weights.set_above(&above.weight);
-        let mut divergence = vec![0.0f64; width];
-        let colours = reds.chunks_mut(half).zip(blacks.chunks_mut(half));
-        for (row, (reds, blacks)) in weights.rows.clone().zip(colours) {
-            join(Axis::Right, row, &mut along);
-            if row + 1 < grid.height {
-                join(Axis::Below, row, &mut below);
-            } else {
-                below.clear();
+        let rows = weights.rows.clone();
+        let mut colours = reds.chunks_mut(half).zip(blacks.chunks_mut(half));
+        each_row(grid, joiner(), rows.clone(), |row, [above, along, below], divergence| {
+            if row == rows.start {
+                weights.set_above(&above.weight);
             }
             weights.set_row(row, &along.weight, &below.weight);
-            diverge([&above.push, &along.push, &below.push], &mut divergence);
-            split_whole_row(row, &divergence, reds, blacks);
-            std::mem::swap(&mut above, &mut below);
-        }
+            if let Some((reds, blacks)) = colours.next() {
+                split_whole_row(row, divergence, reds, blacks);
+            }
+        });
     });
     (weights, right)
+}
+
+/// Some rows of the right side alone, from the edges that `join` knows; it is asked as for [`from_edges`].
+pub(super) fn right_side(
+    grid: Grid,
+    join: impl FnMut(Axis, usize, &mut EdgeRow),
+    rows: Range<usize>,
+    [reds, blacks]: [&mut [f64]; 2],
+) {
+    let half = grid.half();
+    let mut colours = reds.chunks_mut(half).zip(blacks.chunks_mut(half));
+    each_row(grid, join, rows, |row, _, divergence| {
+        if let Some((reds, blacks)) = colours.next() {
+            split_whole_row(row, divergence, reds, blacks);
+        }
+    });
+}
+
+/// Calls `visit` for each of some rows with the edges above, along and below it, and what they push onto its pixels.
+fn each_row(
+    grid: Grid,
+    mut join: impl FnMut(Axis, usize, &mut EdgeRow),
+    rows: Range<usize>,
+    mut visit: impl FnMut(usize, [&EdgeRow; 3], &[f64]),
+) {
+    let [mut above, mut along, mut below] = std::array::from_fn(|_| EdgeRow::zeros(grid.width));
+    if let Some(row) = rows.start.checked_sub(1) {
+        join(Axis::Below, row, &mut above);
+    }
+    let mut divergence = vec![0.0f64; grid.width];
+    for row in rows {
+        join(Axis::Right, row, &mut along);
+        if row + 1 < grid.height {
+            join(Axis::Below, row, &mut below);
+        } else {
+            below.clear();
+        }
+        diverge([&above.push, &along.push, &below.push], &mut divergence);
+        visit(row, [&above, &along, &below], &divergence);
+        std::mem::swap(&mut above, &mut below);
+    }
 }
 
 /// What the edges above, along and below a row push onto its pixels, less what they take.

@@ -1,10 +1,12 @@
 //! The blacks that follow from reds, and what the system leaves: the right side of the reduced system, its true residual, and the
 //! end of a solution.
 
+use std::ops::Range;
+
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::checkerboard::{BAND_ROWS, Weights};
+use super::checkerboard::{BAND_ROWS, Grid, Weights};
 use super::edges::Colours;
 use super::real::{Real, on_vectors, sum_of};
 use super::reduction::load;
@@ -12,13 +14,62 @@ use super::ring::Ring;
 use super::spans::Span;
 use crate::vector::Packed;
 
+/// Sets some rows of a right side, reds and blacks.
+pub(super) type SetRows<'a> = dyn Fn(Range<usize>, [&mut [f64]; 2]) + Send + Sync + 'a;
+
+/// The right side of a system, which is needed before the iterations and after them.
+pub(super) struct Right<'a> {
+    kept: Option<Colours>,
+    /// Makes it anew.
+    again: Option<&'a SetRows<'a>>,
+}
+
+impl<'a> Right<'a> {
+    /// One that stays in memory.
+    pub fn kept(colours: Colours) -> Self {
+        Self { kept: Some(colours), again: None }
+    }
+
+    /// One that can be made again, row by row.
+    pub fn with_source(colours: Colours, again: &'a SetRows<'a>) -> Self {
+        Self { kept: Some(colours), again: Some(again) }
+    }
+
+    /// Gives its memory back to the system if it can be made again.
+    pub fn release(&mut self) {
+        if self.again.is_some()
+            && let Some(Colours { reds, blacks }) = self.kept.take()
+        {
+            reds.release();
+            blacks.release();
+        }
+    }
+
+    /// The rows from one before a band to one after it, as far as there are any: reds, blacks, and which row is the first.
+    fn around<'b>(&'b self, grid: Grid, band: usize, [reds, blacks]: &'b mut [Vec<f64>; 2]) -> Given<'b> {
+        if let Some(Colours { reds, blacks }) = &self.kept {
+            return (reds, blacks, 0);
+        }
+        let first = band * BAND_ROWS;
+        let rows = first.saturating_sub(1)..(first + BAND_ROWS + 1).min(grid.height);
+        let start = rows.start;
+        for colour in [&mut *reds, blacks] {
+            colour.resize(rows.len() * grid.half(), 0.0);
+        }
+        if let Some(again) = self.again {
+            again(rows, [reds, blacks]);
+        }
+        (reds, blacks, start)
+    }
+}
+
 /// `blacks = D_black^-1 (right.blacks + W^T reds)`, and what the system leaves at the reds: `left = right.reds + W blacks - D_red reds`.
 /// Returns the square sum of `left`. Both are zero beside the spans of the grid.
 ///
 /// From no reds, `left` is the right side of the reduced system; from a solution, `blacks`, where asked for, are the rest of it.
 pub(super) fn settle(
     weights: &Weights,
-    right: &Colours,
+    right: &Right<'_>,
     reds: Option<&[f64]>,
     blacks: Option<&mut [f64]>,
     left: &mut [f64],
@@ -29,14 +80,19 @@ pub(super) fn settle(
         Some(blacks) => blacks.chunks_mut(chunk).map(Some).collect(),
         None => left.chunks(chunk).map(|_| None).collect(),
     };
-    let rows = || [Ring::new(half), Ring::new(half)];
+    let memory = || ([Ring::new(half), Ring::new(half)], [Vec::new(), Vec::new()]);
     let squares: Vec<f64> = (blacks, left.par_chunks_mut(chunk))
         .into_par_iter()
         .enumerate()
-        .map_init(rows, |rows, (band, out)| settle_band(weights, right, reds, band, rows, out))
+        .map_init(memory, |(rows, made), (band, out)| {
+            settle_band(weights, right.around(weights.grid, band, made), reds, band, rows, out)
+        })
         .collect();
     squares.iter().sum()
 }
+
+/// Rows of the right side: reds, blacks, and which row of the grid is their first.
+type Given<'a> = (&'a [f64], &'a [f64], usize);
 
 /// The rows of a band to write: of the blacks, where they are asked for, and of what is left.
 type Settled<'a> = (Option<&'a mut [f64]>, &'a mut [f64]);
@@ -44,19 +100,19 @@ type Settled<'a> = (Option<&'a mut [f64]>, &'a mut [f64]);
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 fn settle_band(
     weights: &Weights,
-    right: &Colours,
+    given: Given<'_>,
     reds: Option<&[f64]>,
     band: usize,
     rows: &mut [Ring<f64>; 2],
     out: Settled<'_>,
 ) -> f64 {
-    on_vectors!(weights.grid, [f64], settle_band_with(weights, right, reds, band, rows, out))
+    on_vectors!(weights.grid, [f64], settle_band_with(weights, given, reds, band, rows, out))
 }
 
 #[inline(always)]
 fn settle_band_with<V: Packed<Number = f64>>(
     weights: &Weights,
-    right: &Colours,
+    (given_reds, given_blacks, first_given): Given<'_>,
     reds: Option<&[f64]>,
     band: usize,
     [here, solved]: &mut [Ring<f64>; 2],
@@ -79,7 +135,7 @@ fn settle_band_with<V: Packed<Number = f64>>(
         let row = row - 1;
         if row >= first - 1 && weights.grid.contains(row) {
             let stencil = weights.black_stencil::<V>(row, span, here.around(row));
-            let given = V::chunks(&right.blacks[row as usize * n..][span.range()], stencil.len());
+            let given = V::chunks(&given_blacks[(row as usize - first_given) * n..][span.range()], stencil.len());
             let out = V::chunks_mut(&mut solved.row_mut(row)[span.start..], stencil.len());
             for k in 0..stencil.len() {
                 ((V::read(&given[k]) + stencil.sum(k)) * stencil.diagonal(k).inverse()).put(&mut out[k]);
@@ -96,7 +152,7 @@ fn settle_band_with<V: Packed<Number = f64>>(
             continue;
         }
         let stencil = weights.red_stencil::<V>(row, span, solved.around(row));
-        let given = V::chunks(&right.reds[row as usize * n..][span.range()], stencil.len());
+        let given = V::chunks(&given_reds[(row as usize - first_given) * n..][span.range()], stencil.len());
         let own = V::chunks(&here.row(row)[1 + span.start..], stencil.len());
         let out = V::chunks_mut(&mut left[(row - first) as usize * n..][span.range()], stencil.len());
         let mut square = V::splat(V::Number::default());
@@ -150,7 +206,14 @@ mod tests {
             *red = number(place);
             (right.reds[place], right.blacks[place]) = (number(place + 9_999), number(place + 77_777));
         }
-        let squares = settle(&weights, &right, Some(&reds), Some(&mut blacks), &mut left);
+        let all = [right.reds.to_vec(), right.blacks.to_vec()];
+        let again = |rows: Range<usize>, colours: [&mut [f64]; 2]| {
+            for (colour, all) in colours.into_iter().zip(&all) {
+                colour.copy_from_slice(&all[rows.start * half..rows.end * half]);
+            }
+        };
+        let mut given = Right::with_source(right, &again);
+        let squares = settle(&weights, &given, Some(&reds), Some(&mut blacks), &mut left);
         let (mut expected, mut beside) = (0.0, 0);
         for row in 0..grid.height {
             let span = weights.spans.at(row as isize);
@@ -163,15 +226,21 @@ mod tests {
                 }
                 let edges = reds_around(&weights, place);
                 let sum = diagonal(edges);
-                let black = if sum > 0.0 { (right.blacks[at] + sum_around(edges, half, &reds)) / sum } else { 0.0 };
+                let black = if sum > 0.0 { (all[1][at] + sum_around(edges, half, &reds)) / sum } else { 0.0 };
                 assert!((blacks[at] - black).abs() < 1e-12, "black {k} of row {row}");
                 let edges = blacks_around(&weights, place);
-                let rest = right.reds[at] + sum_around(edges, half, &blacks) - diagonal(edges) * reds[at];
+                let rest = all[0][at] + sum_around(edges, half, &blacks) - diagonal(edges) * reds[at];
                 assert!((left[at] - rest).abs() < 1e-12, "red {k} of row {row}");
                 expected += rest * rest;
             }
         }
         assert!(beside > 0);
         assert!((squares - expected).abs() < 1e-12 * expected && expected > 1.0, "{squares} for {expected}");
+
+        let kept = (squares, blacks.clone(), left.clone());
+        given.release();
+        assert!(given.kept.is_none());
+        let squares = settle(&weights, &given, Some(&reds), Some(&mut blacks), &mut left);
+        assert!((squares, blacks, left) == kept, "a right side made again");
     }
 }

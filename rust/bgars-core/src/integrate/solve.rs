@@ -9,7 +9,8 @@ use super::checkerboard::join_row;
 use super::components::Runs;
 use super::conjugate_gradient::{Solution, conjugate_gradients, square_sum};
 use super::fill::fill_corners;
-use super::operator::{Field, assemble};
+use super::operator::{Field, assemble, right_side_of};
+use super::settle::Right;
 use super::{Fit, OnProgress, Params, Surface};
 use crate::memory::zeros;
 use crate::{Error, Result};
@@ -107,8 +108,9 @@ pub fn integrate_into(
     let (mut weights, right) = assemble(field, params.difference);
     fill_corners(&mut weights);
     let scale = (square_sum(&right.reds) + square_sum(&right.blacks)).sqrt();
+    let again = right_side_of(field, params.difference);
     let Solution { reds, blacks, iterations, residual, solved } =
-        conjugate_gradients(&weights, &right, None, scale, params, on_progress)?;
+        conjugate_gradients(&weights, Right::with_source(right, &again), None, scale, params, on_progress)?;
     if !solved {
         return Err(Error::NoConvergence { iterations, residual, tolerance: params.relative_tolerance });
     }

@@ -10,6 +10,7 @@ use super::super::conjugate_gradient::{conjugate_gradients, square_sum};
 use super::super::edges::Colours;
 use super::super::fill::fill_corners;
 use super::super::operator::Field;
+use super::super::settle::Right;
 use super::super::solve::{Facing, check_lengths, check_pixels};
 use super::super::{Params, Progress};
 use super::assemble::assemble;
@@ -82,7 +83,7 @@ pub fn integrate_bilateral(
             published.improve(&pixels, &shares, &mut z, &mut fit, on_progress)?;
         } else {
             let (system, right) = assemble(&pixels, &shares, CONVERGED_LEAST_SHARE);
-            improve(system, &right, &mut z, &mut fit, on_progress)?;
+            improve(system, right, &mut z, &mut fit, on_progress)?;
         }
         let energy = reweigh(&pixels, &z, params.k, &mut shares);
         let before = energies.last().copied().unwrap_or(f64::INFINITY);
@@ -170,7 +171,7 @@ pub(super) struct Progressed {
 /// Brings `z` (row-major in the box) to the solution of a system by multigrid.
 fn improve(
     mut weights: Weights,
-    right: &Colours,
+    right: Colours,
     z: &mut [f64],
     fit: &mut Progressed,
     on_progress: OnReweigh<'_>,
@@ -191,8 +192,9 @@ fn improve(
         .for_each_init(|| vec![0.0; half], |blacks, (row, (reds, z))| split_whole_row(row, z, reds, blacks));
     let inner = Params { relative_tolerance: CONVERGED_TOLERANCE, max_iters: CONVERGED_ITERS, ..Params::default() };
     let state = Progress { iteration: fit.rounds, residual: fit.change };
-    let solution =
-        conjugate_gradients(&weights, right, Some(reds), scale, &inner, &mut |_: Progress| on_progress(state))?;
+    let solution = conjugate_gradients(&weights, Right::kept(right), Some(reds), scale, &inner, &mut |_: Progress| {
+        on_progress(state)
+    })?;
     fit.inner_iterations += solution.iterations;
     if !solution.residual.is_finite() {
         let (iterations, tolerance) = (fit.inner_iterations, CONVERGED_TOLERANCE);

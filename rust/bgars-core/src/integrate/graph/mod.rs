@@ -41,9 +41,6 @@ const MAX_LEVELS: usize = 40;
 /// Nodes that one task works on.
 const CHUNK: usize = 1 << 12;
 
-/// Nodes that one task sets up, which takes a hundred times as long.
-const SETUP_CHUNK: usize = 1 << 6;
-
 /// One V-cycle on the reds of a grid, as on a graph.
 #[derive(Debug)]
 pub(super) struct GraphCycle {

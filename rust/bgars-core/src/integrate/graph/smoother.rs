@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 
 use super::CHUNK;
-use super::matrix::Rows;
+use super::matrix::{BLOCK, Rows};
 
 #[derive(Debug)]
 pub(super) struct Smoother {
@@ -28,35 +28,43 @@ impl Smoother {
 
     /// `x = (D + L)^-1 b`, chunk by chunk: one sweep up the nodes, from zero.
     pub fn forward_from_zero(&self, graph: &Rows, b: &[f32], x: &mut [f32]) {
-        x.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, x)| {
+        let chunks = graph.chunks().zip(x.par_chunks_mut(CHUNK)).enumerate();
+        chunks.for_each_init(Vec::new, |memory, (chunk, (blocks, x))| {
             let first = chunk * CHUNK;
-            for offset in 0..x.len() {
-                let node = first + offset;
-                let mut sum = b[node];
-                for (other, weight) in graph.pairs(node) {
-                    if (first..node).contains(&other) {
-                        sum += weight * x[other - first];
+            for (at, block) in blocks.iter().enumerate() {
+                let block = block.open(memory);
+                for offset in at * BLOCK..((at + 1) * BLOCK).min(x.len()) {
+                    let node = first + offset;
+                    let mut sum = b[node];
+                    for (other, weight) in block.pairs(offset % BLOCK) {
+                        if (first..node).contains(&other) {
+                            sum += weight * x[other - first];
+                        }
                     }
+                    x[offset] = sum * self.inverse_diagonal[node];
                 }
-                x[offset] = sum * self.inverse_diagonal[node];
             }
         });
     }
 
     /// One sweep down the nodes, from `before` to `x`.
     pub fn backward(&self, graph: &Rows, b: &[f32], before: &[f32], x: &mut [f32]) {
-        x.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, x)| {
+        let chunks = graph.chunks().zip(x.par_chunks_mut(CHUNK)).enumerate();
+        chunks.for_each_init(Vec::new, |memory, (chunk, (blocks, x))| {
             let first = chunk * CHUNK;
             let end = first + x.len();
-            for offset in (0..x.len()).rev() {
-                let node = first + offset;
-                let here = before[node];
-                let mut sum = b[node];
-                for (other, weight) in graph.pairs(node) {
-                    let value = if (node..end).contains(&other) { x[other - first] } else { before[other] };
-                    sum += weight * (value - here);
+            for (at, block) in blocks.iter().enumerate().rev() {
+                let block = block.open(memory);
+                for offset in (at * BLOCK..((at + 1) * BLOCK).min(x.len())).rev() {
+                    let node = first + offset;
+                    let here = before[node];
+                    let mut sum = b[node];
+                    for (other, weight) in block.pairs(offset % BLOCK) {
+                        let value = if (node..end).contains(&other) { x[other - first] } else { before[other] };
+                        sum += weight * (value - here);
+                    }
+                    x[offset] = here + sum * self.inverse_diagonal[node];
                 }
-                x[offset] = here + sum * self.inverse_diagonal[node];
             }
         });
     }

@@ -15,7 +15,7 @@ const NONE: u32 = u32::MAX;
 /// The smallest weight on which each node depends strongly.
 pub(super) fn strong_limits(graph: &Rows) -> Vec<f32> {
     (0..graph.len())
-        .map(|node| STRONG * graph.row(node).1.iter().fold(f32::MIN_POSITIVE, |max, &w| max.max(w)))
+        .map(|node| STRONG * graph.values(node).iter().fold(f32::MIN_POSITIVE, |max, &w| max.max(w)))
         .collect()
 }
 
@@ -115,7 +115,7 @@ pub(super) fn split(graph: &Rows) -> Vec<u32> {
         if coarse_of[node] == UNDECIDED {
             let mut strong = graph.pairs(node).filter(|&(_, weight)| weight >= limits[node]);
             let fine = strong.any(|(other, _)| coarse_of[other] != FINE && coarse_of[other] != UNDECIDED)
-                || graph.row(node).0.is_empty();
+                || graph.values(node).is_empty();
             coarse_of[node] = if fine { FINE } else { COARSE };
         }
         if coarse_of[node] != FINE {
