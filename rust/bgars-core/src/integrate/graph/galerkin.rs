@@ -34,7 +34,8 @@ impl SparseSum {
 }
 
 /// The coarser graph. Its Laplacian's rows add up to zero as those of `L` do, so the diagonal need not be kept.
-pub(super) fn coarser_graph(graph: &Rows, prolongation: &Rows, restriction: &Rows) -> Rows {
+pub(super) fn coarser_graph(graph: &Rows, prolongation: &Rows) -> Rows {
+    let restriction = prolongation.transpose();
     let n = restriction.len();
     let memory = || (SparseSum::new(graph.len()), SparseSum::new(n));
     Rows::build(n, n, memory, |(fine_row, coarse_row), coarse, row| {

@@ -1,148 +1,19 @@
 //! Sparse matrices by rows.
 
-use std::ops::Range;
-
 use rayon::prelude::*;
 
 use super::CHUNK;
-
-/// Rows that one task sets up, which takes a hundred times as long as to multiply by them. Their columns lie near each other.
-pub(super) const BLOCK: usize = 1 << 6;
-
-/// Stands for a column too far from the others of its block.
-const FAR: u16 = u16::MAX;
+use super::block::{BLOCK, Block, Part, pairs};
 
 /// A sparse matrix by rows. As a graph: row i holds the neighbours of node i and the weights of the edges to them; the
 /// diagonal of its Laplacian is the sum of a row.
 ///
-/// Large ones are half of the memory of an integration, hence 16 bits a column, and blocks that stay where a task made them.
+/// Large ones are half of the memory of an integration, hence blocks that stay where a task made them, with 16 bits a column.
 #[derive(Debug)]
 pub(in crate::integrate) struct Rows {
     blocks: Vec<Block>,
     count: usize,
     width: usize,
-}
-
-/// [`BLOCK`] rows; the last block of a matrix may have empty ones too many.
-#[derive(Debug)]
-pub(in crate::integrate) struct Block {
-    /// Where each row starts, and the end.
-    starts: [u32; BLOCK + 1],
-    first_column: u32,
-    /// The column of each entry, counted from the first, or [`FAR`].
-    columns: Box<[u16]>,
-    values: Box<[f32]>,
-    /// The entries that are far, ascending, and their columns.
-    far: Box<[(u32, u32)]>,
-}
-
-/// A block with its columns written out.
-pub(super) struct OpenBlock<'a> {
-    block: &'a Block,
-    columns: &'a [u32],
-}
-
-/// Rows of a block that is being filled in.
-#[derive(Debug, Default)]
-pub(super) struct Part {
-    columns: Vec<u32>,
-    values: Vec<f32>,
-    ends: Vec<u32>,
-}
-
-impl Part {
-    /// A further entry of the row.
-    pub fn push(&mut self, column: u32, value: f32) {
-        self.columns.push(column);
-        self.values.push(value);
-    }
-
-    /// Adds to the row's entry in a column, which may be a further one.
-    pub fn add(&mut self, column: u32, value: f32) {
-        let start = self.ends.last().map_or(0, |&end| end as usize);
-        match self.columns[start..].iter().position(|&known| known == column) {
-            Some(at) => self.values[start + at] += value,
-            None => self.push(column, value),
-        }
-    }
-
-    fn end_row(&mut self) {
-        self.ends.push(self.columns.len() as u32);
-    }
-
-    /// The rows as a block; none are left.
-    fn take(&mut self) -> Block {
-        let entries = self.columns.len() as u32;
-        let starts = std::array::from_fn(|row| if row == 0 { 0 } else { *self.ends.get(row - 1).unwrap_or(&entries) });
-        let first_column = first_column(&self.columns);
-        let near = |column: u32| column.checked_sub(first_column).filter(|&offset| offset < u32::from(FAR));
-        let block = Block {
-            starts,
-            first_column,
-            columns: self.columns.iter().map(|&column| near(column).map_or(FAR, |offset| offset as u16)).collect(),
-            values: self.values.as_slice().into(),
-            far: (0..).zip(self.columns.iter().copied()).filter(|entry| near(entry.1).is_none()).collect(),
-        };
-        self.columns.clear();
-        self.values.clear();
-        self.ends.clear();
-        block
-    }
-}
-
-/// The column from which all others of a block can be counted; failing that, most of them.
-fn first_column(columns: &[u32]) -> u32 {
-    let (least, most) = columns.iter().fold((u32::MAX, 0), |(least, most), &at| (least.min(at), most.max(at)));
-    if columns.is_empty() || most - least < u32::from(FAR) {
-        return least;
-    }
-    let mut sorted = columns.to_vec();
-    let middle = sorted.len() / 2;
-    sorted.select_nth_unstable(middle).1.saturating_sub(u32::from(FAR) / 2)
-}
-
-impl Block {
-    #[inline(always)]
-    fn span(&self, row: usize) -> Range<usize> {
-        self.starts[row] as usize..self.starts[row + 1] as usize
-    }
-
-    /// Writes the columns out to `memory`, for a pass over all rows.
-    pub(super) fn open<'a>(&'a self, memory: &'a mut Vec<u32>) -> OpenBlock<'a> {
-        memory.clear();
-        memory.extend(self.columns.iter().map(|&column| self.first_column + u32::from(column)));
-        for &(entry, column) in &self.far {
-            memory[entry as usize] = column;
-        }
-        OpenBlock { block: self, columns: memory }
-    }
-
-    #[cold]
-    fn far_column(&self, entry: usize) -> u32 {
-        let at = self.far.partition_point(|&(known, _)| (known as usize) < entry);
-        self.far[at].1
-    }
-}
-
-impl<'a> OpenBlock<'a> {
-    /// Columns and values of a row.
-    #[inline(always)]
-    pub fn row(&self, row: usize) -> (&'a [u32], &'a [f32]) {
-        let span = self.block.span(row);
-        (&self.columns[span.clone()], &self.block.values[span])
-    }
-
-    /// The entries of a row.
-    #[inline(always)]
-    pub fn pairs(&self, row: usize) -> impl Iterator<Item = (usize, f32)> {
-        pairs(self.row(row))
-    }
-}
-
-/// Columns and values, entry by entry.
-#[inline(always)]
-fn pairs<'a>((columns, values): (&'a [u32], &'a [f32])) -> impl Iterator<Item = (usize, f32)> + use<'a> {
-    columns.iter().map(|&column| column as usize).zip(values.iter().copied())
 }
 
 impl Rows {
@@ -180,32 +51,24 @@ impl Rows {
     }
 
     pub fn entries(&self) -> usize {
-        self.blocks.iter().map(|block| block.values.len()).sum()
+        self.blocks.iter().map(Block::entries).sum()
     }
 
     /// Rows that are not empty.
     pub fn rows_with_entries(&self) -> usize {
-        let starts = self.blocks.iter().flat_map(|block| block.starts.windows(2));
-        starts.filter(|ends| ends[0] < ends[1]).count()
+        self.blocks.iter().map(Block::rows_with_entries).sum()
     }
 
     /// The values of a row.
     #[inline(always)]
     pub fn values(&self, row: usize) -> &[f32] {
-        let block = &self.blocks[row / BLOCK];
-        &block.values[block.span(row % BLOCK)]
+        self.blocks[row / BLOCK].values(row % BLOCK)
     }
 
     /// Columns and values of a row.
     #[inline(always)]
     pub fn pairs(&self, row: usize) -> impl Iterator<Item = (usize, f32)> {
-        let block = &self.blocks[row / BLOCK];
-        let span = block.span(row % BLOCK);
-        let entries = span.clone().zip(&block.columns[span.clone()]).zip(&block.values[span]);
-        entries.map(move |((entry, &column), &value)| {
-            let near = block.first_column + u32::from(column);
-            (if column == FAR { block.far_column(entry) } else { near } as usize, value)
-        })
+        self.blocks[row / BLOCK].pairs(row % BLOCK)
     }
 
     /// Sum of a row: as a graph, the diagonal of the Laplacian.
@@ -250,6 +113,23 @@ impl Rows {
         self.each(out, |at, row| x[at] + pairs(row).map(|(column, value)| value * y[column]).sum::<f32>());
     }
 
+    /// `out = A^T x`, in an order that does not depend on the threads: each task adds up what its rows give to the columns near
+    /// each other, and then the tasks' sums follow in turn.
+    pub fn multiply_transposed(&self, x: &[f32], out: &mut [f32]) {
+        let tasks = self.chunks().zip(x.par_chunks(CHUNK));
+        let sum = |memory: &mut Vec<u32>, (blocks, x)| Columns::of(blocks, self.width, x, memory);
+        let sums: Vec<Columns> = tasks.map_init(Vec::new, sum).collect();
+        out.fill(0.0);
+        for Columns { first, near, far } in sums {
+            for (out, sum) in out[first..].iter_mut().zip(near) {
+                *out += sum;
+            }
+            for (column, value) in far {
+                out[column] += value;
+            }
+        }
+    }
+
     /// `out = b - L x` with the Laplacian `L` of the graph.
     pub fn residual(&self, b: &[f32], x: &[f32], out: &mut [f32]) {
         self.each(out, |at, row| {
@@ -259,7 +139,7 @@ impl Rows {
     }
 
     /// The blocks of each task.
-    pub fn chunks(&self) -> rayon::slice::Chunks<'_, Block> {
+    pub(super) fn chunks(&self) -> rayon::slice::Chunks<'_, Block> {
         self.blocks.par_chunks(CHUNK / BLOCK)
     }
 
@@ -275,6 +155,40 @@ impl Rows {
                 }
             }
         });
+    }
+}
+
+/// What the rows of a task give to the columns.
+struct Columns {
+    /// The first of those near each other.
+    first: usize,
+    /// Their sums.
+    near: Vec<f32>,
+    /// Single values of others.
+    far: Vec<(usize, f32)>,
+}
+
+impl Columns {
+    /// Most columns that are near each other: several rows of a wide image.
+    const MOST: usize = 1 << 14;
+
+    fn of(blocks: &[Block], width: usize, x: &[f32], memory: &mut Vec<u32>) -> Self {
+        let first = blocks.iter().filter_map(Block::least_column).min().unwrap_or(0) as usize;
+        let (mut near, mut far) = (vec![0.0; Self::MOST.min(width - first)], Vec::new());
+        for (block, x) in blocks.iter().zip(x.chunks(BLOCK)) {
+            let block = block.open(memory);
+            for (row, &x) in x.iter().enumerate() {
+                for (column, value) in block.pairs(row) {
+                    match near.get_mut(column.wrapping_sub(first)) {
+                        Some(sum) => *sum += value * x,
+                        None => far.push((column, value * x)),
+                    }
+                }
+            }
+        }
+        near.truncate(near.iter().rposition(|&sum| sum != 0.0).map_or(0, |last| last + 1));
+        near.shrink_to_fit();
+        Self { first, near, far }
     }
 }
 
@@ -296,7 +210,7 @@ mod tests {
             })
             .collect();
         let rows = Rows::from_lists(&lists, WIDTH);
-        let far: usize = rows.blocks.iter().map(|block| block.far.len()).sum();
+        let far: usize = rows.blocks.iter().map(Block::far_entries).sum();
         assert!((1..rows.entries() / 2).contains(&far), "{far} far");
         let back = |rows: &Rows, row: usize| -> Vec<(usize, f64)> {
             rows.pairs(row).map(|(column, value)| (column, f64::from(value))).collect()
@@ -307,6 +221,11 @@ mod tests {
         let transpose = rows.transpose();
         let entries: usize = (0..WIDTH).map(|column| transpose.pairs(column).count()).sum();
         assert_eq!(entries, rows.entries());
+        let x: Vec<f32> = (0..lists.len()).map(|row| (row % 17) as f32).collect();
+        let [mut fast, mut slow] = [vec![7.0; WIDTH], vec![7.0; WIDTH]];
+        rows.multiply_transposed(&x, &mut fast);
+        transpose.multiply(&x, &mut slow);
+        assert!(fast == slow && slow.iter().any(|&sum| sum > 0.0), "sums of whole numbers are exact");
         for (row, list) in lists.iter().enumerate() {
             for &(column, value) in list {
                 assert!(back(&transpose, column).contains(&(row, value)), "{row}, {column}");

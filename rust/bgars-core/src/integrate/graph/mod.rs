@@ -9,6 +9,7 @@
 //! (see `strays`) are nodes like any other (`attach`).
 
 mod attach;
+mod block;
 mod direct;
 mod galerkin;
 mod interpolation;
@@ -58,8 +59,6 @@ struct Level {
     smoother: Smoother,
     /// A row a node: the coarse nodes it takes its value from.
     prolongation: Rows,
-    /// Its transpose.
-    restriction: Rows,
 }
 
 /// Right side, solution and spare memory of each graph.
@@ -82,11 +81,10 @@ impl GraphCycle {
         while graph.rows_with_entries() > DIRECT_NODES && levels.len() < MAX_LEVELS {
             let coarse_of = split(&graph);
             let prolongation = interpolation(&graph, &coarse_of);
-            let restriction = prolongation.transpose();
-            let coarser = coarser_graph(&graph, &prolongation, &restriction);
+            let coarser = coarser_graph(&graph, &prolongation);
             let smoother = Smoother::new(&graph);
             let graph = std::mem::replace(&mut graph, coarser);
-            levels.push(Level { graph, smoother, prolongation, restriction });
+            levels.push(Level { graph, smoother, prolongation });
         }
         let direct = Direct::new(&graph);
         Self { nodes, bases, levels, direct }
@@ -141,7 +139,7 @@ impl GraphCycle {
         };
         level.smoother.forward_from_zero(&level.graph, b, x);
         level.graph.residual(b, x, spare);
-        level.restriction.multiply(spare, &mut coarser[0][0]);
+        level.prolongation.multiply_transposed(spare, &mut coarser[0][0]);
         self.cycle(depth + 1, coarser);
         level.prolongation.multiply_add(&coarser[0][1], x, spare);
         level.smoother.backward(&level.graph, b, spare, x);

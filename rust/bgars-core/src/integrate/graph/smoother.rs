@@ -7,7 +7,8 @@
 use rayon::prelude::*;
 
 use super::CHUNK;
-use super::matrix::{BLOCK, Rows};
+use super::block::BLOCK;
+use super::matrix::Rows;
 
 #[derive(Debug)]
 pub(super) struct Smoother {
