@@ -1,0 +1,69 @@
+"""Memory of an integration beyond its input and output, in a process of its own: at most 60 bytes a pixel, also over slits."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+LIMIT_BYTES = 60.0
+SIDE_PX = 2048
+
+PROGRAM = """
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import bgars
+
+
+def status_bytes(field):
+    lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+    return 1024 * int(next(line for line in lines if line.startswith(field)).split()[1])
+
+
+def integrate(mask):
+    normals = np.zeros((*mask.shape, 3), dtype=np.float32)
+    y, x = np.indices(mask.shape, dtype=np.float32) * (20 / mask.shape[0])
+    normals[..., 0], normals[..., 1] = 0.3 * np.sin(x) * np.cos(y), 0.3 * np.cos(x + y)
+    normals[..., 2] = np.sqrt(1 - normals[..., 0] ** 2 - normals[..., 1] ** 2)
+    Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
+    before = status_bytes("VmRSS")
+    height = bgars.integrate_normals(normals, mask=mask, relative_tolerance=1e-6)
+    output = height.height_px.nbytes + height.labels.nbytes + height.mask.nbytes
+    return (status_bytes("VmHWM") - before - output) / mask.size
+
+
+shape, side = sys.argv[1], int(sys.argv[2])
+random = np.random.default_rng(11)
+mask = np.ones((side, side), dtype=np.bool_)
+integrate(mask[:64, :64])
+if shape == "dense slits":
+    for cut in range((side // 128) ** 2):
+        row, col = random.integers(side, size=2)
+        mask[(slice(row, row + 256), col) if cut % 2 else (row, slice(col, col + 256))] = False
+elif shape == "serpentine":
+    mask[:, 1::2] = False
+    mask[0, 1::4] = mask[-1, 3::4] = True
+print(integrate(mask))
+"""
+
+
+def _can_measure() -> bool:
+    try:
+        Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
+    except OSError:
+        return False
+    return True
+
+
+@pytest.mark.skipif(not _can_measure(), reason="the most that was resident is known on Linux alone")
+@pytest.mark.parametrize("shape", ["rectangle", "dense slits", "serpentine"])
+def test_an_integration_needs_at_most_sixty_bytes_a_pixel(shape: str) -> None:
+    command = [sys.executable, "-c", PROGRAM, shape, str(SIDE_PX)]
+    done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=120)
+    # The solution alone takes eight: less would mean that nothing was measured.
+    assert 8.0 < float(done.stdout) <= LIMIT_BYTES
