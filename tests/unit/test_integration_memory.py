@@ -1,4 +1,4 @@
-"""Memory of an integration beyond its input and output, in a process of its own: at most 60 bytes a pixel, also over slits."""
+"""Memory of an integration beyond its input and output: at most 60 bytes a pixel, also over slits."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ random = np.random.default_rng(11)
 mask = np.ones((side, side), dtype=np.bool_)
 integrate(mask[:64, :64])
 if shape == "dense slits":
-    for cut in range((side // 128) ** 2):
+    for cut in range((side // 100) ** 2):
         row, col = random.integers(side, size=2)
         mask[(slice(row, row + 256), col) if cut % 2 else (row, slice(col, col + 256))] = False
 elif shape == "serpentine":
