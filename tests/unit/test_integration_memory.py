@@ -38,12 +38,12 @@ def integrate(mask):
 
 
 shape, side = sys.argv[1], int(sys.argv[2])
-random = np.random.default_rng(11)
+random = np.random.default_rng(0)
 mask = np.ones((side, side), dtype=np.bool_)
 integrate(mask[:64, :64])
 if shape == "dense slits":
-    for cut in range((side // 100) ** 2):
-        row, col = random.integers(side, size=2)
+    for cut in range((side // 128) ** 2):
+        row, col = (random.random(2) * side).astype(int)
         mask[(slice(row, row + 256), col) if cut % 2 else (row, slice(col, col + 256))] = False
 elif shape == "serpentine":
     mask[:, 1::2] = False
