@@ -25,8 +25,8 @@ class Field(NamedTuple):
 
 
 def make_field(shape: str, side: int) -> Field:
-    """A square field: "rectangle" (the full image), "disc with holes", or a kind of slits: `MASKS`."""
-    return Field(_wavy_normals(side), MASKS[shape](side))
+    """A square field: "rectangle" (the full image), "disc with holes", or a kind of slits: `MASKS`, `GRAPH_MASKS`."""
+    return Field(_wavy_normals(side), (MASKS | GRAPH_MASKS)[shape](side))
 
 
 def _wavy_normals(side: int) -> NDArray[np.float32]:
@@ -91,6 +91,18 @@ def _cut(side: int, cuts: int, length: int) -> NDArray[np.bool_]:
     return mask
 
 
+def _many_holes(side: int) -> NDArray[np.bool_]:
+    """Three pixels in ten missing, wherever they fall."""
+    return np.random.default_rng(5).random((side, side)) > 0.3
+
+
+def _narrow_lanes(side: int) -> NDArray[np.bool_]:
+    """Lanes one pixel wide with walls as wide between them, all open at the bottom."""
+    mask = np.ones((side, side), dtype=np.bool_)
+    mask[:-1, 0::2] = False
+    return mask
+
+
 MASKS = {
     "rectangle": _rectangle,
     "disc with holes": _disc_with_holes,
@@ -98,3 +110,6 @@ MASKS = {
     "random slits": _random_slits,
     "dense slits": _dense_slits,
 }
+
+GRAPH_MASKS = {"many holes": _many_holes, "narrow lanes": _narrow_lanes}
+"""Nearly all of these is the graph's: for `memory.py` by hand, not in the tables."""

@@ -17,8 +17,7 @@ use crate::{Error, Result};
 /// Elements of a vector that one task copies or adds up.
 const BLOCK: usize = 1 << 14;
 
-/// A graph of one node for so many reds needs much of the memory; to make the right side again then takes a hundredth of the
-/// time.
+/// A graph of more than one node for so many reds needs much of the memory, and much more time than to make the right side again.
 const LARGE_GRAPH: usize = 16;
 
 /// What [`conjugate_gradients`] found.
@@ -61,7 +60,7 @@ pub(super) fn conjugate_gradients(
     let preconditioner = Multigrid::new(weights);
     let is_large = preconditioner.graph_unknowns() > size / LARGE_GRAPH;
     if is_large {
-        right.release();
+        right = right.released();
     }
     let mut vectors = preconditioner.vectors();
     // A direction may be any; what x and r take along it agrees in `f64`.

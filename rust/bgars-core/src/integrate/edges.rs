@@ -60,57 +60,41 @@ where
         .zip(right.blacks.par_chunks_mut(BAND_ROWS * half));
     bands.for_each(|((mut weights, reds), blacks)| {
         let rows = weights.rows.clone();
-        let mut colours = reds.chunks_mut(half).zip(blacks.chunks_mut(half));
-        each_row(grid, joiner(), rows.clone(), |row, [above, along, below], divergence| {
+        each_row(grid, joiner(), rows.clone(), [reds, blacks], |row, [above, along, below]| {
             if row == rows.start {
                 weights.set_above(&above.weight);
             }
             weights.set_row(row, &along.weight, &below.weight);
-            if let Some((reds, blacks)) = colours.next() {
-                split_whole_row(row, divergence, reds, blacks);
-            }
         });
     });
     (weights, right)
 }
 
-/// Some rows of the right side alone, from the edges that `join` knows; it is asked as for [`from_edges`].
-pub(super) fn right_side(
-    grid: Grid,
-    join: impl FnMut(Axis, usize, &mut EdgeRow),
-    rows: Range<usize>,
-    [reds, blacks]: [&mut [f64]; 2],
-) {
-    let half = grid.half();
-    let mut colours = reds.chunks_mut(half).zip(blacks.chunks_mut(half));
-    each_row(grid, join, rows, |row, _, divergence| {
-        if let Some((reds, blacks)) = colours.next() {
-            split_whole_row(row, divergence, reds, blacks);
-        }
-    });
-}
-
-/// Calls `visit` for each of some rows with the edges above, along and below it, and what they push onto its pixels.
-fn each_row(
+/// Calls `visit` for each of some rows with the edges above, along and below it, and sets the right side of these rows, both
+/// colours. `join` is asked as for [`from_edges`].
+pub(super) fn each_row(
     grid: Grid,
     mut join: impl FnMut(Axis, usize, &mut EdgeRow),
     rows: Range<usize>,
-    mut visit: impl FnMut(usize, [&EdgeRow; 3], &[f64]),
+    [reds, blacks]: [&mut [f64]; 2],
+    mut visit: impl FnMut(usize, [&EdgeRow; 3]),
 ) {
+    let half = grid.half();
     let [mut above, mut along, mut below] = std::array::from_fn(|_| EdgeRow::zeros(grid.width));
     if let Some(row) = rows.start.checked_sub(1) {
         join(Axis::Below, row, &mut above);
     }
     let mut divergence = vec![0.0f64; grid.width];
-    for row in rows {
+    for (row, (reds, blacks)) in rows.zip(reds.chunks_mut(half).zip(blacks.chunks_mut(half))) {
         join(Axis::Right, row, &mut along);
         if row + 1 < grid.height {
             join(Axis::Below, row, &mut below);
         } else {
             below.clear();
         }
+        visit(row, [&above, &along, &below]);
         diverge([&above.push, &along.push, &below.push], &mut divergence);
-        visit(row, [&above, &along, &below], &divergence);
+        split_whole_row(row, &divergence, reds, blacks);
         std::mem::swap(&mut above, &mut below);
     }
 }
@@ -153,6 +137,12 @@ mod tests {
             };
             let (weights, right) = from_edges(grid, || join);
             let half = grid.half();
+            for rows in [0..height, height / 2..height, height / 3..height.div_ceil(2)] {
+                let [mut reds, mut blacks] = [vec![7.0; rows.len() * half], vec![7.0; rows.len() * half]];
+                each_row(grid, join, rows.clone(), [&mut reds, &mut blacks], |_, _| ());
+                let given = rows.start * half..rows.end * half;
+                assert_eq!((&reds[..], &blacks[..]), (&right.reds[given.clone()], &right.blacks[given]), "{rows:?}");
+            }
             for row in 0..height {
                 for place in 0..2 * half {
                     let at = |axis: Axis, row: isize, col: isize, inside: bool| {

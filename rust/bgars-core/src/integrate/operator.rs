@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::Difference;
 use super::checkerboard::{Grid, Weights};
-use super::edges::{Axis, Colours, EdgeRow, from_edges, right_side};
+use super::edges::{Axis, Colours, EdgeRow, each_row, from_edges};
 use super::real::greater;
 
 /// Smallest n_z of an edge: a normal seen edge-on has no finite slope.
@@ -143,51 +143,63 @@ pub(super) fn to_unit(weight: f64) -> f64 {
     if weight > 0.0 { 4f64.powf(-(weight.log2() / 2.0).floor()) } else { 1.0 }
 }
 
-/// Weights and right side `M^T v` of a field; both zero outside the mask.
-pub(super) fn assemble(field: Field<'_>, difference: Difference) -> (Weights, Colours) {
-    let unit = unit(field);
-    from_edges(grid(field), || joiner(field, unit, difference))
-}
-
-/// Makes any rows of that right side anew, of both colours.
-pub(super) fn right_side_of(
-    field: Field<'_>,
+/// The edges of a field.
+#[derive(Clone, Copy)]
+pub(super) struct FieldEdges<'a> {
+    field: Field<'a>,
     difference: Difference,
-) -> impl Fn(Range<usize>, [&mut [f64]; 2]) + Send + Sync {
-    let unit = unit(field);
-    move |rows, colours| right_side(grid(field), joiner(field, unit, difference), rows, colours)
+    /// What brings the weights of the field to the size of 1.
+    unit: f64,
 }
 
-fn grid(field: Field<'_>) -> Grid {
-    Grid { height: field.mask.len() / field.width, width: field.width }
-}
+impl<'a> FieldEdges<'a> {
+    pub fn new(field: Field<'a>, difference: Difference) -> Self {
+        let unit = field.weights.map_or(1.0, |weights| to_unit(largest(weights, field.mask)));
+        Self { field, difference, unit }
+    }
 
-/// What brings the weights of a field to the size of 1.
-fn unit(field: Field<'_>) -> f64 {
-    field.weights.map_or(1.0, |weights| to_unit(largest(weights, field.mask)))
-}
+    /// Weights and right side `M^T v`; both zero outside the mask.
+    pub fn assemble(&self) -> (Weights, Colours) {
+        from_edges(self.grid(), || self.joiner())
+    }
 
-/// Sets the edges of one row after another.
-fn joiner(field: Field<'_>, unit: f64, difference: Difference) -> impl FnMut(Axis, usize, &mut EdgeRow) {
-    let width = field.width;
-    let mut rows = FieldRows::default();
-    move |axis: Axis, row: usize, edges: &mut EdgeRow| {
-        rows.load(field, unit, row);
-        let FieldRow { along, n_z, trust } = &rows.rows[row % 2];
-        match axis {
-            Axis::Right => {
-                let (a, b) = ((&along[0][..], &n_z[..], &trust[..]), (&along[0][1..], &n_z[1..], &trust[1..]));
-                edges.join(a, b, 1.0, difference, true);
-                edges.cut(field, row * width, 1);
-            }
-            Axis::Below => {
-                rows.load(field, unit, row + 1);
-                let [upper, lower] = [&rows.rows[row % 2], &rows.rows[(row + 1) % 2]];
-                let a = (&upper.along[1][..], &upper.n_z[..], &upper.trust[..]);
-                // y grows upward: the forward difference starts at the lower pixel.
-                edges.join(a, (&lower.along[1], &lower.n_z, &lower.trust), -1.0, difference, false);
-                edges.cut(field, row * width, width);
+    /// Some rows of that right side, made anew.
+    pub fn right_side(&self, rows: Range<usize>, colours: [&mut [f64]; 2]) {
+        each_row(self.grid(), self.joiner(), rows, colours, |_, _| ());
+    }
+
+    fn grid(&self) -> Grid {
+        Grid { height: self.field.mask.len() / self.field.width, width: self.field.width }
+    }
+
+    /// Sets the edges of one row after another.
+    fn joiner(&self) -> impl FnMut(Axis, usize, &mut EdgeRow) + use<'a> {
+        let Self { field, difference, unit } = *self;
+        let width = field.width;
+        let mut rows = FieldRows::default();
+        move |axis: Axis, row: usize, edges: &mut EdgeRow| {
+            rows.load(field, unit, row);
+            let FieldRow { along, n_z, trust } = &rows.rows[row % 2];
+            match axis {
+                Axis::Right => {
+                    let (a, b) = ((&along[0][..], &n_z[..], &trust[..]), (&along[0][1..], &n_z[1..], &trust[1..]));
+                    edges.join(a, b, 1.0, difference, true);
+                    edges.cut(field, row * width, 1);
+                }
+                Axis::Below => {
+                    rows.load(field, unit, row + 1);
+                    let [upper, lower] = [&rows.rows[row % 2], &rows.rows[(row + 1) % 2]];
+                    let a = (&upper.along[1][..], &upper.n_z[..], &upper.trust[..]);
+                    // y grows upward: the forward difference starts at the lower pixel.
+                    edges.join(a, (&lower.along[1], &lower.n_z, &lower.trust), -1.0, difference, false);
+                    edges.cut(field, row * width, width);
+                }
             }
         }
     }
+}
+
+/// Weights and right side of a field, as by [`FieldEdges::assemble`].
+pub(super) fn assemble(field: Field<'_>, difference: Difference) -> (Weights, Colours) {
+    FieldEdges::new(field, difference).assemble()
 }

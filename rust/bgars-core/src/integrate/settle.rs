@@ -18,48 +18,36 @@ use crate::vector::Packed;
 pub(super) type SetRows<'a> = dyn Fn(Range<usize>, [&mut [f64]; 2]) + Send + Sync + 'a;
 
 /// The right side of a system, which is needed before the iterations and after them.
-pub(super) struct Right<'a> {
-    kept: Option<Colours>,
-    /// Makes it anew.
-    again: Option<&'a SetRows<'a>>,
+pub(super) enum Right<'a> {
+    /// In memory, and perhaps how to make it again.
+    Kept(Colours, Option<&'a SetRows<'a>>),
+    /// Made anew, row by row.
+    Anew(&'a SetRows<'a>),
 }
 
-impl<'a> Right<'a> {
-    /// One that stays in memory.
-    pub fn kept(colours: Colours) -> Self {
-        Self { kept: Some(colours), again: None }
+impl Right<'_> {
+    /// The same, with its memory given back to the system if it can be made again.
+    pub fn released(self) -> Self {
+        let Self::Kept(Colours { reds, blacks }, Some(again)) = self else { return self };
+        reds.release();
+        blacks.release();
+        Self::Anew(again)
     }
 
-    /// One that can be made again, row by row.
-    pub fn with_source(colours: Colours, again: &'a SetRows<'a>) -> Self {
-        Self { kept: Some(colours), again: Some(again) }
-    }
-
-    /// Gives its memory back to the system if it can be made again.
-    pub fn release(&mut self) {
-        if self.again.is_some()
-            && let Some(Colours { reds, blacks }) = self.kept.take()
-        {
-            reds.release();
-            blacks.release();
-        }
-    }
-
-    /// The rows from one before a band to one after it, as far as there are any: reds, blacks, and which row is the first.
+    /// The rows from one before a band to one after it, as far as there are any.
     fn around<'b>(&'b self, grid: Grid, band: usize, [reds, blacks]: &'b mut [Vec<f64>; 2]) -> Given<'b> {
-        if let Some(Colours { reds, blacks }) = &self.kept {
-            return (reds, blacks, 0);
+        match self {
+            Self::Kept(Colours { reds, blacks }, _) => (reds, blacks, 0),
+            Self::Anew(again) => {
+                let first = band * BAND_ROWS;
+                let rows = first.saturating_sub(1)..(first + BAND_ROWS + 1).min(grid.height);
+                let (start, size) = (rows.start, rows.len() * grid.half());
+                reds.resize(size, 0.0);
+                blacks.resize(size, 0.0);
+                again(rows, [reds, blacks]);
+                (reds, blacks, start)
+            }
         }
-        let first = band * BAND_ROWS;
-        let rows = first.saturating_sub(1)..(first + BAND_ROWS + 1).min(grid.height);
-        let start = rows.start;
-        for colour in [&mut *reds, blacks] {
-            colour.resize(rows.len() * grid.half(), 0.0);
-        }
-        if let Some(again) = self.again {
-            again(rows, [reds, blacks]);
-        }
-        (reds, blacks, start)
     }
 }
 
@@ -212,7 +200,7 @@ mod tests {
                 colour.copy_from_slice(&all[rows.start * half..rows.end * half]);
             }
         };
-        let mut given = Right::with_source(right, &again);
+        let given = Right::Kept(right, Some(&again));
         let squares = settle(&weights, &given, Some(&reds), Some(&mut blacks), &mut left);
         let (mut expected, mut beside) = (0.0, 0);
         for row in 0..grid.height {
@@ -238,8 +226,8 @@ mod tests {
         assert!((squares - expected).abs() < 1e-12 * expected && expected > 1.0, "{squares} for {expected}");
 
         let kept = (squares, blacks.clone(), left.clone());
-        given.release();
-        assert!(given.kept.is_none());
+        let given = given.released();
+        assert!(matches!(given, Right::Anew(_)));
         let squares = settle(&weights, &given, Some(&reds), Some(&mut blacks), &mut left);
         assert!((squares, blacks, left) == kept, "a right side made again");
     }

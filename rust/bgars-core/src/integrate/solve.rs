@@ -9,7 +9,7 @@ use super::checkerboard::join_row;
 use super::components::Runs;
 use super::conjugate_gradient::{Solution, conjugate_gradients, square_sum};
 use super::fill::fill_corners;
-use super::operator::{Field, assemble, right_side_of};
+use super::operator::{Field, FieldEdges};
 use super::settle::Right;
 use super::{Fit, OnProgress, Params, Surface};
 use crate::memory::zeros;
@@ -105,12 +105,13 @@ pub fn integrate_into(
     check_length("height_px", mask.len(), height_px.len())?;
     check_length("labels", mask.len(), labels.len())?;
     let runs = Runs::new(mask, field.regions, width);
-    let (mut weights, right) = assemble(field, params.difference);
+    let edges = FieldEdges::new(field, params.difference);
+    let (mut weights, right) = edges.assemble();
     fill_corners(&mut weights);
     let scale = (square_sum(&right.reds) + square_sum(&right.blacks)).sqrt();
-    let again = right_side_of(field, params.difference);
+    let again = |rows: Range<usize>, colours: [&mut [f64]; 2]| edges.right_side(rows, colours);
     let Solution { reds, blacks, iterations, residual, solved } =
-        conjugate_gradients(&weights, Right::with_source(right, &again), None, scale, params, on_progress)?;
+        conjugate_gradients(&weights, Right::Kept(right, Some(&again)), None, scale, params, on_progress)?;
     if !solved {
         return Err(Error::NoConvergence { iterations, residual, tolerance: params.relative_tolerance });
     }
