@@ -107,11 +107,6 @@ impl Weights {
         weights
     }
 
-    /// Narrows the work on each band of rows to its pixels with edges; to be called once the last edge is set.
-    pub fn find_spans(&mut self) {
-        self.spans = Spans::of_edges(self);
-    }
-
     /// Weights from one red to the one below.
     #[inline(always)]
     pub fn stride(&self) -> usize {
@@ -270,6 +265,11 @@ impl Band<'_> {
 
 #[cfg(test)]
 impl Weights {
+    /// Narrows the work on each band of rows to its pixels with edges.
+    pub fn find_spans(&mut self) {
+        self.spans = Spans::of_edges(self.grid, &super::edge_bits::EdgeBits::of(self));
+    }
+
     /// Edges of any of some weights, at random, on a grid of 40 x 90 pixels.
     pub fn ragged(choices: [f32; 6]) -> Self {
         let mut weights = Self::zeros(Grid { height: 40, width: 90 });

@@ -115,10 +115,13 @@ impl Runs {
     /// [`Self::labels`] into memory that is there already.
     pub fn write_labels(&self, labels: &mut [i32]) {
         labels.par_chunks_mut(self.width).enumerate().for_each(|(row, labels)| {
-            labels.fill(-1);
+            let mut done = 0;
             for (cols, component) in self.row(row) {
+                labels[done..cols.start].fill(-1);
+                done = cols.end;
                 labels[cols].fill(component as i32);
             }
+            labels[done..].fill(-1);
         });
     }
 

@@ -7,6 +7,7 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::checkerboard::{BAND_ROWS, Weights};
+use super::edge_bits::EdgeBits;
 use super::multigrid::Multigrid;
 use super::reduction::dot;
 use super::settle::{Right, settle};
@@ -39,6 +40,7 @@ pub(super) struct Solution {
 /// a component's residuals no step can take away, and the preconditioner makes the most of it.
 pub(super) fn conjugate_gradients(
     weights: &Weights,
+    bits: EdgeBits,
     mut right: Right<'_>,
     start: Option<Aligned<f64>>,
     scale: f64,
@@ -57,7 +59,7 @@ pub(super) fn conjugate_gradients(
         settle(weights, &right, Some(x.end(weights, &[])), Some(&mut q), &mut r);
         return Ok(Solution { reds: x.x, blacks: q, iterations, residual, solved });
     }
-    let preconditioner = Multigrid::new(weights);
+    let preconditioner = Multigrid::new(weights, bits);
     let is_large = preconditioner.graph_unknowns() > size / LARGE_GRAPH;
     if is_large {
         right = right.released();

@@ -5,43 +5,58 @@
 //! values between grids but has no part in the system. It may not join what the mask keeps apart: its neighbours must be
 //! connected around it, through the centres; of several groups it takes the one that conducts best.
 
-use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::checkerboard::{PaddedRow, Weights};
+use super::checkerboard::{DOWN, LEFT, PaddedRow, RIGHT, UP, Weights};
 use super::coarsen::series;
-use super::places::above_zero;
-use super::real::{greater, lesser};
+use super::edge_bits::EdgeBits;
+use super::spans::Spans;
 use super::stops::stops;
 
 /// Ties every corner without edges to the neighbours around it, or makes it a stop. These are a grid's last edges: its spans
-/// follow.
-pub(super) fn fill_corners(weights: &mut Weights) {
+/// follow. Returns which edges there are then.
+pub(super) fn fill_corners(weights: &mut Weights) -> EdgeBits {
+    let mut bits = EdgeBits::of(weights);
     for tied in [ways_around, stops] {
-        for (row, k, ties) in tied(weights) {
+        for (row, k, ties) in tied(weights, &bits) {
             weights.set_red(row, k, ties.map(|tie| -tie));
+            bits.tie(row, k, ties);
         }
     }
-    weights.find_spans();
+    weights.spans = Spans::of_edges(weights.grid, &bits);
+    bits
 }
 
 /// Corners to be tied, by row and number, and their ties: left, right, up, down.
 pub(super) type Tied = Vec<(usize, usize, [f32; 4])>;
 
 /// The corners without edges that have a way around.
-fn ways_around(weights: &Weights) -> Tied {
-    let n = weights.grid.half();
-    (0..weights.grid.height.div_ceil(2))
-        .into_par_iter()
-        .flat_map_iter(|coarse_row| {
-            let row = 2 * coarse_row;
-            let around = Around::new(weights, row as isize);
-            let mut free = vec![0.0; n];
-            find_free(&around, &mut free);
-            let candidates = above_zero(&free).into_iter();
-            candidates.filter_map(move |k| around.virtual_ties(k).map(|ties| (row, k, ties)))
-        })
-        .collect()
+fn ways_around(weights: &Weights, bits: &EdgeBits) -> Tied {
+    let rows = (0..weights.grid.height).into_par_iter().step_by(2);
+    rows.flat_map_iter(|row| {
+        let ties = move |k: usize| {
+            let ties = Around::new(weights, row as isize).virtual_ties(k)?;
+            Some((row, k, ties))
+        };
+        beside_ways(bits, row as isize).into_iter().filter_map(ties)
+    })
+    .collect()
+}
+
+/// The corners of a row without edges around which two edges lead.
+fn beside_ways(bits: &EdgeBits, row: isize) -> Vec<usize> {
+    let [above, here, below] = [bits.any(row - 1), bits.any(row), bits.any(row + 1)];
+    bits.places(|word| {
+        let free = !here.any(word);
+        if free == 0 {
+            return 0;
+        }
+        let left_above = above.before(DOWN, word) & above.before(RIGHT, word);
+        let right_above = above.at(LEFT, word) & above.at(DOWN, word);
+        let left_below = below.before(RIGHT, word) & below.before(UP, word);
+        let right_below = below.at(UP, word) & below.at(LEFT, word);
+        free & ((left_above | right_above) | (left_below | right_below))
+    })
 }
 
 /// The weights in and beside a row of corners: left, right, up, down.
@@ -49,32 +64,6 @@ pub(super) struct Around<'a> {
     above: [PaddedRow<'a, f32>; 4],
     here: [PaddedRow<'a, f32>; 4],
     below: [PaddedRow<'a, f32>; 4],
-}
-
-/// Of each corner without edges the strongest way around, by its weaker edge; 0 for the others. Corners are seldom of this
-/// kind: one fast pass finds them.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn find_free(around: &Around<'_>, free: &mut [f32]) {
-    let n = free.len();
-    let ([left_above, right_above, _, down_above], [left_below, right_below, up_below, _]) =
-        (around.above, around.below);
-    let arcs = [
-        [&down_above[..n], &right_above[..n]],
-        [&left_above[1..=n], &down_above[1..=n]],
-        [&up_below[1..=n], &left_below[1..=n]],
-        [&right_below[..n], &up_below[..n]],
-    ];
-    let own = around.here.map(|side| &side[1..=n]);
-    for k in 0..n {
-        let (mut tied, mut way) = (0.0f32, 0.0f32);
-        for side in own {
-            tied = greater(tied, side[k].abs());
-        }
-        for [a, b] in arcs {
-            way = greater(way, lesser(a[k].abs(), b[k].abs()));
-        }
-        free[k] = if tied == 0.0 { way } else { 0.0 };
-    }
 }
 
 impl<'a> Around<'a> {
@@ -110,22 +99,18 @@ impl<'a> Around<'a> {
         if arcs.iter().all(|&arc| arc <= 0.0) {
             return None;
         }
-        let open: Vec<usize> = (0..4).filter(|&arc| arcs[arc] > 0.0).collect();
+        // Of opposite arcs alone, which make two groups, the better one.
+        let mut open = arcs.map(|arc| arc > 0.0);
+        for (a, b) in [(0, 2), (1, 3)] {
+            if open[a] && open[b] && !open[a + 1] && !open[(b + 1) % 4] {
+                open[if arcs[a] >= arcs[b] { b } else { a }] = false;
+            }
+        }
         // Neighbours in the order of the arcs: left, up, right, down; arc a joins neighbours a and a + 1.
         let mut group = [0.0; 4];
-        match open.as_slice() {
-            // Opposite arcs alone: two groups, the better one.
-            &[a, b] if b - a == 2 => {
-                let arc = if arcs[a] >= arcs[b] { a } else { b };
-                group[arc] += arcs[arc];
-                group[(arc + 1) % 4] += arcs[arc];
-            }
-            _ => {
-                for arc in open {
-                    group[arc] += arcs[arc];
-                    group[(arc + 1) % 4] += arcs[arc];
-                }
-            }
+        for arc in (0..4).filter(|&arc| open[arc]) {
+            group[arc] += arcs[arc];
+            group[(arc + 1) % 4] += arcs[arc];
         }
         let [left, up, right, down] = group;
         Some([left, right, up, down])
@@ -137,16 +122,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn one_pass_finds_all_corners_to_be_tied() {
+    fn all_corners_to_be_tied_are_found() {
         let (weights, mut found) = (Weights::ragged([0.0, 0.0, 0.0, 0.0, 0.7, -0.5]), 0);
-        let n = weights.grid.half();
+        let bits = EdgeBits::of(&weights);
         for row in (0..40).step_by(2) {
-            let (around, mut free) = (Around::new(&weights, row), vec![0.0; n]);
-            find_free(&around, &mut free);
-            for k in (0..n).filter(|&k| around.virtual_ties(k).is_some()) {
-                assert!(free[k] > 0.0, "corner {k} of row {row}");
-                found += 1;
-            }
+            let around = Around::new(&weights, row);
+            let tied: Vec<usize> = (0..weights.grid.half()).filter(|&k| around.virtual_ties(k).is_some()).collect();
+            assert_eq!(beside_ways(&bits, row), tied, "row {row}");
+            found += tied.len();
         }
         assert!(found > 5, "{found}");
     }

@@ -1,22 +1,22 @@
 //! What the next coarser grid cannot hold.
 
-use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::checkerboard::{Grid, Weights};
 use super::detours::Window;
-use super::places::{Place, above_zero, blacks_around, diagonal};
-use super::real::{greater, lesser};
+use super::edge_bits::EdgeBits;
+use super::places::{Place, blacks_around, diagonal};
 use super::strays::{is_alone, place};
 
 /// The centres that tie together what has no coarse edge along the rim of their cell: indices among the reds, ascending. The
 /// coarser grid serves them badly or not at all.
-pub(super) fn doubtful_centres(weights: &Weights) -> Vec<u32> {
+pub(super) fn doubtful_centres(weights: &Weights, bits: &EdgeBits) -> Vec<u32> {
     let half = weights.grid.half();
     let rows = (0..weights.grid.height / 2).into_par_iter().map(|cell_row| 2 * cell_row + 1);
-    let found = rows
-        .flat_map_iter(|row| doubtful_in_row(weights, row as isize).into_iter().map(move |k| (row * half + k) as u32));
-    found.collect()
+    rows.flat_map_iter(|row| {
+        doubtful_in_row(weights, bits, row as isize).into_iter().map(move |k| (row * half + k) as u32)
+    })
+    .collect()
 }
 
 /// The reds that get lost: indices in ascending order.
@@ -72,31 +72,25 @@ pub(super) fn cells_around(grid: Grid, (row, k): Place) -> impl Iterator<Item = 
 }
 
 /// The centres of odd `row` that tie together what has no coarse edge along the rim of their cell.
-fn doubtful_in_row(weights: &Weights, row: isize) -> Vec<usize> {
-    let rows = CellRow::new(weights, row);
-    // All edges there, or none, is the common case: one fast pass finds the cells that are worth a look.
-    let mut suspects = vec![0.0; weights.grid.half()];
-    suspect(&rows, &mut suspects);
-    above_zero(&suspects).into_iter().filter(|&k| rows.rim(k).is_doubtful()).collect()
+fn doubtful_in_row(weights: &Weights, bits: &EdgeBits, row: isize) -> Vec<usize> {
+    let mut centres = lacking_an_edge(bits, row);
+    if !centres.is_empty() {
+        let cells = CellRow::new(weights, row);
+        centres.retain(|&k| cells.rim(k).is_doubtful());
+    }
+    centres
 }
 
-/// The strongest spoke of each cell that lacks an edge; 0 for the others.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn suspect(rows: &CellRow<'_>, suspects: &mut [f32]) {
-    let n = suspects.len();
-    let [up, right, down, left] = rows.spokes.map(|side| &side[..n]);
-    for k in 0..n {
-        suspects[k] = greater(greater(greater(up[k], right[k]), greater(down[k], left[k])), 0.0);
-    }
-    let weakest_of = |a: &[f32], b: &[f32], k: usize| lesser(a[k].abs(), b[k].abs());
-    let [[a, b], [c, d], [e, f], [g, h]] = rows.rims.map(|rim| rim.map(|side| &side[..n]));
-    for k in 0..n {
-        let spokes = lesser(weakest_of(up, right, k), weakest_of(down, left, k));
-        let first = lesser(weakest_of(a, b, k), weakest_of(c, d, k));
-        let second = lesser(weakest_of(e, f, k), weakest_of(g, h, k));
-        let weakest = lesser(spokes, lesser(first, second));
-        suspects[k] = if weakest == 0.0 { suspects[k] } else { 0.0 };
-    }
+/// The centres of odd `row` in the mask whose cells lack an edge: all there, or none, is the common case.
+fn lacking_an_edge(bits: &EdgeBits, row: isize) -> Vec<usize> {
+    let (any, real) = (bits.any_around(row), bits.real_around(row));
+    bits.places(|word| {
+        let [up, right, down, left] = any.spokes(word);
+        let [[a, b], [c, d], [e, f], [g, h]] = any.rims(word);
+        let whole = (up & right & down & left) & (a & b & c & d) & (e & f & g & h);
+        let [up, right, down, left] = real.spokes(word);
+        (up | right | down | left) & !whole
+    })
 }
 
 /// Whether the coarser grid joins all that centre `k` of odd `row` ties together by a short way around.
@@ -225,8 +219,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn one_pass_finds_all_doubtful_centres() {
+    fn all_doubtful_centres_are_found() {
         let (weights, mut found) = (Weights::ragged([0.0, 0.0, 0.3, 0.7, 1.0, -0.5]), 0);
+        let bits = EdgeBits::of(&weights);
         for row in (1..40).step_by(2) {
             let cells = CellRow::new(&weights, row);
             let slow = |&k: &usize| {
@@ -235,7 +230,7 @@ mod tests {
                 lacks_an_edge && cells.rim(k).is_doubtful()
             };
             let doubtful: Vec<usize> = (0..weights.grid.half()).filter(slow).collect();
-            assert_eq!(doubtful_in_row(&weights, row), doubtful);
+            assert_eq!(doubtful_in_row(&weights, &bits, row), doubtful);
             found += doubtful.len();
         }
         assert!(found > 50, "{found}");

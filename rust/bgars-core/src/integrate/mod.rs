@@ -15,6 +15,7 @@ mod coarsen;
 mod components;
 mod conjugate_gradient;
 mod detours;
+mod edge_bits;
 mod edges;
 mod fill;
 mod graph;

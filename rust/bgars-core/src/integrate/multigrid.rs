@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::checkerboard::{Grid, Weights};
 use super::coarsen::coarsen;
+use super::edge_bits::EdgeBits;
 use super::fill::fill_corners;
 use super::graph::{GraphCycle, GraphVectors};
 use super::lost::{Lost, doubtful_centres};
@@ -63,8 +64,8 @@ impl LevelVectors {
 }
 
 impl<'a> Multigrid<'a> {
-    /// Coarsens `finest` as far as grids go, and from there as a graph.
-    pub fn new(finest: &'a Weights) -> Self {
+    /// Coarsens `finest`, which has the edges of `bits`, as far as grids go, and from there as a graph.
+    pub fn new(finest: &'a Weights, mut bits: EdgeBits) -> Self {
         let mut levels: Vec<Weights> = Vec::new();
         let mut strays = Vec::new();
         let mut stray_count = 0;
@@ -74,7 +75,7 @@ impl<'a> Multigrid<'a> {
             if pixels <= DIRECT_PIXELS {
                 break;
             }
-            let doubtful = doubtful_centres(weights);
+            let doubtful = doubtful_centres(weights, &bits);
             // Where detours are the rule, they are no longer short and wide.
             if doubtful.len() > pixels / HOPELESS {
                 // A grid that is nearly all lanes is no good neighbour for the strays of the one before.
@@ -94,9 +95,10 @@ impl<'a> Multigrid<'a> {
                 lost.add_corners(weights, &coarser);
             }
             strays.push(Strays::new(weights, &coarser, &lost));
-            fill_corners(&mut coarser);
+            bits = fill_corners(&mut coarser);
             levels.push(coarser);
         }
+        drop(bits);
         let weights: Vec<&Weights> = std::iter::once(finest).chain(&levels).collect();
         let graph = GraphCycle::new(&weights, &strays);
         Self { finest, levels, strays, graph }
@@ -257,8 +259,8 @@ mod tests {
             let normals = [0.0, 0.0, 1.0].repeat(mask.len());
             let field = Field { normals: &normals, mask: &mask, weights: None, regions: None, width: SIDE };
             let (mut weights, _) = assemble(field, Difference::Trapezoid);
-            fill_corners(&mut weights);
-            let multigrid = Multigrid::new(&weights);
+            let bits = fill_corners(&mut weights);
+            let multigrid = Multigrid::new(&weights, bits);
             let mut vectors = multigrid.vectors();
             let half = weights.grid.half();
             let mut b = vec![0.0; weights.grid.half_pixels()];

@@ -42,30 +42,32 @@ impl FieldRow {
     fn load(&mut self, field: Field<'_>, unit: f64, row: usize) {
         let span = row * field.width..(row + 1) * field.width;
         let mask = &field.mask[span.clone()];
-        self.trust.clear();
-        match field.weights {
-            Some(weights) => {
-                let roots = weights[span.clone()].iter().map(|&weight| (f64::from(weight) * unit).sqrt());
-                self.trust.extend(roots.zip(mask).map(|(root, &used)| if used { root } else { 0.0 }));
-            }
-            None => self.trust.extend(mask.iter().map(|&used| f64::from(u8::from(used)))),
-        }
         let [n_x, n_y] = &mut self.along;
         for component in [&mut *n_x, n_y, &mut self.n_z] {
             component.resize(mask.len(), 0.0);
         }
-        split_normals(&field.normals[span.start * 3..span.end * 3], mask, [n_x, n_y, &mut self.n_z]);
+        self.trust.resize(mask.len(), 0.0);
+        let normals = &field.normals[span.start * 3..span.end * 3];
+        split_normals(normals, mask, [n_x, n_y, &mut self.n_z], &mut self.trust);
+        if let Some(weights) = field.weights {
+            for ((trust, &weight), &used) in self.trust.iter_mut().zip(&weights[span]).zip(mask) {
+                *trust = if used { (f64::from(weight) * unit).sqrt() } else { 0.0 };
+            }
+        }
     }
 }
 
-/// The components of a row of normals.
+/// The components of a row of normals, and 1 in the mask.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn split_normals(normals: &[f32], mask: &[bool], [n_x, n_y, n_z]: [&mut [f32]; 3]) {
+fn split_normals(normals: &[f32], mask: &[bool], [n_x, n_y, n_z]: [&mut [f32]; 3], inside: &mut [f64]) {
     let (normals, n) = (normals.as_chunks::<3>().0, mask.len());
     let (normals, n_x, n_y, n_z) = (&normals[..n], &mut n_x[..n], &mut n_y[..n], &mut n_z[..n]);
     for k in 0..n {
         let [x, y, z] = normals[k];
         (n_x[k], n_y[k], n_z[k]) = if mask[k] { (x, y, z) } else { (0.0, 0.0, 1.0) };
+    }
+    for (inside, &used) in inside.iter_mut().zip(mask) {
+        *inside = f64::from(u8::from(used));
     }
 }
 
@@ -78,12 +80,13 @@ impl EdgeRow {
     ///
     /// `n_z^2` is the weight that the paper's rows `n_z dz = -n_x` imply.
     fn join(&mut self, a: Ends<'_>, b: Ends<'_>, sign: f64, difference: Difference, lead_is_a: bool) {
-        let (share_a, share_b) = match (difference, lead_is_a) {
-            (Difference::Trapezoid, _) => (0.5, 0.5),
-            (Difference::Forward, true) => (1.0, 0.0),
-            (Difference::Forward, false) => (0.0, 1.0),
+        let normals = match (difference, lead_is_a) {
+            (Difference::Trapezoid, _) => [a, b],
+            // The mean of a normal with itself.
+            (Difference::Forward, true) => [a, a],
+            (Difference::Forward, false) => [b, b],
         };
-        weigh(a, b, [share_a, share_b], sign, &mut self.weight, &mut self.push);
+        weigh(normals, [a.2, b.2], sign, &mut self.weight, &mut self.push);
     }
 
     /// Takes away the edges between regions: from pixel k of the image to pixel k + `stride`, k counted from `first`.
@@ -98,20 +101,20 @@ impl EdgeRow {
     }
 }
 
-/// Weight and push of the edges between the pixels of two rows; `shares` are those of their normals in an edge's.
+/// Weight and push of the edges between the pixels of two rows, from the mean of two rows of normals.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn weigh(a: Ends<'_>, b: Ends<'_>, shares: [f64; 2], sign: f64, weight: &mut [f32], push: &mut [f64]) {
-    let edges = a.2.len().min(b.2.len());
-    let [a_along, a_z, b_along, b_z] = [a.0, a.1, b.0, b.1].map(|values| &values[..edges]);
-    let [a_trust, b_trust] = [a.2, b.2].map(|values| &values[..edges]);
+fn weigh([c, d]: [Ends<'_>; 2], trust: [&[f64]; 2], sign: f64, weight: &mut [f32], push: &mut [f64]) {
+    let edges = trust[0].len().min(trust[1].len());
+    let [c_along, c_z, d_along, d_z] = [c.0, c.1, d.0, d.1].map(|values| &values[..edges]);
+    let [a_trust, b_trust] = trust.map(|values| &values[..edges]);
     let (weight, push) = (&mut weight[..edges], &mut push[..edges]);
-    let [share_a, share_b] = shares;
     for k in 0..edges {
-        let along = share_a * f64::from(a_along[k]) + share_b * f64::from(b_along[k]);
-        let n_z = greater(share_a * f64::from(a_z[k]) + share_b * f64::from(b_z[k]), MIN_N_Z);
-        let trust = a_trust[k] * b_trust[k];
-        weight[k] = (trust * n_z * n_z) as f32;
-        push[k] = -sign * trust * n_z * along;
+        // Twice the means; halves of them change no digit.
+        let along = f64::from(c_along[k]) + f64::from(d_along[k]);
+        let n_z = greater(f64::from(c_z[k]) + f64::from(d_z[k]), 2.0 * MIN_N_Z);
+        let trusted = a_trust[k] * b_trust[k] * n_z;
+        weight[k] = (0.25 * (trusted * n_z)) as f32;
+        push[k] = (-0.25 * sign) * (trusted * along);
     }
 }
 

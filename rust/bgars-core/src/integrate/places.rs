@@ -1,6 +1,6 @@
 //! Single pixels of a checkerboard, for the few places where rows are not walked along.
 
-use super::checkerboard::{LANES, Weights};
+use super::checkerboard::Weights;
 
 /// Pixel k of its colour in a row.
 pub(super) type Place = (isize, usize);
@@ -59,33 +59,4 @@ pub(super) fn ties(weights: &Weights, red: Place, out: &mut Vec<(Place, f64)>) {
         Some(tie) => tie.1 += weight,
         None => out.push((other, weight)),
     });
-}
-
-/// Where values are above zero: few are.
-pub(super) fn above_zero(values: &[f32]) -> Vec<usize> {
-    let mut places = Vec::new();
-    for (block, values) in values.chunks(LANES).enumerate() {
-        // Counted, as the compiler makes vectors of that.
-        if values.iter().map(|&value| u32::from(value > 0.0)).sum::<u32>() > 0 {
-            let above = values.iter().enumerate().filter(|value| *value.1 > 0.0);
-            places.extend(above.map(|value| block * LANES + value.0));
-        }
-    }
-    places
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn values_above_zero_are_found_in_every_block() {
-        let mut values = [0.0; 3 * LANES + 5];
-        let places = [0, LANES - 1, LANES, 3 * LANES + 4];
-        for place in places {
-            values[place] = 1e-30;
-        }
-        values[2 * LANES] = -1.0;
-        assert_eq!(above_zero(&values), places);
-    }
 }

@@ -2,7 +2,6 @@
 
 use std::ops::{Add, Mul};
 
-use super::checkerboard::LANES;
 use crate::memory::Reused;
 
 use crate::vector::{One, Packed};
@@ -46,24 +45,10 @@ macro_rules! real {
 real!(f32, Avx512, Avx2, Portable);
 real!(f64, Avx512Double, Avx2Double, PortableDouble);
 
-/// The lesser of two numbers that are none of them NaN: one instruction, where `min` takes three.
-#[inline(always)]
-pub(super) fn lesser<T: PartialOrd>(a: T, b: T) -> T {
-    if a < b { a } else { b }
-}
-
-/// The greater of two, likewise.
+/// The greater of two numbers that are none of them NaN: one instruction, where `max` takes three.
 #[inline(always)]
 pub(super) fn greater<T: PartialOrd>(a: T, b: T) -> T {
     if a > b { a } else { b }
-}
-
-/// Sum of a vector's numbers.
-#[inline(always)]
-pub(super) fn sum_of<V: Packed<Number: Real>>(vector: V) -> f64 {
-    let mut numbers = [V::Number::default(); LANES];
-    vector.write(&mut numbers);
-    numbers.iter().map(|&number| number.to_f64()).sum()
 }
 
 /// Calls `function::<.., V>(..)` with the vectors `V` of a type of numbers in brackets, or of several that the enclosing

@@ -4,7 +4,7 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::checkerboard::{BAND_ROWS, Grid, Weights, join_row};
-use super::real::{Real, on_vectors, sum_of};
+use super::real::{Real, on_vectors};
 use super::ring::Ring;
 use super::spans::Span;
 use crate::vector::Packed;
@@ -147,7 +147,7 @@ pub(super) fn multiply_row<V: Packed<Number = f64>>(
         product.put(&mut products[k]);
         energy = x.times_plus(product, energy);
     }
-    sum_of(energy)
+    energy.sum()
 }
 
 /// Sum in eight lanes, so that it vectorises and has one order.
@@ -208,7 +208,7 @@ fn eliminate_band_with<V: Packed<Number: Real>>(
                 of_row = black.times_plus(solved, of_row);
             }
             if (first..end).contains(&row) {
-                energy += sum_of(of_row);
+                energy += of_row.sum();
             }
         }
         let row = row - 1;

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::checkerboard::{BAND_ROWS, Grid, Weights};
 use super::edges::Colours;
-use super::real::{Real, on_vectors, sum_of};
+use super::real::{Real, on_vectors};
 use super::reduction::load;
 use super::ring::Ring;
 use super::spans::Span;
@@ -149,7 +149,7 @@ fn settle_band_with<V: Packed<Number = f64>>(
             rest.put(&mut out[k]);
             square = rest.times_plus(rest, square);
         }
-        squares += sum_of(square);
+        squares += square.sum();
     }
     squares
 }

@@ -107,35 +107,50 @@ pub fn integrate_into(
     let runs = Runs::new(mask, field.regions, width);
     let edges = FieldEdges::new(field, params.difference);
     let (mut weights, right) = edges.assemble();
-    fill_corners(&mut weights);
+    let bits = fill_corners(&mut weights);
     let scale = (square_sum(&right.reds) + square_sum(&right.blacks)).sqrt();
     let again = |rows: Range<usize>, colours: [&mut [f64]; 2]| edges.right_side(rows, colours);
     let Solution { reds, blacks, iterations, residual, solved } =
-        conjugate_gradients(&weights, Right::Kept(right, Some(&again)), None, scale, params, on_progress)?;
+        conjugate_gradients(&weights, bits, Right::Kept(right, Some(&again)), None, scale, params, on_progress)?;
     if !solved {
         return Err(Error::NoConvergence { iterations, residual, tolerance: params.relative_tolerance });
     }
     let half = weights.grid.half();
     let fill = |row: usize, values: &mut [f64]| {
         let span = row * half..(row + 1) * half;
-        join_row(row, &reds[span.clone()], &blacks[span], values);
+        join_whole_row(row, &reds[span.clone()], &blacks[span], values);
     };
     let means = runs.means(fill);
     height_px.par_chunks_mut(width).enumerate().for_each_init(
         || vec![0.0; width],
         |values, (row, height_px)| {
             fill(row, values);
-            height_px.fill(f32::NAN);
+            let mut done = 0;
             for (cols, component) in runs.row(row) {
                 let mean = means[component];
-                for (height_px, value) in height_px[cols.clone()].iter_mut().zip(&values[cols]) {
-                    *height_px = (value - mean) as f32;
-                }
+                height_px[done..cols.start].fill(f32::NAN);
+                done = cols.end;
+                center(&values[cols.clone()], mean, &mut height_px[cols]);
             }
+            height_px[done..].fill(f32::NAN);
         },
     );
     runs.write_labels(labels);
     Ok(Fit { components: runs.components, iterations, residual })
+}
+
+/// [`join_row`], compiled for the processor at hand.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn join_whole_row(row: usize, reds: &[f64], blacks: &[f64], values: &mut [f64]) {
+    join_row(row, reds, blacks, values);
+}
+
+/// Values less their mean.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn center(values: &[f64], mean: f64, out: &mut [f32]) {
+    for (out, value) in out.iter_mut().zip(values) {
+        *out = (value - mean) as f32;
+    }
 }
 
 /// The mask without the pixels of weight zero, of which nothing is known; `None` where there are none.

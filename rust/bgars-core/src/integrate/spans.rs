@@ -2,9 +2,8 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
-use super::checkerboard::{BAND_ROWS, Grid, LANES, Weights};
+use super::checkerboard::{BAND_ROWS, Grid, LANES};
+use super::edge_bits::EdgeBits;
 use crate::vector::Packed;
 
 /// Rows above and below a band that its kernels compute for themselves.
@@ -43,10 +42,10 @@ impl Spans {
     }
 
     /// All pixels with edges, virtual ones included.
-    pub fn of_edges(weights: &Weights) -> Self {
-        let Grid { height, .. } = weights.grid;
-        let (half, lanes) = (weights.grid.half(), if weights.grid.has_lanes() { LANES } else { 1 });
-        let reds: Vec<_> = (0..height).into_par_iter().map(|row| reds_with_edges(weights, row)).collect();
+    pub fn of_edges(grid: Grid, bits: &EdgeBits) -> Self {
+        let Grid { height, .. } = grid;
+        let (half, lanes) = (grid.half(), if grid.has_lanes() { LANES } else { 1 });
+        let reds: Vec<_> = (0..height).map(|row| reds_with_edges(bits, row)).collect();
         let span = |band: usize| {
             // The black at the far end of an edge lies in a row of its own, or one further left or right.
             let first = (band * BAND_ROWS).saturating_sub(HALO_ROWS + 1);
@@ -55,7 +54,7 @@ impl Spans {
             let Range { start, end } = hull.map_or(0..0, |reds| reds.start.saturating_sub(1)..(reds.end + 1).min(half));
             Span { start: start / lanes * lanes, end: end.next_multiple_of(lanes) }
         };
-        Self { bands: (0..height.div_ceil(BAND_ROWS)).map(span).collect(), grid: weights.grid }
+        Self { bands: (0..height.div_ceil(BAND_ROWS)).map(span).collect(), grid }
     }
 
     /// The span of a band.
@@ -95,24 +94,15 @@ impl Spans {
 }
 
 /// From the first to the last red with an edge; `None` in a row without any.
-fn reds_with_edges(weights: &Weights, row: usize) -> Option<Range<usize>> {
-    let (row, half) = (row as isize, weights.grid.half());
-    let sides = weights.row(row);
-    // All bits but the signs, which zeros may have.
-    let bits = |side: &[f32]| side.iter().fold(0, |bits, weight| bits | weight.to_bits()) << 1;
-    let has_edges = |reds: &Range<usize>| sides.iter().any(|side| bits(&side[1 + reds.start..=reds.end]) != 0);
-    // Blocks first, which are compared at once, then the reds of the first and the last.
-    let block = |index: usize| index * LANES..((index + 1) * LANES).min(half);
-    let mut blocks = (0..half.div_ceil(LANES)).map(block).filter(has_edges);
-    let mut first = blocks.next()?;
-    let mut last = blocks.next_back().unwrap_or(first.clone());
-    let is_used = |red: &usize| has_edges(&(*red..red + 1));
-    Some(first.find(is_used)?..last.rfind(is_used)? + 1)
+fn reds_with_edges(bits: &EdgeBits, row: usize) -> Option<Range<usize>> {
+    let row = bits.any(row as isize);
+    bits.hull(|word| row.any(word))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::integrate::checkerboard::Weights;
 
     /// No edges but those of some reds to the right.
     fn spans(grid: Grid, reds: &[(usize, usize)]) -> Vec<(usize, usize)> {
@@ -120,7 +110,8 @@ mod tests {
         for &(row, k) in reds {
             weights.set_red(row, k, [0.0, 1.0, 0.0, 0.0]);
         }
-        Spans::of_edges(&weights).bands.iter().map(|span| (span.start, span.end)).collect()
+        weights.find_spans();
+        weights.spans.bands.iter().map(|span| (span.start, span.end)).collect()
     }
 
     #[test]

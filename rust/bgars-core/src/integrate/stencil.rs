@@ -17,7 +17,7 @@ impl<V: Packed> Sides<'_, V> {
     /// The weights of vector `k`; 0 for virtual edges, which are no part of the system.
     #[inline(always)]
     fn at(&self, side: usize, k: usize) -> V {
-        V::widen(&self.0[side][k]).positive_part()
+        V::widen_positive(&self.0[side][k])
     }
 
     /// Sums of the weights.

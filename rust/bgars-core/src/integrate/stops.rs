@@ -5,83 +5,86 @@
 //! corner, it gets its edge to the other by the path through the centre. The tie is such that the coarser grid's two edges
 //! conduct, one after the other, what the lane does.
 
-use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::checkerboard::{DOWN, LEFT, PaddedRow, RIGHT, UP, Weights};
+use super::checkerboard::{DOWN, Grid, LEFT, RIGHT, UP, Weights};
 use super::coarsen::series;
+use super::edge_bits::{CellBits, EdgeBits};
 use super::fill::{Around, Tied};
-use super::lost::{CellRow, Rim, cells_around};
-use super::places::{Place, above_zero};
-use super::real::{greater, lesser};
+use super::lost::{Rim, cells_around};
+use super::places::Place;
 
 /// Most that a stop has in a black: all of it where the lane ends in a much stronger edge, but that would take an endless tie.
 const MAX_SHARE: f32 = 0.999;
 
 /// The corners that become stops, and their ties.
-pub(super) fn stops(weights: &Weights) -> Tied {
-    (0..weights.grid.height.div_ceil(2))
-        .into_par_iter()
-        .flat_map_iter(|coarse_row| {
-            let row = 2 * coarse_row;
-            let candidates = beside_lanes(weights, row as isize).into_iter();
-            candidates.filter_map(move |k| stop(weights, (row as isize, k)).map(|ties| (row, k, ties)))
-        })
-        .collect()
+pub(super) fn stops(weights: &Weights, bits: &EdgeBits) -> Tied {
+    let rows = (0..weights.grid.height).into_par_iter().step_by(2);
+    rows.flat_map_iter(|row| {
+        let ties = move |k: usize| stop(weights, (row as isize, k)).map(|ties| (row, k, ties));
+        beside_lanes(weights.grid, bits, row as isize).into_iter().filter_map(ties)
+    })
+    .collect()
 }
 
 /// The corners of a row without edges that have a lane in a cell beside them.
-fn beside_lanes(weights: &Weights, row: isize) -> Vec<usize> {
-    let mut lanes = vec![0.0; weights.grid.half()];
-    if !find_free(weights.row(row), &mut lanes) {
-        return Vec::new();
-    }
-    for (beside, corners) in [(row - 1, [3, 2]), (row + 1, [0, 1])] {
-        if weights.grid.contains(beside) {
-            find_lanes(&CellRow::new(weights, beside), corners, &mut lanes);
+fn beside_lanes(grid: Grid, bits: &EdgeBits, row: isize) -> Vec<usize> {
+    let here = bits.any(row);
+    let cells = |row: isize, corners: [usize; 2]| {
+        grid.contains(row).then(|| LaneBits { any: bits.any_around(row), real: bits.real_around(row), corners })
+    };
+    let (above, below) = (cells(row - 1, [3, 2]), cells(row + 1, [0, 1]));
+    bits.places(|word| {
+        let free = !here.any(word);
+        if free == 0 {
+            return 0;
         }
-    }
-    above_zero(&lanes)
+        let lanes = |cells: &Option<LaneBits<'_>>| cells.as_ref().map_or(0, |cells| cells.past_corners(word));
+        free & (lanes(&above) | lanes(&below))
+    })
 }
 
-/// Sets corners without edges to 0 and the others to minus infinity; true if there are any of the first.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn find_free(edges: [PaddedRow<'_, f32>; 4], free: &mut [f32]) -> bool {
-    let n = free.len();
-    let [left, right, up, down] = edges.map(|side| &side[1..=n]);
-    let mut any = false;
-    for k in 0..n {
-        let strongest = greater(greater(left[k].abs(), right[k].abs()), greater(up[k].abs(), down[k].abs()));
-        free[k] = if strongest == 0.0 { 0.0 } else { f32::NEG_INFINITY };
-        any |= strongest == 0.0;
+/// Where lanes cross the cells of a row that has the corners on one side.
+struct LaneBits<'a> {
+    any: CellBits<'a>,
+    real: CellBits<'a>,
+    /// What number corner k is in its own cell, and in the one before.
+    corners: [usize; 2],
+}
+
+impl LaneBits<'_> {
+    /// The corners that a lane leads past.
+    #[inline(always)]
+    fn past_corners(&self, word: usize) -> u64 {
+        let [own, next] = self.corners;
+        let carried = if word > 0 { self.past(next, word - 1) >> (u64::BITS - 1) } else { 0 };
+        self.past(own, word) | self.past(next, word) << 1 | carried
     }
-    any
+
+    /// The cells that a lane crosses past their corner `own`.
+    #[inline(always)]
+    fn past(&self, own: usize, word: usize) -> u64 {
+        let spokes = self.real.spokes(word);
+        if spokes[0] & spokes[2] | spokes[1] & spokes[3] == 0 {
+            return 0;
+        }
+        let (rims, real_rims) = (self.any.rims(word), self.real.rims(word));
+        let mut lanes = 0;
+        for (side, end) in lanes_past(own) {
+            let across = (side + 2) % 4;
+            // The fourth corner of the cell must not hang on the lane.
+            let lane = rims[side][end] & spokes[side] & spokes[across] & rims[across][end];
+            lanes |= lane & !real_rims[across][1 - end];
+        }
+        lanes
+    }
 }
 
 /// The lanes that may cross a cell past its corner `own`: the side of the rim that each comes by, and the end of this side that it
 /// comes from.
+#[inline(always)]
 fn lanes_past(own: usize) -> [(usize, usize); 2] {
     [(own, 1), ((own + 3) % 4, 0)]
-}
-
-/// Raises `lanes` by the weakest edge of each lane past a corner, through the cells of a row of which it is number `first` of its
-/// own and `second` of the one before.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn find_lanes(cells: &CellRow<'_>, [first, second]: [usize; 2], lanes: &mut [f32]) {
-    for (own, skip) in [(first, 0), (second, 1)] {
-        for (side, end) in lanes_past(own) {
-            let across = (side + 2) % 4;
-            let lanes = &mut lanes[skip..];
-            let n = lanes.len();
-            let [a, b] = [&cells.rims[side][end][..n], &cells.spokes[side][..n]];
-            let [c, d] = [&cells.spokes[across][..n], &cells.rims[across][end][..n]];
-            let fourth = &cells.rims[across][1 - end][..n];
-            for k in 0..n {
-                let weakest = lesser(lesser(a[k].abs(), b[k]), lesser(c[k], d[k].abs()));
-                lanes[k] += if fourth[k] > 0.0 { 0.0 } else { greater(weakest, 0.0) };
-            }
-        }
-    }
 }
 
 /// The ties of a corner to the left, right, up and down if it is to be a stop.
@@ -149,16 +152,16 @@ fn is_free(weights: &Weights, (row, k): Place) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::integrate::checkerboard::Grid;
     use crate::integrate::coarsen::{coarsen, conduct};
     use crate::integrate::fill::fill_corners;
     use crate::integrate::lost::{Lost, doubtful_centres};
 
     #[test]
-    fn two_passes_find_all_stops() {
+    fn all_stops_are_found() {
         let (weights, mut found) = (Weights::ragged([0.0, 0.0, 0.0, 0.0, 0.3, 0.7]), 0);
+        let bits = EdgeBits::of(&weights);
         for row in (0..40).step_by(2) {
-            let beside = beside_lanes(&weights, row);
+            let beside = beside_lanes(weights.grid, &bits, row);
             for k in (0..weights.grid.half()).filter(|&k| stop(&weights, (row, k)).is_some()) {
                 assert!(beside.contains(&k), "corner {k} of row {row}");
                 found += 1;
@@ -196,7 +199,7 @@ mod tests {
                 let lanes = lanes.map(|lane| (lane, 1e-5)).into_iter().chain(far_apart.map(|lane| (lane, 0.05)));
                 for (lane, most) in lanes {
                     let (mut weights, ends) = single_lane(own, past, lane);
-                    fill_corners(&mut weights);
+                    let bits = fill_corners(&mut weights);
                     let [mut right, mut down, mut elsewhere] = [[0.0; 32], [0.0; 32], [0.0; 32]];
                     conduct(&weights, 3, &mut right, &mut down);
                     let [top, left, next] = [right[8], down[8], down[9]];
@@ -209,7 +212,9 @@ mod tests {
                     let expected = 1.0 / lane.iter().map(|edge| 1.0 / edge).sum::<f32>();
                     let error = (conducted / expected - 1.0).abs();
                     assert!(error < most, "{own}, {past:?}, {lane:?}: {conducted} for {expected}");
-                    assert!(Lost::centres(&doubtful_centres(&weights), &weights, &coarsen(&weights)).reds.is_empty());
+                    assert!(
+                        Lost::centres(&doubtful_centres(&weights, &bits), &weights, &coarsen(&weights)).reds.is_empty()
+                    );
                 }
             }
         }
@@ -220,7 +225,7 @@ mod tests {
         for lane in [[1e-30, 1e30, 1.0, 1.0], [1e30, 1.0, 1.0, 1e-30], [1.0, 1e30, 1e30, 1e-30], [1e-44, 1.0, 1.0, 1.0]]
         {
             let (weights, _) = single_lane(0, (0, 1), lane);
-            let ties = stops(&weights).into_iter().flat_map(|stop| stop.2);
+            let ties = stops(&weights, &EdgeBits::of(&weights)).into_iter().flat_map(|stop| stop.2);
             assert!(ties.into_iter().all(f32::is_finite), "{lane:?}");
         }
     }
@@ -231,6 +236,6 @@ mod tests {
         // Both corners beside the lane have edges of their own, away from it.
         weights.set_red(6, 8, [1.0, 0.0, 0.0, 0.0]);
         weights.set_red(8, 9, [0.0, 1.0, 0.0, 0.0]);
-        assert!(stops(&weights).is_empty());
+        assert!(stops(&weights, &EdgeBits::of(&weights)).is_empty());
     }
 }

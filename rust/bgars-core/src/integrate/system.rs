@@ -7,6 +7,7 @@ use faer::matrix_free::{LinOp, Precond};
 use faer::{MatMut, MatRef, Par};
 
 use super::checkerboard::Weights;
+use super::edge_bits::EdgeBits;
 use super::fill::fill_corners;
 use super::multigrid::{Multigrid, Vectors};
 use super::operator::{Field, assemble};
@@ -69,7 +70,7 @@ impl System {
     /// One multigrid V-cycle, an approximation of the inverse of `S`.
     #[must_use]
     pub fn preconditioner(&self) -> VCycle<'_> {
-        let multigrid = Multigrid::new(&self.weights);
+        let multigrid = Multigrid::new(&self.weights, EdgeBits::of(&self.weights));
         VCycle { vectors: Mutex::new(multigrid.vectors()), multigrid, size: self.right_side.len() }
     }
 }

@@ -1,12 +1,13 @@
 //! Eight floats of AVX2 with fused products.
 
 use std::arch::x86_64::{
-    __m256, __m256i, _CMP_GT_OQ, _mm_cvtsi64_si128, _mm256_add_ps, _mm256_alignr_epi8, _mm256_and_ps, _mm256_and_si256,
-    _mm256_andnot_ps, _mm256_blend_ps, _mm256_blendv_ps, _mm256_castps128_ps256, _mm256_castsi256_ps, _mm256_cmp_ps,
-    _mm256_cmpeq_epi32, _mm256_cvtepi32_ps, _mm256_cvtepu8_epi32, _mm256_cvtepu16_epi32, _mm256_div_ps,
-    _mm256_fmadd_ps, _mm256_fmsub_ps, _mm256_insertf128_ps, _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_ps,
-    _mm256_permute2f128_ps, _mm256_permutevar8x32_ps, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setzero_ps,
-    _mm256_shuffle_ps, _mm256_sqrt_ps, _mm256_srli_epi32, _mm256_sub_ps, _mm256_unpackhi_ps, _mm256_unpacklo_ps,
+    __m128, __m256, __m256i, _CMP_GT_OQ, _mm_cvtsi64_si128, _mm256_add_pd, _mm256_add_ps, _mm256_alignr_epi8,
+    _mm256_and_ps, _mm256_and_si256, _mm256_andnot_ps, _mm256_blend_ps, _mm256_blendv_ps, _mm256_castps128_ps256,
+    _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi32, _mm256_cvtepi32_ps, _mm256_cvtepu8_epi32,
+    _mm256_cvtepu16_epi32, _mm256_cvtps_pd, _mm256_div_ps, _mm256_fmadd_ps, _mm256_fmsub_ps, _mm256_insertf128_ps,
+    _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_permute2f128_ps, _mm256_permutevar8x32_ps,
+    _mm256_set1_epi32, _mm256_set1_ps, _mm256_setzero_ps, _mm256_shuffle_ps, _mm256_sqrt_ps, _mm256_srli_epi32,
+    _mm256_sub_ps, _mm256_unpackhi_ps, _mm256_unpacklo_ps,
 };
 
 use super::packed::chunked;
@@ -103,8 +104,8 @@ impl Packed for Avx2 {
     }
 
     #[inline(always)]
-    fn positive_part(self) -> Self {
-        Self(here!(_mm256_max_ps(self.0, _mm256_setzero_ps())))
+    fn widen_positive(from: &[f32; WIDTH]) -> Self {
+        Self(here!(_mm256_max_ps(Self::load(from).0, _mm256_setzero_ps())))
     }
 
     #[inline(always)]
@@ -116,6 +117,13 @@ impl Packed for Avx2 {
     fn inverse(self) -> Self {
         let above = here!(_mm256_cmp_ps::<_CMP_GT_OQ>(self.0, _mm256_setzero_ps()));
         Self(here!(_mm256_and_ps(above, _mm256_div_ps(_mm256_set1_ps(1.0), self.0))))
+    }
+
+    #[inline(always)]
+    fn sum(self) -> f64 {
+        let [lower, upper] = bytemuck::must_cast::<__m256, [__m128; 2]>(self.0);
+        let sums: [f64; 4] = bytemuck::must_cast(here!(_mm256_add_pd(_mm256_cvtps_pd(lower), _mm256_cvtps_pd(upper))));
+        (sums[0] + sums[2]) + (sums[1] + sums[3])
     }
 }
 

@@ -1,12 +1,13 @@
 //! Sixteen floats of AVX-512.
 
 use std::arch::x86_64::{
-    __m512, __m512i, _CMP_GT_OQ, _mm512_abs_ps, _mm512_add_ps, _mm512_alignr_epi32, _mm512_castps128_ps512,
-    _mm512_cmp_ps_mask, _mm512_cvtepi32_ps, _mm512_cvtepu8_epi32, _mm512_cvtepu16_epi32, _mm512_div_ps,
-    _mm512_fmadd_ps, _mm512_fmsub_ps, _mm512_fnmadd_ps, _mm512_insertf32x4, _mm512_mask_blend_ps, _mm512_maskz_div_ps,
-    _mm512_maskz_mov_ps, _mm512_max_ps, _mm512_mul_ps, _mm512_permutex2var_ps, _mm512_permutexvar_ps,
-    _mm512_rsqrt14_ps, _mm512_set1_epi32, _mm512_set1_ps, _mm512_setzero_ps, _mm512_shuffle_ps, _mm512_sqrt_ps,
-    _mm512_srli_epi32, _mm512_stream_ps, _mm512_sub_ps, _mm512_test_epi32_mask, _mm512_unpackhi_ps, _mm512_unpacklo_ps,
+    __m256, __m512, __m512i, _CMP_GT_OQ, _mm512_abs_ps, _mm512_add_pd, _mm512_add_ps, _mm512_alignr_epi32,
+    _mm512_castps128_ps512, _mm512_cmp_ps_mask, _mm512_cvtepi32_ps, _mm512_cvtepu8_epi32, _mm512_cvtepu16_epi32,
+    _mm512_cvtps_pd, _mm512_div_ps, _mm512_fmadd_ps, _mm512_fmsub_ps, _mm512_fnmadd_ps, _mm512_insertf32x4,
+    _mm512_mask_blend_ps, _mm512_maskz_div_ps, _mm512_maskz_mov_ps, _mm512_max_ps, _mm512_mul_ps,
+    _mm512_permutex2var_ps, _mm512_permutexvar_ps, _mm512_reduce_add_pd, _mm512_rsqrt14_ps, _mm512_set1_epi32,
+    _mm512_set1_ps, _mm512_setzero_ps, _mm512_shuffle_ps, _mm512_sqrt_ps, _mm512_srli_epi32, _mm512_stream_ps,
+    _mm512_sub_ps, _mm512_test_epi32_mask, _mm512_unpackhi_ps, _mm512_unpacklo_ps,
 };
 
 use super::packed::chunked;
@@ -90,8 +91,8 @@ impl Packed for Avx512 {
     }
 
     #[inline(always)]
-    fn positive_part(self) -> Self {
-        Self(here!(_mm512_max_ps(self.0, _mm512_setzero_ps())))
+    fn widen_positive(from: &[f32; WIDTH]) -> Self {
+        Self(here!(_mm512_max_ps(Self::load(from).0, _mm512_setzero_ps())))
     }
 
     #[inline(always)]
@@ -104,6 +105,12 @@ impl Packed for Avx512 {
     fn inverse(self) -> Self {
         let above = here!(_mm512_cmp_ps_mask::<_CMP_GT_OQ>(self.0, _mm512_setzero_ps()));
         Self(here!(_mm512_maskz_div_ps(above, _mm512_set1_ps(1.0), self.0)))
+    }
+
+    #[inline(always)]
+    fn sum(self) -> f64 {
+        let [lower, upper] = bytemuck::must_cast::<__m512, [__m256; 2]>(self.0);
+        here!(_mm512_reduce_add_pd(_mm512_add_pd(_mm512_cvtps_pd(lower), _mm512_cvtps_pd(upper))))
     }
 }
 

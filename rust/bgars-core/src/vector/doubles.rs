@@ -1,11 +1,12 @@
 //! Vectors of `f64` by their intrinsics: what linear algebra needs.
 
 use std::arch::x86_64::{
-    __m256d, __m512d, _CMP_GT_OQ, _mm256_add_pd, _mm256_and_pd, _mm256_andnot_pd, _mm256_cmp_pd, _mm256_cvtps_pd,
-    _mm256_div_pd, _mm256_fmadd_pd, _mm256_max_pd, _mm256_mul_pd, _mm256_permute2f128_pd, _mm256_set1_pd,
-    _mm256_setzero_pd, _mm256_shuffle_pd, _mm256_sub_pd, _mm512_abs_pd, _mm512_add_pd, _mm512_alignr_epi64,
-    _mm512_cmp_pd_mask, _mm512_cvtps_pd, _mm512_fmadd_pd, _mm512_maskz_div_pd, _mm512_maskz_mov_pd, _mm512_max_pd,
-    _mm512_mul_pd, _mm512_set1_pd, _mm512_setzero_pd, _mm512_sub_pd,
+    __m256d, __m512d, _CMP_GT_OQ, _mm_max_ps, _mm_setzero_ps, _mm256_add_pd, _mm256_and_pd, _mm256_andnot_pd,
+    _mm256_cmp_pd, _mm256_cvtps_pd, _mm256_div_pd, _mm256_fmadd_pd, _mm256_max_ps, _mm256_mul_pd,
+    _mm256_permute2f128_pd, _mm256_set1_pd, _mm256_setzero_pd, _mm256_setzero_ps, _mm256_shuffle_pd, _mm256_sub_pd,
+    _mm512_abs_pd, _mm512_add_pd, _mm512_alignr_epi64, _mm512_cmp_pd_mask, _mm512_cvtps_pd, _mm512_fmadd_pd,
+    _mm512_maskz_div_pd, _mm512_maskz_mov_pd, _mm512_mul_pd, _mm512_reduce_add_pd, _mm512_set1_pd, _mm512_setzero_pd,
+    _mm512_sub_pd,
 };
 
 use super::packed::chunked;
@@ -30,9 +31,9 @@ macro_rules! here {
 macro_rules! double {
     (
         $(#[$doc:meta])* $vector:ident($raw:ty), $width:literal, $splat:ident, $add:ident, $sub:ident, $mul:ident,
-        $fused:ident, $max:ident, $zero:ident, $convert:ident,
+        $fused:ident, $convert:ident, $floats_max:ident, $floats_zero:ident,
         |$x:ident, $y:ident| after_last_of $after:expr, before_first_of $before:expr,
-        magnitude $magnitude:expr, where_positive $where_positive:expr, inverse $inverse:expr
+        magnitude $magnitude:expr, where_positive $where_positive:expr, inverse $inverse:expr, sum $sum:expr
     ) => {
         $(#[$doc])*
         #[derive(Clone, Copy)]
@@ -68,6 +69,12 @@ macro_rules! double {
         impl Packed for $vector {
             chunked!(f64, $width, |from| Self(here!($convert(bytemuck::must_cast(*from)))));
 
+            /// Half a vector is enough before they are widened.
+            #[inline(always)]
+            fn widen_positive(from: &[f32; $width]) -> Self {
+                Self(here!($convert($floats_max(bytemuck::must_cast(*from), $floats_zero()))))
+            }
+
             #[inline(always)]
             fn after_last_of(self, before: Self) -> Self {
                 let ($x, $y) = (before.0, self.0);
@@ -87,11 +94,6 @@ macro_rules! double {
             }
 
             #[inline(always)]
-            fn positive_part(self) -> Self {
-                Self(here!($max(self.0, $zero())))
-            }
-
-            #[inline(always)]
             fn where_positive(self, other: Self) -> Self {
                 let ($x, $y) = (self.0, other.0);
                 Self(here!($where_positive))
@@ -102,6 +104,12 @@ macro_rules! double {
                 let $x = self.0;
                 Self(here!($inverse))
             }
+
+            #[inline(always)]
+            fn sum(self) -> f64 {
+                let $x = self.0;
+                $sum
+            }
         }
     };
 }
@@ -109,20 +117,25 @@ macro_rules! double {
 double!(
     /// Eight doubles of AVX-512.
     Avx512Double(__m512d), 8, _mm512_set1_pd, _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_fmadd_pd,
-    _mm512_max_pd, _mm512_setzero_pd, _mm512_cvtps_pd,
+    _mm512_cvtps_pd, _mm256_max_ps, _mm256_setzero_ps,
     |x, y| after_last_of bytemuck::must_cast(_mm512_alignr_epi64::<7>(bytemuck::must_cast(y), bytemuck::must_cast(x))),
     before_first_of bytemuck::must_cast(_mm512_alignr_epi64::<1>(bytemuck::must_cast(y), bytemuck::must_cast(x))),
     magnitude _mm512_abs_pd(x),
     where_positive _mm512_maskz_mov_pd(_mm512_cmp_pd_mask::<_CMP_GT_OQ>(y, _mm512_setzero_pd()), x),
-    inverse _mm512_maskz_div_pd(_mm512_cmp_pd_mask::<_CMP_GT_OQ>(x, _mm512_setzero_pd()), _mm512_set1_pd(1.0), x)
+    inverse _mm512_maskz_div_pd(_mm512_cmp_pd_mask::<_CMP_GT_OQ>(x, _mm512_setzero_pd()), _mm512_set1_pd(1.0), x),
+    sum here!(_mm512_reduce_add_pd(x))
 );
 double!(
     /// Four doubles of AVX2 with fused products.
     Avx2Double(__m256d), 4, _mm256_set1_pd, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_fmadd_pd,
-    _mm256_max_pd, _mm256_setzero_pd, _mm256_cvtps_pd,
+    _mm256_cvtps_pd, _mm_max_ps, _mm_setzero_ps,
     |x, y| after_last_of _mm256_shuffle_pd::<ODD_EVEN>(_mm256_permute2f128_pd::<HALVES>(x, y), y),
     before_first_of _mm256_shuffle_pd::<ODD_EVEN>(x, _mm256_permute2f128_pd::<HALVES>(x, y)),
     magnitude _mm256_andnot_pd(_mm256_set1_pd(-0.0), x),
     where_positive _mm256_and_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(y, _mm256_setzero_pd()), x),
-    inverse _mm256_and_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(x, _mm256_setzero_pd()), _mm256_div_pd(_mm256_set1_pd(1.0), x))
+    inverse _mm256_and_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(x, _mm256_setzero_pd()), _mm256_div_pd(_mm256_set1_pd(1.0), x)),
+    sum {
+        let [a, b, c, d]: [f64; 4] = bytemuck::must_cast(x);
+        (a + c) + (b + d)
+    }
 );

@@ -82,8 +82,8 @@ macro_rules! one {
             }
 
             #[inline(always)]
-            fn positive_part(self) -> Self {
-                Self(self.0.max(0.0))
+            fn widen_positive(from: &[f32; 1]) -> Self {
+                Self(Self::widen(from).0.max(0.0))
             }
 
             #[inline(always)]
@@ -94,6 +94,11 @@ macro_rules! one {
             #[inline(always)]
             fn inverse(self) -> Self {
                 Self(if self.0 > 0.0 { 1.0 / self.0 } else { 0.0 })
+            }
+
+            #[inline(always)]
+            fn sum(self) -> f64 {
+                f64::from(self.0)
             }
         }
     };

@@ -21,11 +21,11 @@ pub trait Packed: Arithmetic {
     fn put(self, to: &mut Self::Chunk);
     /// Floats as numbers.
     fn widen(from: &Self::Floats) -> Self;
+    /// The same, 0 where below.
+    fn widen_positive(from: &Self::Floats) -> Self;
 
     /// Without its sign.
     fn magnitude(self) -> Self;
-    /// 0 where below.
-    fn positive_part(self) -> Self;
     /// 0 where `other` is not above 0.
     fn where_positive(self, other: Self) -> Self;
     /// The numbers one place further on: the last of `before`, then all but the last of `self`.
@@ -34,6 +34,8 @@ pub trait Packed: Arithmetic {
     fn before_first_of(self, next: Self) -> Self;
     /// `1 / self`, or 0 where that is not above 0.
     fn inverse(self) -> Self;
+    /// Sum of the numbers.
+    fn sum(self) -> f64;
 }
 
 /// The part of [`Packed`] that only moves numbers.

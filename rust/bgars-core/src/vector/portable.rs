@@ -74,8 +74,8 @@ macro_rules! portable {
             }
 
             #[inline(always)]
-            fn positive_part(self) -> Self {
-                Self(self.0.fast_max($raw::ZERO))
+            fn widen_positive(from: &[f32; $width]) -> Self {
+                Self(Self::widen(from).0.fast_max($raw::ZERO))
             }
 
             #[inline(always)]
@@ -86,6 +86,11 @@ macro_rules! portable {
             #[inline(always)]
             fn inverse(self) -> Self {
                 Self(($raw::ONE / self.0) & self.0.simd_gt($raw::ZERO))
+            }
+
+            #[inline(always)]
+            fn sum(self) -> f64 {
+                self.0.to_array().map(f64::from).iter().sum()
             }
         }
     };

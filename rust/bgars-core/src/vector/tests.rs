@@ -90,7 +90,6 @@ where
     assert_numbers(x * y, &|a, b| a * b);
     assert_numbers(x.times_plus(y, two), &|a, b| a * b + 2.0); // exact for these values
     assert_numbers(y.magnitude(), &|_, b| b.abs());
-    assert_numbers(y.positive_part(), &|_, b| b.max(0.0));
     assert_numbers(x.where_positive(y), &|a, b| if b > 0.0 { a } else { 0.0 });
     let powers: [V::Number; VALUES] = std::array::from_fn(|lane| number([0.0, -4.0, 0.25, 8.0][lane % 4]));
     let mut out = [number(f32::MAX); VALUES];
@@ -98,6 +97,9 @@ where
     for (lane, out) in out[..V::WIDTH].iter().enumerate() {
         assert_eq!(*out, number([0.0, 0.0, 4.0, 0.125][lane % 4]), "{lane}");
     }
+
+    let sum: f32 = (0..V::WIDTH).map(|lane| lane as f32 - 3.0).sum();
+    assert!((x.sum() - f64::from(sum)).abs() == 0.0);
 
     // Shifted by one place, between two vectors.
     for (shifted, place) in [(x.after_last_of(y), V::WIDTH - 1), (y.before_first_of(x), 1)] {
@@ -110,6 +112,12 @@ where
     // The second of two vectors of a row.
     let row: Vec<f32> = (0..=2 * V::WIDTH).map(|place| place as f32).collect();
     let numbers: Vec<V::Number> = row.iter().map(|&value| number(value)).collect();
+    let signed: Vec<f32> = row.iter().map(|&value| value - 1.5 * V::WIDTH as f32).collect();
+    let mut positive = vec![number(-1.0); V::WIDTH];
+    V::widen_positive(&V::floats(&signed, 2)[1]).put(&mut V::chunks_mut(&mut positive, 1)[0]);
+    for (positive, &signed) in positive.iter().zip(&signed[V::WIDTH..]) {
+        assert_eq!(*positive, number(signed.max(0.0)));
+    }
     let mut copy = vec![number(-1.0); 2 * V::WIDTH + 1];
     let chunks = V::chunks_mut(&mut copy, 2);
     V::read(&V::chunks(&numbers, 2)[1]).put(&mut chunks[0]);

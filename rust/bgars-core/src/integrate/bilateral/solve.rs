@@ -183,7 +183,7 @@ fn improve(
         z.fill(0.0);
         return Ok(());
     }
-    fill_corners(&mut weights);
+    let bits = fill_corners(&mut weights);
     let mut reds = Aligned::any(grid.half_pixels());
     // Of the blacks only the memory matters: they follow from the reds.
     reds.par_chunks_mut(half)
@@ -192,10 +192,15 @@ fn improve(
         .for_each_init(|| vec![0.0; half], |blacks, (row, (reds, z))| split_whole_row(row, z, reds, blacks));
     let inner = Params { relative_tolerance: CONVERGED_TOLERANCE, max_iters: CONVERGED_ITERS, ..Params::default() };
     let state = Progress { iteration: fit.rounds, residual: fit.change };
-    let solution =
-        conjugate_gradients(&weights, Right::Kept(right, None), Some(reds), scale, &inner, &mut |_: Progress| {
-            on_progress(state)
-        })?;
+    let solution = conjugate_gradients(
+        &weights,
+        bits,
+        Right::Kept(right, None),
+        Some(reds),
+        scale,
+        &inner,
+        &mut |_: Progress| on_progress(state),
+    )?;
     fit.inner_iterations += solution.iterations;
     if !solution.residual.is_finite() {
         let (iterations, tolerance) = (fit.inner_iterations, CONVERGED_TOLERANCE);

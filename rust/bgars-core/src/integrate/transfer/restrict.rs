@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::{CentreTies, corner_ties};
 use crate::integrate::checkerboard::{BAND_ROWS, Weights, split_row};
-use crate::integrate::real::{Real, on_vectors, sum_of};
+use crate::integrate::real::{Real, on_vectors};
 use crate::integrate::ring::Ring;
 use crate::vector::Packed;
 
@@ -137,7 +137,7 @@ fn smooth<V: Packed<Number = f32>>(weights: &Weights, b: &[f32], row: isize, row
         smooth.put(&mut out[k]);
         energy = b.times_plus(smooth, energy);
     }
-    sum_of(energy)
+    energy.sum()
 }
 
 /// `D_black^-1 W^T` of the smoothed reds of a row, and what ties its blacks to corners; returns the product of the former with
@@ -161,7 +161,7 @@ fn solve_and_tie_blacks<V: Packed<Number = f32>>(weights: &Weights, row: isize, 
         solved.put(&mut blacks[k]);
         (V::widen(&first[k]).magnitude() + V::widen(&second[k]).magnitude()).put(&mut ties[k]);
     }
-    sum_of(energy)
+    energy.sum()
 }
 
 /// The residual of a row: `D - N` applied to `D^-1 b` leaves `N D^-1 b`. At centres, over their ties.
