@@ -32,8 +32,8 @@ pub(super) struct Solution {
     pub solved: bool,
 }
 
-/// Solves for the reds, from `start` or from zero, until the norm of what the system leaves is at most the tolerance times `scale`;
-/// the blacks follow from them.
+/// Solves for the reds of `weights`, which have the edges of `bits`, from `start` or from zero, until the norm of what the
+/// system leaves is at most the tolerance times `scale`; the blacks follow from them.
 ///
 /// The residual that the iteration carries along drifts from the true one by rounding: when it says done, the true one is
 /// computed, and if it does not agree the iteration starts again from there. It is kept in `f64`: what rounding adds to the sum of

@@ -11,6 +11,12 @@ use crate::memory::Aligned;
 /// Reds that one word tells of, the first by its lowest bit.
 const REDS: usize = u64::BITS as usize;
 
+/// Left, right, up and down.
+const SIDES: usize = 4;
+
+/// Sides of any edges, and of real ones.
+const ALL_SIDES: usize = 2 * SIDES;
+
 /// For each row, from the one above the grid to the one below: of each side which reds have an edge, virtual ones included,
 /// and of each side which have a real one.
 #[derive(Debug)]
@@ -85,11 +91,12 @@ impl CellBits<'_> {
 }
 
 impl EdgeBits {
+    /// The edges of a grid.
     pub fn of(weights: &Weights) -> Self {
         let (rows, half) = (weights.grid.height + 2, weights.grid.half());
         let side_words = half.div_ceil(REDS) + 2;
-        let mut bits = Self { rows: Aligned::any(rows * 8 * side_words), side_words };
-        bits.rows.par_chunks_mut(8 * side_words).with_min_len(BAND_ROWS).enumerate().for_each(|(row, bits)| {
+        let mut bits = Self { rows: Aligned::any(rows * ALL_SIDES * side_words), side_words };
+        bits.rows.par_chunks_mut(ALL_SIDES * side_words).with_min_len(BAND_ROWS).enumerate().for_each(|(row, bits)| {
             set_row(weights.row(row as isize - 1).map(|side| &side[1..=half]), bits);
         });
         bits
@@ -109,9 +116,8 @@ impl EdgeBits {
 
     #[inline(always)]
     fn row(&self, row: isize, kind: usize) -> RowBits<'_> {
-        let side_words = self.side_words;
-        let sides = &self.rows[((row + 1) as usize * 2 + kind) * 4 * side_words..][..4 * side_words];
-        RowBits { sides, side_words }
+        let words = SIDES * self.side_words;
+        RowBits { sides: &self.rows[(2 * (row + 1) as usize + kind) * words..][..words], side_words: self.side_words }
     }
 
     /// The edges around the centres of odd `row`, virtual ones included.
@@ -127,8 +133,8 @@ impl EdgeBits {
     }
 
     /// Adds the virtual edges of red `k` of `row`: where a tie is not zero.
-    pub fn tie(&mut self, row: usize, k: usize, ties: [f32; 4]) {
-        let start = (row + 1) * 8 * self.side_words + 1 + k / REDS;
+    pub fn tie(&mut self, row: usize, k: usize, ties: [f32; SIDES]) {
+        let start = (row + 1) * ALL_SIDES * self.side_words + 1 + k / REDS;
         for (side, tie) in ties.into_iter().enumerate() {
             self.rows[start + side * self.side_words] |= u64::from(tie != 0.0) << (k % REDS);
         }
@@ -140,7 +146,7 @@ impl EdgeBits {
         0..self.side_words - 2
     }
 
-    /// The reds of the words that `tells` makes, ascending.
+    /// The reds of the words that `tells` makes, ascending. Of those behind the last red of a row it must not tell.
     #[inline(always)]
     pub fn places(&self, tells: impl Fn(usize) -> u64) -> Vec<usize> {
         let mut places = Vec::new();
@@ -166,10 +172,10 @@ impl EdgeBits {
 
 /// The bits of a row with the `weights` of these sides.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn set_row(weights: [&[f32]; 4], bits: &mut [u64]) {
+fn set_row(weights: [&[f32]; SIDES], bits: &mut [u64]) {
     bits.fill(0);
-    let side_words = bits.len() / 8;
-    let (any, real) = bits.split_at_mut(4 * side_words);
+    let side_words = bits.len() / ALL_SIDES;
+    let (any, real) = bits.split_at_mut(SIDES * side_words);
     let sides = any.chunks_exact_mut(side_words).zip(real.chunks_exact_mut(side_words));
     for (weights, (any, real)) in weights.into_iter().zip(sides) {
         let (words, rest) = weights.as_chunks::<REDS>();
@@ -182,6 +188,7 @@ fn set_row(weights: [&[f32]; 4], bits: &mut [u64]) {
     }
 }
 
+/// Which of up to [`REDS`] weights are not zero, and which are above.
 #[inline(always)]
 fn word_of(weights: &[f32]) -> (u64, u64) {
     let (mut any, mut real) = (0, 0);

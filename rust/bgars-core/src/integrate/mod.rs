@@ -6,8 +6,8 @@
 //! The way through the files: `operator` makes `edges` of the normals, these the system on a `checkerboard`; `reduction`
 //! eliminates every other pixel; `conjugate_gradient` solves for the rest (`settle` says what is left, and ends it),
 //! preconditioned by `multigrid`, whose grids come from `coarsen` (after `fill` has closed the smallest holes, and `stops` has
-//! led lanes across) and talk to each other by `transfer`. What a coarser grid cannot hold, nor lead around (`detours`), is
-//! found by `lost`; it goes as `strays` to the `graph` that takes over from the last grid.
+//! led lanes across; `edge_bits` tell where) and talk to each other by `transfer`. What a coarser grid cannot hold, nor lead
+//! around (`detours`), is found by `lost`; it goes as `strays` to the `graph` that takes over from the last grid.
 
 mod bilateral;
 mod checkerboard;
