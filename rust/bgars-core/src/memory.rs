@@ -119,7 +119,7 @@ macro_rules! reused {
         }
     )*};
 }
-reused!(f32 f64 u64);
+reused!(f32 f64);
 
 /// Most arrays of a type that wait: those of two large integrations.
 const WAITING_ARRAYS: usize = 64;

@@ -105,6 +105,13 @@ impl Runs {
         cols.zip(self.component_of[runs].iter().map(|&component| component as usize))
     }
 
+    /// The columns before, between and after the runs of a row, as far as there are any.
+    pub fn gaps(&self, row: usize) -> impl Iterator<Item = Range<usize>> {
+        let mut done = 0;
+        let ends = self.row(row).map(|(cols, _)| cols).chain(std::iter::once(self.width..self.width));
+        ends.map(move |cols| std::mem::replace(&mut done, cols.end)..cols.start)
+    }
+
     /// Index of each pixel's component, row-major; -1 outside the mask.
     pub fn labels(&self) -> Vec<i32> {
         let mut labels = zeros((self.row_starts.len() - 1) * self.width);
@@ -115,13 +122,12 @@ impl Runs {
     /// [`Self::labels`] into memory that is there already.
     pub fn write_labels(&self, labels: &mut [i32]) {
         labels.par_chunks_mut(self.width).enumerate().for_each(|(row, labels)| {
-            let mut done = 0;
             for (cols, component) in self.row(row) {
-                labels[done..cols.start].fill(-1);
-                done = cols.end;
                 labels[cols].fill(component as i32);
             }
-            labels[done..].fill(-1);
+            for cols in self.gaps(row) {
+                labels[cols].fill(-1);
+            }
         });
     }
 

@@ -6,7 +6,7 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::checkerboard::{BAND_ROWS, DOWN, LEFT, RIGHT, UP, Weights};
-use crate::memory::Aligned;
+use crate::memory::zeros;
 
 /// Reds that one word tells of, the first by its lowest bit.
 const REDS: usize = u64::BITS as usize;
@@ -21,7 +21,7 @@ const ALL_SIDES: usize = 2 * SIDES;
 /// and of each side which have a real one.
 #[derive(Debug)]
 pub(super) struct EdgeBits {
-    rows: Aligned<u64>,
+    rows: Vec<u64>,
     /// In a row of one side: a word of zeros, those of the reds, and one of zeros.
     side_words: usize,
 }
@@ -44,7 +44,7 @@ impl RowBits<'_> {
     #[inline(always)]
     pub fn before(self, side: usize, word: usize) -> u64 {
         let at = side * self.side_words + word;
-        self.sides[at] >> (REDS - 1) | self.sides[at + 1] << 1
+        moved_on(self.sides[at], self.sides[at + 1])
     }
 
     /// The same of the reds one place behind these.
@@ -56,9 +56,15 @@ impl RowBits<'_> {
 
     /// Those that have one to any side.
     #[inline(always)]
-    pub fn any(self, word: usize) -> u64 {
+    pub fn to_any_side(self, word: usize) -> u64 {
         (self.at(LEFT, word) | self.at(RIGHT, word)) | (self.at(UP, word) | self.at(DOWN, word))
     }
+}
+
+/// A word by one place further on, after the one before it.
+#[inline(always)]
+pub(super) fn moved_on(previous: u64, word: u64) -> u64 {
+    previous >> (REDS - 1) | word << 1
 }
 
 /// The edges around the centres of an odd row, clockwise from the top (see [`super::lost::Rim`]).
@@ -95,7 +101,7 @@ impl EdgeBits {
     pub fn of(weights: &Weights) -> Self {
         let (rows, half) = (weights.grid.height + 2, weights.grid.half());
         let side_words = half.div_ceil(REDS) + 2;
-        let mut bits = Self { rows: Aligned::any(rows * ALL_SIDES * side_words), side_words };
+        let mut bits = Self { rows: zeros(rows * ALL_SIDES * side_words), side_words };
         bits.rows.par_chunks_mut(ALL_SIDES * side_words).with_min_len(BAND_ROWS).enumerate().for_each(|(row, bits)| {
             set_row(weights.row(row as isize - 1).map(|side| &side[1..=half]), bits);
         });
@@ -170,10 +176,9 @@ impl EdgeBits {
     }
 }
 
-/// The bits of a row with the `weights` of these sides.
+/// Sets the bits of a row, all zero, from the `weights` of these sides.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 fn set_row(weights: [&[f32]; SIDES], bits: &mut [u64]) {
-    bits.fill(0);
     let side_words = bits.len() / ALL_SIDES;
     let (any, real) = bits.split_at_mut(SIDES * side_words);
     let sides = any.chunks_exact_mut(side_words).zip(real.chunks_exact_mut(side_words));

@@ -34,10 +34,7 @@ pub(super) type Tied = Vec<(usize, usize, [f32; 4])>;
 fn ways_around(weights: &Weights, bits: &EdgeBits) -> Tied {
     let rows = (0..weights.grid.height).into_par_iter().step_by(2);
     rows.flat_map_iter(|row| {
-        let ties = move |k: usize| {
-            let ties = Around::new(weights, row as isize).virtual_ties(k)?;
-            Some((row, k, ties))
-        };
+        let ties = move |k: usize| Around::new(weights, row as isize).virtual_ties(k).map(|ties| (row, k, ties));
         beside_ways(bits, row as isize).into_iter().filter_map(ties)
     })
     .collect()
@@ -47,7 +44,7 @@ fn ways_around(weights: &Weights, bits: &EdgeBits) -> Tied {
 fn beside_ways(bits: &EdgeBits, row: isize) -> Vec<usize> {
     let [above, here, below] = [bits.any(row - 1), bits.any(row), bits.any(row + 1)];
     bits.places(|word| {
-        let free = !here.any(word);
+        let free = !here.to_any_side(word);
         if free == 0 {
             return 0;
         }

@@ -125,14 +125,12 @@ pub fn integrate_into(
         || vec![0.0; width],
         |values, (row, height_px)| {
             fill(row, values);
-            let mut done = 0;
             for (cols, component) in runs.row(row) {
-                let mean = means[component];
-                height_px[done..cols.start].fill(f32::NAN);
-                done = cols.end;
-                center(&values[cols.clone()], mean, &mut height_px[cols]);
+                center(&values[cols.clone()], means[component], &mut height_px[cols]);
             }
-            height_px[done..].fill(f32::NAN);
+            for cols in runs.gaps(row) {
+                height_px[cols].fill(f32::NAN);
+            }
         },
     );
     runs.write_labels(labels);

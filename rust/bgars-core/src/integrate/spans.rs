@@ -96,7 +96,7 @@ impl Spans {
 /// From the first to the last red with an edge; `None` in a row without any.
 fn reds_with_edges(bits: &EdgeBits, row: usize) -> Option<Range<usize>> {
     let row = bits.any(row as isize);
-    bits.hull(|word| row.any(word))
+    bits.hull(|word| row.to_any_side(word))
 }
 
 #[cfg(test)]

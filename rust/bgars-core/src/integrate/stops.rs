@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::checkerboard::{DOWN, Grid, LEFT, RIGHT, UP, Weights};
 use super::coarsen::series;
-use super::edge_bits::{CellBits, EdgeBits};
+use super::edge_bits::{CellBits, EdgeBits, moved_on};
 use super::fill::{Around, Tied};
 use super::lost::{Rim, cells_around};
 use super::places::Place;
@@ -35,7 +35,7 @@ fn beside_lanes(grid: Grid, bits: &EdgeBits, row: isize) -> Vec<usize> {
     };
     let (above, below) = (cells(row - 1, [3, 2]), cells(row + 1, [0, 1]));
     bits.places(|word| {
-        let free = !here.any(word);
+        let free = !here.to_any_side(word);
         if free == 0 {
             return 0;
         }
@@ -57,8 +57,8 @@ impl LaneBits<'_> {
     #[inline(always)]
     fn past_corners(&self, word: usize) -> u64 {
         let [own, next] = self.corners;
-        let carried = if word > 0 { self.past(next, word - 1) >> (u64::BITS - 1) } else { 0 };
-        self.past(own, word) | self.past(next, word) << 1 | carried
+        let previous = if word > 0 { self.past(next, word - 1) } else { 0 };
+        self.past(own, word) | moved_on(previous, self.past(next, word))
     }
 
     /// The cells that a lane crosses past their corner `own`.
