@@ -96,6 +96,11 @@ def _many_holes(side: int) -> NDArray[np.bool_]:
     return np.random.default_rng(5).random((side, side)) > 0.3
 
 
+def _quarter_holes(side: int) -> NDArray[np.bool_]:
+    """One pixel in four missing: about the fewest that leave nothing to grids, and so the most for the graph."""
+    return np.random.default_rng(5).random((side, side)) > 0.25
+
+
 def _narrow_lanes(side: int) -> NDArray[np.bool_]:
     """Lanes one pixel wide with walls as wide between them, all open at the bottom."""
     mask = np.ones((side, side), dtype=np.bool_)
@@ -111,5 +116,5 @@ MASKS = {
     "dense slits": _dense_slits,
 }
 
-GRAPH_MASKS = {"many holes": _many_holes, "narrow lanes": _narrow_lanes}
+GRAPH_MASKS = {"many holes": _many_holes, "quarter holes": _quarter_holes, "narrow lanes": _narrow_lanes}
 """Nearly all of these is the graph's: for `memory.py` by hand, not in the tables."""

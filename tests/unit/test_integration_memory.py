@@ -1,4 +1,4 @@
-"""Memory of an integration beyond its input and output: at most 60 bytes a pixel, also over slits."""
+"""Memory of an integration beyond its input and output: at most 60 bytes a pixel, also over slits and holes."""
 
 from __future__ import annotations
 
@@ -45,6 +45,8 @@ if shape == "dense slits":
     for cut in range((side // 128) ** 2):
         row, col = (random.random(2) * side).astype(int)
         mask[(slice(row, row + 256), col) if cut % 2 else (row, slice(col, col + 256))] = False
+elif shape == "many holes":
+    mask = random.random(mask.shape) > 0.3
 elif shape == "serpentine":
     mask[:, 1::2] = False
     mask[0, 1::4] = mask[-1, 3::4] = True
@@ -61,7 +63,7 @@ def _can_measure() -> bool:
 
 
 @pytest.mark.skipif(not _can_measure(), reason="the most that was resident is known on Linux alone")
-@pytest.mark.parametrize("shape", ["rectangle", "dense slits", "serpentine"])
+@pytest.mark.parametrize("shape", ["rectangle", "dense slits", "many holes", "serpentine"])
 def test_an_integration_needs_at_most_sixty_bytes_a_pixel(shape: str) -> None:
     command = [sys.executable, "-c", PROGRAM, shape, str(SIDE_PX)]
     done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=120)

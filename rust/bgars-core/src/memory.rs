@@ -101,6 +101,52 @@ impl<T: Reused> DerefMut for Aligned<T> {
     }
 }
 
+/// Memory for a short while. The pages of a large one go back to the system with it, whatever the allocator would keep.
+#[derive(Debug)]
+pub(crate) struct Scratch<T: bytemuck::Zeroable + Copy>(Vec<T>);
+
+impl<T: bytemuck::Zeroable + Copy> Scratch<T> {
+    pub fn filled(value: T, len: usize) -> Self {
+        let mut memory = Vec::with_capacity(len);
+        prefer_large_pages(memory.spare_capacity_mut());
+        memory.resize(len, value);
+        Self(memory)
+    }
+}
+
+impl<T: bytemuck::Zeroable + Copy> FromIterator<T> for Scratch<T> {
+    fn from_iter<I: IntoIterator<Item = T>>(values: I) -> Self {
+        Self(values.into_iter().collect())
+    }
+}
+
+impl<T: bytemuck::Zeroable + Copy> Drop for Scratch<T> {
+    fn drop(&mut self) {
+        /// Smallest array whose pages are not kept, in bytes.
+        const MIN_BYTES: usize = 4 << 20;
+        if size_of_val(&self.0[..]) >= MIN_BYTES {
+            #[cfg(target_os = "linux")]
+            advise(&mut self.0, libc::MADV_DONTNEED);
+        }
+    }
+}
+
+impl<T: bytemuck::Zeroable + Copy> Deref for Scratch<T> {
+    type Target = [T];
+
+    #[inline(always)]
+    fn deref(&self) -> &[T] {
+        &self.0
+    }
+}
+
+impl<T: bytemuck::Zeroable + Copy> DerefMut for Scratch<T> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [T] {
+        &mut self.0
+    }
+}
+
 /// Arrays that wait for the next of their size, the longest waiting first.
 pub(crate) type Waiting<T> = Mutex<Vec<Vec<T>>>;
 

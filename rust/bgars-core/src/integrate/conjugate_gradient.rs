@@ -59,18 +59,20 @@ pub(super) fn conjugate_gradients(
         settle(weights, &right, Some(x.end(weights, &[])), Some(&mut q), &mut r);
         return Ok(Solution { reds: x.x, blacks: q, iterations, residual, solved });
     }
-    let preconditioner = Multigrid::new(weights, bits);
-    let is_large = preconditioner.graph_unknowns() > size / LARGE_GRAPH;
-    if is_large {
-        right = right.released();
-    }
+    let mut is_large = false;
+    let preconditioner = Multigrid::new(weights, bits, |unknowns| {
+        is_large = unknowns > size / LARGE_GRAPH;
+        if is_large {
+            right.release();
+        }
+    });
     let mut vectors = preconditioner.vectors();
     // A direction may be any; what x and r take along it agrees in `f64`.
     let [mut p, mut previous] = [Aligned::<f32>::any(size), Aligned::any(size)];
-    // r for the V-cycle, which reads it twice.
-    let mut rounded = Aligned::<f32>::any(size);
+    // r for the V-cycle, which grids read twice; a graph alone reads it once, where the next direction will be.
+    let mut rounded = preconditioner.has_grids().then(|| Aligned::<f32>::any(size));
     loop {
-        round(&r, &mut rounded);
+        round(&r, rounded.as_mut().unwrap_or(&mut previous));
         let mut r_z_before = None;
         // Written so that NaN goes on, to be found below.
         while !(norm <= target) {
@@ -78,11 +80,11 @@ pub(super) fn conjugate_gradients(
             if !solved {
                 break;
             }
-            let r_z = preconditioner.descend(&rounded, &mut vectors);
+            let r_z = preconditioner.descend(rounded.as_ref().unwrap_or(&previous), &mut vectors);
             // What was there before the first direction is finite, and counts nothing.
             let beta = r_z_before.replace(r_z).map_or(0.0, |before| (r_z / before) as f32);
             std::mem::swap(&mut p, &mut previous);
-            let p_q = preconditioner.advance(&rounded, &vectors, (beta, &previous), &mut p, &mut q);
+            let p_q = preconditioner.advance(rounded.as_deref(), &vectors, (beta, &previous), &mut p, &mut q);
             // Both are positive but for rounding; what is lost in it cannot be found again.
             solved = r_z > 0.0 && p_q > 0.0;
             if !solved {
@@ -92,8 +94,8 @@ pub(super) fn conjugate_gradients(
                 break;
             }
             let alpha = r_z / p_q;
-            norm = subtract(weights, (alpha, &q), &mut r, &mut rounded).sqrt();
             x.step(weights, alpha, [&previous, &p]);
+            norm = subtract(weights, (alpha, &q), &mut r, rounded.as_mut().unwrap_or(&mut previous)).sqrt();
             iterations += 1;
             if on_progress(Progress { iteration: iterations, residual: norm / scale }).is_break() {
                 return Err(Error::Cancelled);
@@ -102,7 +104,7 @@ pub(super) fn conjugate_gradients(
         norm = settle(weights, &right, Some(x.end(weights, &p)), Some(&mut q), &mut r).sqrt();
         if !solved || norm <= target {
             if is_large {
-                [p, previous, rounded].into_iter().for_each(Aligned::release);
+                [p, previous].into_iter().chain(rounded).for_each(Aligned::release);
             }
             return Ok(Solution { reds: x.x, blacks: q, iterations, residual: norm / scale, solved });
         }

@@ -5,34 +5,49 @@
 //! values between grids but has no part in the system. It may not join what the mask keeps apart: its neighbours must be
 //! connected around it, through the centres; of several groups it takes the one that conducts best.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
-use super::checkerboard::{DOWN, LEFT, PaddedRow, RIGHT, UP, Weights};
+use super::checkerboard::{DOWN, Grid, LEFT, PaddedRow, RIGHT, UP, Weights};
 use super::coarsen::series;
 use super::edge_bits::EdgeBits;
 use super::spans::Spans;
 use super::stops::stops;
 
+/// Pixels of the rows whose corners are found before they are tied.
+const PART_PIXELS: usize = 1 << 18;
+
 /// Ties every corner without edges to the neighbours around it, or makes it a stop. These are a grid's last edges: its spans
 /// follow. Returns which edges there are then.
 pub(super) fn fill_corners(weights: &mut Weights) -> EdgeBits {
     let mut bits = EdgeBits::of(weights);
-    for tied in [ways_around, stops] {
-        for (row, k, ties) in tied(weights, &bits) {
-            weights.set_red(row, k, ties.map(|tie| -tie));
-            bits.tie(row, k, ties);
-        }
+    // Corners that have a way around do not know of each other; of those in a few rows at a time there are never many.
+    let Grid { height, width } = weights.grid;
+    let rows = PART_PIXELS.div_ceil(width).next_multiple_of(2);
+    for first in (0..height).step_by(rows) {
+        let tied = ways_around(weights, &bits, first..(first + rows).min(height));
+        tie(weights, &mut bits, tied);
     }
+    let tied = stops(weights, &bits);
+    tie(weights, &mut bits, tied);
     weights.spans = Spans::of_edges(weights.grid, &bits);
     bits
+}
+
+fn tie(weights: &mut Weights, bits: &mut EdgeBits, tied: Tied) {
+    for (row, k, ties) in tied {
+        weights.set_red(row, k, ties.map(|tie| -tie));
+        bits.tie(row, k, ties);
+    }
 }
 
 /// Corners to be tied, by row and number, and their ties: left, right, up, down.
 pub(super) type Tied = Vec<(usize, usize, [f32; 4])>;
 
-/// The corners without edges that have a way around.
-fn ways_around(weights: &Weights, bits: &EdgeBits) -> Tied {
-    let rows = (0..weights.grid.height).into_par_iter().step_by(2);
+/// The corners without edges that have a way around, in some rows from an even one on.
+fn ways_around(weights: &Weights, bits: &EdgeBits, rows: Range<usize>) -> Tied {
+    let rows = rows.into_par_iter().step_by(2);
     rows.flat_map_iter(|row| {
         let ties = move |k: usize| Around::new(weights, row as isize).virtual_ties(k).map(|ties| (row, k, ties));
         beside_ways(bits, row as isize).into_iter().filter_map(ties)

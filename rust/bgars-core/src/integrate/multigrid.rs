@@ -64,8 +64,9 @@ impl LevelVectors {
 }
 
 impl<'a> Multigrid<'a> {
-    /// Coarsens `finest`, which has the edges of `bits`, as far as grids go, and from there as a graph.
-    pub fn new(finest: &'a Weights, mut bits: EdgeBits) -> Self {
+    /// Coarsens `finest`, which has the edges of `bits`, as far as grids go, and from there as a graph. `before_graph` is told the
+    /// unknowns of this one before it takes memory.
+    pub fn new(finest: &'a Weights, mut bits: EdgeBits, before_graph: impl FnOnce(usize)) -> Self {
         let mut levels: Vec<Weights> = Vec::new();
         let mut strays = Vec::new();
         let mut stray_count = 0;
@@ -100,7 +101,7 @@ impl<'a> Multigrid<'a> {
         }
         drop(bits);
         let weights: Vec<&Weights> = std::iter::once(finest).chain(&levels).collect();
-        let graph = GraphCycle::new(&weights, &strays);
+        let graph = GraphCycle::new(&weights, &strays, before_graph);
         Self { finest, levels, strays, graph }
     }
 
@@ -126,16 +127,23 @@ impl<'a> Multigrid<'a> {
         self.down(0, b, levels, graph, 0)
     }
 
-    /// The way up after [`Self::descend`]: the next direction `p = M b + beta previous` and `q = S p`; returns `<p, q>`.
+    /// Whether there is a grid above the graph.
+    pub fn has_grids(&self) -> bool {
+        !self.levels.is_empty()
+    }
+
+    /// The way up after [`Self::descend`], which grids need `b` for once more: the next direction `p = M b + beta previous` and
+    /// `q = S p`; returns `<p, q>`.
     pub fn advance(
         &self,
-        b: &[f32],
+        b: Option<&[f32]>,
         vectors: &Vectors,
         (beta, previous): (f32, &[f32]),
         p: &mut [f32],
         q: &mut [f64],
     ) -> f64 {
         if let Some(next) = vectors.levels.first() {
+            let b = b.expect("grids are given b");
             let changes = self.changes(0, next, &vectors.graph, 0);
             let below = Below { b, coarse: &next.solution, changes: &changes };
             return advance(self.finest, below, (beta, previous), p, q);
@@ -260,7 +268,7 @@ mod tests {
             let field = Field { normals: &normals, mask: &mask, weights: None, regions: None, width: SIDE };
             let (mut weights, _) = assemble(field, Difference::Trapezoid);
             let bits = fill_corners(&mut weights);
-            let multigrid = Multigrid::new(&weights, bits);
+            let multigrid = Multigrid::new(&weights, bits, |_| ());
             let mut vectors = multigrid.vectors();
             let half = weights.grid.half();
             let mut b = vec![0.0; weights.grid.half_pixels()];

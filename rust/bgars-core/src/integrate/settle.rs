@@ -26,12 +26,13 @@ pub(super) enum Right<'a> {
 }
 
 impl Right<'_> {
-    /// The same, with its memory given back to the system if it can be made again.
-    pub fn released(self) -> Self {
-        let Self::Kept(Colours { reds, blacks }, Some(again)) = self else { return self };
-        reds.release();
-        blacks.release();
-        Self::Anew(again)
+    /// Gives its memory back to the system if it can be made again.
+    pub fn release(&mut self) {
+        let &mut Self::Kept(_, Some(again)) = self else { return };
+        if let Self::Kept(Colours { reds, blacks }, _) = std::mem::replace(self, Self::Anew(again)) {
+            reds.release();
+            blacks.release();
+        }
     }
 
     /// The rows from one before a band to one after it, as far as there are any.
@@ -200,7 +201,7 @@ mod tests {
                 colour.copy_from_slice(&all[rows.start * half..rows.end * half]);
             }
         };
-        let given = Right::Kept(right, Some(&again));
+        let mut given = Right::Kept(right, Some(&again));
         let squares = settle(&weights, &given, Some(&reds), Some(&mut blacks), &mut left);
         let (mut expected, mut beside) = (0.0, 0);
         for row in 0..grid.height {
@@ -226,7 +227,7 @@ mod tests {
         assert!((squares - expected).abs() < 1e-12 * expected && expected > 1.0, "{squares} for {expected}");
 
         let kept = (squares, blacks.clone(), left.clone());
-        let given = given.released();
+        given.release();
         assert!(matches!(given, Right::Anew(_)));
         let squares = settle(&weights, &given, Some(&reds), Some(&mut blacks), &mut left);
         assert!((squares, blacks, left) == kept, "a right side made again");

@@ -104,7 +104,6 @@ pub fn integrate_into(
     let (field, width) = (Field { mask, ..field }, field.width);
     check_length("height_px", mask.len(), height_px.len())?;
     check_length("labels", mask.len(), labels.len())?;
-    let runs = Runs::new(mask, field.regions, width);
     let edges = FieldEdges::new(field, params.difference);
     let (mut weights, right) = edges.assemble();
     let bits = fill_corners(&mut weights);
@@ -115,7 +114,7 @@ pub fn integrate_into(
     if !solved {
         return Err(Error::NoConvergence { iterations, residual, tolerance: params.relative_tolerance });
     }
-    let half = weights.grid.half();
+    let (half, runs) = (weights.grid.half(), Runs::new(mask, field.regions, width));
     let fill = |row: usize, values: &mut [f64]| {
         let span = row * half..(row + 1) * half;
         join_whole_row(row, &reds[span.clone()], &blacks[span], values);

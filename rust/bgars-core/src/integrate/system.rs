@@ -70,7 +70,7 @@ impl System {
     /// One multigrid V-cycle, an approximation of the inverse of `S`.
     #[must_use]
     pub fn preconditioner(&self) -> VCycle<'_> {
-        let multigrid = Multigrid::new(&self.weights, EdgeBits::of(&self.weights));
+        let multigrid = Multigrid::new(&self.weights, EdgeBits::of(&self.weights), |_| ());
         VCycle { vectors: Mutex::new(multigrid.vectors()), multigrid, size: self.right_side.len() }
     }
 }

@@ -79,7 +79,7 @@ impl Direct {
 /// The nodes with edges by connected component.
 fn components(graph: &Rows) -> Vec<Vec<u32>> {
     // Nodes without edges are in none.
-    let mut seen: Vec<bool> = (0..graph.len()).map(|node| graph.values(node).is_empty()).collect();
+    let mut seen: Vec<bool> = (0..graph.len()).map(|node| graph.values(node).next().is_none()).collect();
     let mut components = Vec::new();
     for first in 0..graph.len() {
         if seen[first] {

@@ -1,17 +1,18 @@
 //! The edges of the next coarser graph: `P^T L P` for the Laplacian `L` of a graph.
 
 use super::matrix::Rows;
+use crate::memory::Scratch;
 
 /// A sparse row that is added up entry by entry.
 struct SparseSum {
     entries: Vec<(u32, f64)>,
     /// Where each column is among the entries.
-    place: Vec<u32>,
+    place: Scratch<u32>,
 }
 
 impl SparseSum {
     fn new(width: usize) -> Self {
-        Self { entries: Vec::new(), place: vec![u32::MAX; width] }
+        Self { entries: Vec::new(), place: Scratch::filled(u32::MAX, width) }
     }
 
     #[inline(always)]
@@ -36,12 +37,12 @@ impl SparseSum {
 /// The coarser graph. Its Laplacian's rows add up to zero as those of `L` do, so the diagonal need not be kept.
 pub(super) fn coarser_graph(graph: &Rows, prolongation: &Rows) -> Rows {
     let restriction = prolongation.transpose();
-    let n = restriction.len();
+    let n = prolongation.width();
     let memory = || (SparseSum::new(graph.len()), SparseSum::new(n));
     Rows::build(n, n, memory, |(fine_row, coarse_row), coarse, row| {
         // -P^T L first: its columns are fewer than its terms.
-        for (fine, share) in restriction.pairs(coarse) {
-            let share = f64::from(share);
+        for &(fine, share) in restriction.column(coarse) {
+            let (fine, share) = (fine as usize, f64::from(share));
             graph.pairs(fine).for_each(|(other, weight)| fine_row.add(other, share * f64::from(weight)));
             fine_row.add(fine, -share * graph.sum(fine));
         }

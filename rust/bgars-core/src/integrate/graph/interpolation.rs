@@ -2,12 +2,16 @@
 
 use super::matrix::Rows;
 use super::splitting::{FINE, strong_limits};
+use crate::memory::Scratch;
 
 /// Most coarse nodes that a node takes its value from.
 const MAX_SOURCES: usize = 4;
 
 /// Stands for a node that is no source.
 const NONE: u32 = u32::MAX;
+
+/// Shares are whole multiples of one part in so many: a short value (see `block`) each, and their sum exactly 1.
+const PARTS: f64 = 256.0;
 
 /// A row a node: 1 for a coarse node, else shares of coarse nodes that add up to 1.
 ///
@@ -17,18 +21,37 @@ const NONE: u32 = u32::MAX;
 pub(super) fn interpolation(graph: &Rows, coarse_of: &[u32]) -> Rows {
     let limits = strong_limits(graph);
     let coarse_nodes = coarse_of.iter().filter(|&&coarse| coarse != FINE).count();
-    let memory = || Sources { graph, coarse_of, limits: &limits, shares: Vec::new(), place: vec![NONE; graph.len()] };
+    let memory =
+        || Sources { graph, coarse_of, limits: &limits, shares: Vec::new(), place: Scratch::filled(NONE, graph.len()) };
     Rows::build(graph.len(), coarse_nodes, memory, |sources, node, row| {
         if coarse_of[node] != FINE {
             row.push(coarse_of[node], 1.0);
             return;
         }
-        let shares = sources.of(node);
-        let sum: f64 = shares.iter().map(|source| source.1).sum();
-        for &(source, share) in shares {
-            row.push(coarse_of[source as usize], (share / sum) as f32);
+        for &(source, share) in in_parts(sources.of(node)) {
+            row.push(coarse_of[source as usize], share as f32);
         }
     })
+}
+
+/// Shares of a whole in its parts; the largest makes up for what the others lose or win.
+fn in_parts(shares: &mut Vec<(u32, f64)>) -> &[(u32, f64)] {
+    let sum: f64 = shares.iter().map(|source| source.1).sum();
+    let (mut left, mut largest) = (PARTS, 0);
+    for at in 0..shares.len() {
+        // Rounded to the nearest.
+        shares[at].1 = f64::from((shares[at].1 * (PARTS / sum) + 0.5) as u32);
+        left -= shares[at].1;
+        largest = if shares[at].1 > shares[largest].1 { at } else { largest };
+    }
+    if let Some(largest) = shares.get_mut(largest) {
+        largest.1 += left;
+    }
+    shares.retain(|source| source.1 > 0.0);
+    for source in &mut *shares {
+        source.1 /= PARTS;
+    }
+    shares
 }
 
 /// Finds the sources of one node after another.
@@ -39,12 +62,12 @@ struct Sources<'a> {
     /// Coarse nodes and what the node hangs on each.
     shares: Vec<(u32, f64)>,
     /// Where each node is in `shares`.
-    place: Vec<u32>,
+    place: Scratch<u32>,
 }
 
 impl Sources<'_> {
     /// The sources of fine `node` and their weights.
-    fn of(&mut self, node: usize) -> &[(u32, f64)] {
+    fn of(&mut self, node: usize) -> &mut Vec<(u32, f64)> {
         let Self { graph, coarse_of, limits, shares, place } = self;
         let is_coarse = |node: usize| coarse_of[node] != FINE;
         shares.clear();
@@ -84,5 +107,30 @@ impl Sources<'_> {
             shares.truncate(MAX_SOURCES);
         }
         shares
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::float_cmp)]
+mod tests {
+    use super::*;
+    use crate::integrate::graph::block::nearest_short;
+
+    #[test]
+    fn shares_are_short_and_add_up_to_one() {
+        for seed in 1..500 {
+            let given: Vec<(u32, f64)> =
+                (0..=seed % 4).map(|at| (at, f64::from((seed * 31 + at * 17) % 97 + 1))).collect();
+            let sum: f64 = given.iter().map(|source| source.1).sum();
+            let mut shares = given.clone();
+            let shares = in_parts(&mut shares);
+            assert_eq!(shares.iter().map(|source| source.1).sum::<f64>(), 1.0);
+            for &(source, share) in shares {
+                assert_eq!(f64::from(nearest_short(share as f32)), share);
+                assert!((share - given[source as usize].1 / sum).abs() < 2.0 / PARTS, "{given:?}: {shares:?}");
+            }
+        }
+        // What is too small for a part is left out.
+        assert_eq!(in_parts(&mut vec![(4, 1e-4), (9, 1.0)]), [(9, 1.0)]);
     }
 }

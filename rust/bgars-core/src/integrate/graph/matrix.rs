@@ -3,7 +3,8 @@
 use rayon::prelude::*;
 
 use super::CHUNK;
-use super::block::{BLOCK, Block, Part, pairs};
+use super::block::{BLOCK, Block, Opened, Part, pairs};
+use crate::memory::Scratch;
 
 /// A sparse matrix by rows. As a graph: row i holds the neighbours of node i and the weights of the edges to them; the
 /// diagonal of its Laplacian is the sum of a row.
@@ -50,6 +51,11 @@ impl Rows {
         self.count
     }
 
+    /// Number of columns.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
     pub fn entries(&self) -> usize {
         self.blocks.iter().map(Block::entries).sum()
     }
@@ -61,7 +67,7 @@ impl Rows {
 
     /// The values of a row.
     #[inline(always)]
-    pub fn values(&self, row: usize) -> &[f32] {
+    pub fn values(&self, row: usize) -> impl Iterator<Item = f32> {
         self.blocks[row / BLOCK].values(row % BLOCK)
     }
 
@@ -73,34 +79,27 @@ impl Rows {
 
     /// Sum of a row: as a graph, the diagonal of the Laplacian.
     pub fn sum(&self, row: usize) -> f64 {
-        self.values(row).iter().map(|&value| f64::from(value)).sum()
+        self.values(row).map(f64::from).sum()
     }
 
-    pub fn transpose(&self) -> Self {
-        let mut starts = vec![0u32; self.width + 1];
+    /// The same by columns.
+    pub(super) fn transpose(&self) -> Transpose {
+        let mut starts = Scratch::filled(0u32, self.width + 2);
         for (column, _) in (0..self.len()).flat_map(|row| self.pairs(row)) {
-            starts[column + 1] += 1;
+            starts[column + 2] += 1;
         }
         for column in 0..self.width {
-            starts[column + 1] += starts[column];
+            starts[column + 2] += starts[column + 1];
         }
-        let mut next = starts.clone();
-        let mut entries = vec![(0, 0.0); self.entries()];
+        // Each start but the first moves on to the next one, entry by entry.
+        let mut entries = Scratch::filled((0, 0.0), self.entries());
         for row in 0..self.len() {
             for (column, value) in self.pairs(row) {
-                entries[next[column] as usize] = (row as u32, value);
-                next[column] += 1;
+                entries[starts[column + 1] as usize] = (row as u32, value);
+                starts[column + 1] += 1;
             }
         }
-        Self::build(
-            self.width,
-            self.len(),
-            || (),
-            |(), column, part| {
-                let span = starts[column] as usize..starts[column + 1] as usize;
-                entries[span].iter().for_each(|&(row, value)| part.push(row, value));
-            },
-        )
+        Transpose { starts, entries }
     }
 
     /// `out = A x`.
@@ -117,8 +116,9 @@ impl Rows {
     /// each other, and then the tasks' sums follow in turn.
     pub fn multiply_transposed(&self, x: &[f32], out: &mut [f32]) {
         let tasks = self.chunks().zip(x.par_chunks(CHUNK));
-        let sum = |memory: &mut Vec<u32>, (blocks, x)| Columns::of(blocks, self.width, x, memory);
-        let sums: Vec<Columns> = tasks.map_init(Vec::new, sum).collect();
+        let sum =
+            |(opened, near): &mut (Opened, Vec<f32>), (blocks, x)| Columns::of(blocks, self.width, x, opened, near);
+        let sums: Vec<Columns> = tasks.map_init(Default::default, sum).collect();
         out.fill(0.0);
         for Columns { first, near, far } in sums {
             for (out, sum) in out[first..].iter_mut().zip(near) {
@@ -146,7 +146,7 @@ impl Rows {
     /// Sets each element by its index, and columns and values of its row, on all threads.
     fn each(&self, out: &mut [f32], value: impl Fn(usize, (&[u32], &[f32])) -> f32 + Sync) {
         let chunks = self.chunks().zip(out.par_chunks_mut(CHUNK)).enumerate();
-        chunks.for_each_init(Vec::new, |memory, (chunk, (blocks, out))| {
+        chunks.for_each_init(Opened::default, |memory, (chunk, (blocks, out))| {
             let firsts = (chunk * CHUNK..).step_by(BLOCK);
             for ((first, block), out) in firsts.zip(blocks).zip(out.chunks_mut(BLOCK)) {
                 let block = block.open(memory);
@@ -158,12 +158,27 @@ impl Rows {
     }
 }
 
+/// The columns of a matrix, for a short while.
+pub(super) struct Transpose {
+    /// Where each column starts, and the end.
+    starts: Scratch<u32>,
+    /// Rows and values, column by column.
+    entries: Scratch<(u32, f32)>,
+}
+
+impl Transpose {
+    /// Rows and values of a column.
+    pub fn column(&self, column: usize) -> &[(u32, f32)] {
+        &self.entries[self.starts[column] as usize..self.starts[column + 1] as usize]
+    }
+}
+
 /// What the rows of a task give to the columns.
 struct Columns {
     /// The first of those near each other.
     first: usize,
     /// Their sums.
-    near: Vec<f32>,
+    near: Box<[f32]>,
     /// Single values of others.
     far: Vec<(usize, f32)>,
 }
@@ -172,23 +187,32 @@ impl Columns {
     /// Most columns that are near each other: several rows of a wide image.
     const MOST: usize = 1 << 14;
 
-    fn of(blocks: &[Block], width: usize, x: &[f32], memory: &mut Vec<u32>) -> Self {
+    /// By how many there come to be more.
+    const STEP: usize = 1 << 8;
+
+    /// `opened` and `near` are memory of the task.
+    fn of(blocks: &[Block], width: usize, x: &[f32], opened: &mut Opened, near: &mut Vec<f32>) -> Self {
         let first = blocks.iter().filter_map(Block::least_column).min().unwrap_or(0) as usize;
-        let (mut near, mut far) = (vec![0.0; Self::MOST.min(width - first)], Vec::new());
+        let most = Self::MOST.min(width - first);
+        near.clear();
+        let mut far = Vec::new();
         for (block, x) in blocks.iter().zip(x.chunks(BLOCK)) {
-            let block = block.open(memory);
+            let block = block.open(opened);
             for (row, &x) in x.iter().enumerate() {
                 for (column, value) in block.pairs(row) {
-                    match near.get_mut(column.wrapping_sub(first)) {
-                        Some(sum) => *sum += value * x,
-                        None => far.push((column, value * x)),
+                    let at = column.wrapping_sub(first);
+                    if at >= near.len() {
+                        if at >= most {
+                            far.push((column, value * x));
+                            continue;
+                        }
+                        near.resize((at + Self::STEP).min(most), 0.0);
                     }
+                    near[at] += value * x;
                 }
             }
         }
-        near.truncate(near.iter().rposition(|&sum| sum != 0.0).map_or(0, |last| last + 1));
-        near.shrink_to_fit();
-        Self { first, near, far }
+        Self { first, near: near.as_slice().into(), far }
     }
 }
 
@@ -219,16 +243,18 @@ mod tests {
             assert_eq!(&back(&rows, row), list);
         }
         let transpose = rows.transpose();
-        let entries: usize = (0..WIDTH).map(|column| transpose.pairs(column).count()).sum();
+        let entries: usize = (0..WIDTH).map(|column| transpose.column(column).len()).sum();
         assert_eq!(entries, rows.entries());
         let x: Vec<f32> = (0..lists.len()).map(|row| (row % 17) as f32).collect();
         let [mut fast, mut slow] = [vec![7.0; WIDTH], vec![7.0; WIDTH]];
         rows.multiply_transposed(&x, &mut fast);
-        transpose.multiply(&x, &mut slow);
+        for (column, slow) in slow.iter_mut().enumerate() {
+            *slow = transpose.column(column).iter().map(|&(row, value)| x[row as usize] * value).sum();
+        }
         assert!(fast == slow && slow.iter().any(|&sum| sum > 0.0), "sums of whole numbers are exact");
         for (row, list) in lists.iter().enumerate() {
             for &(column, value) in list {
-                assert!(back(&transpose, column).contains(&(row, value)), "{row}, {column}");
+                assert!(transpose.column(column).contains(&(row as u32, value as f32)), "{row}, {column}");
             }
         }
     }

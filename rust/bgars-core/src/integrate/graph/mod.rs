@@ -23,7 +23,7 @@ use rayon::prelude::*;
 use super::checkerboard::Weights;
 use super::reduction::dot;
 use super::strays::Strays;
-use crate::memory::zeros;
+use crate::memory::{Scratch, zeros};
 use attach::Grids;
 use direct::Direct;
 use galerkin::coarser_graph;
@@ -61,21 +61,24 @@ struct Level {
     prolongation: Rows,
 }
 
-/// Right side, solution and spare memory of each graph.
+/// Right side and solution of each graph.
 #[derive(Debug)]
 pub(super) struct GraphVectors {
-    levels: Vec<[Vec<f32>; 3]>,
+    levels: Vec<[Scratch<f32>; 2]>,
+    /// What one graph at a time has on its way.
+    spare: Scratch<f32>,
     /// Right side, then solution of the strays, above their bases.
     pub strays: Vec<f32>,
 }
 
 impl GraphCycle {
-    /// The hierarchy below the reds of the last of `weights` and the strays of the others.
-    pub fn new(weights: &[&Weights], strays: &[Strays]) -> Self {
+    /// The hierarchy below the reds of the last of `weights` and the strays of the others. `before` is told its unknowns first.
+    pub fn new(weights: &[&Weights], strays: &[Strays], before: impl FnOnce(usize)) -> Self {
         let last = weights[strays.len()];
         let nodes = Nodes::new(last);
         let grids = Grids { weights, strays, nodes: &nodes };
         let bases = grids.bases();
+        before(nodes.len() + bases.len());
         let mut graph = reduced_graph(last, &nodes, bases.len(), &grids.edges_of_strays());
         let mut levels = Vec::new();
         while graph.rows_with_entries() > DIRECT_NODES && levels.len() < MAX_LEVELS {
@@ -99,7 +102,8 @@ impl GraphCycle {
     pub fn vectors(&self) -> GraphVectors {
         let sizes = self.levels.iter().map(|level| level.graph.len()).chain([self.direct.len()]);
         GraphVectors {
-            levels: sizes.map(|len| std::array::from_fn(|_| zeros(len))).collect(),
+            levels: sizes.map(|len| std::array::from_fn(|_| Scratch::filled(0.0, len))).collect(),
+            spare: Scratch::filled(0.0, self.unknowns()),
             strays: zeros(self.bases.len()),
         }
     }
@@ -108,7 +112,7 @@ impl GraphCycle {
     /// `vectors`. Returns the product of the whole right side with the solution.
     pub fn solve(&self, b: &[f32], vectors: &mut GraphVectors) -> f64 {
         self.nodes.gather(b, &mut vectors.levels[0][0]);
-        let GraphVectors { levels, strays } = vectors;
+        let GraphVectors { levels, spare, strays } = vectors;
         let reds = self.nodes.len();
         // The graph knows each stray's whole value, the grids only what it is above its base.
         levels[0][0][reds..].copy_from_slice(strays);
@@ -117,8 +121,8 @@ impl GraphCycle {
                 levels[0][0][node] -= share * own;
             }
         }
-        self.cycle(0, levels);
-        let [right, whole, _] = &levels[0];
+        self.cycle(0, levels, spare);
+        let [right, whole] = &levels[0];
         for (stray, own) in strays.iter_mut().enumerate() {
             *own = whole[reds + stray] - self.bases.pairs(stray).map(|(node, share)| share * whole[node]).sum::<f32>();
         }
@@ -131,17 +135,18 @@ impl GraphCycle {
         self.nodes.scatter(&vectors.levels[0][1], x);
     }
 
-    fn cycle(&self, depth: usize, vectors: &mut [[Vec<f32>; 3]]) {
-        let Some(([b, x, spare], coarser)) = vectors.split_first_mut() else { return };
+    fn cycle(&self, depth: usize, vectors: &mut [[Scratch<f32>; 2]], spare: &mut [f32]) {
+        let Some(([b, x], coarser)) = vectors.split_first_mut() else { return };
         let Some(level) = self.levels.get(depth) else {
             self.direct.solve(b, x);
             return;
         };
         level.smoother.forward_from_zero(&level.graph, b, x);
-        level.graph.residual(b, x, spare);
-        level.prolongation.multiply_transposed(spare, &mut coarser[0][0]);
-        self.cycle(depth + 1, coarser);
-        level.prolongation.multiply_add(&coarser[0][1], x, spare);
-        level.smoother.backward(&level.graph, b, spare, x);
+        let here = x.len();
+        level.graph.residual(b, x, &mut spare[..here]);
+        level.prolongation.multiply_transposed(&spare[..here], &mut coarser[0][0]);
+        self.cycle(depth + 1, coarser, spare);
+        level.prolongation.multiply_add(&coarser[0][1], x, &mut spare[..here]);
+        level.smoother.backward(&level.graph, b, &spare[..here], x);
     }
 }

@@ -1,73 +1,118 @@
 //! The reds of a grid as a graph: `S = D_red - W D_black^-1 W^T`, entry by entry.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::CHUNK;
+use super::block::nearest_short;
 use super::matrix::Rows;
 use crate::integrate::checkerboard::Weights;
 use crate::integrate::places::ties;
+use crate::memory::Scratch;
 
 /// Which reds are nodes: those with an edge, row by row.
 #[derive(Debug)]
-pub(super) struct Nodes(Vec<u32>);
+pub(super) struct Nodes {
+    /// A bit a red, the first by the lowest.
+    bits: Vec<u64>,
+    /// Nodes before each word of bits, and all of them.
+    before: Vec<u32>,
+}
+
+/// Reds that one word tells of.
+const REDS: usize = u64::BITS as usize;
+
+/// Words that one task works on.
+const WORDS: usize = CHUNK / REDS;
 
 impl Nodes {
     pub fn new(weights: &Weights) -> Self {
-        let half = weights.grid.half();
-        let rows = (0..weights.grid.height).into_par_iter();
-        let found = rows.flat_map_iter(|row| {
-            let sides = weights.row(row as isize);
-            let used = move |k: &usize| sides.iter().any(|side| side[k + 1] > 0.0);
-            (0..half).filter(used).map(move |k| (row * half + k) as u32)
-        });
-        Self(found.collect())
+        let (half, count) = (weights.grid.half(), weights.grid.half_pixels());
+        let word = |word: usize| {
+            let reds = word * REDS..((word + 1) * REDS).min(count);
+            let is_node = |red: usize| weights.row((red / half) as isize).iter().any(|side| side[red % half + 1] > 0.0);
+            reds.enumerate().map(|(bit, red)| u64::from(is_node(red)) << bit).sum::<u64>()
+        };
+        let bits: Vec<u64> = (0..count.div_ceil(REDS)).into_par_iter().with_min_len(WORDS).map(word).collect();
+        let mut before = vec![0; bits.len() + 1];
+        for (word, bits) in bits.iter().enumerate() {
+            before[word + 1] = before[word] + bits.count_ones();
+        }
+        Self { bits, before }
     }
 
     pub fn len(&self) -> usize {
-        self.0.len()
+        self.before[self.bits.len()] as usize
     }
 
     /// The node of a red.
     pub fn find(&self, red: usize) -> Option<usize> {
-        self.0.binary_search(&(red as u32)).ok()
+        let (word, bit) = (red / REDS, 1 << (red % REDS));
+        let bits = self.bits[word];
+        (bits & bit != 0).then(|| (self.before[word] + (bits & (bit - 1)).count_ones()) as usize)
     }
 
-    pub fn gather(&self, reds: &[f32], nodes: &mut [f32]) {
-        nodes.par_chunks_mut(CHUNK).zip(self.0.par_chunks(CHUNK)).for_each(|(nodes, places)| {
-            for (node, &place) in nodes.iter_mut().zip(places) {
-                *node = reds[place as usize];
+    /// The reds that are nodes among those of some words.
+    fn reds(&self, words: Range<usize>) -> impl Iterator<Item = usize> {
+        words.flat_map(|word| {
+            let mut left = self.bits[word];
+            std::iter::from_fn(move || {
+                let bit = left.trailing_zeros() as usize;
+                left &= left.wrapping_sub(1);
+                (bit < REDS).then_some(word * REDS + bit)
+            })
+        })
+    }
+
+    /// The words of each task.
+    fn tasks(&self) -> impl Iterator<Item = Range<usize>> {
+        (0..self.bits.len()).step_by(WORDS).map(|first| first..(first + WORDS).min(self.bits.len()))
+    }
+
+    pub fn gather(&self, reds: &[f32], mut nodes: &mut [f32]) {
+        let parts = self.tasks().map(|words| {
+            let count = self.before[words.end] - self.before[words.start];
+            (words, nodes.split_off_mut(..count as usize).unwrap_or_default())
+        });
+        parts.collect::<Vec<_>>().into_par_iter().for_each(|(words, nodes)| {
+            for (node, red) in nodes.iter_mut().zip(self.reds(words)) {
+                *node = reds[red];
             }
         });
     }
 
     /// The reds that are no nodes become 0.
     pub fn scatter(&self, nodes: &[f32], reds: &mut [f32]) {
-        reds.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, reds)| {
+        let tasks: Vec<_> = self.tasks().collect();
+        tasks.into_par_iter().zip(reds.par_chunks_mut(CHUNK)).for_each(|(words, reds)| {
             reds.fill(0.0);
-            let first = chunk * CHUNK;
-            let start = self.0.partition_point(|&place| (place as usize) < first);
-            for (node, &place) in nodes[start..].iter().zip(&self.0[start..]) {
-                let Some(red) = reds.get_mut(place as usize - first) else { break };
-                *red = *node;
+            let (first_red, first) = (words.start * REDS, self.before[words.start] as usize);
+            for (node, red) in nodes[first..].iter().zip(self.reds(words)) {
+                reds[red - first_red] = *node;
             }
         });
     }
 }
 
 /// The graph of the reds, and of `strays` more nodes, with further `edges` (ascending; what ties a pair already grows).
+///
+/// Without these its weights are short (see `block`). All of them are positive, so that whatever a Laplacian with the
+/// rounded ones measures is right to one part in 256. The negative ones of strays, and those of coarser graphs, are there to
+/// cancel others.
 pub(super) fn reduced_graph(weights: &Weights, nodes: &Nodes, strays: usize, edges: &[Edge]) -> Rows {
     let half = weights.grid.half();
-    let mut node_of = vec![u32::MAX; weights.grid.half_pixels()];
-    for (node, &place) in nodes.0.iter().enumerate() {
-        node_of[place as usize] = node as u32;
-    }
+    let reds: Scratch<u32> = nodes.tasks().flat_map(|words| nodes.reds(words)).map(|red| red as u32).collect();
     let count = nodes.len() + strays;
+    let kept = if edges.is_empty() { nearest_short } else { |weight| weight };
     Rows::build(count, count, Vec::new, |found, node, row| {
-        if let Some(&place) = nodes.0.get(node) {
-            let red = ((place as usize / half) as isize, place as usize % half);
-            ties(weights, red, found);
-            for &((line, k), weight) in found.iter().filter(|tie| tie.0 != red) {
-                row.push(node_of[line as usize * half + k], weight as f32);
+        if let Some(&red) = reds.get(node) {
+            let here = ((red as usize / half) as isize, red as usize % half);
+            ties(weights, here, found);
+            for &((line, k), weight) in found.iter().filter(|tie| tie.0 != here) {
+                if let Some(other) = nodes.find(line as usize * half + k) {
+                    row.push(other as u32, kept(weight as f32));
+                }
             }
         }
         let first = edges.partition_point(|edge| (edge.from as usize) < node);

@@ -1,6 +1,7 @@
 //! Which nodes of a graph become the next coarser one.
 
 use super::matrix::Rows;
+use crate::memory::Scratch;
 
 /// A node depends strongly on a neighbour whose edge weighs at least this share of its heaviest (Ruge and Stüben 1987).
 pub(super) const STRONG: f32 = 0.25;
@@ -13,18 +14,16 @@ const UNDECIDED: u32 = u32::MAX - 1;
 const NONE: u32 = u32::MAX;
 
 /// The smallest weight on which each node depends strongly.
-pub(super) fn strong_limits(graph: &Rows) -> Vec<f32> {
-    (0..graph.len())
-        .map(|node| STRONG * graph.values(node).iter().fold(f32::MIN_POSITIVE, |max, &w| max.max(w)))
-        .collect()
+pub(super) fn strong_limits(graph: &Rows) -> Scratch<f32> {
+    (0..graph.len()).map(|node| STRONG * graph.values(node).fold(f32::MIN_POSITIVE, f32::max)).collect()
 }
 
 /// Nodes in lists by how many others want them as a coarse one.
 struct Ranking {
     first: Vec<u32>,
-    next: Vec<u32>,
-    previous: Vec<u32>,
-    rank: Vec<u16>,
+    next: Scratch<u32>,
+    previous: Scratch<u32>,
+    rank: Scratch<u16>,
     best: usize,
 }
 
@@ -80,12 +79,13 @@ impl Ranking {
 ///
 /// The first pass of Ruge and Stüben 1987: again and again the node on which most others depend becomes coarse, and these
 /// others fine.
-pub(super) fn split(graph: &Rows) -> Vec<u32> {
+pub(super) fn split(graph: &Rows) -> Scratch<u32> {
     let n = graph.len();
     let limits = strong_limits(graph);
-    let mut coarse_of = vec![UNDECIDED; n];
+    let mut coarse_of = Scratch::filled(UNDECIDED, n);
+    let nobody = || Scratch::filled(NONE, n);
     let mut ranking =
-        Ranking { first: Vec::new(), next: vec![NONE; n], previous: vec![NONE; n], rank: vec![0; n], best: 0 };
+        Ranking { first: Vec::new(), next: nobody(), previous: nobody(), rank: Scratch::filled(0, n), best: 0 };
     for node in (0..n).rev() {
         let wanted = graph.pairs(node).filter(|&(other, weight)| weight >= limits[other]).count();
         ranking.rank[node] = wanted.min(1 << 14) as u16;
@@ -115,7 +115,7 @@ pub(super) fn split(graph: &Rows) -> Vec<u32> {
         if coarse_of[node] == UNDECIDED {
             let mut strong = graph.pairs(node).filter(|&(_, weight)| weight >= limits[node]);
             let fine = strong.any(|(other, _)| coarse_of[other] != FINE && coarse_of[other] != UNDECIDED)
-                || graph.values(node).is_empty();
+                || graph.values(node).next().is_none();
             coarse_of[node] = if fine { FINE } else { COARSE };
         }
         if coarse_of[node] != FINE {
