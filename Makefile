@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-rust test-python lint format accuracy inspection bilateral simulator experiments method schema studies performance instructions clean
+.PHONY: demo test test-rust test-python data lint format accuracy inspection bilateral simulator experiments method schema studies performance instructions clean
 
 demo: $(VENV)/.installed ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
@@ -32,16 +32,19 @@ format: $(VENV)/.installed
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-accuracy: $(VENV)/.installed ## Rewrite the tables of docs/accuracy.md (needs BGARS_DATA)
+data:
+	@test -n "$$BGARS_DATA" || { echo "BGARS_DATA is not set: it names the folder of scenes, photographs and normal maps" >&2; exit 1; }
+
+accuracy: data $(VENV)/.installed ## Rewrite the tables of docs/accuracy.md (needs BGARS_DATA)
 	$(BIN)/python docs/make_accuracy.py
 
-inspection: $(VENV)/.installed ## Rewrite the inspection tables of docs/accuracy.md (needs BGARS_DATA)
+inspection: data $(VENV)/.installed ## Rewrite the inspection tables of docs/accuracy.md (needs BGARS_DATA)
 	$(BIN)/python docs/make_inspection_accuracy.py
 
-bilateral: $(VENV)/.installed ## Rewrite the bilateral tables of docs/accuracy.md, draw their pictures (needs BGARS_DATA)
+bilateral: data $(VENV)/.installed ## Rewrite the bilateral tables of docs/accuracy.md, draw their pictures (needs BGARS_DATA)
 	$(BIN)/python docs/make_bilateral.py
 
-simulator: $(VENV)/.installed ## Rewrite the tables of docs/simulator.md (needs BGARS_DATA)
+simulator: data $(VENV)/.installed ## Rewrite the tables of docs/simulator.md (needs BGARS_DATA)
 	$(BIN)/python docs/make_simulator_check.py
 
 experiments: $(VENV)/.installed ## Run the paper's experiments again and rewrite docs/experiments.md
