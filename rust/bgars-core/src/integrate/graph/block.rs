@@ -49,6 +49,7 @@ pub(super) fn to_short(value: f32) -> u16 {
     (value.to_bits() >> SHORT_BITS) as u16
 }
 
+/// The number of a short value.
 #[inline(always)]
 pub(super) fn from_short(upper_half: u16) -> f32 {
     f32::from_bits(u32::from(upper_half) << SHORT_BITS)
