@@ -9,7 +9,7 @@ use super::checkerboard::{BAND_ROWS, DOWN, LEFT, RIGHT, UP, Weights};
 use crate::memory::zeros;
 
 /// Reds that one word tells of, the first by its lowest bit.
-const REDS: usize = u64::BITS as usize;
+pub(super) const REDS: usize = u64::BITS as usize;
 
 /// Left, right, up and down.
 const SIDES: usize = 4;
@@ -65,6 +65,16 @@ impl RowBits<'_> {
 #[inline(always)]
 pub(super) fn moved_on(previous: u64, word: u64) -> u64 {
     previous >> (REDS - 1) | word << 1
+}
+
+/// The reds that a word tells of by `bits`, ascending; `word` words are before it.
+#[inline(always)]
+pub(super) fn reds_of(word: usize, mut bits: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = bits.trailing_zeros() as usize;
+        bits &= bits.wrapping_sub(1);
+        (bit < REDS).then_some(word * REDS + bit)
+    })
 }
 
 /// The edges around the centres of an odd row, clockwise from the top (see [`super::lost::Rim`]).
@@ -157,11 +167,7 @@ impl EdgeBits {
     pub fn places(&self, tells: impl Fn(usize) -> u64) -> Vec<usize> {
         let mut places = Vec::new();
         for word in self.words() {
-            let mut rest = tells(word);
-            while rest != 0 {
-                places.push(word * REDS + rest.trailing_zeros() as usize);
-                rest &= rest - 1;
-            }
+            places.extend(reds_of(word, tells(word)));
         }
         places
     }

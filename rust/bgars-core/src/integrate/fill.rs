@@ -132,6 +132,8 @@ impl<'a> Around<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::integrate::Difference;
+    use crate::integrate::operator::{Field, assemble};
 
     #[test]
     fn all_corners_to_be_tied_are_found() {
@@ -144,5 +146,30 @@ mod tests {
             found += tied.len();
         }
         assert!(found > 5, "{found}");
+    }
+
+    #[test]
+    fn corners_found_in_parts_are_those_found_at_once() {
+        const WIDTH: usize = 700;
+        let mut state = 1_u32;
+        let mut next = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            state >> 24
+        };
+        let mask: Vec<bool> = (0..WIDTH * 900).map(|_| next() > 64).collect();
+        let normals = [0.0, 0.0, 1.0].repeat(mask.len());
+        let field = Field { normals: &normals, mask: &mask, weights: None, regions: None, width: WIDTH };
+        let [(mut parts, _), (mut whole, _)] = [(); 2].map(|()| assemble(field, Difference::Trapezoid));
+        assert!(mask.len() > 2 * PART_PIXELS);
+        fill_corners(&mut parts);
+        let mut bits = EdgeBits::of(&whole);
+        let tied = ways_around(&whole, &bits, 0..whole.grid.height);
+        assert!(tied.len() > 1_000, "{}", tied.len());
+        tie(&mut whole, &mut bits, tied);
+        let tied = stops(&whole, &bits);
+        tie(&mut whole, &mut bits, tied);
+        for row in 0..whole.grid.height as isize {
+            assert_eq!(parts.row(row), whole.row(row), "row {row}");
+        }
     }
 }

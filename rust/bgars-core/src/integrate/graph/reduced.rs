@@ -8,6 +8,7 @@ use super::CHUNK;
 use super::block::nearest_short;
 use super::matrix::Rows;
 use crate::integrate::checkerboard::Weights;
+use crate::integrate::edge_bits::{REDS, reds_of};
 use crate::integrate::places::ties;
 use crate::memory::Scratch;
 
@@ -19,9 +20,6 @@ pub(super) struct Nodes {
     /// Nodes before each word of bits, and all of them.
     before: Vec<u32>,
 }
-
-/// Reds that one word tells of.
-const REDS: usize = u64::BITS as usize;
 
 /// Words that one task works on.
 const WORDS: usize = CHUNK / REDS;
@@ -55,14 +53,7 @@ impl Nodes {
 
     /// The reds that are nodes among those of some words.
     fn reds(&self, words: Range<usize>) -> impl Iterator<Item = usize> {
-        words.flat_map(|word| {
-            let mut left = self.bits[word];
-            std::iter::from_fn(move || {
-                let bit = left.trailing_zeros() as usize;
-                left &= left.wrapping_sub(1);
-                (bit < REDS).then_some(word * REDS + bit)
-            })
-        })
+        words.flat_map(|word| reds_of(word, self.bits[word]))
     }
 
     /// The words of each task.
@@ -128,4 +119,37 @@ pub(super) struct Edge {
     pub from: u32,
     pub to: u32,
     pub weight: f64,
+}
+
+#[cfg(test)]
+#[allow(clippy::float_cmp)]
+mod tests {
+    use super::*;
+    use crate::integrate::checkerboard::Grid;
+
+    /// Red by red, on a grid of several tasks whose rows end within a word.
+    #[test]
+    fn nodes_are_the_reds_with_a_real_edge() {
+        let mut weights = Weights::unset(Grid { height: 130, width: 210 });
+        let half = weights.grid.half();
+        let is_tied = |red: usize| (red * 2_654_435_761) >> 7 & 7 > 2;
+        for red in 0..weights.grid.half_pixels() {
+            let tie = if is_tied(red) { 0.5 } else { -0.5 };
+            weights.set_red(red / half, red % half, [0.0, tie, 0.0, 0.0]);
+        }
+        let (nodes, reds) = (Nodes::new(&weights), weights.grid.half_pixels());
+        let expected: Vec<usize> = (0..reds).filter(|&red| is_tied(red)).collect();
+        assert!(nodes.len() == expected.len() && reds > CHUNK && !half.is_multiple_of(REDS));
+        for red in 0..reds {
+            assert_eq!(nodes.find(red), expected.binary_search(&red).ok(), "red {red}");
+        }
+        let values: Vec<f32> = (0..reds).map(|red| 1.0 + red as f32).collect();
+        let [mut gathered, mut scattered] = [vec![7.0; nodes.len()], vec![7.0; reds]];
+        nodes.gather(&values, &mut gathered);
+        assert!(gathered.iter().zip(&expected).all(|(&value, &red)| value == values[red]));
+        nodes.scatter(&gathered, &mut scattered);
+        for red in 0..reds {
+            assert_eq!(scattered[red], if is_tied(red) { values[red] } else { 0.0 }, "red {red}");
+        }
+    }
 }
