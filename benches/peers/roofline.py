@@ -38,9 +38,9 @@ NORMAL_OPERATIONS = {
 ITERATION_BYTES = {
     "way up: weights, rounded r, coarse solution and last p read, p and q written": 8 + 2 + 1 + 2 + 2 + 4,
     "step of r, read, written and written rounded, q read": 8 + 2 + 4,
-    "every second time two steps of x, read and written, two p read": (8 + 2 + 2) // 2,
+    "every second time two steps of x, read and written on the way up, the p before the last read": (8 + 2) // 2,
     "restriction: weights and rounded r read, coarse right side written": 8 + 2 + 1,
-    "coarser grids: 60 bytes for each of their pixels, a third as many": 20,
+    "coarser grids: 32 bytes for each of their pixels, a third as many": 11,
 }
 """Half the pixels are unknowns (float64: 4 bytes a pixel; float32: 2; the four float32 weights of an unknown: 8)."""
 ITERATION_OPERATIONS = {

@@ -11,6 +11,7 @@ use super::edge_bits::EdgeBits;
 use super::multigrid::Multigrid;
 use super::reduction::dot;
 use super::settle::{Right, settle};
+use super::steps::Steps;
 use super::{OnProgress, Params, Progress};
 use crate::memory::{self, Aligned};
 use crate::{Error, Result};
@@ -56,8 +57,8 @@ pub(super) fn conjugate_gradients(
     let (mut iterations, mut solved) = (0, true);
     if norm <= target {
         let residual = if norm > 0.0 { norm / scale } else { 0.0 };
-        settle(weights, &right, Some(x.end(weights, &[])), Some(&mut q), &mut r);
-        return Ok(Solution { reds: x.x, blacks: q, iterations, residual, solved });
+        settle(weights, &right, Some(x.end(weights, [&[], &[]])), Some(&mut q), &mut r);
+        return Ok(Solution { reds: x.into_solution(), blacks: q, iterations, residual, solved });
     }
     let mut is_large = false;
     let preconditioner = Multigrid::new(weights, bits, |unknowns| {
@@ -84,7 +85,8 @@ pub(super) fn conjugate_gradients(
             // What was there before the first direction is finite, and counts nothing.
             let beta = r_z_before.replace(r_z).map_or(0.0, |before| (r_z / before) as f32);
             std::mem::swap(&mut p, &mut previous);
-            let p_q = preconditioner.advance(rounded.as_deref(), &vectors, (beta, &previous), &mut p, &mut q);
+            let on_grids = rounded.as_deref().map(|b| (b, x.due()));
+            let p_q = preconditioner.advance(on_grids, &vectors, (beta, &previous), &mut p, &mut q);
             // Both are positive but for rounding; what is lost in it cannot be found again.
             solved = r_z > 0.0 && p_q > 0.0;
             if !solved {
@@ -94,19 +96,25 @@ pub(super) fn conjugate_gradients(
                 break;
             }
             let alpha = r_z / p_q;
-            x.step(weights, alpha, [&previous, &p]);
+            x.add(alpha);
+            if rounded.is_none()
+                && let Some(due) = x.due()
+            {
+                // The residual takes the place of the direction before.
+                due.take(weights, [&previous, &p]);
+            }
             norm = subtract(weights, (alpha, &q), &mut r, rounded.as_mut().unwrap_or(&mut previous)).sqrt();
             iterations += 1;
             if on_progress(Progress { iteration: iterations, residual: norm / scale }).is_break() {
                 return Err(Error::Cancelled);
             }
         }
-        norm = settle(weights, &right, Some(x.end(weights, &p)), Some(&mut q), &mut r).sqrt();
+        norm = settle(weights, &right, Some(x.end(weights, [&previous, &p])), Some(&mut q), &mut r).sqrt();
         if !solved || norm <= target {
             if is_large {
                 [p, previous].into_iter().chain(rounded).for_each(Aligned::release);
             }
-            return Ok(Solution { reds: x.x, blacks: q, iterations, residual: norm / scale, solved });
+            return Ok(Solution { reds: x.into_solution(), blacks: q, iterations, residual: norm / scale, solved });
         }
     }
 }
@@ -142,72 +150,4 @@ fn subtract_part((alpha, q): (f64, &[f64]), r: &mut [f64], rounded: &mut [f32]) 
         *rounded = *r as f32;
     }
     dot(r, r)
-}
-
-/// A step, and the direction it is taken along.
-type Step<'a> = (f64, &'a [f32]);
-
-/// The sum of all steps.
-struct Steps {
-    x: Aligned<f64>,
-    /// Nothing was written to `x` yet.
-    is_blank: bool,
-    /// A step that `x` has not taken yet: two at once touch its memory half as often.
-    waiting: Option<f64>,
-}
-
-impl Steps {
-    fn from(start: Option<Aligned<f64>>, size: usize) -> Self {
-        let is_blank = start.is_none();
-        Self { x: start.unwrap_or_else(|| Aligned::any(size)), is_blank, waiting: None }
-    }
-
-    /// A step along the second direction; along the first there was the one before.
-    fn step(&mut self, weights: &Weights, alpha: f64, [previous, p]: [&[f32]; 2]) {
-        match self.waiting.take() {
-            Some(before) => self.take(weights, [(before, previous), (alpha, p)]),
-            None => self.waiting = Some(alpha),
-        }
-    }
-
-    /// Where they lead, all of them; the last was along `p`.
-    fn end(&mut self, weights: &Weights, p: &[f32]) -> &[f64] {
-        if let Some(alpha) = self.waiting.take() {
-            self.take(weights, [(alpha, p), (0.0, p)]);
-        }
-        if std::mem::take(&mut self.is_blank) {
-            self.x.fill(0.0);
-        }
-        &self.x
-    }
-
-    /// Takes two steps, one after the other, along the spans of the grid.
-    fn take(&mut self, weights: &Weights, [(alpha, p), (beta, q)]: [Step<'_>; 2]) {
-        let chunk = BAND_ROWS * weights.grid.half();
-        let is_blank = std::mem::take(&mut self.is_blank);
-        (self.x.par_chunks_mut(chunk), p.par_chunks(chunk), q.par_chunks(chunk)).into_par_iter().enumerate().for_each(
-            |(band, (x, p, q))| {
-                if is_blank {
-                    x.fill(0.0);
-                }
-                for part in weights.spans.parts(band) {
-                    take_steps([(alpha, &p[part.clone()]), (beta, &q[part.clone()])], &mut x[part]);
-                }
-            },
-        );
-    }
-}
-
-/// [`Steps::take`] in a part of a band.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn take_steps([(alpha, p), (beta, q)]: [Step<'_>; 2], x: &mut [f64]) {
-    for ((x, &p), &q) in x.iter_mut().zip(p).zip(q) {
-        *x = (*x + alpha * f64::from(p)) + beta * f64::from(q);
-    }
-}
-
-/// Sum of squares, by blocks in parallel and then in order: the same bits for any number of threads.
-pub(super) fn square_sum(vector: &[f64]) -> f64 {
-    let blocks: Vec<f64> = vector.par_chunks(BLOCK).map(|block| dot(block, block)).collect();
-    blocks.iter().sum()
 }

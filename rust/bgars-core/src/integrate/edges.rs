@@ -5,7 +5,8 @@ use std::ops::Range;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::checkerboard::{BAND_ROWS, Grid, Weights, split_whole_row};
+use super::checkerboard::{BAND_ROWS, Band, Grid, Weights, split_whole_row};
+use super::reduction::dot;
 use crate::memory::Aligned;
 
 /// A right side, or a solution, by colour.
@@ -13,6 +14,8 @@ use crate::memory::Aligned;
 pub(super) struct Colours {
     pub reds: Aligned<f64>,
     pub blacks: Aligned<f64>,
+    /// The norm of both, as they were made.
+    pub norm: f64,
 }
 
 /// Where the edges of a row lead.
@@ -53,21 +56,23 @@ where
 {
     let half = grid.half();
     let mut weights = Weights::unset(grid);
-    let mut right = Colours { reds: Aligned::any(grid.half_pixels()), blacks: Aligned::any(grid.half_pixels()) };
-    let bands = weights
-        .bands_mut()
-        .zip(right.reds.par_chunks_mut(BAND_ROWS * half))
-        .zip(right.blacks.par_chunks_mut(BAND_ROWS * half));
-    bands.for_each(|((mut weights, reds), blacks)| {
+    let [mut reds, mut blacks] = [(); 2].map(|()| Aligned::any(grid.half_pixels()));
+    let bands =
+        weights.bands_mut().zip(reds.par_chunks_mut(BAND_ROWS * half)).zip(blacks.par_chunks_mut(BAND_ROWS * half));
+    let square_of = |((mut weights, reds), blacks): ((Band<'_>, &mut [f64]), &mut [f64])| {
         let rows = weights.rows.clone();
-        each_row(grid, joiner(), rows.clone(), [reds, blacks], |row, [above, along, below]| {
+        each_row(grid, joiner(), rows.clone(), [&mut *reds, &mut *blacks], |row, [above, along, below]| {
             if row == rows.start {
                 weights.set_above(&above.weight);
             }
             weights.set_row(row, &along.weight, &below.weight);
         });
-    });
-    (weights, right)
+        dot(reds, reds) + dot(blacks, blacks)
+    };
+    // Each band by itself: the same bits for any number of threads.
+    let squares: Vec<f64> = bands.map(square_of).collect();
+    let norm = squares.iter().sum::<f64>().sqrt();
+    (weights, Colours { reds, blacks, norm })
 }
 
 /// Calls `visit` for each of some rows with the edges above, along and below it, and sets the right side of these rows, both

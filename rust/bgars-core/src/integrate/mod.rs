@@ -30,6 +30,7 @@ mod settle;
 mod solve;
 mod spans;
 mod stencil;
+mod steps;
 mod stops;
 mod strays;
 mod system;

@@ -12,8 +12,9 @@ use super::fill::fill_corners;
 use super::graph::{GraphCycle, GraphVectors};
 use super::lost::{Lost, doubtful_centres};
 use super::reduction::{eliminate_blacks, fill_and_join, multiply};
+use super::steps::Due;
 use super::strays::{Changes, Strays};
-use super::transfer::{Below, advance, prolong, restrict};
+use super::transfer::{Below, RightSide, advance, prolong, prolong_and_fill, restrict};
 use crate::memory::Aligned;
 
 /// A grid of at most this many pixels is solved directly.
@@ -46,7 +47,8 @@ pub(super) struct Vectors {
 struct LevelVectors {
     reds: Aligned<f32>,
     blacks: Aligned<f32>,
-    red_solution: Aligned<f32>,
+    /// The right side of the reds with the blacks eliminated; on the last grid their solution in the end.
+    reduced: Aligned<f32>,
     /// Row-major.
     solution: Aligned<f32>,
 }
@@ -57,7 +59,7 @@ impl LevelVectors {
         Self {
             reds: Aligned::zeros(grid.half_pixels()),
             blacks: Aligned::zeros(grid.half_pixels()),
-            red_solution: Aligned::zeros(grid.half_pixels()),
+            reduced: Aligned::zeros(grid.half_pixels()),
             solution: Aligned::any(grid.height * grid.width),
         }
     }
@@ -118,13 +120,18 @@ impl<'a> Multigrid<'a> {
     /// `x = M b`.
     pub fn cycle(&self, b: &[f32], vectors: &mut Vectors, x: &mut [f32]) {
         self.descend(b, vectors);
-        self.up(0, b, x, &vectors.levels, &vectors.graph, 0);
+        let Some(next) = vectors.levels.first() else { return self.graph.scatter(&vectors.graph, x) };
+        prolong(self.finest, b, &next.solution, x);
+        self.changes(0, next, &vectors.graph, 0).add_to(0, x);
     }
 
     /// The way down; returns `<b, M b>`, which is known before `M b` is.
     pub fn descend(&self, b: &[f32], vectors: &mut Vectors) -> f64 {
         let Vectors { levels, graph } = vectors;
-        self.down(0, b, levels, graph, 0)
+        let Some((next, coarser)) = levels.split_first_mut() else { return self.graph.solve(b, graph) };
+        let [_, smoothed] = restrict(self.finest, RightSide::Reds(b), [&mut next.reds, &mut next.blacks]);
+        self.strays[0].restrict(b, &mut graph.strays[..self.strays[0].len()], &mut next.reds, &mut next.blacks);
+        smoothed + self.solve(1, next, coarser, graph, self.strays[0].len())
     }
 
     /// Whether there is a grid above the graph.
@@ -132,64 +139,31 @@ impl<'a> Multigrid<'a> {
         !self.levels.is_empty()
     }
 
-    /// The way up after [`Self::descend`], which grids need `b` for once more: the next direction `p = M b + beta previous` and
-    /// `q = S p`; returns `<p, q>`.
+    /// The way up after [`Self::descend`]: the next direction `p = M b + beta previous` and `q = S p`; returns `<p, q>`. Grids need
+    /// `b` for it once more, and take the steps that are due along what is in `p` and along `previous`.
     pub fn advance(
         &self,
-        b: Option<&[f32]>,
+        on_grids: Option<(&[f32], Option<Due<'_>>)>,
         vectors: &Vectors,
         (beta, previous): (f32, &[f32]),
         p: &mut [f32],
         q: &mut [f64],
     ) -> f64 {
         if let Some(next) = vectors.levels.first() {
-            let b = b.expect("grids are given b");
+            let (b, due) = on_grids.expect("grids are given b");
             let changes = self.changes(0, next, &vectors.graph, 0);
             let below = Below { b, coarse: &next.solution, changes: &changes };
-            return advance(self.finest, below, (beta, previous), p, q);
+            return advance(self.finest, below, (beta, previous), due, p, q);
         }
         self.graph.scatter(&vectors.graph, p);
         p.par_iter_mut().zip(previous).for_each(|(p, previous)| *p += beta * previous);
         multiply(self.finest, p, q)
     }
 
-    /// From the right side of the reds of a grid (0 is the finest) to the solution of the next coarser one; `coarser` are the
-    /// grids below, `first_stray` counts the strays of the finer grids. Returns the product of `b` with its solution: all that
-    /// smoothing adds on the way, and the part of the graph.
-    fn down(
-        &self,
-        level: usize,
-        b: &[f32],
-        coarser: &mut [LevelVectors],
-        graph: &mut GraphVectors,
-        first_stray: usize,
-    ) -> f64 {
-        let Some((next, coarser)) = coarser.split_first_mut() else { return self.graph.solve(b, graph) };
-        let strays = &self.strays[level];
-        let own = first_stray..first_stray + strays.len();
-        let smoothed = restrict(self.weights(level), b, &mut next.reds, &mut next.blacks);
-        strays.restrict(b, &mut graph.strays[own.clone()], &mut next.reds, &mut next.blacks);
-        smoothed + self.whole(level + 1, next, coarser, graph, own.end)
-    }
-
-    /// From there to the reds of the grid.
-    fn up(
-        &self,
-        level: usize,
-        b: &[f32],
-        x: &mut [f32],
-        coarser: &[LevelVectors],
-        graph: &GraphVectors,
-        first_stray: usize,
-    ) {
-        let Some(next) = coarser.first() else { return self.graph.scatter(graph, x) };
-        prolong(self.weights(level), b, &next.solution, x);
-        self.changes(level, next, graph, first_stray).add_to(0, x);
-    }
-
-    /// Solves for the whole of a coarser grid: blacks eliminated, reds by a V-cycle, blacks filled in. Returns the product of
-    /// right side and solution.
-    fn whole(
+    /// From the right side of a whole coarser grid to its solution: blacks eliminated, reds by a V-cycle, blacks filled in.
+    /// `coarser` are the grids below, `first_stray` counts the strays of the finer ones. Returns the product of right side and
+    /// solution: all that smoothing and blacks add on the way, and the part of the graph.
+    fn solve(
         &self,
         level: usize,
         here: &mut LevelVectors,
@@ -197,17 +171,25 @@ impl<'a> Multigrid<'a> {
         graph: &mut GraphVectors,
         first_stray: usize,
     ) -> f64 {
-        let weights = self.weights(level);
-        let of_blacks = eliminate_blacks(weights, &mut here.reds, &here.blacks);
-        let of_reds = self.down(level, &here.reds, coarser, graph, first_stray);
-        self.up(level, &here.reds, &mut here.red_solution, coarser, graph, first_stray);
-        fill_and_join(weights, &here.red_solution, &mut here.blacks, &mut here.solution);
-        of_blacks + of_reds
-    }
-
-    /// The weights of a grid.
-    fn weights(&self, level: usize) -> &Weights {
-        if level == 0 { self.finest } else { &self.levels[level - 1] }
+        let weights = &self.levels[level - 1];
+        let LevelVectors { reds, blacks, reduced, solution } = here;
+        let Some((next, coarser)) = coarser.split_first_mut() else {
+            let of_blacks = eliminate_blacks(weights, reds, blacks);
+            let of_reds = self.graph.solve(reds, graph);
+            self.graph.scatter(graph, reduced);
+            fill_and_join(weights, reduced, blacks, solution);
+            return of_blacks + of_reds;
+        };
+        let strays = &self.strays[level];
+        let own = first_stray..first_stray + strays.len();
+        let right = RightSide::Whole { colours: [reds, blacks], reduced };
+        let [of_blacks, smoothed] = restrict(weights, right, [&mut next.reds, &mut next.blacks]);
+        strays.restrict(reduced, &mut graph.strays[own.clone()], &mut next.reds, &mut next.blacks);
+        let of_rest = self.solve(level + 1, next, coarser, graph, own.end);
+        let changes = self.changes(level, next, graph, first_stray);
+        let below = Below { b: reduced, coarse: &next.solution, changes: &changes };
+        prolong_and_fill(weights, below, blacks, solution);
+        of_blacks + (smoothed + of_rest)
     }
 
     /// What the strays of a grid change in it.

@@ -162,6 +162,14 @@ pub(super) fn sum(values: &[f64]) -> f64 {
     lanes.iter().chain(rest).sum()
 }
 
+/// Sum of squares, by blocks in parallel and then in order: the same bits for any number of threads.
+pub(super) fn square_sum(vector: &[f64]) -> f64 {
+    /// Numbers that one task adds up.
+    const BLOCK: usize = 1 << 14;
+    let blocks: Vec<f64> = vector.par_chunks(BLOCK).map(|block| dot(block, block)).collect();
+    blocks.iter().sum()
+}
+
 /// Sum of products in eight lanes, so that it vectorises and has one order.
 #[inline(always)]
 pub(super) fn dot<A: Real, B: Real>(a: &[A], b: &[B]) -> f64 {
@@ -194,34 +202,63 @@ fn eliminate_band_with<V: Packed<Number: Real>>(
     let first = (band * BAND_ROWS) as isize;
     let end = first + (reds.len() / n) as isize;
     let span = weights.spans.band(band);
+    let mut before = vec![V::Number::default(); n];
     let mut energy = 0.0;
     for row in first - 1..=end {
-        if weights.grid.contains(row) {
-            let sides = weights.blacks::<V>(row, span);
-            let out = V::chunks_mut(&mut scaled.row_mut(row)[span.start..], sides.len());
-            let blacks = V::chunks(&blacks[row as usize * n..][span.range()], sides.len());
-            let mut of_row = V::splat(V::Number::default());
-            for k in 0..sides.len() {
-                let black = V::read(&blacks[k]);
-                let solved = black * sides.diagonal(k).inverse();
-                solved.put(&mut out[k]);
-                of_row = black.times_plus(solved, of_row);
-            }
-            if (first..end).contains(&row) {
-                energy += of_row.sum();
-            }
+        let of_row = scale_blacks::<V>(weights, blacks, row, span, scaled);
+        if (first..end).contains(&row) {
+            energy += of_row;
         }
         let row = row - 1;
-        if row < first {
-            continue;
-        }
-        let stencil = weights.red_stencil::<V>(row, span, scaled.around(row));
-        let reds = V::chunks_mut(&mut reds[(row - first) as usize * n + span.start..], stencil.len());
-        for k in 0..stencil.len() {
-            (V::read(&reds[k]) + stencil.sum(k)).put(&mut reds[k]);
+        if row >= first {
+            let reds = &mut reds[(row - first) as usize * n..][span.range()];
+            before[span.range()].copy_from_slice(reds);
+            add_blacks::<V>(weights, row, span, &before[span.range()], scaled, reds);
         }
     }
     energy
+}
+
+/// `D_black^-1 blacks` of a row along a span; returns its product with the blacks.
+#[inline(always)]
+pub(super) fn scale_blacks<V: Packed<Number: Real>>(
+    weights: &Weights,
+    blacks: &[V::Number],
+    row: isize,
+    span: Span,
+    scaled: &mut Ring<V::Number>,
+) -> f64 {
+    if !weights.grid.contains(row) {
+        return 0.0;
+    }
+    let sides = weights.blacks::<V>(row, span);
+    let out = V::chunks_mut(&mut scaled.row_mut(row)[span.start..], sides.len());
+    let blacks = V::chunks(&blacks[row as usize * weights.grid.half()..][span.range()], sides.len());
+    let mut energy = V::splat(V::Number::default());
+    for k in 0..sides.len() {
+        let black = V::read(&blacks[k]);
+        let solved = black * sides.diagonal(k).inverse();
+        solved.put(&mut out[k]);
+        energy = black.times_plus(solved, energy);
+    }
+    energy.sum()
+}
+
+/// `reds + W scaled` of a row along a span.
+#[inline(always)]
+pub(super) fn add_blacks<V: Packed<Number: Real>>(
+    weights: &Weights,
+    row: isize,
+    span: Span,
+    reds: &[V::Number],
+    scaled: &Ring<V::Number>,
+    out: &mut [V::Number],
+) {
+    let stencil = weights.red_stencil::<V>(row, span, scaled.around(row));
+    let (reds, out) = (V::chunks(reds, stencil.len()), V::chunks_mut(out, stencil.len()));
+    for k in 0..stencil.len() {
+        (V::read(&reds[k]) + stencil.sum(k)).put(&mut out[k]);
+    }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
@@ -241,16 +278,32 @@ fn fill_band_with<V: Packed<Number = f32>>(
     let first = (band * BAND_ROWS) as isize;
     let end = first + (blacks.len() / n) as isize;
     let span = weights.spans.band(band);
+    let mut before = vec![0.0; n];
     for row in first - 1..=end {
         load(weights.grid, reds, row, span, here.row_mut(row), |value| value);
         let row = row - 1;
         if row < first {
             continue;
         }
-        let stencil = weights.black_stencil::<V>(row, span, here.around(row));
-        let blacks = V::chunks_mut(&mut blacks[(row - first) as usize * n + span.start..], stencil.len());
-        for k in 0..stencil.len() {
-            ((V::read(&blacks[k]) + stencil.sum(k)) * stencil.diagonal(k).inverse()).put(&mut blacks[k]);
-        }
+        let blacks = &mut blacks[(row - first) as usize * n..][span.range()];
+        before[span.range()].copy_from_slice(blacks);
+        fill_row::<V>(weights, row, span, here, &before[span.range()], blacks);
+    }
+}
+
+/// `D_black^-1 (blacks + W^T reds)` of a row along a span.
+#[inline(always)]
+pub(super) fn fill_row<V: Packed<Number: Real>>(
+    weights: &Weights,
+    row: isize,
+    span: Span,
+    reds: &Ring<V::Number>,
+    blacks: &[V::Number],
+    out: &mut [V::Number],
+) {
+    let stencil = weights.black_stencil::<V>(row, span, reds.around(row));
+    let (blacks, out) = (V::chunks(blacks, stencil.len()), V::chunks_mut(out, stencil.len()));
+    for k in 0..stencil.len() {
+        ((V::read(&blacks[k]) + stencil.sum(k)) * stencil.diagonal(k).inverse()).put(&mut out[k]);
     }
 }

@@ -29,7 +29,7 @@ impl Right<'_> {
     /// Gives its memory back to the system if it can be made again.
     pub fn release(&mut self) {
         let &mut Self::Kept(_, Some(again)) = self else { return };
-        if let Self::Kept(Colours { reds, blacks }, _) = std::mem::replace(self, Self::Anew(again)) {
+        if let Self::Kept(Colours { reds, blacks, .. }, _) = std::mem::replace(self, Self::Anew(again)) {
             reds.release();
             blacks.release();
         }
@@ -38,7 +38,7 @@ impl Right<'_> {
     /// The rows from one before a band to one after it, as far as there are any.
     fn around<'b>(&'b self, grid: Grid, band: usize, [reds, blacks]: &'b mut [Vec<f64>; 2]) -> Given<'b> {
         match self {
-            Self::Kept(Colours { reds, blacks }, _) => (reds, blacks, 0),
+            Self::Kept(Colours { reds, blacks, .. }, _) => (reds, blacks, 0),
             Self::Anew(again) => {
                 let first = band * BAND_ROWS;
                 let rows = first.saturating_sub(1)..(first + BAND_ROWS + 1).min(grid.height);
@@ -188,7 +188,7 @@ mod tests {
         let (grid, half) = (weights.grid, weights.grid.half());
         let number = |seed: usize| ((seed * 2_654_435_761) >> 7) as f64 % 1000.0 / 1000.0 - 0.5;
         let mut right =
-            Colours { reds: Aligned::zeros(grid.half_pixels()), blacks: Aligned::zeros(grid.half_pixels()) };
+            Colours { reds: Aligned::zeros(grid.half_pixels()), blacks: Aligned::zeros(grid.half_pixels()), norm: 0.0 };
         let mut reds = vec![0.0; grid.half_pixels()];
         let (mut blacks, mut left) = (vec![7.0; reds.len()], vec![7.0; reds.len()]);
         for (place, red) in reds.iter_mut().enumerate() {

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::checkerboard::join_row;
 use super::components::Runs;
-use super::conjugate_gradient::{Solution, conjugate_gradients, square_sum};
+use super::conjugate_gradient::{Solution, conjugate_gradients};
 use super::fill::fill_corners;
 use super::operator::{Field, FieldEdges};
 use super::settle::Right;
@@ -107,8 +107,8 @@ pub fn integrate_into(
     let edges = FieldEdges::new(field, params.difference);
     let (mut weights, right) = edges.assemble();
     let bits = fill_corners(&mut weights);
-    let scale = (square_sum(&right.reds) + square_sum(&right.blacks)).sqrt();
     let again = |rows: Range<usize>, colours: [&mut [f64]; 2]| edges.right_side(rows, colours);
+    let scale = right.norm;
     let Solution { reds, blacks, iterations, residual, solved } =
         conjugate_gradients(&weights, bits, Right::Kept(right, Some(&again)), None, scale, params, on_progress)?;
     if !solved {

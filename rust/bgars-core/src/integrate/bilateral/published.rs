@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::super::Progress;
-use super::super::conjugate_gradient::square_sum;
+use super::super::reduction::square_sum;
 use super::Precision;
 use super::frame::Frame;
 use super::jacobi::Jacobi;

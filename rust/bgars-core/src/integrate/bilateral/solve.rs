@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::super::checkerboard::{Weights, join_row, split_whole_row};
 use super::super::components::Runs;
-use super::super::conjugate_gradient::{conjugate_gradients, square_sum};
+use super::super::conjugate_gradient::conjugate_gradients;
 use super::super::edges::Colours;
 use super::super::fill::fill_corners;
 use super::super::operator::Field;
@@ -178,7 +178,7 @@ fn improve(
 ) -> Result<()> {
     let grid = weights.grid;
     let (width, half) = (grid.width, grid.half());
-    let scale = (square_sum(&right.reds) + square_sum(&right.blacks)).sqrt();
+    let scale = right.norm;
     if scale == 0.0 {
         z.fill(0.0);
         return Ok(());

@@ -8,6 +8,7 @@ use crate::integrate::checkerboard::{BAND_ROWS, Weights};
 use crate::integrate::real::{Real, on_vectors};
 use crate::integrate::reduction::{multiply_row, solve_blacks};
 use crate::integrate::ring::Ring;
+use crate::integrate::steps::Due;
 use crate::integrate::strays::Changes;
 use crate::vector::Packed;
 
@@ -22,12 +23,13 @@ pub(in crate::integrate) struct Below<'a> {
     pub changes: &'a Changes<'a>,
 }
 
-/// `p = z + beta previous` and `q = S p`, along the spans of the grid, where `z` is what [`super::prolong`] makes of `below`
+/// `p = z + beta previous` and `q = S p`, the steps that are `due` before `p` is overwritten, along the spans of the grid, where `z` is what [`super::prolong`] makes of `below`
 /// with the changes of the strays. Returns `<p, q>`, each band summed by itself: the same bits for any number of threads.
 pub(in crate::integrate) fn advance(
     weights: &Weights,
     below: Below<'_>,
     (beta, previous): (f32, &[f32]),
+    due: Option<Due<'_>>,
     p: &mut [f32],
     q: &mut [f64],
 ) -> f64 {
@@ -35,13 +37,17 @@ pub(in crate::integrate) fn advance(
     let bands = weights.spans.bands_of_a_task();
     let chunk = bands * BAND_ROWS * half;
     let mut products = vec![0.0; weights.spans.len()];
-    (p.par_chunks_mut(chunk), q.par_chunks_mut(chunk), products.par_chunks_mut(bands))
+    let due: Vec<_> = match due {
+        Some(due) => due.chunks(chunk).map(Some).collect(),
+        None => products.chunks(bands).map(|_| None).collect(),
+    };
+    (p.par_chunks_mut(chunk), q.par_chunks_mut(chunk), products.par_chunks_mut(bands), due)
         .into_par_iter()
         .enumerate()
         .for_each_init(
             || Advancing::new(half),
-            |rows, (task, (p, q, products))| {
-                advance_rows(weights, below, (beta, previous), task * bands * BAND_ROWS, rows, (p, q, products));
+            |rows, (task, (p, q, products, due))| {
+                advance_rows(weights, below, (beta, previous), task * bands * BAND_ROWS, rows, (p, q, products, due));
             },
         );
     products.iter().sum()
@@ -62,8 +68,8 @@ impl Advancing {
     }
 }
 
-/// The rows of a task to write: of `p`, of `q`, and `<p, q>` of each band.
-type Out<'a> = (&'a mut [f32], &'a mut [f64], &'a mut [f64]);
+/// The rows of a task to write: of `p`, of `q`, `<p, q>` of each band, and of the solution, if steps are due.
+type Out<'a> = (&'a mut [f32], &'a mut [f64], &'a mut [f64], Option<Due<'a>>);
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 pub(super) fn advance_rows(
@@ -84,7 +90,7 @@ pub(super) fn advance_rows_with<V: Packed<Number = f32>, D: Packed<Number = f64>
     before: (f32, &[f32]),
     first_row: usize,
     rows: &mut Advancing,
-    (p, q, products): Out<'_>,
+    (p, q, products, mut due): Out<'_>,
 ) {
     let (n, first) = (weights.grid.half(), first_row as isize);
     let end = first + (p.len() / n) as isize;
@@ -92,7 +98,15 @@ pub(super) fn advance_rows_with<V: Packed<Number = f32>, D: Packed<Number = f64>
     for row in first - LEAD - 2..end + 2 {
         go_ahead::<V>(weights, below.b, below.coarse, row, &mut rows.up);
         if row >= first - 2 && weights.grid.contains(row) {
-            let own = (first..end).contains(&row).then(|| &mut p[(row - first) as usize * n..][..n]);
+            let own = (first..end).contains(&row).then(|| {
+                let at = (row - first) as usize;
+                let (own, span) = (&mut p[at * n..][..n], weights.spans.at(row));
+                if let Some(due) = &mut due {
+                    let previous = &before.1[row as usize * n..][span.range()];
+                    due.take_row(at, n, span, [&own[span.range()], previous]);
+                }
+                own
+            });
             turn_row::<V, D>(weights, below, before, row, rows, own);
         }
         let row = row - 1;

@@ -8,15 +8,20 @@
 //!
 //! Smoothing is one damping-free Jacobi step on the reduced system (a red-black Gauss-Seidel sweep on the whole) on the way
 //! down and its adjoint on the way up. Both halves are plain functions of their input: no thread sees another one's writes. On
-//! the finest grid the way up goes on to conjugate gradient's next direction and its product (`advance`).
+//! the finest grid the way up goes on to conjugate gradient's next direction and its product (`advance`), on the others to the
+//! blacks (`fill`), which the way down eliminates as it reads them (`right_side`).
 
 mod advance;
+mod fill;
 mod prolong;
 mod restrict;
+mod right_side;
 
 pub(super) use advance::{Below, advance};
+pub(super) use fill::prolong_and_fill;
 pub(super) use prolong::prolong;
 pub(super) use restrict::restrict;
+pub(super) use right_side::RightSide;
 
 use super::checkerboard::{DOWN, LEFT, RIGHT, UP, Weights};
 use super::ring::Ring;
@@ -65,11 +70,14 @@ impl<'a, V: Packed<Number = f32>> CentreTies<'a, V> {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp)]
 mod tests {
     use super::*;
     use crate::integrate::checkerboard::Grid;
-    use crate::integrate::reduction::multiply;
+    use crate::integrate::reduction::{eliminate_blacks, fill_and_join, multiply};
+    use crate::integrate::steps::Steps;
     use crate::integrate::strays::Changes;
+    use crate::memory::Aligned;
     use crate::vector::{One, Portable};
 
     fn number(seed: usize) -> f32 {
@@ -103,7 +111,7 @@ mod tests {
         }
     }
 
-    type Down<'a> = dyn Fn(&mut restrict::Restricting, [&mut [f32]; 2], &mut [f64]) + 'a;
+    type Down<'a> = dyn Fn(&mut restrict::Restricting, [&mut [f32]; 2], &mut [[f64; 2]]) + 'a;
 
     #[test]
     fn every_instruction_set_does_the_same() {
@@ -112,14 +120,18 @@ mod tests {
         let b: Vec<f32> = (0..grid.half_pixels()).map(|place| number(place) - 0.5).collect();
         let down = |task: &Down<'_>| {
             let [mut reds, mut blacks] = [vec![0.0; coarse.half_pixels()], vec![0.0; coarse.half_pixels()]];
-            let mut energy = [0.0];
-            task(&mut restrict::Restricting::new(n), [&mut reds, &mut blacks], &mut energy);
-            [reds, blacks, vec![energy[0] as f32]].concat()
+            let mut energies = [[0.0; 2]];
+            task(&mut restrict::Restricting::new(n), [&mut reds, &mut blacks], &mut energies);
+            [reds, blacks, vec![energies[0][1] as f32]].concat()
         };
-        let fast = down(&|rows, out, sum| restrict::restrict_rows(&weights, &b, 0, rows, out, sum));
-        let portable =
-            down(&|rows, out, sum| restrict::restrict_rows_with::<Portable>(&weights, &b, 0, rows, out, sum));
-        let one = down(&|rows, out, sum| restrict::restrict_rows_with::<One<f32>>(&weights, &b, 0, rows, out, sum));
+        let fast =
+            down(&|rows, out, sum| restrict::restrict_rows(&weights, &mut RightSide::Reds(&b), 0, rows, out, sum));
+        let portable = down(&|rows, out, sum| {
+            restrict::restrict_rows_with::<Portable>(&weights, &mut RightSide::Reds(&b), 0, rows, out, sum);
+        });
+        let one = down(&|rows, out, sum| {
+            restrict::restrict_rows_with::<One<f32>>(&weights, &mut RightSide::Reds(&b), 0, rows, out, sum);
+        });
         assert_near(&fast, &portable);
         assert_near(&fast, &one);
 
@@ -136,9 +148,9 @@ mod tests {
         assert_near(&fast, &one);
     }
 
-    /// Up, turned and multiplied in one go, and one after the other: with the same bits, for any number of threads.
+    /// Up, turned, multiplied and stepped along in one go, and one after the other: with the same bits, for any number of threads.
     #[test]
-    fn the_next_direction_is_what_three_passes_make() {
+    fn the_next_direction_is_what_four_passes_make() {
         let changed: Vec<u32> = (0..4_000).step_by(117).collect();
         for (height, width) in [(1, 64), (33, 20), (9, 1), (300, 70), (130, 64)] {
             let grid = Grid { height, width };
@@ -146,7 +158,8 @@ mod tests {
             weights.find_spans();
             let b: Vec<f32> = (0..grid.half_pixels()).map(|place| number(place) - 0.5).collect();
             let correction: Vec<f32> = (0..coarse.height * coarse.width).map(|place| number(place + 5) - 0.5).collect();
-            let previous: Vec<f32> = (0..grid.half_pixels()).map(|place| number(place + 9) - 0.5).collect();
+            let [before, previous]: [Vec<f32>; 2] =
+                [77, 9].map(|seed| (0..grid.half_pixels()).map(|place| number(place + seed) - 0.5).collect());
             let reds: Vec<u32> = changed.iter().copied().filter(|&red| (red as usize) < grid.half_pixels()).collect();
             let changes = Changes::new(&reds, reds.iter().map(|&red| number(red as usize)).collect());
 
@@ -158,8 +171,19 @@ mod tests {
             let below = Below { b: &b, coarse: &correction, changes: &changes };
             for threads in [1, 2, 3] {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-                let mut found = (vec![0.0; p.len()], vec![0.0; p.len()]);
-                let product = pool.install(|| advance(&weights, below, (0.25, &previous), &mut found.0, &mut found.1));
+                let start = (threads > 1).then(|| Aligned::zeros(p.len()));
+                let mut steps = Steps::from(start, p.len());
+                steps.add(0.7);
+                steps.add(-1.3);
+                let due = steps.due();
+                let mut found = (before.clone(), vec![0.0; p.len()]);
+                let product =
+                    pool.install(|| advance(&weights, below, (0.25, &previous), due, &mut found.0, &mut found.1));
+                for (at, x) in steps.end(&weights, [&[], &[]]).iter().enumerate() {
+                    let is_inside = weights.spans.at((at / n) as isize).range().contains(&(at % n));
+                    let taken = 0.7 * f64::from(before[at]) - 1.3 * f64::from(previous[at]);
+                    assert!((x - if is_inside { taken } else { 0.0 }).abs() < 1e-12, "{grid:?}: steps of red {at}");
+                }
                 let mut expected = vec![0.0; p.len()];
                 let slow = multiply(&weights, &found.0, &mut expected);
                 assert_eq!(found.1, expected, "{grid:?}, {threads} threads");
@@ -170,6 +194,60 @@ mod tests {
                         assert!(near(found.0[at], p[at] + 0.25 * previous[at]), "{grid:?}: row {row}, red {k}");
                     }
                 }
+            }
+        }
+    }
+
+    /// Eliminated and restricted, or prolonged and filled in, row by row, and one pass after the other: the same bits, for any
+    /// number of threads.
+    #[test]
+    fn a_whole_grid_in_one_pass_is_as_in_two() {
+        let changed: Vec<u32> = (0..4_000).step_by(131).collect();
+        for (height, width) in [(1, 64), (33, 20), (9, 1), (300, 70), (130, 64)] {
+            let grid = Grid { height, width };
+            let (mut weights, size, coarse) = (weights(grid), grid.half_pixels(), grid.coarser());
+            weights.find_spans();
+            let in_spans = |seed: usize| -> Vec<f32> {
+                let mut values = vec![0.0; size];
+                for row in 0..height {
+                    for k in weights.spans.at(row as isize).range() {
+                        values[row * grid.half() + k] = number(row * grid.half() + k + seed) - 0.5;
+                    }
+                }
+                values
+            };
+            let (reds, blacks) = (in_spans(0), in_spans(99));
+            let mut eliminated = reds.clone();
+            let of_blacks = eliminate_blacks(&weights, &mut eliminated, &blacks);
+            let down = |right: RightSide<'_>| {
+                let mut next = [(); 2].map(|()| vec![0.0; coarse.half_pixels()]);
+                let sums = restrict(&weights, right, next.each_mut().map(|colour| &mut colour[..]));
+                (sums, next)
+            };
+            let expected = down(RightSide::Reds(&eliminated));
+            assert_eq!(expected.0[0], 0.0);
+            assert_eq!(expected.1.iter().flatten().any(|&value| value != 0.0), width > 1, "{grid:?}");
+
+            let correction: Vec<f32> = (0..coarse.height * coarse.width).map(|place| number(place + 5) - 0.5).collect();
+            let changed: Vec<u32> = changed.iter().copied().filter(|&red| (red as usize) < size).collect();
+            let changes = Changes::new(&changed, changed.iter().map(|&red| number(red as usize)).collect());
+            let mut solved = vec![0.0; size];
+            prolong(&weights, &eliminated, &correction, &mut solved);
+            changes.add_to(0, &mut solved);
+            let mut solution = vec![0.0; height * width];
+            fill_and_join(&weights, &solved, &mut blacks.clone(), &mut solution);
+            for threads in [1, 2, 3] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let mut reduced = vec![0.0; size];
+                let whole = RightSide::Whole { colours: [&reds, &blacks], reduced: &mut reduced };
+                let (sums, next) = pool.install(|| down(whole));
+                assert_eq!((sums, &next), ([of_blacks, expected.0[1]], &expected.1), "{grid:?}, {threads} threads");
+                assert_eq!(reduced, eliminated, "{grid:?}, {threads} threads");
+
+                let below = Below { b: &reduced, coarse: &correction, changes: &changes };
+                let mut found = vec![0.0; solution.len()];
+                pool.install(|| prolong_and_fill(&weights, below, &blacks, &mut found));
+                assert_eq!(found, solution, "{grid:?}, {threads} threads");
             }
         }
     }
@@ -248,7 +326,7 @@ mod tests {
         let half = grid.coarser().half();
         let colours: [Vec<f32>; 2] = std::array::from_fn(|_| vec![0.0; grid.coarser().half_pixels()]);
         let [mut reds, mut blacks] = colours;
-        restrict(&weights, &single(&b), &mut reds, &mut blacks);
+        restrict(&weights, RightSide::Reds(&single(&b)), [&mut reds, &mut blacks]);
         let found = (0..corners.len()).map(|at| (at / n, at % n)).map(|(row, k)| {
             let colour = if (row + k) % 2 == 0 { &reds } else { &blacks };
             colour[row * half + k / 2]

@@ -3,6 +3,7 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
+use super::right_side::{Making, RightSide};
 use super::{CentreTies, corner_ties};
 use crate::integrate::checkerboard::{BAND_ROWS, Weights, split_row};
 use crate::integrate::real::{Real, on_vectors};
@@ -12,32 +13,34 @@ use crate::vector::Packed;
 /// `coarse = P^T (b - S D^-1 b)`: smooths `b` from zero and restricts what is left to the coarser grid, as reds and blacks,
 /// below the spans of this grid.
 ///
-/// Returns `<b, D^-1 b + D^-1 N D^-1 b>`, `N = D - S = W D_black^-1 W^T`: what the smoothing adds to `<b, x>` in a V-cycle. Each
-/// band is summed by itself: the same bits for any number of threads.
+/// Returns `<b, D^-1 b + D^-1 N D^-1 b>`, `N = D - S = W D_black^-1 W^T`: what the smoothing adds to `<b, x>` in a V-cycle; before
+/// it, what making `b` adds. Each band is summed by itself: the same bits for any number of threads.
 pub(in crate::integrate) fn restrict(
     weights: &Weights,
-    b: &[f32],
-    coarse_reds: &mut [f32],
-    coarse_blacks: &mut [f32],
-) -> f64 {
-    let coarse_half = weights.grid.coarser().half();
+    b: RightSide<'_>,
+    [coarse_reds, coarse_blacks]: [&mut [f32]; 2],
+) -> [f64; 2] {
+    let (half, coarse_half) = (weights.grid.half(), weights.grid.coarser().half());
     let bands = weights.spans.bands_of_a_task();
-    let chunk = bands * BAND_ROWS / 2 * coarse_half;
-    let mut energies = vec![0.0; weights.spans.len()];
-    (coarse_reds.par_chunks_mut(chunk), coarse_blacks.par_chunks_mut(chunk), energies.par_chunks_mut(bands))
+    let rows = bands * BAND_ROWS;
+    let coarse = rows / 2 * coarse_half;
+    let mut energies = vec![[0.0; 2]; weights.spans.len()];
+    let sides = b.of_tasks(rows * half, energies.len().div_ceil(bands));
+    (sides, coarse_reds.par_chunks_mut(coarse), coarse_blacks.par_chunks_mut(coarse), energies.par_chunks_mut(bands))
         .into_par_iter()
         .enumerate()
         .for_each_init(
-            || Restricting::new(weights.grid.half()),
-            |rows, (task, (reds, blacks, energies))| {
-                restrict_rows(weights, b, task * bands * BAND_ROWS, rows, [reds, blacks], energies);
+            || Restricting::new(half),
+            |memory, (task, (mut b, reds, blacks, energies))| {
+                restrict_rows(weights, &mut b, task * rows, memory, [reds, blacks], energies);
             },
         );
-    energies.iter().sum()
+    energies.iter().fold([0.0; 2], |sums, energies| [sums[0] + energies[0], sums[1] + energies[1]])
 }
 
 /// Rows on their way through the restriction of a band.
 pub(super) struct Restricting {
+    making: Making,
     smooth: Ring<f32>,
     blacks: Ring<f32>,
     corners: Ring<f32>,
@@ -51,19 +54,20 @@ pub(super) struct Restricting {
 impl Restricting {
     pub fn new(n: usize) -> Self {
         let [smooth, blacks, corners, centres, vertical, horizontal, ties] = std::array::from_fn(|_| Ring::new(n));
-        Self { smooth, blacks, corners, centres, vertical, horizontal, ties, coarse: vec![0.0; n] }
+        let making = Making::new(n);
+        Self { making, smooth, blacks, corners, centres, vertical, horizontal, ties, coarse: vec![0.0; n] }
     }
 }
 
-/// [`restrict`] to the corners of the rows from `first_row` on; an energy for each band.
+/// [`restrict`] to the corners of the rows from `first_row` on; two energies for each band.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 pub(super) fn restrict_rows(
     weights: &Weights,
-    b: &[f32],
+    b: &mut RightSide<'_>,
     first_row: usize,
     rows: &mut Restricting,
     coarse: [&mut [f32]; 2],
-    energies: &mut [f64],
+    energies: &mut [[f64; 2]],
 ) {
     on_vectors!(weights.grid, [f32], restrict_rows_with(weights, b, first_row, rows, coarse, energies));
 }
@@ -71,30 +75,36 @@ pub(super) fn restrict_rows(
 #[inline(always)]
 pub(super) fn restrict_rows_with<V: Packed<Number = f32>>(
     weights: &Weights,
-    b: &[f32],
+    b: &mut RightSide<'_>,
     first_row: usize,
     rows: &mut Restricting,
     [coarse_reds, coarse_blacks]: [&mut [f32]; 2],
-    energies: &mut [f64],
+    energies: &mut [[f64; 2]],
 ) {
     let grid = weights.grid;
     let coarse_half = grid.coarser().half();
     let first = first_row as isize;
     let coarse_rows = coarse_reds.len() / coarse_half;
     let end = first + 2 * coarse_rows as isize;
-    let mut count = |row: isize, energy: f64| {
+    let mut count = |row: isize, of: usize, energy: f64| {
         if (first..end).contains(&row) && grid.contains(row) {
-            energies[(row - first) as usize / BAND_ROWS] += energy;
+            energies[(row - first) as usize / BAND_ROWS][of] += energy;
         }
     };
-    for row in first - 3..=end + 1 {
-        count(row, smooth::<V>(weights, b, row, rows));
+    for row in first - 4..=end + 2 {
+        count(row, 0, b.prepare::<V>(weights, row, &mut rows.making));
+
+        let row = row - 1;
+        if row < first - 3 {
+            continue;
+        }
+        count(row, 1, smooth::<V>(weights, b, row, first, rows));
 
         let row = row - 1;
         if row < first - 2 {
             continue;
         }
-        count(row, solve_and_tie_blacks::<V>(weights, row, rows));
+        count(row, 1, solve_and_tie_blacks::<V>(weights, row, rows));
 
         let row = row - 1;
         if row < first - 1 {
@@ -122,12 +132,18 @@ pub(super) fn restrict_rows_with<V: Packed<Number = f32>>(
 
 /// `D^-1 b` of a row; returns `<b, D^-1 b>`.
 #[inline(always)]
-fn smooth<V: Packed<Number = f32>>(weights: &Weights, b: &[f32], row: isize, rows: &mut Restricting) -> f64 {
+fn smooth<V: Packed<Number = f32>>(
+    weights: &Weights,
+    b: &mut RightSide<'_>,
+    row: isize,
+    first: isize,
+    rows: &mut Restricting,
+) -> f64 {
     if !weights.grid.contains(row) {
         return 0.0;
     }
     let span = weights.spans.at(row);
-    let b = &b[row as usize * weights.grid.half()..][span.range()];
+    let b = b.row::<V>(weights, row, first, &mut rows.making);
     let sides = weights.reds::<V>(row, span);
     let (b, out) = (V::chunks(b, sides.len()), V::chunks_mut(&mut rows.smooth.row_mut(row)[span.start..], sides.len()));
     let mut energy = V::splat(0.0);
