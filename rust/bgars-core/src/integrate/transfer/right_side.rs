@@ -50,9 +50,9 @@ impl RightSide<'_> {
         match self {
             Self::Reds(reds) => here(reds),
             Self::Whole { colours: [reds, _], reduced } => {
-                let own = (row - first) as usize * half;
-                let out = if row >= first && own < reduced.len() {
-                    &mut reduced[own..][span.range()]
+                let rows = first..first + (reduced.len() / half) as isize;
+                let out = if rows.contains(&row) {
+                    &mut reduced[(row - first) as usize * half..][span.range()]
                 } else {
                     &mut memory.beside[span.range()]
                 };
