@@ -323,3 +323,9 @@ pub(super) fn join_row<T: Copy>(row: usize, reds: &[T], blacks: &[T], pixels: &m
         pixels[width - 1] = first[width / 2];
     }
 }
+
+/// [`join_row`], compiled for the processor at hand.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+pub(super) fn join_whole_row<T: Copy>(row: usize, reds: &[T], blacks: &[T], pixels: &mut [T]) {
+    join_row(row, reds, blacks, pixels);
+}

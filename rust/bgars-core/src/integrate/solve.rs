@@ -5,7 +5,7 @@ use std::ops::Range;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::checkerboard::join_row;
+use super::checkerboard::join_whole_row;
 use super::components::Runs;
 use super::conjugate_gradient::{Solution, conjugate_gradients};
 use super::fill::fill_corners;
@@ -134,12 +134,6 @@ pub fn integrate_into(
     );
     runs.write_labels(labels);
     Ok(Fit { components: runs.components, iterations, residual })
-}
-
-/// [`join_row`], compiled for the processor at hand.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn join_whole_row(row: usize, reds: &[f64], blacks: &[f64], values: &mut [f64]) {
-    join_row(row, reds, blacks, values);
 }
 
 /// Values less their mean.

@@ -15,7 +15,7 @@ use crate::vector::Packed;
 /// What the way up starts from.
 #[derive(Clone, Copy)]
 pub(in crate::integrate) struct Below<'a> {
-    /// The right side of the finest grid.
+    /// The right side of the grid's reds.
     pub b: &'a [f32],
     /// The solution of the next coarser one, row-major.
     pub coarse: &'a [f32],
@@ -23,8 +23,9 @@ pub(in crate::integrate) struct Below<'a> {
     pub changes: &'a Changes<'a>,
 }
 
-/// `p = z + beta previous` and `q = S p`, the steps that are `due` before `p` is overwritten, along the spans of the grid, where `z` is what [`super::prolong`] makes of `below`
-/// with the changes of the strays. Returns `<p, q>`, each band summed by itself: the same bits for any number of threads.
+/// `p = z + beta previous` and `q = S p`, along the spans of the grid, where `z` is what [`super::prolong`] makes of `below` with
+/// the changes of the strays. The steps that are `due`, along what is in `p` and along `previous`, are taken before. Returns
+/// `<p, q>`, each band summed by itself: the same bits for any number of threads.
 pub(in crate::integrate) fn advance(
     weights: &Weights,
     below: Below<'_>,

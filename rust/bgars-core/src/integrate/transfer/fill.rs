@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::advance::Below;
 use super::prolong::{LEAD, Prolonging, finish_row, go_ahead};
-use crate::integrate::checkerboard::{BAND_ROWS, Weights, join_row};
+use crate::integrate::checkerboard::{BAND_ROWS, Weights, join_whole_row};
 use crate::integrate::real::{Real, on_vectors};
 use crate::integrate::reduction::fill_row;
 use crate::integrate::ring::Ring;
@@ -27,20 +27,20 @@ pub(in crate::integrate) fn prolong_and_fill(
 }
 
 /// Rows on their way through [`prolong_and_fill`].
-struct Filling {
+pub(super) struct Filling {
     up: Prolonging,
     reds: Ring<f32>,
     blacks: Vec<f32>,
 }
 
 impl Filling {
-    fn new(n: usize) -> Self {
+    pub fn new(n: usize) -> Self {
         Self { up: Prolonging::new(n), reds: Ring::new(n), blacks: vec![0.0; n] }
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn fill_rows(
+pub(super) fn fill_rows(
     weights: &Weights,
     below: Below<'_>,
     blacks: &[f32],
@@ -52,7 +52,7 @@ fn fill_rows(
 }
 
 #[inline(always)]
-fn fill_rows_with<V: Packed<Number = f32>>(
+pub(super) fn fill_rows_with<V: Packed<Number = f32>>(
     weights: &Weights,
     Below { b, coarse, changes }: Below<'_>,
     blacks: &[f32],
@@ -75,13 +75,7 @@ fn fill_rows_with<V: Packed<Number = f32>>(
             let own = &mut rows.blacks[span.range()];
             fill_row::<V>(weights, row, span, &rows.reds, &blacks[row as usize * half..][span.range()], own);
             let solution = &mut solution[(row - first) as usize * width..][2 * span.start..(2 * span.end).min(width)];
-            join_floats(row as usize, &rows.reds.row(row)[1..][span.range()], own, solution);
+            join_whole_row(row as usize, &rows.reds.row(row)[1..][span.range()], own, solution);
         }
     }
-}
-
-/// [`join_row`], compiled for the processor at hand.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn join_floats(row: usize, reds: &[f32], blacks: &[f32], pixels: &mut [f32]) {
-    join_row(row, reds, blacks, pixels);
 }

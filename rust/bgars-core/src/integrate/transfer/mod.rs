@@ -111,6 +111,7 @@ mod tests {
         }
     }
 
+    type Whole<'a> = dyn Fn(&mut RightSide<'_>, &mut restrict::Restricting, [&mut [f32]; 2], &mut [[f64; 2]]) + 'a;
     type Down<'a> = dyn Fn(&mut restrict::Restricting, [&mut [f32]; 2], &mut [[f64; 2]]) + 'a;
 
     #[test]
@@ -144,6 +145,38 @@ mod tests {
         let fast = up(&|rows, x| prolong::prolong_rows(&weights, &b, &correction, 0, rows, x));
         let portable = up(&|rows, x| prolong::prolong_rows_with::<Portable>(&weights, &b, &correction, 0, rows, x));
         let one = up(&|rows, x| prolong::prolong_rows_with::<One<f32>>(&weights, &b, &correction, 0, rows, x));
+        assert_near(&fast, &portable);
+        assert_near(&fast, &one);
+
+        let blacks: Vec<f32> = b.iter().rev().copied().collect();
+        let whole = |task: &Whole<'_>| {
+            let mut reduced = vec![0.0; grid.half_pixels()];
+            let mut next = [(); 2].map(|()| vec![0.0; coarse.half_pixels()]);
+            let mut right = RightSide::Whole { colours: [&b, &blacks], reduced: &mut reduced };
+            let out = next.each_mut().map(|colour| &mut colour[..]);
+            task(&mut right, &mut restrict::Restricting::new(n), out, &mut [[0.0; 2]]);
+            [next.concat(), reduced].concat()
+        };
+        let fast = whole(&|right, rows, out, sum| restrict::restrict_rows(&weights, right, 0, rows, out, sum));
+        let portable = whole(&|right, rows, out, sum| {
+            restrict::restrict_rows_with::<Portable>(&weights, right, 0, rows, out, sum);
+        });
+        let one = whole(&|right, rows, out, sum| {
+            restrict::restrict_rows_with::<One<f32>>(&weights, right, 0, rows, out, sum);
+        });
+        assert_near(&fast, &portable);
+        assert_near(&fast, &one);
+
+        let changes = Changes::new(&[], Vec::new());
+        let below = Below { b: &b, coarse: &correction, changes: &changes };
+        let filled = |task: &dyn Fn(&mut fill::Filling, &mut [f32])| {
+            let mut solution = vec![0.0; grid.height * grid.width];
+            task(&mut fill::Filling::new(n), &mut solution);
+            solution
+        };
+        let fast = filled(&|rows, out| fill::fill_rows(&weights, below, &blacks, 0, rows, out));
+        let portable = filled(&|rows, out| fill::fill_rows_with::<Portable>(&weights, below, &blacks, 0, rows, out));
+        let one = filled(&|rows, out| fill::fill_rows_with::<One<f32>>(&weights, below, &blacks, 0, rows, out));
         assert_near(&fast, &portable);
         assert_near(&fast, &one);
     }
