@@ -3,21 +3,15 @@
 //! Written out here for its memory traffic: the sums ride along with the passes that make their vectors, and every pass runs on
 //! all threads. faer's solver, with which the tests compare it, does its vector work on one thread and in passes of its own.
 
-use multiversion::multiversion;
-use rayon::prelude::*;
-
-use super::checkerboard::{BAND_ROWS, Weights};
+use super::checkerboard::Weights;
 use super::edge_bits::EdgeBits;
 use super::multigrid::Multigrid;
-use super::reduction::dot;
+use super::residual::Residual;
 use super::settle::{Right, settle};
 use super::steps::Steps;
 use super::{OnProgress, Params, Progress};
 use crate::memory::{self, Aligned};
 use crate::{Error, Result};
-
-/// Elements of a vector that one task copies or adds up.
-const BLOCK: usize = 1 << 14;
 
 /// A graph of more than one node for so many reds needs much of the memory, and much more time than to make the right side again.
 const LARGE_GRAPH: usize = 16;
@@ -51,13 +45,14 @@ pub(super) fn conjugate_gradients(
     let size = weights.grid.half_pixels();
     let target = (params.relative_tolerance * scale).max(params.absolute_tolerance * (2.0 * size as f64).sqrt());
     // After the steps the blacks lie in q.
-    let [mut q, mut r] = [Aligned::<f64>::any(size), Aligned::any(size)];
-    let mut norm = settle(weights, &right, start.as_deref(), None, &mut r).sqrt();
+    let mut q = Aligned::<f64>::any(size);
+    let mut r = Residual::any(size);
+    let mut norm = settle(weights, &right, start.as_deref(), None, Some(&mut r)).sqrt();
     let mut x = Steps::from(start, size);
     let (mut iterations, mut solved) = (0, true);
     if norm <= target {
         let residual = if norm > 0.0 { norm / scale } else { 0.0 };
-        settle(weights, &right, Some(x.end(weights, [&[], &[]])), Some(&mut q), &mut r);
+        settle(weights, &right, Some(x.end(weights, [&[], &[]])), Some(&mut q), None);
         return Ok(Solution { reds: x.into_solution(), blacks: q, iterations, residual, solved });
     }
     let mut is_large = false;
@@ -70,10 +65,7 @@ pub(super) fn conjugate_gradients(
     let mut vectors = preconditioner.vectors();
     // A direction may be any; what x and r take along it agrees in `f64`.
     let [mut p, mut previous] = [Aligned::<f32>::any(size), Aligned::any(size)];
-    // r for the V-cycle, which grids read twice; a graph alone reads it once, where the next direction will be.
-    let mut rounded = preconditioner.has_grids().then(|| Aligned::<f32>::any(size));
     loop {
-        round(&r, rounded.as_mut().unwrap_or(&mut previous));
         let mut r_z_before = None;
         // Written so that NaN goes on, to be found below.
         while !(norm <= target) {
@@ -81,12 +73,11 @@ pub(super) fn conjugate_gradients(
             if !solved {
                 break;
             }
-            let r_z = preconditioner.descend(rounded.as_ref().unwrap_or(&previous), &mut vectors);
+            let r_z = preconditioner.descend(r.rounded(), &mut vectors);
             // What was there before the first direction is finite, and counts nothing.
             let beta = r_z_before.replace(r_z).map_or(0.0, |before| (r_z / before) as f32);
             std::mem::swap(&mut p, &mut previous);
-            let on_grids = rounded.as_deref().map(|b| (b, x.due()));
-            let p_q = preconditioner.advance(on_grids, &vectors, (beta, &previous), &mut p, &mut q);
+            let p_q = preconditioner.advance(r.rounded(), x.due(), &vectors, (beta, &previous), &mut p, &mut q);
             // Both are positive but for rounding; what is lost in it cannot be found again.
             solved = r_z > 0.0 && p_q > 0.0;
             if !solved {
@@ -97,57 +88,19 @@ pub(super) fn conjugate_gradients(
             }
             let alpha = r_z / p_q;
             x.add(alpha);
-            if rounded.is_none()
-                && let Some(due) = x.due()
-            {
-                // The residual takes the place of the direction before.
-                due.take(weights, [&previous, &p]);
-            }
-            norm = subtract(weights, (alpha, &q), &mut r, rounded.as_mut().unwrap_or(&mut previous)).sqrt();
+            norm = r.subtract(weights, alpha, &q).sqrt();
             iterations += 1;
             if on_progress(Progress { iteration: iterations, residual: norm / scale }).is_break() {
                 return Err(Error::Cancelled);
             }
         }
-        norm = settle(weights, &right, Some(x.end(weights, [&previous, &p])), Some(&mut q), &mut r).sqrt();
+        norm = settle(weights, &right, Some(x.end(weights, [&previous, &p])), Some(&mut q), None).sqrt();
         if !solved || norm <= target {
             if is_large {
-                [p, previous].into_iter().chain(rounded).for_each(Aligned::release);
+                [p, previous].into_iter().for_each(Aligned::release);
             }
             return Ok(Solution { reds: x.into_solution(), blacks: q, iterations, residual: norm / scale, solved });
         }
+        settle(weights, &right, Some(x.end(weights, [&[], &[]])), None, Some(&mut r));
     }
-}
-
-/// A residual as floats.
-fn round(r: &[f64], rounded: &mut [f32]) {
-    rounded.par_chunks_mut(BLOCK).zip(r.par_chunks(BLOCK)).for_each(|(rounded, r)| {
-        for (rounded, &r) in rounded.iter_mut().zip(r) {
-            *rounded = r as f32;
-        }
-    });
-}
-
-/// `r -= alpha q` along the spans of the grid, also rounded; returns `<r, r>`, each band summed by itself.
-fn subtract(weights: &Weights, (alpha, q): (f64, &[f64]), r: &mut [f64], rounded: &mut [f32]) -> f64 {
-    let chunk = BAND_ROWS * weights.grid.half();
-    let squares: Vec<f64> = (r.par_chunks_mut(chunk), rounded.par_chunks_mut(chunk), q.par_chunks(chunk))
-        .into_par_iter()
-        .enumerate()
-        .map(|(band, (r, rounded, q))| {
-            let parts = weights.spans.parts(band);
-            parts.map(|part| subtract_part((alpha, &q[part.clone()]), &mut r[part.clone()], &mut rounded[part])).sum()
-        })
-        .collect();
-    squares.iter().sum()
-}
-
-/// [`subtract`] from a part of a band.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn subtract_part((alpha, q): (f64, &[f64]), r: &mut [f64], rounded: &mut [f32]) -> f64 {
-    for ((r, rounded), q) in r.iter_mut().zip(rounded).zip(q) {
-        *r -= alpha * q;
-        *rounded = *r as f32;
-    }
-    dot(r, r)
 }

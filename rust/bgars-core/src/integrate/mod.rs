@@ -25,6 +25,7 @@ mod operator;
 mod places;
 mod real;
 mod reduction;
+mod residual;
 mod ring;
 mod settle;
 mod solve;

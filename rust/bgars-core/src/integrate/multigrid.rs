@@ -134,26 +134,24 @@ impl<'a> Multigrid<'a> {
         smoothed + self.solve(1, next, coarser, graph, self.strays[0].len())
     }
 
-    /// Whether there is a grid above the graph.
-    pub fn has_grids(&self) -> bool {
-        !self.levels.is_empty()
-    }
-
-    /// The way up after [`Self::descend`]: the next direction `p = M b + beta previous` and `q = S p`; returns `<p, q>`. Grids need
-    /// `b` for it once more, and take the steps that are due along what is in `p` and along `previous`.
+    /// The way up after [`Self::descend`]: the next direction `p = M b + beta previous` and `q = S p`; returns `<p, q>`. The steps
+    /// that are due are taken on the way, along what is in `p` and along `previous`.
     pub fn advance(
         &self,
-        on_grids: Option<(&[f32], Option<Due<'_>>)>,
+        b: &[f32],
+        due: Option<Due<'_>>,
         vectors: &Vectors,
         (beta, previous): (f32, &[f32]),
         p: &mut [f32],
         q: &mut [f64],
     ) -> f64 {
         if let Some(next) = vectors.levels.first() {
-            let (b, due) = on_grids.expect("grids are given b");
             let changes = self.changes(0, next, &vectors.graph, 0);
             let below = Below { b, coarse: &next.solution, changes: &changes };
             return advance(self.finest, below, (beta, previous), due, p, q);
+        }
+        if let Some(due) = due {
+            due.take(self.finest, [p, previous]);
         }
         self.graph.scatter(&vectors.graph, p);
         p.par_iter_mut().zip(previous).for_each(|(p, previous)| *p += beta * previous);

@@ -10,6 +10,7 @@ use super::checkerboard::{BAND_ROWS, Grid, Weights};
 use super::edges::Colours;
 use super::real::{Real, on_vectors};
 use super::reduction::load;
+use super::residual::{Residual, split};
 use super::ring::Ring;
 use super::spans::Span;
 use crate::vector::Packed;
@@ -55,27 +56,34 @@ impl Right<'_> {
 /// `blacks = D_black^-1 (right.blacks + W^T reds)`, and what the system leaves at the reds: `left = right.reds + W blacks - D_red reds`.
 /// Returns the square sum of `left`. Both are zero beside the spans of the grid.
 ///
-/// From no reds, `left` is the right side of the reduced system; from a solution, `blacks`, where asked for, are the rest of it.
+/// From no reds, `left` is the right side of the reduced system; from a solution, `blacks` are the rest of it. Each is written
+/// where it is asked for.
 pub(super) fn settle(
     weights: &Weights,
     right: &Right<'_>,
     reds: Option<&[f64]>,
     blacks: Option<&mut [f64]>,
-    left: &mut [f64],
+    left: Option<&mut Residual>,
 ) -> f64 {
     let half = weights.grid.half();
-    let chunk = BAND_ROWS * half;
+    let (chunk, bands) = (BAND_ROWS * half, weights.spans.len());
     let blacks: Vec<_> = match blacks {
         Some(blacks) => blacks.chunks_mut(chunk).map(Some).collect(),
-        None => left.chunks(chunk).map(|_| None).collect(),
+        None => (0..bands).map(|_| None).collect(),
     };
-    let memory = || ([Ring::new(half), Ring::new(half)], [Vec::new(), Vec::new()]);
-    let squares: Vec<f64> = (blacks, left.par_chunks_mut(chunk))
+    let left: Vec<_> = match left {
+        Some(left) => left.chunks_mut(chunk).map(Some).collect(),
+        None => (0..bands).map(|_| None).collect(),
+    };
+    let squares: Vec<f64> = (blacks, left)
         .into_par_iter()
         .enumerate()
-        .map_init(memory, |(rows, made), (band, out)| {
-            settle_band(weights, right.around(weights.grid, band, made), reds, band, rows, out)
-        })
+        .map_init(
+            || (Settling::new(half), [Vec::new(), Vec::new()]),
+            |(rows, made), (band, out)| {
+                settle_band(weights, right.around(weights.grid, band, made), reds, band, rows, out)
+            },
+        )
         .collect();
     squares.iter().sum()
 }
@@ -83,8 +91,21 @@ pub(super) fn settle(
 /// Rows of the right side: reds, blacks, and which row of the grid is their first.
 type Given<'a> = (&'a [f64], &'a [f64], usize);
 
-/// The rows of a band to write: of the blacks, where they are asked for, and of what is left.
-type Settled<'a> = (Option<&'a mut [f64]>, &'a mut [f64]);
+/// The rows of a band to write, where they are asked for: of the blacks, and of what is left.
+type Settled<'a> = (Option<&'a mut [f64]>, Option<[&'a mut [f32]; 2]>);
+
+/// Rows on their way.
+struct Settling {
+    reds: Ring<f64>,
+    blacks: Ring<f64>,
+    left: Vec<f64>,
+}
+
+impl Settling {
+    fn new(half: usize) -> Self {
+        Self { reds: Ring::new(half), blacks: Ring::new(half), left: vec![0.0; half] }
+    }
+}
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 fn settle_band(
@@ -92,7 +113,7 @@ fn settle_band(
     given: Given<'_>,
     reds: Option<&[f64]>,
     band: usize,
-    rows: &mut [Ring<f64>; 2],
+    rows: &mut Settling,
     out: Settled<'_>,
 ) -> f64 {
     on_vectors!(weights.grid, [f64], settle_band_with(weights, given, reds, band, rows, out))
@@ -104,35 +125,35 @@ fn settle_band_with<V: Packed<Number = f64>>(
     (given_reds, given_blacks, first_given): Given<'_>,
     reds: Option<&[f64]>,
     band: usize,
-    [here, solved]: &mut [Ring<f64>; 2],
-    (mut blacks, left): Settled<'_>,
+    rows: &mut Settling,
+    (mut blacks, mut left): Settled<'_>,
 ) -> f64 {
     let n = weights.grid.half();
     let first = (band * BAND_ROWS) as isize;
-    let end = first + (left.len() / n) as isize;
+    let end = (first + BAND_ROWS as isize).min(weights.grid.height as isize);
     let span = weights.spans.band(band);
     if let Some(blacks) = &mut blacks {
         clear_beside(span, n, blacks);
     }
-    clear_beside(span, n, left);
+    left.iter_mut().flatten().for_each(|floats| clear_beside(span, n, floats));
     let mut squares = 0.0;
     for row in first - 2..=end + 1 {
         // Without any, the rows stay zero.
         if let Some(reds) = reds {
-            load(weights.grid, reds, row, span, here.row_mut(row), |value| value);
+            load(weights.grid, reds, row, span, rows.reds.row_mut(row), |value| value);
         }
         let row = row - 1;
         if row >= first - 1 && weights.grid.contains(row) {
-            let stencil = weights.black_stencil::<V>(row, span, here.around(row));
+            let stencil = weights.black_stencil::<V>(row, span, rows.reds.around(row));
             let given = V::chunks(&given_blacks[(row as usize - first_given) * n..][span.range()], stencil.len());
-            let out = V::chunks_mut(&mut solved.row_mut(row)[span.start..], stencil.len());
+            let out = V::chunks_mut(&mut rows.blacks.row_mut(row)[span.start..], stencil.len());
             for k in 0..stencil.len() {
                 ((V::read(&given[k]) + stencil.sum(k)) * stencil.diagonal(k).inverse()).put(&mut out[k]);
             }
             if let Some(blacks) = &mut blacks
                 && (first..end).contains(&row)
             {
-                let solved = &solved.row(row)[1..][span.range()];
+                let solved = &rows.blacks.row(row)[1..][span.range()];
                 blacks[(row - first) as usize * n..][span.range()].copy_from_slice(solved);
             }
         }
@@ -140,10 +161,10 @@ fn settle_band_with<V: Packed<Number = f64>>(
         if row < first {
             continue;
         }
-        let stencil = weights.red_stencil::<V>(row, span, solved.around(row));
+        let stencil = weights.red_stencil::<V>(row, span, rows.blacks.around(row));
         let given = V::chunks(&given_reds[(row as usize - first_given) * n..][span.range()], stencil.len());
-        let own = V::chunks(&here.row(row)[1 + span.start..], stencil.len());
-        let out = V::chunks_mut(&mut left[(row - first) as usize * n..][span.range()], stencil.len());
+        let own = V::chunks(&rows.reds.row(row)[1 + span.start..], stencil.len());
+        let out = V::chunks_mut(&mut rows.left[span.range()], stencil.len());
         let mut square = V::splat(V::Number::default());
         for k in 0..stencil.len() {
             let rest = (V::read(&given[k]) + stencil.sum(k)) - stencil.diagonal(k) * V::read(&own[k]);
@@ -151,15 +172,19 @@ fn settle_band_with<V: Packed<Number = f64>>(
             square = rest.times_plus(rest, square);
         }
         squares += square.sum();
+        if let Some(left) = &mut left {
+            let out = left.each_mut().map(|floats| &mut floats[(row - first) as usize * n..][span.range()]);
+            split(&rows.left[span.range()], out);
+        }
     }
     squares
 }
 
 /// Zeros beside a span in all rows of a band.
-fn clear_beside(span: Span, half: usize, band: &mut [f64]) {
+fn clear_beside<T: Default + Clone>(span: Span, half: usize, band: &mut [T]) {
     for row in band.chunks_mut(half) {
-        row[..span.start].fill(0.0);
-        row[span.end..].fill(0.0);
+        row[..span.start].fill(T::default());
+        row[span.end..].fill(T::default());
     }
 }
 
@@ -190,7 +215,8 @@ mod tests {
         let mut right =
             Colours { reds: Aligned::zeros(grid.half_pixels()), blacks: Aligned::zeros(grid.half_pixels()), norm: 0.0 };
         let mut reds = vec![0.0; grid.half_pixels()];
-        let (mut blacks, mut left) = (vec![7.0; reds.len()], vec![7.0; reds.len()]);
+        let (mut blacks, mut left) = (vec![7.0; reds.len()], Residual::any(reds.len()));
+        split(&vec![7.0; reds.len()], left.chunks_mut(reds.len()).next().unwrap());
         for (place, red) in reds.iter_mut().enumerate() {
             *red = number(place);
             (right.reds[place], right.blacks[place]) = (number(place + 9_999), number(place + 77_777));
@@ -202,14 +228,20 @@ mod tests {
             }
         };
         let mut given = Right::Kept(right, Some(&again));
-        let squares = settle(&weights, &given, Some(&reds), Some(&mut blacks), &mut left);
+        let squares = settle(&weights, &given, Some(&reds), Some(&mut blacks), Some(&mut left));
+        let sums = |left: &mut Residual| -> Vec<f64> {
+            let [rounded, missing] = left.chunks_mut(reds.len()).next().unwrap();
+            let sum = |(&rounded, &missing): (&f32, &f32)| f64::from(rounded) + f64::from(missing);
+            rounded.iter().zip(&*missing).map(sum).collect()
+        };
+        let first_left = sums(&mut left);
         let (mut expected, mut beside) = (0.0, 0);
         for row in 0..grid.height {
             let span = weights.spans.at(row as isize);
             for k in 0..half {
                 let (at, place) = (row * half + k, (row as isize, k));
                 if !span.range().contains(&k) {
-                    assert!(blacks[at] == 0.0 && left[at] == 0.0, "beside: {k} of row {row}");
+                    assert!(blacks[at] == 0.0 && first_left[at] == 0.0, "beside: {k} of row {row}");
                     beside += 1;
                     continue;
                 }
@@ -219,17 +251,20 @@ mod tests {
                 assert!((blacks[at] - black).abs() < 1e-12, "black {k} of row {row}");
                 let edges = blacks_around(&weights, place);
                 let rest = all[0][at] + sum_around(edges, half, &blacks) - diagonal(edges) * reds[at];
-                assert!((left[at] - rest).abs() < 1e-12, "red {k} of row {row}");
+                assert!((first_left[at] - rest).abs() < 1e-12, "red {k} of row {row}");
                 expected += rest * rest;
             }
         }
         assert!(beside > 0);
         assert!((squares - expected).abs() < 1e-12 * expected && expected > 1.0, "{squares} for {expected}");
 
-        let kept = (squares, blacks.clone(), left.clone());
+        let kept = (squares, blacks.clone(), first_left);
         given.release();
         assert!(matches!(given, Right::Anew(_)));
-        let squares = settle(&weights, &given, Some(&reds), Some(&mut blacks), &mut left);
-        assert!((squares, blacks, left) == kept, "a right side made again");
+        let squares = settle(&weights, &given, Some(&reds), Some(&mut blacks), Some(&mut left));
+        assert!((squares, blacks.clone(), sums(&mut left)) == kept, "a right side made again");
+        blacks.fill(7.0);
+        assert!(squares == settle(&weights, &given, Some(&reds), Some(&mut blacks), None) && blacks == kept.1);
+        assert!(squares == settle(&weights, &given, Some(&reds), None, None));
     }
 }
