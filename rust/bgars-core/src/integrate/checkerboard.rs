@@ -289,10 +289,16 @@ fn is_odd(row: isize) -> usize {
     row.rem_euclid(2) as usize
 }
 
+/// The colour of a row's first pixel, and the other one.
+#[inline(always)]
+pub(super) fn by_column<T>(row: usize, [reds, blacks]: [T; 2]) -> [T; 2] {
+    if row.is_multiple_of(2) { [reds, blacks] } else { [blacks, reds] }
+}
+
 /// Splits a row of pixels into its reds and blacks.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 pub(super) fn split_row<T: Copy>(row: usize, pixels: &[T], reds: &mut [T], blacks: &mut [T]) {
-    let (first, second) = if row.is_multiple_of(2) { (reds, blacks) } else { (blacks, reds) };
+    let [first, second] = by_column(row, [reds, blacks]);
     for (pair, (first, second)) in pixels.chunks_exact(2).zip(first.iter_mut().zip(second.iter_mut())) {
         *first = pair[0];
         *second = pair[1];
@@ -305,7 +311,7 @@ pub(super) fn split_row<T: Copy>(row: usize, pixels: &[T], reds: &mut [T], black
 /// The same, and zeros for the pixels that are missing at the end.
 pub(super) fn split_whole_row<T: Copy + Default>(row: usize, pixels: &[T], reds: &mut [T], blacks: &mut [T]) {
     split_row(row, pixels, reds, blacks);
-    let (longer, shorter) = if row.is_multiple_of(2) { (reds, blacks) } else { (blacks, reds) };
+    let [longer, shorter] = by_column(row, [reds, blacks]);
     longer[pixels.len().div_ceil(2)..].fill(T::default());
     shorter[pixels.len() / 2..].fill(T::default());
 }
@@ -313,7 +319,7 @@ pub(super) fn split_whole_row<T: Copy + Default>(row: usize, pixels: &[T], reds:
 /// Joins reds and blacks to a row of pixels.
 #[inline(always)]
 pub(super) fn join_row<T: Copy>(row: usize, reds: &[T], blacks: &[T], pixels: &mut [T]) {
-    let (first, second) = if row.is_multiple_of(2) { (reds, blacks) } else { (blacks, reds) };
+    let [first, second] = by_column(row, [reds, blacks]);
     let width = pixels.len();
     for (pair, (&first, &second)) in pixels.chunks_exact_mut(2).zip(first.iter().zip(second)) {
         pair[0] = first;

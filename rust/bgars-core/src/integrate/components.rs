@@ -5,7 +5,6 @@ use std::ops::Range;
 use memchr::memchr;
 use rayon::prelude::*;
 
-use super::reduction::sum;
 use crate::memory::zeros;
 
 /// One connected component of the mask (4-neighbourhood).
@@ -131,18 +130,12 @@ impl Runs {
         });
     }
 
-    /// Mean of the values of each component; `fill` writes the values of a row, of its runs at least.
+    /// Mean of the values of each component; `sum` adds up those of some columns of a row.
     ///
     /// Summed in an order that does not depend on the threads.
-    pub fn means(&self, fill: impl Fn(usize, &mut [f64]) + Sync) -> Vec<f64> {
-        let row_sums = |values: &mut Vec<f64>, row: usize| -> Vec<f64> {
-            if self.row_starts[row] < self.row_starts[row + 1] {
-                fill(row, values);
-            }
-            self.row(row).map(|(cols, _)| sum(&values[cols])).collect()
-        };
-        let rows = (0..self.row_starts.len() - 1).into_par_iter();
-        let run_sums: Vec<Vec<f64>> = rows.map_init(|| vec![0.0; self.width], row_sums).collect();
+    pub fn means(&self, sum: impl Fn(usize, Range<usize>) -> f64 + Sync) -> Vec<f64> {
+        let row_sums = |row: usize| -> Vec<f64> { self.row(row).map(|(cols, _)| sum(row, cols)).collect() };
+        let run_sums: Vec<Vec<f64>> = (0..self.row_starts.len() - 1).into_par_iter().map(row_sums).collect();
         let mut means = vec![0.0; self.components.len()];
         for (&component, sum) in self.component_of.iter().zip(run_sums.iter().flatten()) {
             means[component as usize] += sum;
@@ -280,11 +273,7 @@ mod tests {
     #[test]
     fn means_are_taken_a_component() {
         let mask = [true, true, false, true, false, false];
-        let means = Runs::new(&mask, None, 3).means(|row, values| {
-            for (col, value) in values.iter_mut().enumerate() {
-                *value = (10 * row + col) as f64;
-            }
-        });
+        let means = Runs::new(&mask, None, 3).means(|row, cols| cols.map(|col| (10 * row + col) as f64).sum());
         // Row 0: columns 0 and 1; row 1: column 0, below column 0.
         assert_eq!(means, [(0.0 + 1.0 + 10.0) / 3.0]);
     }

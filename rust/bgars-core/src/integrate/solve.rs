@@ -5,11 +5,12 @@ use std::ops::Range;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::checkerboard::join_whole_row;
+use super::checkerboard::{by_column, join_whole_row};
 use super::components::Runs;
 use super::conjugate_gradient::{Solution, conjugate_gradients};
 use super::fill::fill_corners;
 use super::operator::{Field, FieldEdges};
+use super::reduction::sum;
 use super::settle::Right;
 use super::{Fit, OnProgress, Params, Surface};
 use crate::memory::zeros;
@@ -119,7 +120,11 @@ pub fn integrate_into(
         let span = row * half..(row + 1) * half;
         join_whole_row(row, &reds[span.clone()], &blacks[span], values);
     };
-    let means = runs.means(fill);
+    let means = runs.means(|row, cols| {
+        let span = row * half..(row + 1) * half;
+        let [first, second] = by_column(row, [&reds[span.clone()], &blacks[span]]);
+        sum(&first[cols.start.div_ceil(2)..cols.end.div_ceil(2)]) + sum(&second[cols.start / 2..cols.end / 2])
+    });
     height_px.par_chunks_mut(width).enumerate().for_each_init(
         || vec![0.0; width],
         |values, (row, height_px)| {

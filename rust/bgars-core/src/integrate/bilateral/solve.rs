@@ -10,6 +10,7 @@ use super::super::conjugate_gradient::conjugate_gradients;
 use super::super::edges::Colours;
 use super::super::fill::fill_corners;
 use super::super::operator::Field;
+use super::super::reduction::sum;
 use super::super::settle::Right;
 use super::super::solve::{Facing, check_lengths, check_pixels};
 use super::super::{Params, Progress};
@@ -97,9 +98,9 @@ pub fn integrate_bilateral(
     }
     let runs = Runs::new(mask, field.regions, width);
     let crop = pixels.crop;
-    let means = runs.means(|row, values| {
+    let means = runs.means(|row, cols| {
         let start = (row - crop.row) * crop.grid.width;
-        values[crop.col..crop.col + crop.grid.width].copy_from_slice(&z[start..start + crop.grid.width]);
+        sum(&z[start + cols.start - crop.col..start + cols.end - crop.col])
     });
     let labels = runs.labels();
     let mean_at = |pixel: usize| {
