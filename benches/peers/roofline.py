@@ -37,7 +37,7 @@ NORMAL_OPERATIONS = {
 """Of a pixel that loses a light; where a vector keeps all of them, the inverse falls away."""
 ITERATION_BYTES = {
     "way up: weights, rounded r, coarse solution and last p read, p and q written": 8 + 2 + 1 + 2 + 2 + 4,
-    "step of r, read, written and written rounded, q read": 8 + 2 + 4,
+    "step of r, two floats read and written, q read": 8 + 4,
     "every second time two steps of x, read and written on the way up, the p before the last read": (8 + 2) // 2,
     "restriction: weights and rounded r read, coarse right side written": 8 + 2 + 1,
     "coarser grids: 32 bytes for each of their pixels, a third as many": 11,

@@ -71,7 +71,7 @@ pub(super) fn solve_blacks<V: Packed<Number: Real>>(
     let stencil = weights.black_stencil::<V>(row, span, reds.around(row));
     let out = V::chunks_mut(&mut blacks.row_mut(row)[span.start..], stencil.len());
     for k in 0..stencil.len() {
-        (stencil.sum(k) * stencil.diagonal(k).inverse()).put(&mut out[k]);
+        stencil.sum(k).over(stencil.diagonal(k)).put(&mut out[k]);
     }
 }
 
@@ -237,7 +237,7 @@ pub(super) fn scale_blacks<V: Packed<Number: Real>>(
     let mut energy = V::splat(V::Number::default());
     for k in 0..sides.len() {
         let black = V::read(&blacks[k]);
-        let solved = black * sides.diagonal(k).inverse();
+        let solved = black.over(sides.diagonal(k));
         solved.put(&mut out[k]);
         energy = black.times_plus(solved, energy);
     }
@@ -304,6 +304,6 @@ pub(super) fn fill_row<V: Packed<Number: Real>>(
     let stencil = weights.black_stencil::<V>(row, span, reds.around(row));
     let (blacks, out) = (V::chunks(blacks, stencil.len()), V::chunks_mut(out, stencil.len()));
     for k in 0..stencil.len() {
-        ((V::read(&blacks[k]) + stencil.sum(k)) * stencil.diagonal(k).inverse()).put(&mut out[k]);
+        (V::read(&blacks[k]) + stencil.sum(k)).over(stencil.diagonal(k)).put(&mut out[k]);
     }
 }

@@ -148,7 +148,7 @@ fn settle_band_with<V: Packed<Number = f64>>(
             let given = V::chunks(&given_blacks[(row as usize - first_given) * n..][span.range()], stencil.len());
             let out = V::chunks_mut(&mut rows.blacks.row_mut(row)[span.start..], stencil.len());
             for k in 0..stencil.len() {
-                ((V::read(&given[k]) + stencil.sum(k)) * stencil.diagonal(k).inverse()).put(&mut out[k]);
+                (V::read(&given[k]) + stencil.sum(k)).over(stencil.diagonal(k)).put(&mut out[k]);
             }
             if let Some(blacks) = &mut blacks
                 && (first..end).contains(&row)

@@ -114,9 +114,9 @@ impl Packed for Avx2 {
     }
 
     #[inline(always)]
-    fn inverse(self) -> Self {
-        let above = here!(_mm256_cmp_ps::<_CMP_GT_OQ>(self.0, _mm256_setzero_ps()));
-        Self(here!(_mm256_and_ps(above, _mm256_div_ps(_mm256_set1_ps(1.0), self.0))))
+    fn over(self, divisor: Self) -> Self {
+        let above = here!(_mm256_cmp_ps::<_CMP_GT_OQ>(divisor.0, _mm256_setzero_ps()));
+        Self(here!(_mm256_and_ps(above, _mm256_div_ps(self.0, divisor.0))))
     }
 
     #[inline(always)]

@@ -102,9 +102,9 @@ impl Packed for Avx512 {
     }
 
     #[inline(always)]
-    fn inverse(self) -> Self {
-        let above = here!(_mm512_cmp_ps_mask::<_CMP_GT_OQ>(self.0, _mm512_setzero_ps()));
-        Self(here!(_mm512_maskz_div_ps(above, _mm512_set1_ps(1.0), self.0)))
+    fn over(self, divisor: Self) -> Self {
+        let above = here!(_mm512_cmp_ps_mask::<_CMP_GT_OQ>(divisor.0, _mm512_setzero_ps()));
+        Self(here!(_mm512_maskz_div_ps(above, self.0, divisor.0)))
     }
 
     #[inline(always)]

@@ -33,7 +33,7 @@ macro_rules! double {
         $(#[$doc:meta])* $vector:ident($raw:ty), $width:literal, $splat:ident, $add:ident, $sub:ident, $mul:ident,
         $fused:ident, $convert:ident, $floats_max:ident, $floats_zero:ident,
         |$x:ident, $y:ident| after_last_of $after:expr, before_first_of $before:expr,
-        magnitude $magnitude:expr, where_positive $where_positive:expr, inverse $inverse:expr, sum $sum:expr
+        magnitude $magnitude:expr, where_positive $where_positive:expr, over $over:expr, sum $sum:expr
     ) => {
         $(#[$doc])*
         #[derive(Clone, Copy)]
@@ -100,9 +100,9 @@ macro_rules! double {
             }
 
             #[inline(always)]
-            fn inverse(self) -> Self {
-                let $x = self.0;
-                Self(here!($inverse))
+            fn over(self, divisor: Self) -> Self {
+                let ($x, $y) = (self.0, divisor.0);
+                Self(here!($over))
             }
 
             #[inline(always)]
@@ -122,7 +122,7 @@ double!(
     before_first_of bytemuck::must_cast(_mm512_alignr_epi64::<1>(bytemuck::must_cast(y), bytemuck::must_cast(x))),
     magnitude _mm512_abs_pd(x),
     where_positive _mm512_maskz_mov_pd(_mm512_cmp_pd_mask::<_CMP_GT_OQ>(y, _mm512_setzero_pd()), x),
-    inverse _mm512_maskz_div_pd(_mm512_cmp_pd_mask::<_CMP_GT_OQ>(x, _mm512_setzero_pd()), _mm512_set1_pd(1.0), x),
+    over _mm512_maskz_div_pd(_mm512_cmp_pd_mask::<_CMP_GT_OQ>(y, _mm512_setzero_pd()), x, y),
     sum here!(_mm512_reduce_add_pd(x))
 );
 double!(
@@ -133,7 +133,7 @@ double!(
     before_first_of _mm256_shuffle_pd::<ODD_EVEN>(x, _mm256_permute2f128_pd::<HALVES>(x, y)),
     magnitude _mm256_andnot_pd(_mm256_set1_pd(-0.0), x),
     where_positive _mm256_and_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(y, _mm256_setzero_pd()), x),
-    inverse _mm256_and_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(x, _mm256_setzero_pd()), _mm256_div_pd(_mm256_set1_pd(1.0), x)),
+    over _mm256_and_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(y, _mm256_setzero_pd()), _mm256_div_pd(x, y)),
     sum {
         let [a, b, c, d]: [f64; 4] = bytemuck::must_cast(x);
         (a + c) + (b + d)

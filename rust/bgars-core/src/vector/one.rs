@@ -92,8 +92,8 @@ macro_rules! one {
             }
 
             #[inline(always)]
-            fn inverse(self) -> Self {
-                Self(if self.0 > 0.0 { 1.0 / self.0 } else { 0.0 })
+            fn over(self, divisor: Self) -> Self {
+                Self(if divisor.0 > 0.0 { self.0 / divisor.0 } else { 0.0 })
             }
 
             #[inline(always)]

@@ -32,8 +32,8 @@ pub trait Packed: Arithmetic {
     fn after_last_of(self, before: Self) -> Self;
     /// The numbers one place back: all but the first of `self`, then the first of `next`.
     fn before_first_of(self, next: Self) -> Self;
-    /// `1 / self`, or 0 where that is not above 0.
-    fn inverse(self) -> Self;
+    /// `self / divisor`, or 0 where the divisor is not above 0.
+    fn over(self, divisor: Self) -> Self;
     /// Sum of the numbers.
     fn sum(self) -> f64;
 }

@@ -84,8 +84,8 @@ macro_rules! portable {
             }
 
             #[inline(always)]
-            fn inverse(self) -> Self {
-                Self(($raw::ONE / self.0) & self.0.simd_gt($raw::ZERO))
+            fn over(self, divisor: Self) -> Self {
+                Self((self.0 / divisor.0) & divisor.0.simd_gt($raw::ZERO))
             }
 
             #[inline(always)]

@@ -58,14 +58,14 @@ impl<'a, V: Packed<Number = f32>> CentreTies<'a, V> {
         Self { sides, ties }
     }
 
-    /// One over their sum at vector `k`.
+    /// Their sum at vector `k`.
     #[inline(always)]
-    fn inverse(&self, k: usize) -> V {
+    fn sum(&self, k: usize) -> V {
         let mut sum = V::widen(&self.sides[LEFT][k]).where_positive(V::read(&self.ties[LEFT][k]));
         for side in [RIGHT, UP, DOWN] {
             sum = sum + V::widen(&self.sides[side][k]).where_positive(V::read(&self.ties[side][k]));
         }
-        sum.inverse()
+        sum
     }
 }
 

@@ -105,7 +105,7 @@ pub(super) fn finish_row<V: Packed<Number = f32>>(
     let stencil = weights.red_stencil::<V>(row, span, rows.blacks.around(row));
     let (b, x) = (V::chunks(&b[row as usize * half..][span.range()], stencil.len()), V::chunks_mut(x, stencil.len()));
     for k in 0..stencil.len() {
-        then(k, (V::read(&b[k]) + stencil.sum(k)) * stencil.diagonal(k).inverse()).put(&mut x[k]);
+        then(k, (V::read(&b[k]) + stencil.sum(k)).over(stencil.diagonal(k))).put(&mut x[k]);
     }
 }
 
@@ -141,7 +141,7 @@ fn corners_to_blacks<V: Packed<Number = f32>>(weights: &Weights, row: isize, coa
         let sum = to_first.times_plus(V::read(&first[k]), to_second * V::read(&second[k]));
         let tie = to_first + to_second;
         tie.put(&mut ties[k]);
-        (sum * tie.inverse()).put(&mut out[k]);
+        sum.over(tie).put(&mut out[k]);
     }
 }
 
@@ -166,14 +166,14 @@ fn smooth_and_correct<V: Packed<Number = f32>>(
         let sides = weights.reds::<V>(row, span);
         let corners = V::chunks(&corner_row(coarse, row, half)[span.start..], n);
         for k in 0..n {
-            (V::read(&b[k]) * sides.diagonal(k).inverse() + V::read(&corners[k])).put(&mut out[k]);
+            (V::read(&b[k]).over(sides.diagonal(k)) + V::read(&corners[k])).put(&mut out[k]);
         }
     } else {
         let stencil = weights.red_stencil::<V>(row, span, on_edges.around(row));
         let ties = CentreTies::<V>::new(stencil.sides(), row, span, ties);
         for k in 0..n {
-            let centre = stencil.sum(k) * ties.inverse(k);
-            (V::read(&b[k]) * stencil.diagonal(k).inverse() + centre).put(&mut out[k]);
+            let centre = stencil.sum(k).over(ties.sum(k));
+            (V::read(&b[k]).over(stencil.diagonal(k)) + centre).put(&mut out[k]);
         }
     }
 }

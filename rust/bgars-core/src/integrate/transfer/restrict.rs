@@ -149,7 +149,7 @@ fn smooth<V: Packed<Number = f32>>(
     let mut energy = V::splat(0.0);
     for k in 0..sides.len() {
         let b = V::read(&b[k]);
-        let smooth = b * sides.diagonal(k).inverse();
+        let smooth = b.over(sides.diagonal(k));
         smooth.put(&mut out[k]);
         energy = b.times_plus(smooth, energy);
     }
@@ -172,7 +172,7 @@ fn solve_and_tie_blacks<V: Packed<Number = f32>>(weights: &Weights, row: isize, 
     let mut energy = V::splat(0.0);
     for k in 0..stencil.len() {
         let sum = stencil.sum(k);
-        let solved = sum * stencil.diagonal(k).inverse();
+        let solved = sum.over(stencil.diagonal(k));
         energy = sum.times_plus(solved, energy);
         solved.put(&mut blacks[k]);
         (V::widen(&first[k]).magnitude() + V::widen(&second[k]).magnitude()).put(&mut ties[k]);
@@ -198,7 +198,7 @@ fn leave_residual<V: Packed<Number = f32>>(weights: &Weights, row: isize, rows: 
         let ties = CentreTies::<V>::new(stencil.sides(), row, span, ties);
         let out = V::chunks_mut(&mut centres.row_mut(row)[span.start..], stencil.len());
         for k in 0..stencil.len() {
-            (stencil.sum(k) * ties.inverse(k)).put(&mut out[k]);
+            stencil.sum(k).over(ties.sum(k)).put(&mut out[k]);
         }
     }
 }
@@ -218,7 +218,7 @@ fn centres_to_blacks<V: Packed<Number = f32>>(weights: &Weights, row: isize, row
     let out = V::chunks_mut(&mut rows.vertical.row_mut(row)[start..], n);
     for k in 0..n {
         let sum = V::read(&right[k]).times_plus(V::read(&before[k]), V::read(&left[k]) * V::read(&after[k]));
-        (sum * V::read(&tie[k]).inverse()).put(&mut out[k]);
+        sum.over(V::read(&tie[k])).put(&mut out[k]);
     }
 }
 
@@ -234,7 +234,7 @@ fn blacks_to_corners<V: Packed<Number = f32>>(weights: &Weights, row: isize, row
     let out = V::chunks_mut(&mut rows.horizontal.row_mut(row)[span.start..], n);
     for k in 0..n {
         let sum = V::read(&down[k]).times_plus(V::read(&above[k]), V::read(&up[k]) * V::read(&below[k]));
-        (sum * V::read(&tie[k]).inverse()).put(&mut out[k]);
+        sum.over(V::read(&tie[k])).put(&mut out[k]);
     }
     let [above, _, below] = rows.vertical.around(row);
     let stencil = weights.red_stencil::<V>(row, span, [above, rows.horizontal.row(row), below]);
