@@ -5,7 +5,7 @@
 
 use std::ops::{Deref, DerefMut};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use rayon::prelude::*;
 
@@ -18,8 +18,8 @@ pub fn zeros<T: bytemuck::Zeroable + Clone>(len: usize) -> Vec<T> {
 
 /// Numbers that start at a cache line: a load of a whole vector then touches one line, not two.
 ///
-/// The memory of large arrays is used again by the next of the same size. The system is told meanwhile that it may take the
-/// pages whenever it wants (`MADV_FREE`), so that they stand in nobody's way.
+/// The memory of large arrays is used again by the next of the same size. But for the last few the system is told meanwhile that
+/// it may take the pages whenever it wants (`MADV_FREE`), so that they stand in nobody's way.
 #[derive(Debug)]
 pub(crate) struct Aligned<T: Reused> {
     memory: Vec<T>,
@@ -36,8 +36,8 @@ static ERA: AtomicUsize = AtomicUsize::new(0);
 /// what was written, times zero, and must be finite.
 pub(crate) fn forget() {
     ERA.fetch_add(1, Ordering::SeqCst);
-    f32::waiting().lock().unwrap_or_else(PoisonError::into_inner).clear();
-    f64::waiting().lock().unwrap_or_else(PoisonError::into_inner).clear();
+    *f32::waiting() = Waiting::new();
+    *f64::waiting() = Waiting::new();
 }
 
 impl<T: Reused> Aligned<T> {
@@ -69,7 +69,7 @@ impl<T: Reused> Aligned<T> {
         /// Bytes.
         const CACHE_LINE: usize = 64;
         let room = len + CACHE_LINE / size_of::<T>();
-        let kept = take::<T>(room);
+        let kept = T::waiting().take(room);
         let is_fresh = kept.is_none();
         let memory = kept.unwrap_or_else(|| zeros(room));
         let start = memory.as_ptr().align_offset(CACHE_LINE).min(room - len);
@@ -79,8 +79,10 @@ impl<T: Reused> Aligned<T> {
 
 impl<T: Reused> Drop for Aligned<T> {
     fn drop(&mut self) {
-        if self.era == ERA.load(Ordering::SeqCst) {
-            give_back(std::mem::take(&mut self.memory));
+        if self.era == ERA.load(Ordering::SeqCst) && size_of_val(&self.memory[..]) >= Waiting::<T>::MIN_BYTES {
+            // Freed after the lock: that takes long.
+            let gone = T::waiting().give_back(std::mem::take(&mut self.memory));
+            drop(gone);
         }
     }
 }
@@ -148,57 +150,75 @@ impl<T: bytemuck::Zeroable + Copy> DerefMut for Scratch<T> {
 }
 
 /// Arrays that wait for the next of their size, the longest waiting first.
-pub(crate) type Waiting<T> = Mutex<Vec<Vec<T>>>;
+pub(crate) struct Waiting<T> {
+    arrays: Vec<Vec<T>>,
+    /// How many of them, the first ones, have lent their pages.
+    lent: usize,
+}
+
+impl<T: Reused> Waiting<T> {
+    /// Most arrays of a type that wait: those of two large integrations.
+    const ARRAYS: usize = 64;
+
+    /// Smallest array that waits, in bytes; smaller ones are the allocator's.
+    const MIN_BYTES: usize = 1 << 17;
+
+    /// Bytes of a type that wait with their pages: to lend these, and to mark them anew when they are written again, took a
+    /// twentieth of an integration of this size.
+    const HELD_BYTES: usize = 64 << 20;
+
+    const fn new() -> Self {
+        Self { arrays: Vec::new(), lent: 0 }
+    }
+
+    /// An array of this length that was given back, if there is one.
+    fn take(&mut self, len: usize) -> Option<Vec<T>> {
+        // The last one given back may still be in a cache.
+        let index = self.arrays.iter().rposition(|memory| memory.len() == len)?;
+        self.lent -= usize::from(index < self.lent);
+        Some(self.arrays.remove(index))
+    }
+
+    /// Keeps an array for the next of its length; returns those that can no longer be kept.
+    fn give_back(&mut self, memory: Vec<T>) -> Vec<Vec<T>> {
+        let mut gone = Vec::new();
+        self.arrays.push(memory);
+        while self.held_bytes() > Self::HELD_BYTES {
+            if lend_pages(&mut self.arrays[self.lent]) {
+                self.lent += 1;
+            } else {
+                gone.push(self.arrays.remove(self.lent));
+            }
+        }
+        if self.arrays.len() > Self::ARRAYS {
+            self.lent = self.lent.saturating_sub(1);
+            gone.push(self.arrays.remove(0));
+        }
+        gone
+    }
+
+    /// Of the arrays that have not lent their pages.
+    fn held_bytes(&self) -> usize {
+        self.arrays[self.lent..].iter().map(|memory| size_of_val(&memory[..])).sum()
+    }
+}
 
 /// A number whose arrays are used again.
 pub(crate) trait Reused: bytemuck::Zeroable + Copy + Send + Sync + 'static {
-    fn waiting() -> &'static Waiting<Self>;
+    fn waiting() -> MutexGuard<'static, Waiting<Self>>;
 }
 
 macro_rules! reused {
     ($($number:ty)*) => {$(
         impl Reused for $number {
-            fn waiting() -> &'static Waiting<Self> {
-                static WAITING: Waiting<$number> = Mutex::new(Vec::new());
-                &WAITING
+            fn waiting() -> MutexGuard<'static, Waiting<Self>> {
+                static WAITING: Mutex<Waiting<$number>> = Mutex::new(Waiting::new());
+                WAITING.lock().unwrap_or_else(PoisonError::into_inner)
             }
         }
     )*};
 }
 reused!(f32 f64);
-
-/// Most arrays of a type that wait: those of two large integrations.
-const WAITING_ARRAYS: usize = 64;
-
-/// Smallest array that waits, in bytes; smaller ones are the allocator's.
-const MIN_WAITING_BYTES: usize = 1 << 17;
-
-/// Smallest array whose pages are lent meanwhile, in bytes: to say so takes longer than to clear a smaller one.
-const MIN_LENT_BYTES: usize = 2 << 20;
-
-/// An array of this length that was given back, if there is one.
-fn take<T: Reused>(len: usize) -> Option<Vec<T>> {
-    if len * size_of::<T>() < MIN_WAITING_BYTES {
-        return None;
-    }
-    let mut waiting = T::waiting().lock().unwrap_or_else(PoisonError::into_inner);
-    // The last one given back may still be in a cache.
-    let index = waiting.iter().rposition(|memory| memory.len() == len)?;
-    Some(waiting.remove(index))
-}
-
-/// Keeps an array for the next of its length, where the system can be told that it may take the pages.
-fn give_back<T: Reused>(mut memory: Vec<T>) {
-    let bytes = size_of_val(&memory[..]);
-    if bytes < MIN_WAITING_BYTES || bytes >= MIN_LENT_BYTES && !lend_pages(&mut memory) {
-        return;
-    }
-    let mut waiting = T::waiting().lock().unwrap_or_else(PoisonError::into_inner);
-    let oldest = (waiting.len() == WAITING_ARRAYS).then(|| waiting.remove(0));
-    waiting.push(memory);
-    drop(waiting);
-    drop(oldest);
-}
 
 /// Tells the system that it may take the pages of an array whose content nobody needs; they then read as zeros. False where
 /// it cannot be told.
@@ -272,6 +292,25 @@ mod tests {
         let again = Aligned::<f64>::any(LEN);
         assert!(again.iter().all(|&number| number == 7.0 || number == 0.0));
         #[cfg(target_os = "linux")]
-        assert!(f64::waiting().lock().unwrap().iter().all(|memory| memory.len() != again.memory.len()));
+        assert!(f64::waiting().arrays.iter().all(|memory| memory.len() != again.memory.len()));
+    }
+
+    #[test]
+    fn the_longest_waiting_lend_their_pages_and_go_first() {
+        const THIRD: usize = Waiting::<f32>::HELD_BYTES / size_of::<f32>() / 3;
+        let mut waiting = Waiting::new();
+        for lent in [0, 0, 0, 1, 2] {
+            assert!(waiting.give_back(zeros::<f32>(THIRD)).is_empty());
+            #[cfg(target_os = "linux")]
+            assert_eq!(waiting.lent, lent);
+            assert!(waiting.held_bytes() <= Waiting::<f32>::HELD_BYTES);
+        }
+        let left: Vec<usize> = std::iter::from_fn(|| waiting.take(THIRD).map(|_| waiting.lent)).collect();
+        #[cfg(target_os = "linux")]
+        assert_eq!(left, [2, 2, 2, 1, 0]);
+        assert!(!left.is_empty() && waiting.take(THIRD).is_none());
+
+        let gone: usize = (0..Waiting::<f32>::ARRAYS + 3).map(|len| waiting.give_back(vec![0.0; len]).len()).sum();
+        assert_eq!((gone, waiting.arrays.len(), waiting.arrays[0].len()), (3, Waiting::<f32>::ARRAYS, 3));
     }
 }
