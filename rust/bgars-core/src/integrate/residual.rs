@@ -52,18 +52,18 @@ impl Residual {
     }
 }
 
-/// A number as a float and the float that is missing to it.
+/// Numbers as floats, and the floats that are missing to them.
 #[inline(always)]
-fn halves(number: f64) -> [f32; 2] {
-    let rounded = number as f32;
-    [rounded, (number - f64::from(rounded)) as f32]
+fn halves<const N: usize>(numbers: [f64; N]) -> [[f32; N]; 2] {
+    let rounded = numbers.map(|number| number as f32);
+    [rounded, std::array::from_fn(|lane| (numbers[lane] - f64::from(rounded[lane])) as f32)]
 }
 
-/// [`halves`] of several numbers.
+/// [`halves`] of any count of numbers.
 #[inline(always)]
 pub(super) fn split(numbers: &[f64], [rounded, missing]: [&mut [f32]; 2]) {
     for ((&number, rounded), missing) in numbers.iter().zip(rounded).zip(missing) {
-        [*rounded, *missing] = halves(number);
+        [[*rounded], [*missing]] = halves([number]);
     }
 }
 
@@ -95,8 +95,7 @@ fn subtract_lanes<const N: usize>([rounded, missing]: [&mut [f32; N]; 2], alpha:
     // All are read before any is written: only then are they taken for a vector.
     let left: [f64; N] =
         std::array::from_fn(|lane| (f64::from(rounded[lane]) + f64::from(missing[lane])) - alpha * q[lane]);
-    *rounded = left.map(|left| left as f32);
-    *missing = std::array::from_fn(|lane| (left[lane] - f64::from(rounded[lane])) as f32);
+    [*rounded, *missing] = halves(left);
     left.map(|left| left * left)
 }
 
