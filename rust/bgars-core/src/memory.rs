@@ -69,7 +69,7 @@ impl<T: Reused> Aligned<T> {
         /// Bytes.
         const CACHE_LINE: usize = 64;
         let room = len + CACHE_LINE / size_of::<T>();
-        let kept = T::waiting().take(room);
+        let kept = if Waiting::<T>::keeps(room) { T::waiting().take(room) } else { None };
         let is_fresh = kept.is_none();
         let memory = kept.unwrap_or_else(|| zeros(room));
         let start = memory.as_ptr().align_offset(CACHE_LINE).min(room - len);
@@ -79,7 +79,7 @@ impl<T: Reused> Aligned<T> {
 
 impl<T: Reused> Drop for Aligned<T> {
     fn drop(&mut self) {
-        if self.era == ERA.load(Ordering::SeqCst) && size_of_val(&self.memory[..]) >= Waiting::<T>::MIN_BYTES {
+        if self.era == ERA.load(Ordering::SeqCst) && Waiting::<T>::keeps(self.memory.len()) {
             // Freed after the lock: that takes long.
             let gone = T::waiting().give_back(std::mem::take(&mut self.memory));
             drop(gone);
@@ -164,11 +164,16 @@ impl<T: Reused> Waiting<T> {
     const MIN_BYTES: usize = 1 << 17;
 
     /// Bytes of a type that wait with their pages: to lend these, and to mark them anew when they are written again, took a
-    /// twentieth of an integration of this size.
+    /// twentieth of an integration of a megapixel.
     const HELD_BYTES: usize = 64 << 20;
 
     const fn new() -> Self {
         Self { arrays: Vec::new(), lent: 0 }
+    }
+
+    /// True for arrays long enough to wait; the others need not ask, and lock nothing.
+    const fn keeps(len: usize) -> bool {
+        len * size_of::<T>() >= Self::MIN_BYTES
     }
 
     /// An array of this length that was given back, if there is one.

@@ -31,8 +31,8 @@ pub(super) struct Solution {
 /// system leaves is at most the tolerance times `scale`; the blacks follow from them.
 ///
 /// The residual that the iteration carries along drifts from the true one by rounding: when it says done, the true one is
-/// computed, and if it does not agree the iteration starts again from there. It is kept in `f64`: what rounding adds to the sum of
-/// a component's residuals no step can take away, and the preconditioner makes the most of it.
+/// computed, and if it does not agree the iteration starts again from there. It is kept in two floats, not in one: what rounding adds
+/// to the sum of a component's residuals no step can take away, and the preconditioner makes the most of it.
 pub(super) fn conjugate_gradients(
     weights: &Weights,
     bits: EdgeBits,
