@@ -38,6 +38,7 @@ pub(crate) fn forget() {
     ERA.fetch_add(1, Ordering::SeqCst);
     *f32::waiting() = Waiting::new();
     *f64::waiting() = Waiting::new();
+    *u64::waiting() = Waiting::new();
 }
 
 impl<T: Reused> Aligned<T> {
@@ -158,10 +159,12 @@ pub(crate) struct Waiting<T> {
 
 impl<T: Reused> Waiting<T> {
     /// Most arrays of a type that wait: those of two large integrations.
-    const ARRAYS: usize = 64;
+    const ARRAYS: usize = 256;
 
-    /// Smallest array that waits, in bytes; smaller ones are the allocator's.
-    const MIN_BYTES: usize = 1 << 17;
+    /// Smallest array that waits, in bytes; smaller ones are the allocator's. That keeps pages for each thread and size: where
+    /// chance deals the arrays out to threads, the first calls of a process go on taking pages, a large one of which can cost
+    /// a third of an integration of a megapixel.
+    const MIN_BYTES: usize = 1 << 14;
 
     /// Bytes of a type that wait with their pages: to lend these, and to mark them anew when they are written again, took a
     /// twentieth of an integration of a megapixel.
@@ -223,7 +226,7 @@ macro_rules! reused {
         }
     )*};
 }
-reused!(f32 f64);
+reused!(f32 f64 u64);
 
 /// Tells the system that it may take the pages of an array whose content nobody needs; they then read as zeros. False where
 /// it cannot be told.

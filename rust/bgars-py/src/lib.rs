@@ -1,6 +1,7 @@
 //! The compiled half of the Python package `bgars`: a list of functions. Every one of them releases the GIL once, around
 //! the whole of its work; `python/bgars/_bgars.pyi` documents them.
 
+mod allocator;
 mod bilateral;
 mod capture;
 mod convert;
@@ -16,11 +17,6 @@ mod progress;
 mod reflectance;
 mod rims;
 mod shadows;
-
-/// It keeps pages that are free for the next call: with the system's allocator a call on a quarter of a megapixel spent a
-/// fifth of its time on page faults.
-#[global_allocator]
-static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 #[pyo3::pymodule]
 mod _bgars {
@@ -71,4 +67,11 @@ mod _bgars {
     const BLIND_MIN_LIGHTS: usize = bgars_core::blind::MIN_LIGHTS;
     #[pymodule_export]
     const DEBUG_BUILD: bool = cfg!(debug_assertions);
+
+    #[pymodule_init]
+    #[allow(clippy::unnecessary_wraps)]
+    fn set_up(_module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
+        crate::allocator::keep_free_pages();
+        Ok(())
+    }
 }

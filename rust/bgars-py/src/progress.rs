@@ -9,11 +9,15 @@ use std::time::Duration;
 use pyo3::call::PyCallArgs;
 use pyo3::prelude::*;
 
+use crate::allocator::give_free_pages_back;
 use crate::errors::to_python;
 use crate::pool::Pool;
 
 /// Time between two looks at Python.
 const INTERVAL: Duration = Duration::from_millis(100);
+
+/// Looks at Python after which a long call gives free pages back: five times a second.
+const LOOKS_TO_GIVE_BACK: usize = 2;
 
 /// Time to the first look at where the threads run; each of the next ones comes after twice as long.
 const FIRST_WAIT: Duration = Duration::from_millis(2);
@@ -46,7 +50,7 @@ where
                 // The receiver waits until the sender is gone, whatever it sent.
                 drop(sender);
             });
-            let mut wait = FIRST_WAIT;
+            let (mut wait, mut looks) = (FIRST_WAIT, 0);
             while receiver.recv_timeout(wait) == Err::<(), _>(RecvTimeoutError::Timeout) {
                 if wait < INTERVAL {
                     pool.look();
@@ -54,6 +58,10 @@ where
                     continue;
                 }
                 pool.free();
+                looks += 1;
+                if looks % LOOKS_TO_GIVE_BACK == 0 {
+                    give_free_pages_back();
+                }
                 let arguments = state.lock().unwrap_or_else(PoisonError::into_inner).take();
                 // After an exception the work only has to end: nobody is told of its progress any more.
                 if raised.is_none()

@@ -6,7 +6,7 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::checkerboard::{BAND_ROWS, DOWN, LEFT, RIGHT, UP, Weights};
-use crate::memory::zeros;
+use crate::memory::Aligned;
 
 /// Reds that one word tells of, the first by its lowest bit.
 pub(super) const REDS: usize = u64::BITS as usize;
@@ -21,7 +21,7 @@ const ALL_SIDES: usize = 2 * SIDES;
 /// and of each side which have a real one.
 #[derive(Debug)]
 pub(super) struct EdgeBits {
-    rows: Vec<u64>,
+    rows: Aligned<u64>,
     /// In a row of one side: a word of zeros, those of the reds, and one of zeros.
     side_words: usize,
 }
@@ -111,7 +111,7 @@ impl EdgeBits {
     pub fn of(weights: &Weights) -> Self {
         let (rows, half) = (weights.grid.height + 2, weights.grid.half());
         let side_words = half.div_ceil(REDS) + 2;
-        let mut bits = Self { rows: zeros(rows * ALL_SIDES * side_words), side_words };
+        let mut bits = Self { rows: Aligned::any(rows * ALL_SIDES * side_words), side_words };
         bits.rows.par_chunks_mut(ALL_SIDES * side_words).with_min_len(BAND_ROWS).enumerate().for_each(|(row, bits)| {
             set_row(weights.row(row as isize - 1).map(|side| &side[1..=half]), bits);
         });
@@ -182,7 +182,7 @@ impl EdgeBits {
     }
 }
 
-/// Sets the bits of a row, all zero, from the `weights` of these sides.
+/// Sets the bits of a row from the `weights` of these sides.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 fn set_row(weights: [&[f32]; SIDES], bits: &mut [u64]) {
     let side_words = bits.len() / ALL_SIDES;
@@ -195,6 +195,9 @@ fn set_row(weights: [&[f32]; SIDES], bits: &mut [u64]) {
         }
         if !rest.is_empty() {
             (any[1 + words.len()], real[1 + words.len()]) = word_of(rest);
+        }
+        for side in [any, real] {
+            (side[0], side[side_words - 1]) = (0, 0);
         }
     }
 }
