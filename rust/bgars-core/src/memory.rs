@@ -18,8 +18,8 @@ pub fn zeros<T: bytemuck::Zeroable + Clone>(len: usize) -> Vec<T> {
 
 /// Numbers that start at a cache line: a load of a whole vector then touches one line, not two.
 ///
-/// The memory of large arrays is used again by the next of the same size. But for the last few the system is told meanwhile that
-/// it may take the pages whenever it wants (`MADV_FREE`), so that they stand in nobody's way.
+/// The memory of all but small arrays is used again by the next of the same size. But for the last few the system is told
+/// meanwhile that it may take the pages whenever it wants (`MADV_FREE`), so that they stand in nobody's way.
 #[derive(Debug)]
 pub(crate) struct Aligned<T: Reused> {
     memory: Vec<T>,

@@ -254,6 +254,19 @@ mod tests {
     }
 
     #[test]
+    fn nothing_is_left_of_what_was_there() {
+        for half in [1, 64, 100] {
+            let weights: Vec<f32> = (0..half).map(|k| [0.0, -1.0, 2.0][k % 3]).collect();
+            let len = ALL_SIDES * (half.div_ceil(REDS) + 2);
+            let [mut fresh, mut used] = [vec![0; len], vec![u64::MAX; len]];
+            for bits in [&mut fresh, &mut used] {
+                set_row([&weights; SIDES], bits);
+            }
+            assert_eq!(fresh, used, "{half}");
+        }
+    }
+
+    #[test]
     fn cells_are_those_of_their_weights() {
         let weights = Weights::ragged([0.0, 0.0, 0.3, 0.7, 1.0, -0.5]);
         let bits = EdgeBits::of(&weights);
