@@ -12,7 +12,7 @@ use super::real::{Real, on_vectors};
 use super::reduction::load;
 use super::residual::{Residual, split};
 use super::ring::Ring;
-use super::spans::Span;
+use super::spans::{Span, each_or_none};
 use crate::vector::Packed;
 
 /// Sets some rows of a right side, reds and blacks.
@@ -67,14 +67,8 @@ pub(super) fn settle(
 ) -> f64 {
     let half = weights.grid.half();
     let (chunk, bands) = (BAND_ROWS * half, weights.spans.len());
-    let blacks: Vec<_> = match blacks {
-        Some(blacks) => blacks.chunks_mut(chunk).map(Some).collect(),
-        None => (0..bands).map(|_| None).collect(),
-    };
-    let left: Vec<_> = match left {
-        Some(left) => left.chunks_mut(chunk).map(Some).collect(),
-        None => (0..bands).map(|_| None).collect(),
-    };
+    let blacks = each_or_none(blacks.map(|blacks| blacks.chunks_mut(chunk)), bands);
+    let left = each_or_none(left.map(|left| left.chunks_mut(chunk)), bands);
     let squares: Vec<f64> = (blacks, left)
         .into_par_iter()
         .enumerate()

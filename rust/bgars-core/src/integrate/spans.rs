@@ -99,6 +99,11 @@ fn reds_with_edges(bits: &EdgeBits, row: usize) -> Option<Range<usize>> {
     bits.hull(|word| row.to_any_side(word))
 }
 
+/// The chunks of `count` tasks where there are any, else as often nothing.
+pub(super) fn each_or_none<C>(mut chunks: Option<impl Iterator<Item = C>>, count: usize) -> Vec<Option<C>> {
+    (0..count).map(|_| chunks.as_mut().and_then(Iterator::next)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

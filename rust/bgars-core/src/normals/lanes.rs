@@ -168,8 +168,7 @@ fn run_with<K: Pixel, V: Vector>(
                 let keys = a.iter().zip(b).zip(c).zip(d).zip(e).zip(f).zip(g).zip(h);
                 for (number, (out, (((((((a, b), c), d), e), f), g), h))) in blocks.zip(keys).enumerate() {
                     let keys = [a, b, c, d, e, f, g, h];
-                    let ahead = if K::CODES.is_none() { &keys[..] } else { &[] };
-                    task.block::<V>(number, &Reads::Keys { keys: &keys, ahead }, out);
+                    task.block::<V>(number, &Reads::Keys { keys: &keys, ahead: &keys }, out);
                 }
             } else if planes.len() > BYTE_LIGHTS && matches!(solver.choice, Choice::All) && common.offsets.is_none() {
                 run_sums::<K, V>(&mut task, planes, &pixels, blocks);

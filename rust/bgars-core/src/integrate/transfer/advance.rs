@@ -8,6 +8,7 @@ use crate::integrate::checkerboard::{BAND_ROWS, Weights};
 use crate::integrate::real::{Real, on_vectors};
 use crate::integrate::reduction::{multiply_row, solve_blacks};
 use crate::integrate::ring::Ring;
+use crate::integrate::spans::each_or_none;
 use crate::integrate::steps::Due;
 use crate::integrate::strays::Changes;
 use crate::vector::Packed;
@@ -38,10 +39,7 @@ pub(in crate::integrate) fn advance(
     let bands = weights.spans.bands_of_a_task();
     let chunk = bands * BAND_ROWS * half;
     let mut products = vec![0.0; weights.spans.len()];
-    let due: Vec<_> = match due {
-        Some(due) => due.chunks(chunk).map(Some).collect(),
-        None => products.chunks(bands).map(|_| None).collect(),
-    };
+    let due = each_or_none(due.map(|due| due.chunks(chunk)), products.len().div_ceil(bands));
     (p.par_chunks_mut(chunk), q.par_chunks_mut(chunk), products.par_chunks_mut(bands), due)
         .into_par_iter()
         .enumerate()
