@@ -21,8 +21,14 @@ const MOST_IN_PLACE: usize = 12;
 /// Bytes of a block that are written at a time while others wait.
 const FEW_BYTES: usize = 1 << 9;
 
-/// How far ahead images are fetched that crowd, or are very many: a first cache holds few blocks of them.
-pub(super) const FEW_BLOCKS_AHEAD: usize = 2;
+/// How many blocks ahead images are fetched that crowd, or are very many: a first cache holds few bytes of each.
+pub(super) const fn few_blocks_ahead<K>() -> usize {
+    /// Of an image.
+    const MOST_BYTES: usize = 1 << 10;
+    const MOST_BLOCKS: usize = 8;
+    let blocks = MOST_BYTES / size_of::<Lanes<K>>();
+    if blocks < MOST_BLOCKS { blocks } else { MOST_BLOCKS }
+}
 
 /// True where it pays to bring images together: where they crowd, or a block of all of them takes much of the first cache.
 pub(super) fn should_bring<K>(images: &[&[K]]) -> bool {
@@ -59,7 +65,7 @@ pub(super) fn bring<K: Pixel>(images: &[&[Lanes<K>]], stretch: &Range<usize>, me
         let first = part * few;
         for (block, all) in stretch.clone().zip(memory.chunks_exact_mut(images.len())) {
             for image in now {
-                stream::prefetch(&image[block], FEW_BLOCKS_AHEAD);
+                stream::prefetch(&image[block], few_blocks_ahead::<K>());
             }
             for (to, image) in all[first..].iter_mut().zip(now) {
                 *to = image[block];

@@ -4,7 +4,7 @@ use std::borrow::Borrow;
 use std::ops::Range;
 
 use super::cutoff::{LANES, Lanes};
-use super::gather::FEW_BLOCKS_AHEAD;
+use super::gather::few_blocks_ahead;
 use crate::vector::Vector;
 use crate::vector::spread::Spread;
 use crate::{Pixel, stream};
@@ -95,7 +95,7 @@ impl BlockSums {
             let next = &images[next..next + part(images.len() - next)];
             let (images, vectors) = (&images[first..end], &vectors[first..end]);
             let ahead = if is_crowded {
-                Ahead { images, blocks_on: FEW_BLOCKS_AHEAD }
+                Ahead { images, blocks_on: few_blocks_ahead::<K>() }
             } else {
                 Ahead { images: next, blocks_on }
             };
