@@ -22,12 +22,12 @@ const MOST_IN_PLACE: usize = 12;
 const FEW_BYTES: usize = 1 << 9;
 
 /// How many blocks ahead images are fetched that crowd, or are very many: a first cache holds few bytes of each.
-pub(super) const fn few_blocks_ahead<K>() -> usize {
+#[inline(always)]
+pub(super) fn few_blocks_ahead<K>() -> usize {
     /// Of an image.
     const MOST_BYTES: usize = 1 << 10;
     const MOST_BLOCKS: usize = 8;
-    let blocks = MOST_BYTES / size_of::<Lanes<K>>();
-    if blocks < MOST_BLOCKS { blocks } else { MOST_BLOCKS }
+    (MOST_BYTES / size_of::<Lanes<K>>()).min(MOST_BLOCKS)
 }
 
 /// True where it pays to bring images together: where they crowd, or a block of all of them takes much of the first cache.

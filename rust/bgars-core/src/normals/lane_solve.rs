@@ -116,8 +116,7 @@ pub(super) struct Readings<'a, K> {
 }
 
 /// How far ahead so many images are fetched. Streams of floats, or of many lights, are more than processors follow by themselves;
-/// so are eight of bytes where a block lies across two cache lines, as in most arrays: a load that waits for one of these
-/// costs twice.
+/// so are eight of bytes where a block lies across two cache lines, as in most arrays (`benches/results.tsv`).
 fn blocks_ahead<K>(images: usize) -> usize {
     /// Half of a first cache: what is fetched farther ahead is driven out again before it is read.
     const MOST_BYTES: usize = 1 << 14;
