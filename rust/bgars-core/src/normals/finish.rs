@@ -15,6 +15,9 @@ const GRAZING: f32 = 1e-5;
 /// Least `rho^2` that leaves residuals and inverses in the normal range of `f32`, and one over the largest `|rho n|^2`.
 const MIN_SQUARE: f32 = 1e-30;
 
+/// The square of the half-way point of the confidence, radians.
+const HALF2: f64 = (HALF_DEG * std::f64::consts::PI / 180.0) * (HALF_DEG * std::f64::consts::PI / 180.0);
+
 /// The smallest float above zero.
 const LEAST: f32 = f32::from_bits(1);
 
@@ -27,23 +30,24 @@ pub(super) struct Facets<V> {
     pub values_square: V,
     /// `|g|^2`.
     pub square: V,
-    /// `rho = |g|`.
-    pub length: V,
-    /// `1 / rho`.
+    /// `1 / rho`, and not a number where the facet faces away: nothing that is computed from it is one, and no branch is needed.
     pub inverse: V,
-    /// With the [prior](super::confidence::PRIOR_RESIDUAL).
-    pub squared_residuals: V,
-    /// `|g|^2 tr C - g^T C g`, `C` the inverse in use.
+    /// Sum of the squared residuals with the [prior](super::confidence::PRIOR_RESIDUAL), over `rho^2`.
+    pub variance: V,
+    /// `tr C - n^T C n`, `C` the inverse in use.
     pub turning: V,
     /// From [`freedom`].
     pub freedom: V,
 }
 
 /// Degrees of freedom of the residuals of so many kept lights (see [`super::confidence`]), by the square of its half-way point.
+pub(super) fn freedom(kept: usize) -> f32 {
+    ((kept as f64 - 2.0) * HALF2) as f32
+}
+
+/// [`freedom`] of many pixels.
 #[inline(always)]
-pub(super) fn freedom<V: Vector>(kept: V) -> V {
-    /// The square of the half-way point, radians.
-    const HALF2: f64 = (HALF_DEG * std::f64::consts::PI / 180.0) * (HALF_DEG * std::f64::consts::PI / 180.0);
+pub(super) fn freedoms<V: Vector>(kept: V) -> V {
     kept.times_minus(V::splat(HALF2 as f32), V::splat((2.0 * HALF2) as f32))
 }
 
@@ -63,62 +67,56 @@ pub(super) struct Finished {
     pub least_cut: f32,
 }
 
+/// `1 / rho`; see [`Facets::inverse`].
+#[inline(always)]
+pub(super) fn inverse_length<V: Vector>(square: V, [_, _, z]: [V; 3]) -> V {
+    square.with_sign_of(z).inverse_root()
+}
+
 impl Finished {
     pub fn new() -> Self {
         Self { keep_all: true, kept: [0; LANES], valid: 0, careful: 0, finite: true, least_cut: 0.0 }
     }
 
     /// Writes the pixels from `at` on to their block; facets seen from the side, and values far from 1, are left to the careful kernel.
+    /// Values far from 1 are not looked for where none can be (`any_size` false).
     #[inline(always)]
-    pub fn write<V: Vector>(&mut self, at: usize, facets: &Facets<V>, per_full_scale: f32, block: &mut Block<'_>) {
+    pub fn write<V: Vector>(
+        &mut self,
+        at: usize,
+        facets: &Facets<V>,
+        per_full_scale: f32,
+        any_size: bool,
+        block: &mut Block<'_>,
+    ) {
         let zero = V::splat(0.0);
-        let Facets { scaled: [x, y, z], square, mut length, mut inverse, squared_residuals, turning, freedom, .. } =
-            *facets;
-        let in_range = V::both(square.is_over(V::splat(MIN_SQUARE)), V::splat(1.0 / MIN_SQUARE).is_over(square));
-        let mut n_z = z * inverse;
-        // All seen from the front, and of a size whose square is in the range of floats; false for NaN.
-        let usual = V::all(V::both(in_range, n_z.is_over(V::splat(GRAZING))));
-        let mut valid = all_bits::<V>();
-        if !usual {
+        let Facets { scaled: [x, y, z], square, inverse, variance, turning, freedom, .. } = *facets;
+        let (z2, least) = (z * z, square * V::splat(GRAZING * GRAZING));
+        let sound = V::both(in_range(square), z2.is_over(least));
+        // What is zero is not seen from the side.
+        let is_unusual = if any_size { !V::all(sound) } else { V::any(least.is_over(z2)) };
+        if is_unusual {
             let size = x.at_least(zero - x) + y.at_least(zero - y) + z.at_least(zero - z);
             let is_zero = V::bits(V::splat(LEAST).is_over(size));
-            let sound = V::bits(V::both(in_range, n_z.at_least(zero - n_z).is_over(V::splat(GRAZING))));
-            self.careful |= (all_bits::<V>() & !(sound | is_zero)) << at;
-            // NaN spreads into everything that is computed from it.
-            let (faces, nan) = (z.is_over(zero), V::splat(f32::NAN));
-            (length, inverse, n_z) =
-                (V::pick(faces, length, nan), V::pick(faces, inverse, nan), V::pick(faces, n_z, nan));
-            valid = V::bits(faces);
+            self.careful |= (all_bits::<V>() & !(V::bits(sound) | is_zero)) << at;
         }
-        let inverse2 = inverse * inverse;
         let streamed = block.streamed;
         let normals = &mut block.normals[3 * at..3 * (at + V::WIDTH)];
-        let [first, second, third] = V::interleaved([x * inverse, y * inverse, n_z]);
+        let [first, second, third] = V::interleaved([x * inverse, y * inverse, z * inverse]);
         put(first, normals, streamed);
         put(second, &mut normals[V::WIDTH..], streamed);
         put(third, &mut normals[2 * V::WIDTH..], streamed);
-        put(length * V::splat(per_full_scale), &mut block.albedo[at..], streamed);
-        // See `confidence`: over themselves and the squared standard error.
-        let (variance, turning) = (squared_residuals * inverse2, turning * inverse2);
-        let mut certainty = freedom / variance.times_plus(turning, freedom);
-        if !usual {
-            certainty = V::pick(z.is_over(zero), certainty, zero);
-        }
+        put(square * inverse * V::splat(per_full_scale), &mut block.albedo[at..], streamed);
+        // See `confidence`: over themselves and the squared standard error. Not a number becomes zero.
+        let certainty = (freedom / variance.times_plus(turning, freedom)).at_least(zero);
         put(certainty, &mut block.confidence[at..], streamed);
-        self.valid |= valid << at;
+        self.valid |= V::bits(z.is_over(zero)) << at;
     }
+
     /// Mask and counts of a block, and what its unused pixels say.
     #[inline(always)]
-    pub fn write_counts(&self, all_lights: &Lanes<u16>, used: Option<&[bool]>, out: &mut Block<'_>) {
-        static ALL_VALID: Lanes<bool> = [true; LANES];
-        let spread;
-        // Nearly always all of them, and then nothing has to be spread.
-        let valid = if self.valid == u64::MAX {
-            &ALL_VALID
-        } else {
-            spread = flags(self.valid);
-            &spread
-        };
+    pub fn write_counts<V: Vector>(&self, all_lights: &Lanes<u16>, used: Option<&[bool]>, out: &mut Block<'_>) {
+        let valid = &V::flags(self.valid);
         let kept = if self.keep_all { all_lights } else { &self.kept };
         store(kept, out.lights_kept, out.streamed);
         store(valid, out.mask, out.streamed);
@@ -129,6 +127,12 @@ impl Finished {
             }
         }
     }
+}
+
+/// True where residuals and inverses are in the normal range of `f32`; false for NaN.
+#[inline(always)]
+fn in_range<V: Vector>(square: V) -> V::Mask {
+    V::both(square.is_over(V::splat(MIN_SQUARE)), V::splat(1.0 / MIN_SQUARE).is_over(square))
 }
 
 /// Copies a block, past the caches if they say so.
@@ -151,42 +155,8 @@ fn put<V: Vector>(vector: V, to: &mut [f32], streamed: bool) {
     }
 }
 
-/// A flag for every bit, from the lowest on.
-///
-/// By eights: to shift each of 64 by a number of its own, and to pack what comes out, is what vector instructions are slow at.
-#[inline(always)]
-fn flags(bits: u64) -> Lanes<bool> {
-    /// The lowest bit of every byte.
-    const LOWEST: u64 = u64::from_ne_bytes([1; 8]);
-    /// Bit k of byte k.
-    const OWN: u64 = u64::from_le_bytes([1, 2, 4, 8, 16, 32, 64, 128]);
-    let mut eights = [[0; 8]; LANES / 8];
-    for (eight, byte) in eights.iter_mut().zip(bits.to_le_bytes()) {
-        // In every byte a bit of its own, then carried to the highest place, then moved to the lowest.
-        let own = (u64::from(byte) * LOWEST) & OWN;
-        *eight = (((own + (128 * LOWEST - OWN)) >> 7) & LOWEST).to_le_bytes();
-    }
-    let bytes: Lanes<u8> = bytemuck::must_cast(eights);
-    bytes.map(|byte| byte != 0)
-}
-
 /// A bit for every value of a vector.
 #[inline(always)]
 pub(super) fn all_bits<V: Vector>() -> u64 {
     (1 << V::WIDTH) - 1
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn flags_are_the_bits() {
-        let bytes = (0..=u8::MAX).map(|byte| u64::from(byte) * 0x0101_0101_0101_0101);
-        for bits in bytes.chain((0..64).map(|bit| 1 << bit)).chain([0x0123_4567_89ab_cdef, !0x0123_4567_89ab_cdef]) {
-            for (lane, flag) in flags(bits).into_iter().enumerate() {
-                assert_eq!(flag, bits >> lane & 1 == 1, "bit {lane} of {bits:#x}");
-            }
-        }
-    }
 }

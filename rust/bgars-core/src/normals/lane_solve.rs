@@ -6,12 +6,13 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::confidence::PRIOR_RESIDUAL;
 use super::cutoff::{LANES, Lanes, cutoffs};
-use super::finish::{Facets, Finished, all_bits, freedom};
+use super::finish::{Facets, Finished, all_bits, freedom, freedoms, inverse_length};
+use super::finite::{are_finite, is_finite};
 use super::kept::Kept;
 use super::out::Block;
 use super::robust_lanes::{self, RobustLanes};
 use super::sums::{BlockSums, Sums};
-use super::symmetric::{ENTRIES, Inverse, PrincipalAxes, dot, form, inverse_row, outer, spread};
+use super::symmetric::{ENTRIES, Inverse, PrincipalAxes, RayleighQuotient, dot, form, inverse_row, outer, spread};
 use crate::lights::conditioning;
 use crate::vector::spread::Spread;
 use crate::vector::subset_sums::SubsetSums;
@@ -54,10 +55,12 @@ pub(super) struct LaneSolver {
     axes: PrincipalAxes,
     /// `(L^T L)^-1 L^T` of all lights along these axes, a column a light.
     pub pseudo_inverse: Vec<[Spread; 3]>,
-    /// What the square along each axis takes from the squared residuals: `-L^T L` with the [prior](PRIOR_RESIDUAL).
-    unexplained: [Spread; 3],
-    /// What it adds to the turning: `(tr C) I - C`, `C = (L^T L)^-1`.
-    turning: [Spread; 3],
+    /// Of the [prior](PRIOR_RESIDUAL) less `L^T L`: what is not explained, beside the squares of the values.
+    unexplained: RayleighQuotient,
+    /// Of `(tr C) I - C`, `C = (L^T L)^-1`.
+    turning: RayleighQuotient,
+    /// Of all lights.
+    freedom: Spread,
     /// `(L^T L)^-1` of any of up to eight lights; `None` for more, and where all are kept.
     inverses: Option<RowTable>,
     /// `L^T L` of any lights, a table for every eight of them; for where there are no inverses.
@@ -81,8 +84,9 @@ impl LaneSolver {
             .chunks(BYTE_LIGHTS)
             .map(|lights| SubsetSums::new(&lights.iter().map(outer).collect::<Vec<_>>()))
             .collect();
-        let unexplained = axes.values.map(|value| Spread::new((PRIOR_RESIDUAL * PRIOR_RESIDUAL - value) as f32));
-        let turning = axes.values.map(|value| Spread::new((exact.trace() - 1.0 / value) as f32));
+        let unexplained = RayleighQuotient::new(axes.values.map(|value| PRIOR_RESIDUAL * PRIOR_RESIDUAL - value));
+        let turning = RayleighQuotient::new(axes.values.map(|value| exact.trace() - 1.0 / value));
+        let freedom = Spread::new(freedom(directions.len()));
         Some(Self {
             choice,
             directions,
@@ -91,6 +95,7 @@ impl LaneSolver {
             pseudo_inverse,
             unexplained,
             turning,
+            freedom,
             inverses,
             grams,
         })
@@ -127,6 +132,9 @@ fn blocks_ahead<K>(images: usize) -> usize {
 /// Has the processor fetch a part of what comes some blocks later: of many reads at once the last ones wait, and the work with them.
 #[inline(always)]
 fn fetch<K>(ahead: &[&Lanes<K>], blocks: usize, part: usize, parts: usize) {
+    if part >= parts {
+        return;
+    }
     for key in &ahead[part * ahead.len() / parts..(part + 1) * ahead.len() / parts] {
         stream::prefetch(key, blocks);
     }
@@ -145,7 +153,9 @@ pub(super) fn solve<K: Pixel, V: Vector>(
     let Readings { keys, ahead, clipped, offset, largest } = readings;
     (out.careful, out.valid) = (0, 0);
     (out.keep_all, out.finite) = (true, true);
-    let (blocks_on, parts) = (blocks_ahead::<K>(ahead.len()), 2 + LANES / V::WIDTH);
+    let blocks_on = blocks_ahead::<K>(ahead.len());
+    // So little is fetched at once.
+    let parts = if K::CODES.is_some() && ahead.len() <= BYTE_LIGHTS { 1 } else { 2 + LANES / V::WIDTH };
     fetch(ahead, blocks_on, 0, parts);
     if K::CODES.is_none() && (keys.len() > BYTE_LIGHTS || matches!(solver.choice, Choice::Window(_))) {
         out.finite = are_finite::<K, V>(keys);
@@ -192,6 +202,8 @@ pub(super) fn solve<K: Pixel, V: Vector>(
         }
     }
     fetch(ahead, blocks_on, 1, parts);
+    // Sums of whole numbers are zero or far from it.
+    let any_size = K::CODES.is_none() || offset.is_some();
     let mut squares = V::splat(0.0);
     for step in 0..LANES / V::WIDTH {
         let at = step * V::WIDTH;
@@ -199,13 +211,12 @@ pub(super) fn solve<K: Pixel, V: Vector>(
         let facets = if out.keep_all || kept.are_whole(keys.len(), at, V::WIDTH) {
             solve_all(solver, sum_all::<K, V>(solver, keys, offset, at))
         } else {
-            let count = V::from_words(&out.kept[at..]);
-            let (facets, unusable) = solve_kept::<K, V>(solver, kept, keys.len(), offset, at, count);
+            let (facets, unusable) = solve_kept::<K, V>(solver, kept, keys.len(), offset, at, &out.kept);
             out.careful |= unusable << at;
             facets
         };
         squares = facets.values_square + squares;
-        out.write(at, &facets, per_full_scale, block);
+        out.write(at, &facets, per_full_scale, any_size, block);
     }
     out.finite &= K::CODES.is_some() || is_finite(squares);
 }
@@ -226,41 +237,9 @@ pub(super) fn solve_sums<V: Vector>(
         let at = step * V::WIDTH;
         let facets = solve_all(solver, sums.load::<V>(at));
         squares = facets.values_square + squares;
-        out.write(at, &facets, per_full_scale, block);
+        out.write(at, &facets, per_full_scale, true, block);
     }
     out.finite = is_finite(squares);
-}
-
-/// False where a value is NaN or infinite. Asked here, where the values are at hand: a search of its own reads the images twice.
-/// Of many images this light pass also has them in the first cache sooner than the work itself.
-#[inline(always)]
-fn are_finite<K: Pixel, V: Vector>(keys: &[&Lanes<K>]) -> bool {
-    /// Sums that need not wait for one another.
-    const SUMS: usize = 4;
-    let zero = V::splat(0.0);
-    let mut sums = [zero; SUMS];
-    let (whole, rest) = keys.as_chunks::<SUMS>();
-    for step in 0..LANES / V::WIDTH {
-        for key in rest {
-            // 0 times something finite is 0, else NaN.
-            sums[0] = K::load::<V>(&key[step * V::WIDTH..]).times_plus(zero, sums[0]);
-        }
-    }
-    for keys in whole {
-        for light in 0..SUMS {
-            for step in 0..LANES / V::WIDTH {
-                sums[light] = K::load::<V>(&keys[light][step * V::WIDTH..]).times_plus(zero, sums[light]);
-            }
-        }
-    }
-    let [a, b, c, d] = sums;
-    is_finite((a + b) + (c + d))
-}
-
-/// False where one of the values is not.
-#[inline(always)]
-fn is_finite<V: Vector>(values: V) -> bool {
-    V::all((values * V::splat(0.0)).is_over(V::splat(-1.0)))
 }
 
 /// Raises the largest values so far to these.
@@ -300,17 +279,18 @@ fn solve_all<V: Vector>(solver: &LaneSolver, sums: Sums<V>) -> Facets<V> {
     let [x2, y2, z2] = [along[0] * along[0], along[1] * along[1], along[2] * along[2]];
     // First what is waited for longest.
     let square = (x2 + y2) + z2;
-    let (length, inverse) = square.root_and_inverse();
+    let scaled = solver.axes.back(along);
+    let inverse = inverse_length(square, scaled);
+    let inverse2 = inverse * inverse;
     Facets {
-        scaled: solver.axes.back(along),
+        scaled,
         values_square: squares,
         square,
-        length,
         inverse,
         // |I|^2 - |L g|^2; what rounding leaves is far below the prior of 2 %.
-        squared_residuals: squares + dot(spread(&solver.unexplained), [x2, y2, z2]),
-        turning: dot(spread(&solver.turning), [x2, y2, z2]),
-        freedom: freedom(V::splat(solver.lights() as f32)),
+        variance: solver.unexplained.and(squares, [y2, z2], inverse2),
+        turning: solver.turning.and(V::splat(0.0), [y2, z2], inverse2),
+        freedom: V::repeated(&solver.freedom),
     }
 }
 
@@ -322,7 +302,7 @@ fn solve_kept<K: Pixel, V: Vector>(
     lights: usize,
     offset: Option<&Lanes<f32>>,
     at: usize,
-    count: V,
+    counts: &Lanes<u16>,
 ) -> (Facets<V>, Careful) {
     let (keys, directions) = (&kept.keys[..lights], &solver.spread_directions[..lights]);
     let inverse = if let Some(inverses) = &solver.inverses {
@@ -334,7 +314,7 @@ fn solve_kept<K: Pixel, V: Vector>(
                 *entry = *entry + more;
             }
         }
-        Inverse::of(gram)
+        Inverse::of(gram, freedoms(V::from_words(&counts[at..])))
     };
     let sums = if let Some(offset) = offset {
         let (offset, mut sums) = (V::load(&offset[at..]), Sums::zero());
@@ -349,8 +329,12 @@ fn solve_kept<K: Pixel, V: Vector>(
     };
     let mut scaled = inverse.product(sums.vector);
     let explained = dot(scaled, sums.vector);
-    let rough = V::splat(MIN_ROUGH_CONDITIONING).is_over(inverse.conditioning);
-    if V::bits(rough) != 0 {
+    let fine = inverse.conditioning.is_over(V::splat(MIN_ROUGH_CONDITIONING));
+    let mut unusable = 0;
+    if !V::all(fine) {
+        // Written so that NaN is unusable.
+        let usable = V::bits(inverse.conditioning.is_over(V::splat(MIN_LANE_CONDITIONING as f32)));
+        unusable = all_bits::<V>() & !usable;
         // One step of iterative refinement: what the residuals of the lights correct.
         let mut residuals = Sums::zero();
         for (light, (key, direction)) in keys.iter().zip(directions).enumerate() {
@@ -363,26 +347,23 @@ fn solve_kept<K: Pixel, V: Vector>(
         }
         let correction = inverse.product(residuals.vector);
         for axis in 0..3 {
-            scaled[axis] = V::pick(rough, scaled[axis] + correction[axis], scaled[axis]);
+            scaled[axis] = V::pick(fine, scaled[axis], scaled[axis] + correction[axis]);
         }
     }
-    // Written so that NaN is unusable.
-    let usable = V::bits(inverse.conditioning.is_over(V::splat(MIN_LANE_CONDITIONING as f32)));
     let square = dot(scaled, scaled);
-    let (length, inverse_length) = square.root_and_inverse();
+    let inverse_length = inverse_length(square, scaled);
+    let inverse2 = inverse_length * inverse_length;
     let trace = inverse.entries[0] + inverse.entries[3] + inverse.entries[5];
     let facets = Facets {
         scaled,
         values_square: sums.squares,
         square,
-        length,
         inverse: inverse_length,
-        squared_residuals: square
-            .times_plus(V::splat((PRIOR_RESIDUAL * PRIOR_RESIDUAL) as f32), sums.squares - explained),
-        turning: trace.times_minus(square, form(inverse.entries, scaled)),
-        freedom: freedom(count),
+        variance: (sums.squares - explained).times_plus(inverse2, V::splat((PRIOR_RESIDUAL * PRIOR_RESIDUAL) as f32)),
+        turning: (V::splat(0.0) - form(inverse.entries, scaled)).times_plus(inverse2, trace),
+        freedom: inverse.freedom,
     };
-    (facets, all_bits::<V>() & !usable)
+    (facets, unusable)
 }
 
 /// The inverses of all subsets of up to eight lights.
@@ -390,7 +371,7 @@ fn inverses_of(directions: &[Vector3<f64>]) -> RowTable {
     RowTable::new((0..1usize << directions.len()).map(|subset| {
         let lights = directions.iter().enumerate().filter(|(light, _)| subset >> light & 1 == 1);
         let gram = lights.fold(Matrix3::zeros(), |gram, (_, light)| gram + light * light.transpose());
-        inverse_row(&gram, MIN_LANE_CONDITIONING)
+        inverse_row(&gram, MIN_LANE_CONDITIONING, freedom(subset.count_ones() as usize))
     }))
 }
 

@@ -351,7 +351,7 @@ impl<'a, K: Pixel> Task<'a, K> {
             }
         }
         self.left.finite &= self.finished.finite;
-        self.finished.write_counts(&self.all_lights, used, &mut out);
+        self.finished.write_counts::<V>(&self.all_lights, used, &mut out);
         if !sets.is_empty() {
             write_sets(&self.kept, used, sets);
         }

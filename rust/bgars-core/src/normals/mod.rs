@@ -8,6 +8,7 @@ mod checks;
 mod confidence;
 mod cutoff;
 mod finish;
+mod finite;
 mod fused;
 mod gather;
 mod kept;

@@ -67,6 +67,30 @@ impl PrincipalAxes {
     }
 }
 
+/// `v^T A v / |v|^2` by the squares of `v` along the principal axes of `A`.
+#[derive(Debug)]
+pub(super) struct RayleighQuotient {
+    /// What `A` is along the first axis.
+    first: Spread,
+    /// By how much it is more along the others.
+    others: [Spread; 2],
+}
+
+impl RayleighQuotient {
+    /// Of what `A` is along the axes.
+    pub fn new([x, y, z]: [f64; 3]) -> Self {
+        Self { first: Spread::new(x as f32), others: [y - x, z - x].map(|more| Spread::new(more as f32)) }
+    }
+
+    /// The quotient, and `more / |v|^2`; of the squares along the other axes and `1 / |v|^2`.
+    #[inline(always)]
+    pub fn and<V: Vector>(&self, more: V, [y2, z2]: [V; 2], inverse2: V) -> V {
+        let [y, z] = &self.others;
+        let beside = z2.times_plus(V::repeated(z), y2.times_plus(V::repeated(y), more));
+        beside.times_plus(inverse2, V::repeated(&self.first))
+    }
+}
+
 /// The same vector everywhere.
 #[inline(always)]
 pub(super) fn spread<V: Vector>([x, y, z]: &[Spread; 3]) -> [V; 3] {
@@ -78,12 +102,14 @@ pub(super) struct Inverse<V> {
     pub entries: [V; ENTRIES],
     /// See [`crate::lights::conditioning`].
     pub conditioning: V,
+    /// Of so many lights, see [`super::finish::freedom`].
+    pub freedom: V,
 }
 
 impl<V: Vector> Inverse<V> {
-    /// From the matrix itself.
+    /// From the matrix itself, and the freedom.
     #[inline(always)]
-    pub fn of([xx, xy, xz, yy, yz, zz]: [V; ENTRIES]) -> Self {
+    pub fn of([xx, xy, xz, yy, yz, zz]: [V; ENTRIES], freedom: V) -> Self {
         let mut entries = [
             minor(yy, zz, yz, yz),
             minor(xz, yz, xy, zz),
@@ -98,13 +124,13 @@ impl<V: Vector> Inverse<V> {
             *entry = *entry * scale;
         }
         let third = (xx + yy + zz) * V::splat(1.0 / 3.0);
-        Self { entries, conditioning: determinant / (third * third * third) }
+        Self { entries, conditioning: determinant / (third * third * third), freedom }
     }
 
     /// From a row of [`inverse_row`].
     #[inline(always)]
-    pub fn of_row([xx, xy, xz, yy, yz, zz, conditioning, _]: [V; ROW]) -> Self {
-        Self { entries: [xx, xy, xz, yy, yz, zz], conditioning }
+    pub fn of_row([xx, xy, xz, yy, yz, zz, conditioning, freedom]: [V; ROW]) -> Self {
+        Self { entries: [xx, xy, xz, yy, yz, zz], conditioning, freedom }
     }
 
     /// The inverse times a vector.
@@ -114,8 +140,8 @@ impl<V: Vector> Inverse<V> {
     }
 }
 
-/// The inverse of a Gram matrix and its conditioning, to be kept; zeros of a matrix whose conditioning is below `least`.
-pub(super) fn inverse_row(gram: &Matrix3<f64>, least: f64) -> [f32; ROW] {
+/// The inverse of a Gram matrix, its conditioning and the freedom, to be kept; zeros of a matrix whose conditioning is below `least`.
+pub(super) fn inverse_row(gram: &Matrix3<f64>, least: f64, freedom: f32) -> [f32; ROW] {
     let mut row = [0.0; ROW];
     let conditioning = conditioning(gram);
     if let Some(inverse) = gram.try_inverse().filter(|_| conditioning >= least) {
@@ -123,6 +149,7 @@ pub(super) fn inverse_row(gram: &Matrix3<f64>, least: f64) -> [f32; ROW] {
             *place = inverse[entry] as f32;
         }
         row[ENTRIES] = conditioning as f32;
+        row[ENTRIES + 1] = freedom;
     }
     row
 }
@@ -166,6 +193,15 @@ mod tests {
             let inverses = axes.values.map(f64::recip);
             approx::assert_relative_eq!(of_squares(inverses), vector.dot(&(inverse * vector)), epsilon = 1e-12);
             let back = axes.back([along.x, along.y, along.z].map(|component| Portable::splat(component as f32)));
+            let quotient = |values: [f64; 3], more: f32| {
+                let [inverse2, y2, z2] = [1.0 / along.norm_squared(), along.y * along.y, along.z * along.z]
+                    .map(|value| Portable::splat(value as f32));
+                let mut numbers = [0.0; Portable::WIDTH];
+                RayleighQuotient::new(values).and(Portable::splat(more), [y2, z2], inverse2).write(&mut numbers);
+                f64::from(numbers[0]) * along.norm_squared()
+            };
+            approx::assert_relative_eq!(quotient(axes.values, 0.0), of_squares(axes.values), epsilon = 1e-5);
+            approx::assert_relative_eq!(quotient(inverses, 2.5), of_squares(inverses) + 2.5, epsilon = 1e-5);
             for (found, expected) in back.into_iter().zip(&vector) {
                 let mut numbers = [0.0; Portable::WIDTH];
                 found.write(&mut numbers);

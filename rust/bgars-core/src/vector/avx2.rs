@@ -5,7 +5,7 @@ use std::arch::x86_64::{
     _mm256_and_ps, _mm256_and_si256, _mm256_andnot_ps, _mm256_blend_ps, _mm256_blendv_ps, _mm256_castps128_ps256,
     _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi32, _mm256_cvtepi32_ps, _mm256_cvtepu8_epi32,
     _mm256_cvtepu16_epi32, _mm256_cvtps_pd, _mm256_div_ps, _mm256_fmadd_ps, _mm256_fmsub_ps, _mm256_insertf128_ps,
-    _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_permute2f128_ps, _mm256_permutevar8x32_ps,
+    _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_or_ps, _mm256_permute2f128_ps, _mm256_permutevar8x32_ps,
     _mm256_set1_epi32, _mm256_set1_ps, _mm256_setzero_ps, _mm256_shuffle_ps, _mm256_sqrt_ps, _mm256_srli_epi32,
     _mm256_sub_ps, _mm256_unpackhi_ps, _mm256_unpacklo_ps,
 };
@@ -183,6 +183,17 @@ impl Vector for Avx2 {
     #[inline(always)]
     fn both(a: __m256, b: __m256) -> __m256 {
         here!(_mm256_and_ps(a, b))
+    }
+
+    #[inline(always)]
+    fn either(a: __m256, b: __m256) -> __m256 {
+        here!(_mm256_or_ps(a, b))
+    }
+
+    #[inline(always)]
+    fn with_sign_of(self, other: Self) -> Self {
+        let sign = here!(_mm256_set1_ps(-0.0));
+        Self(here!(_mm256_or_ps(_mm256_andnot_ps(sign, self.0), _mm256_and_ps(sign, other.0))))
     }
 
     #[inline(always)]

@@ -1,13 +1,15 @@
 //! Sixteen floats of AVX-512.
 
 use std::arch::x86_64::{
-    __m256, __m512, __m512i, _CMP_GT_OQ, _mm512_abs_ps, _mm512_add_pd, _mm512_add_ps, _mm512_alignr_epi32,
-    _mm512_castps128_ps512, _mm512_cmp_ps_mask, _mm512_cvtepi32_ps, _mm512_cvtepu8_epi32, _mm512_cvtepu16_epi32,
-    _mm512_cvtps_pd, _mm512_div_ps, _mm512_fmadd_ps, _mm512_fmsub_ps, _mm512_fnmadd_ps, _mm512_insertf32x4,
-    _mm512_mask_blend_ps, _mm512_maskz_div_ps, _mm512_maskz_mov_ps, _mm512_max_ps, _mm512_mul_ps,
-    _mm512_permutex2var_ps, _mm512_permutexvar_ps, _mm512_reduce_add_pd, _mm512_rsqrt14_ps, _mm512_set1_epi32,
-    _mm512_set1_ps, _mm512_setzero_ps, _mm512_shuffle_ps, _mm512_sqrt_ps, _mm512_srli_epi32, _mm512_stream_ps,
-    _mm512_sub_ps, _mm512_test_epi32_mask, _mm512_unpackhi_ps, _mm512_unpacklo_ps,
+    __m256, __m512, __m512i, _CMP_GT_OQ, _mm256_castps_pd, _mm512_abs_ps, _mm512_add_pd, _mm512_add_ps,
+    _mm512_alignr_epi32, _mm512_castpd_ps, _mm512_castps_pd, _mm512_castps256_ps512, _mm512_cmp_ps_mask,
+    _mm512_cvtepi32_ps, _mm512_cvtepu8_epi32, _mm512_cvtepu16_epi32, _mm512_cvtps_pd, _mm512_div_ps, _mm512_fmadd_ps,
+    _mm512_fmsub_ps, _mm512_fnmadd_ps, _mm512_insertf64x4, _mm512_mask_blend_ps, _mm512_maskz_div_ps,
+    _mm512_maskz_mov_ps, _mm512_maskz_set1_epi8, _mm512_max_ps, _mm512_mul_ps, _mm512_permutex2var_ps,
+    _mm512_permutexvar_ps, _mm512_reduce_add_pd, _mm512_rsqrt14_ps, _mm512_set1_epi32, _mm512_set1_ps,
+    _mm512_setzero_ps, _mm512_shuffle_f32x4, _mm512_shuffle_ps, _mm512_sqrt_ps, _mm512_srli_epi32, _mm512_stream_ps,
+    _mm512_sub_epi32, _mm512_sub_ps, _mm512_ternarylogic_epi32, _mm512_test_epi32_mask, _mm512_unpackhi_ps,
+    _mm512_unpacklo_ps,
 };
 
 use super::packed::chunked;
@@ -161,11 +163,15 @@ impl Vector for Avx512 {
 
     /// By a rough inverse of 14 bits and a step of Newton's method: roots and divisions are slow, and all else waits for them.
     #[inline(always)]
-    fn root_and_inverse(self) -> (Self, Self) {
+    fn inverse_root(self) -> Self {
+        /// One of the exponent, whose place is behind the bits of the fraction.
+        const EXPONENT: i32 = 1 << (f32::MANTISSA_DIGITS - 1);
         let inverse = Self(here!(_mm512_rsqrt14_ps(self.0)));
-        let root = self * inverse;
-        let half_error = Self(here!(_mm512_fnmadd_ps(root.0, inverse.0, _mm512_set1_ps(1.0)))) * Self::splat(0.5);
-        (root.times_plus(half_error, root), inverse.times_plus(half_error, inverse))
+        // Halved in its exponent: multiplications have enough to do.
+        let half = here!(_mm512_sub_epi32(bytemuck::must_cast(inverse.0), _mm512_set1_epi32(EXPONENT)));
+        let half = bytemuck::must_cast(half);
+        let half_error = Self(here!(_mm512_fnmadd_ps((self * inverse).0, half, _mm512_set1_ps(0.5))));
+        inverse.times_plus(half_error, inverse)
     }
 
     #[inline(always)]
@@ -184,6 +190,22 @@ impl Vector for Avx512 {
     }
 
     #[inline(always)]
+    fn either(a: u16, b: u16) -> u16 {
+        a | b
+    }
+
+    #[inline(always)]
+    fn with_sign_of(self, other: Self) -> Self {
+        /// By the bits of three numbers: the second's where the third's is set, the first's elsewhere.
+        const SECOND_WHERE_THIRD: i32 = 0b1101_1000;
+        Self(here!(bytemuck::must_cast(_mm512_ternarylogic_epi32::<SECOND_WHERE_THIRD>(
+            bytemuck::must_cast(self.0),
+            bytemuck::must_cast(other.0),
+            _mm512_set1_epi32(i32::MIN)
+        ))))
+    }
+
+    #[inline(always)]
     fn all(mask: u16) -> bool {
         mask == u16::MAX
     }
@@ -199,6 +221,12 @@ impl Vector for Avx512 {
     }
 
     #[inline(always)]
+    fn flags(bits: u64) -> [bool; u64::BITS as usize] {
+        let bytes: [u8; u64::BITS as usize] = bytemuck::must_cast(here!(_mm512_maskz_set1_epi8(bits, 1)));
+        bytes.map(|byte| byte != 0)
+    }
+
+    #[inline(always)]
     fn where_bit(self, bytes: &[u8], bit: usize) -> Self {
         let mask = here!(_mm512_test_epi32_mask(widened(bytes), _mm512_set1_epi32(1 << bit)));
         Self(here!(_mm512_maskz_mov_ps(mask, self.0)))
@@ -206,27 +234,40 @@ impl Vector for Avx512 {
 
     #[inline(always)]
     fn rows(bytes: &[u8], table: &RowTable) -> [Self; ROW] {
-        /// Half of the rows of four pixels, four apart.
+        /// The first and the third quarter of both vectors.
+        const EVEN: i32 = 0b10_00_10_00;
+        /// The second and the fourth.
+        const ODD: i32 = 0b11_01_11_01;
+        /// The rows of two pixels, one behind the other.
         #[inline(always)]
-        fn halves(bytes: [u8; WIDTH], table: &RowTable, pixel: usize, half: usize) -> __m512 {
-            let first = bytemuck::must_cast(table.half(bytes[pixel], half));
-            let second = bytemuck::must_cast(table.half(bytes[pixel + 4], half));
-            let third = bytemuck::must_cast(table.half(bytes[pixel + 8], half));
-            let fourth = bytemuck::must_cast(table.half(bytes[pixel + 12], half));
-            let two = here!(_mm512_insertf32x4::<1>(_mm512_castps128_ps512(first), second));
-            here!(_mm512_insertf32x4::<3>(_mm512_insertf32x4::<2>(two, third), fourth))
+        fn two(first: u8, second: u8, table: &RowTable) -> __m512 {
+            let first: __m256 = bytemuck::must_cast(*table.row(first));
+            let second: __m256 = bytemuck::must_cast(*table.row(second));
+            here!(_mm512_castpd_ps(_mm512_insertf64x4::<1>(
+                _mm512_castps_pd(_mm512_castps256_ps512(first)),
+                _mm256_castps_pd(second)
+            )))
         }
-        let bytes = first(bytes);
-        let mut rows = [Self::splat(0.0); ROW];
-        for (half, rows) in rows.as_chunks_mut::<QUARTER>().0.iter_mut().enumerate() {
-            let (a, b) = (halves(bytes, table, 0, half), halves(bytes, table, 1, half));
-            let (c, d) = (halves(bytes, table, 2, half), halves(bytes, table, 3, half));
+        /// Of eight pixels, entry k in the even quarters of vector k, entry 4 + k in its odd ones.
+        #[inline(always)]
+        fn eight(bytes: [u8; WIDTH / 2], table: &RowTable) -> [__m512; QUARTER] {
+            let (a, b) = (two(bytes[0], bytes[4], table), two(bytes[1], bytes[5], table));
+            let (c, d) = (two(bytes[2], bytes[6], table), two(bytes[3], bytes[7], table));
             let (a_b, more_a_b) = here!((_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b)));
             let (c_d, more_c_d) = here!((_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d)));
-            rows[0] = Self(here!(_mm512_shuffle_ps::<FIRST_TWO>(a_b, c_d)));
-            rows[1] = Self(here!(_mm512_shuffle_ps::<LAST_TWO>(a_b, c_d)));
-            rows[2] = Self(here!(_mm512_shuffle_ps::<FIRST_TWO>(more_a_b, more_c_d)));
-            rows[3] = Self(here!(_mm512_shuffle_ps::<LAST_TWO>(more_a_b, more_c_d)));
+            here!([
+                _mm512_shuffle_ps::<FIRST_TWO>(a_b, c_d),
+                _mm512_shuffle_ps::<LAST_TWO>(a_b, c_d),
+                _mm512_shuffle_ps::<FIRST_TWO>(more_a_b, more_c_d),
+                _mm512_shuffle_ps::<LAST_TWO>(more_a_b, more_c_d),
+            ])
+        }
+        let [first, second] = bytemuck::must_cast::<[u8; WIDTH], [[u8; WIDTH / 2]; 2]>(first(bytes));
+        let (first, second) = (eight(first, table), eight(second, table));
+        let mut rows = [Self::splat(0.0); ROW];
+        for entry in 0..QUARTER {
+            rows[entry] = Self(here!(_mm512_shuffle_f32x4::<EVEN>(first[entry], second[entry])));
+            rows[QUARTER + entry] = Self(here!(_mm512_shuffle_f32x4::<ODD>(first[entry], second[entry])));
         }
         rows
     }

@@ -92,30 +92,62 @@ pub trait Vector: Arithmetic<Number = f32> + Div<Output = Self> {
     fn times_minus(self, factor: Self, term: Self) -> Self;
     /// Square root.
     fn root(self) -> Self;
-    /// Square root and one over it, each within `2^-22` of its size; of numbers from 1e-30 to 1e30.
+    /// One over the square root, within `2^-22` of its size, of numbers from 1e-30 to 1e30; NaN of negative ones, NaN or infinite of zero.
     #[inline(always)]
-    fn root_and_inverse(self) -> (Self, Self) {
-        let root = self.root();
-        (root, Self::splat(1.0) / root)
+    fn inverse_root(self) -> Self {
+        Self::splat(1.0) / self.root()
     }
     /// `self > other`; false for NaN.
     fn is_over(self, other: Self) -> Self::Mask;
     /// The larger of both; `other` where one is NaN.
     fn at_least(self, other: Self) -> Self;
+    /// The size of its own, the sign of the other.
+    fn with_sign_of(self, other: Self) -> Self;
     /// True where both are.
     fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// True where one of them is.
+    fn either(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// True where some value is.
+    #[inline(always)]
+    fn any(mask: Self::Mask) -> bool {
+        Self::bits(mask) != 0
+    }
     /// True where every value is.
     fn all(mask: Self::Mask) -> bool;
     /// `yes` where the mask is true, `no` elsewhere.
     fn pick(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// Bit k: value k of the mask.
     fn bits(mask: Self::Mask) -> u64;
+    /// Flag k: bit k.
+    #[inline(always)]
+    fn flags(bits: u64) -> [bool; u64::BITS as usize] {
+        flags_by_eights(bits)
+    }
     /// The value where bit `bit` of its byte is set, 0 elsewhere.
     fn where_bit(self, bytes: &[u8], bit: usize) -> Self;
     /// For each byte its row of the table: the first numbers of all rows, the second, and so on.
     fn rows(bytes: &[u8], table: &RowTable) -> [Self; ROW];
     /// For each byte, the sums over the elements whose bits are set.
     fn sums_of<const ENTRIES: usize>(bytes: &[u8], sums: &SubsetSums<ENTRIES>) -> [Self; ENTRIES];
+}
+
+/// A flag for every bit, from the lowest on.
+///
+/// By eights: to shift each of 64 by a number of its own, and to pack what comes out, is what vector instructions are slow at.
+#[inline(always)]
+fn flags_by_eights(bits: u64) -> [bool; u64::BITS as usize] {
+    /// The lowest bit of every byte.
+    const LOWEST: u64 = u64::from_ne_bytes([1; 8]);
+    /// Bit k of byte k.
+    const OWN: u64 = u64::from_le_bytes([1, 2, 4, 8, 16, 32, 64, 128]);
+    let mut eights = [[0; 8]; 8];
+    for (eight, byte) in eights.iter_mut().zip(bits.to_le_bytes()) {
+        // In every byte a bit of its own, then carried to the highest place, then moved to the lowest.
+        let own = (u64::from(byte) * LOWEST) & OWN;
+        *eight = (((own + (128 * LOWEST - OWN)) >> 7) & LOWEST).to_le_bytes();
+    }
+    let bytes: [u8; u64::BITS as usize] = bytemuck::must_cast(eights);
+    bytes.map(|byte| byte != 0)
 }
 
 /// The first values of a slice.

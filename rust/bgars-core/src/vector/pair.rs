@@ -98,9 +98,8 @@ impl<V: Vector> Vector for Pair<V> {
     }
 
     #[inline(always)]
-    fn root_and_inverse(self) -> (Self, Self) {
-        let ((first, first_inverse), (second, second_inverse)) = (self.0.root_and_inverse(), self.1.root_and_inverse());
-        (Self(first, second), Self(first_inverse, second_inverse))
+    fn inverse_root(self) -> Self {
+        Self(self.0.inverse_root(), self.1.inverse_root())
     }
 
     #[inline(always)]
@@ -119,6 +118,21 @@ impl<V: Vector> Vector for Pair<V> {
     }
 
     #[inline(always)]
+    fn with_sign_of(self, other: Self) -> Self {
+        Self(self.0.with_sign_of(other.0), self.1.with_sign_of(other.1))
+    }
+
+    #[inline(always)]
+    fn either(a: Self::Mask, b: Self::Mask) -> Self::Mask {
+        (V::either(a.0, b.0), V::either(a.1, b.1))
+    }
+
+    #[inline(always)]
+    fn any(mask: Self::Mask) -> bool {
+        V::any(V::either(mask.0, mask.1))
+    }
+
+    #[inline(always)]
     fn all(mask: Self::Mask) -> bool {
         V::all(V::both(mask.0, mask.1))
     }
@@ -131,6 +145,11 @@ impl<V: Vector> Vector for Pair<V> {
     #[inline(always)]
     fn bits(mask: Self::Mask) -> u64 {
         V::bits(mask.0) | V::bits(mask.1) << V::WIDTH
+    }
+
+    #[inline(always)]
+    fn flags(bits: u64) -> [bool; u64::BITS as usize] {
+        V::flags(bits)
     }
 
     #[inline(always)]

@@ -169,6 +169,17 @@ impl Vector for Portable {
     }
 
     #[inline(always)]
+    fn either(a: f32x8, b: f32x8) -> f32x8 {
+        a | b
+    }
+
+    #[inline(always)]
+    fn with_sign_of(self, other: Self) -> Self {
+        let sign = f32x8::splat(-0.0);
+        Self((other.0 & sign) | (self.0 & !sign))
+    }
+
+    #[inline(always)]
     fn all(mask: f32x8) -> bool {
         mask.all()
     }

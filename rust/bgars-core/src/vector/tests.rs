@@ -42,7 +42,11 @@ fn check<V: Vector>() {
     assert_eq!(V::bits(x.is_over(y)), bits);
     assert!(!V::all(both) && V::all(V::splat(1.0).is_over(V::splat(0.5))));
     let but_one: [f32; VALUES] = std::array::from_fn(|lane| if lane + 1 == V::WIDTH { 0.0 } else { 1.0 });
-    assert!(!V::all(V::load(&but_one).is_over(V::splat(0.5))));
+    let but_one = V::load(&but_one).is_over(V::splat(0.5));
+    let (all, none) = (V::splat(1.0).is_over(V::splat(0.5)), V::splat(0.5).is_over(V::splat(1.0)));
+    assert!(!V::all(but_one) && V::any(but_one) && !V::any(none));
+    assert!(V::any(V::either(none, but_one)) && !V::all(V::either(none, but_one)) && V::all(V::either(all, none)));
+    assert_values(x.with_sign_of(y), |lane| a[lane].copysign(b[lane]));
 
     let bytes: [u8; VALUES] = std::array::from_fn(|lane| (lane * 37 % 256) as u8);
     let words: [u16; VALUES] = std::array::from_fn(|lane| (lane * 4099) as u16);
@@ -53,17 +57,28 @@ fn check<V: Vector>() {
     }
 }
 
+fn check_flags<V: Vector>() {
+    let bytes = (0..=u8::MAX).map(|byte| u64::from(byte) * 0x0101_0101_0101_0101);
+    for bits in bytes.chain((0..64).map(|bit| 1 << bit)).chain([0x0123_4567_89ab_cdef, !0x0123_4567_89ab_cdef]) {
+        for (place, flag) in V::flags(bits).into_iter().enumerate() {
+            assert_eq!(flag, bits >> place & 1 == 1, "bit {place} of {bits:#x}");
+        }
+    }
+}
+
 fn check_roots<V: Vector>() {
     const ERROR: f64 = 2.0 * f32::EPSILON as f64;
     for exponent in -99..=99 {
         let squares: [f32; VALUES] =
             std::array::from_fn(|lane| (1.0 + lane as f32 / VALUES as f32) * f32::powi(2.0, exponent));
-        let (root, inverse) = V::load(&squares).root_and_inverse();
-        for ((root, inverse), square) in values(root).into_iter().zip(values(inverse)).zip(squares) {
+        for (inverse, square) in values(V::load(&squares).inverse_root()).into_iter().zip(squares) {
             let exact = f64::from(square).sqrt();
-            assert!((f64::from(root) / exact - 1.0).abs() < ERROR, "root of {square}: {root}");
             assert!((f64::from(inverse) * exact - 1.0).abs() < ERROR, "one over the root of {square}: {inverse}");
         }
+    }
+    assert_values(V::splat(-2.0).inverse_root(), |_| f32::NAN);
+    for zero in [0.0, -0.0] {
+        assert!(values(V::splat(zero).inverse_root()).into_iter().all(|inverse| !inverse.is_finite()));
     }
 }
 
@@ -178,6 +193,7 @@ fn check_stores<V: Vector>() {
 
 fn check_vector<V: Vector>() {
     check::<V>();
+    check_flags::<V>();
     check_sums::<V>();
     check_rows::<V>();
     check_stores::<V>();
