@@ -305,17 +305,7 @@ fn solve_kept<K: Pixel, V: Vector>(
     counts: &Lanes<u16>,
 ) -> (Facets<V>, Careful) {
     let (keys, directions) = (&kept.keys[..lights], &solver.spread_directions[..lights]);
-    let inverse = if let Some(inverses) = &solver.inverses {
-        Inverse::of_row(V::rows(&kept.bits[0][at..], inverses))
-    } else {
-        let mut gram = V::sums_of(&kept.bits[0][at..], &solver.grams[0]);
-        for (sums, bits) in solver.grams.iter().zip(&kept.bits).skip(1) {
-            for (entry, more) in gram.iter_mut().zip(V::sums_of(&bits[at..], sums)) {
-                *entry = *entry + more;
-            }
-        }
-        Inverse::of(gram, freedoms(V::from_words(&counts[at..])))
-    };
+    // Before the inverses: these wait for other parts of the processor, and for where the bits were just written.
     let sums = if let Some(offset) = offset {
         let (offset, mut sums) = (V::load(&offset[at..]), Sums::zero());
         for (light, (key, direction)) in keys.iter().zip(directions).enumerate() {
@@ -326,6 +316,17 @@ fn solve_kept<K: Pixel, V: Vector>(
         sums
     } else {
         Sums::of(keys, directions, at)
+    };
+    let inverse = if let Some(inverses) = &solver.inverses {
+        Inverse::of_row(V::rows(&kept.bits[0][at..], inverses))
+    } else {
+        let mut gram = V::sums_of(&kept.bits[0][at..], &solver.grams[0]);
+        for (sums, bits) in solver.grams.iter().zip(&kept.bits).skip(1) {
+            for (entry, more) in gram.iter_mut().zip(V::sums_of(&bits[at..], sums)) {
+                *entry = *entry + more;
+            }
+        }
+        Inverse::of(gram, freedoms(V::from_words(&counts[at..])))
     };
     let mut scaled = inverse.product(sums.vector);
     let explained = dot(scaled, sums.vector);
