@@ -26,8 +26,8 @@ const WIDTH: usize = 16;
 /// Calls intrinsics where they are compiled in.
 macro_rules! here {
     ($call:expr) => {{
-        // SAFETY: the type is named only where AVX-512F is compiled in (see `Vector`), and the one store stays within a
-        // slice of WIDTH values and is aligned.
+        // SAFETY: the type is named only where AVX-512F, BW and DQ are compiled in (see `Vector`), and the one store stays
+        // within a slice of WIDTH values and is aligned.
         #[allow(unsafe_code)]
         unsafe {
             $call

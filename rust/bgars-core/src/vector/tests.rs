@@ -235,11 +235,15 @@ fn avx2() {
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 fn avx512() {
-    #[target_feature(enable = "avx512f")]
+    #[target_feature(enable = "avx512f,avx512bw,avx512dq,fma")]
     fn checked() {
         check_all::<super::Avx512, super::Avx512Double>();
     }
-    if is_x86_feature_detected!("avx512f") {
+    if is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512bw")
+        && is_x86_feature_detected!("avx512dq")
+        && is_x86_feature_detected!("fma")
+    {
         // SAFETY: the processor has the instructions.
         unsafe { checked() }
     }
