@@ -32,7 +32,8 @@ pub(super) struct Facets<V> {
     pub square: V,
     /// `1 / rho`, and not a number where the facet faces away: nothing that is computed from it is one, and no branch is needed.
     pub inverse: V,
-    /// Sum of the squared residuals with the [prior](super::confidence::PRIOR_RESIDUAL), over `rho^2`.
+    /// Sum of the squared residuals with the [prior](super::confidence::PRIOR_RESIDUAL), over `rho^2`. Or less than zero, if the
+    /// next one is, too: only their product is asked for.
     pub variance: V,
     /// `tr C - n^T C n`, `C` the inverse in use.
     pub turning: V,
@@ -92,10 +93,10 @@ impl Finished {
         let zero = V::splat(0.0);
         let Facets { scaled: [x, y, z], square, inverse, variance, turning, freedom, .. } = *facets;
         let (z2, least) = (z * z, square * V::splat(GRAZING * GRAZING));
-        let sound = V::both(in_range(square), z2.is_over(least));
         // What is zero is not seen from the side.
-        let is_unusual = if any_size { !V::all(sound) } else { V::any(least.is_over(z2)) };
+        let is_unusual = if any_size { !V::all(is_sound(square, z2, least)) } else { V::any(least.is_over(z2)) };
         if is_unusual {
+            let sound = is_sound(square, z2, least);
             let size = x.at_least(zero - x) + y.at_least(zero - y) + z.at_least(zero - z);
             let is_zero = V::bits(V::splat(LEAST).is_over(size));
             self.careful |= (all_bits::<V>() & !(V::bits(sound) | is_zero)) << at;
@@ -127,6 +128,12 @@ impl Finished {
             }
         }
     }
+}
+
+/// True where `f32` can be trusted: by `|g|^2`, `g_z^2` and the least that this may be; false for NaN.
+#[inline(always)]
+fn is_sound<V: Vector>(square: V, z2: V, least: V) -> V::Mask {
+    V::both(in_range(square), z2.is_over(least))
 }
 
 /// True where residuals and inverses are in the normal range of `f32`; false for NaN.

@@ -12,7 +12,9 @@ use super::kept::Kept;
 use super::out::Block;
 use super::robust_lanes::{self, RobustLanes};
 use super::sums::{BlockSums, Sums};
-use super::symmetric::{ENTRIES, Inverse, PrincipalAxes, RayleighQuotient, dot, form, inverse_row, outer, spread};
+use super::symmetric::{
+    ENTRIES, Inverse, PrincipalAxes, RayleighQuotient, dot, dot_less, form, inverse_row, outer, spread,
+};
 use crate::lights::conditioning;
 use crate::vector::spread::Spread;
 use crate::vector::subset_sums::SubsetSums;
@@ -329,26 +331,26 @@ fn solve_kept<K: Pixel, V: Vector>(
         Inverse::of(gram, freedoms(V::from_words(&counts[at..])))
     };
     let mut scaled = inverse.product(sums.vector);
-    let explained = dot(scaled, sums.vector);
+    let excess = dot_less(scaled, sums.vector, sums.squares);
     let fine = inverse.conditioning.is_over(V::splat(MIN_ROUGH_CONDITIONING));
     let mut unusable = 0;
     if !V::all(fine) {
         // Written so that NaN is unusable.
         let usable = V::bits(inverse.conditioning.is_over(V::splat(MIN_LANE_CONDITIONING as f32)));
         unusable = all_bits::<V>() & !usable;
-        // One step of iterative refinement: what the residuals of the lights correct.
-        let mut residuals = Sums::zero();
+        // One step of iterative refinement: what corrects the residuals of the lights, here with the other sign.
+        let mut excesses = Sums::zero();
         for (light, (key, direction)) in keys.iter().zip(directions).enumerate() {
             let mut value = K::load::<V>(&key[at..]);
             if let Some(offset) = offset {
                 value = value - V::load(&offset[at..]);
             }
-            let residual = value - dot(scaled, spread(direction));
-            residuals.add(residual.where_bit(&kept.bits[light / BYTE_LIGHTS][at..], light % BYTE_LIGHTS), direction);
+            let excess = dot_less(scaled, spread(direction), value);
+            excesses.add(excess.where_bit(&kept.bits[light / BYTE_LIGHTS][at..], light % BYTE_LIGHTS), direction);
         }
-        let correction = inverse.product(residuals.vector);
+        let correction = inverse.product(excesses.vector);
         for axis in 0..3 {
-            scaled[axis] = V::pick(fine, scaled[axis], scaled[axis] + correction[axis]);
+            scaled[axis] = V::pick(fine, scaled[axis], scaled[axis] - correction[axis]);
         }
     }
     let square = dot(scaled, scaled);
@@ -360,8 +362,9 @@ fn solve_kept<K: Pixel, V: Vector>(
         values_square: sums.squares,
         square,
         inverse: inverse_length,
-        variance: (sums.squares - explained).times_plus(inverse2, V::splat((PRIOR_RESIDUAL * PRIOR_RESIDUAL) as f32)),
-        turning: (V::splat(0.0) - form(inverse.entries, scaled)).times_plus(inverse2, trace),
+        // Both with the other sign, which takes fewer subtractions.
+        variance: excess.times_minus(inverse2, V::splat((PRIOR_RESIDUAL * PRIOR_RESIDUAL) as f32)),
+        turning: form(inverse.entries, scaled).times_minus(inverse2, trace),
         freedom: inverse.freedom,
     };
     (facets, unusable)

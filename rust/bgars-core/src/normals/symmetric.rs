@@ -18,6 +18,12 @@ pub(super) fn dot<V: Vector>([a, b, c]: [V; 3], [x, y, z]: [V; 3]) -> V {
     c.times_plus(z, b.times_plus(y, a * x))
 }
 
+/// `a^T b - term`.
+#[inline(always)]
+pub(super) fn dot_less<V: Vector>([a, b, c]: [V; 3], [x, y, z]: [V; 3], term: V) -> V {
+    c.times_plus(z, b.times_plus(y, a.times_minus(x, term)))
+}
+
 /// A matrix times a vector.
 #[inline(always)]
 fn product<V: Vector>([xx, xy, xz, yy, yz, zz]: [V; ENTRIES], vector: [V; 3]) -> [V; 3] {
