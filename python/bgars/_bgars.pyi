@@ -33,6 +33,7 @@ __all__ = [
     "rim_profiles",
     "ring_edges",
     "triangulate",
+    "unit_directions",
     "usable_normals",
     "vertex_normals",
     "write_height",
@@ -94,6 +95,7 @@ def estimate_reflectance(
     out: NormalField,
 ) -> dict[str, Any]: ...
 def usable_normals(normals: NDArray[np.float32], *, threads: int | None) -> NDArray[np.bool_]: ...
+def unit_directions(directions: NDArray[np.float64]) -> NDArray[np.float64]: ...
 def float_full_scale(pixels: NDArray[np.float32], *, threads: int | None) -> float: ...
 def integrate_bilateral(
     normals: NDArray[np.float32],

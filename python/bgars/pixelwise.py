@@ -12,7 +12,7 @@ from bgars import _bgars
 from bgars.errors import InputError
 from bgars.kernel_capture import kernel_capture
 from bgars.large_arrays import any_content
-from bgars.records import Capture, NormalField, float_full_scale, integer_full_scale
+from bgars.records import Capture, NormalField, every_pixel, float_full_scale, integer_full_scale
 from bgars.rig import LightRig
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def capture_of(
     return Capture(
         images=stack,
         rig=rig,
-        mask=np.broadcast_to(np.True_, stack.shape[1:]),
+        mask=every_pixel(stack.shape[1:]),
         saturation=clip,
         full_scale=full_scale,
     )
@@ -155,7 +155,7 @@ def pixel_stack(images: ArrayLike) -> PixelArray:
 def combined_mask(capture: Capture, mask: ArrayLike | None) -> NDArray[np.bool_] | None:
     """The pixels to use; None for all of them."""
     if mask is None:
-        if capture.mask.strides == (0, 0) and capture.mask[:1, :1].all():
+        if capture.mask.strides == (0, 0) and capture.mask.size and capture.mask[0, 0]:
             return None  # one True for all pixels, as captures without a mask have it
         return np.ascontiguousarray(capture.mask)
     given = np.asarray(mask)

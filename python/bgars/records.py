@@ -34,6 +34,7 @@ __all__ = [
     "NormalField",
     "PixelArray",
     "Truth",
+    "every_pixel",
     "float_full_scale",
     "integer_full_scale",
 ]
@@ -41,6 +42,11 @@ __all__ = [
 PixelArray = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32]
 FloatArray = NDArray[np.float32]
 BoolArray = NDArray[np.bool_]
+
+
+def every_pixel(shape: tuple[int, ...]) -> BoolArray:
+    """Return a read-only mask (H, W) that uses every pixel: one True in memory."""
+    return np.ndarray(shape, np.bool_, b"\x01", strides=(0, 0))
 
 
 def integer_full_scale(pixels: PixelArray) -> float | None:

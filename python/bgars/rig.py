@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bgars import _bgars
 from bgars.errors import InputError
 from bgars.light_files import read_lp
 from bgars.light_names import light_name
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 __all__ = ["LightRig", "directions_from_angles"]
 
 MIN_LIGHTS = 3
-UNIT_TOLERANCE = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,14 +137,8 @@ class LightRig:
         >>> len(LightRig.from_directions([[0.6, 0, 0.8], [-0.6, 0, 0.8], [0, 0.6, 0.8]]))
         3
         """
-        vectors = _vectors(directions, "light_directions")
-        lengths = np.linalg.norm(vectors, axis=1)
-        wrong = np.flatnonzero(~(np.abs(lengths - 1.0) <= UNIT_TOLERANCE))
-        if wrong.size:
-            index = int(wrong[0])
-            msg = f"light_directions[{index}]: must be a unit vector, got length {lengths[index]:.4g}"
-            raise InputError(msg)
-        return cls(vectors / lengths[:, None], _intensities(intensities, len(vectors)), files=files)
+        vectors = _bgars.unit_directions(_rows(directions, "light_directions"))
+        return cls(vectors, _intensities(intensities, len(vectors)), files=files)
 
     @classmethod
     def from_positions(
@@ -238,7 +232,8 @@ def directions_from_angles(angles_deg: ArrayLike) -> NDArray[np.float64]:
     )
 
 
-def _vectors(values: ArrayLike, name: str) -> NDArray[np.float64]:
+def _rows(values: ArrayLike, name: str) -> NDArray[np.float64]:
+    """A row a light."""
     vectors = np.ascontiguousarray(values, dtype=np.float64)
     if vectors.ndim != 2 or vectors.shape[1] != 3:  # noqa: PLR2004 - x, y, z
         msg = f"{name}: must have shape (L, 3), got {vectors.shape}"
@@ -246,6 +241,12 @@ def _vectors(values: ArrayLike, name: str) -> NDArray[np.float64]:
     if len(vectors) < MIN_LIGHTS:
         msg = f"{name}: at least {MIN_LIGHTS} lights are needed, got {len(vectors)}"
         raise InputError(msg)
+    return vectors
+
+
+def _vectors(values: ArrayLike, name: str) -> NDArray[np.float64]:
+    """A row a light, of finite numbers."""
+    vectors = _rows(values, name)
     if not np.isfinite(vectors).all():
         index = int(np.flatnonzero(~np.isfinite(vectors).all(axis=1))[0])
         msg = f"{name}[{index}]: must be finite, got {vectors[index].tolist()}"

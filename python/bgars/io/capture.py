@@ -13,7 +13,7 @@ from bgars.io.given_paths import need_folder
 from bgars.io.images import MAX_MEGAPIXELS, WEIGHTS, decode_stack, read_mask
 from bgars.io.recipe import RECIPE_NAME, CaptureRecipe, GammaResponse, TableResponse, read_recipe
 from bgars.io.response import Curve, gamma_curve, linearise, read_response_table, tabulate
-from bgars.records import Capture, float_full_scale
+from bgars.records import Capture, every_pixel, float_full_scale
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -116,7 +116,7 @@ def _load(
         paths, channel=channel, response=table, gains=gains, max_megapixels=max_megapixels, threads=threads
     )
     shape = (images.shape[1], images.shape[2])
-    mask = np.broadcast_to(np.True_, shape) if recipe.mask is None else read_mask(folder / recipe.mask, shape)
+    mask = every_pixel(shape) if recipe.mask is None else read_mask(folder / recipe.mask, shape)
     _refuse_nan(images, mask, paths)
 
     levels = _levels(folder, recipe, images, code_scale, threads)

@@ -37,7 +37,7 @@ pub enum Error {
         limit: f64,
     },
     /// A light vector that is not a finite unit vector.
-    #[error("light_directions[{index}]: must be a finite unit vector, got length {length}")]
+    #[error("light_directions[{index}]: must be a finite unit vector, got length {length:.4}")]
     NotUnitDirection {
         /// Light index.
         index: usize,

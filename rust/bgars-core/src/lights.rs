@@ -40,16 +40,7 @@ impl Lights {
     /// # Ok::<(), bgars_core::Error>(())
     /// ```
     pub fn directional(directions: &[[f64; 3]]) -> Result<Self> {
-        let mut unit = Vec::with_capacity(directions.len());
-        for (index, &direction) in directions.iter().enumerate() {
-            let vector = Vector3::from(direction);
-            let length = vector.norm();
-            if !((length - 1.0).abs() <= UNIT_TOLERANCE) {
-                return Err(Error::NotUnitDirection { index, length });
-            }
-            unit.push(vector / length);
-        }
-        let lights = Self::Directional(unit);
+        let lights = Self::Directional(unit_directions(directions)?);
         lights.check_rank()?;
         Ok(lights)
     }
@@ -134,6 +125,24 @@ impl Lights {
         }
         Ok(())
     }
+}
+
+/// Vectors of length 1 from ones of about this length.
+///
+/// # Errors
+/// A vector whose length is not 1 within 1 %.
+pub fn unit_directions(directions: &[[f64; 3]]) -> Result<Vec<Vector3<f64>>> {
+    let unit = |(index, &direction): (usize, &[f64; 3])| {
+        let vector = Vector3::from(direction);
+        let length = vector.norm();
+        // Written so that NaN is refused.
+        if (length - 1.0).abs() <= UNIT_TOLERANCE {
+            Ok(vector / length)
+        } else {
+            Err(Error::NotUnitDirection { index, length })
+        }
+    };
+    directions.iter().enumerate().map(unit).collect()
 }
 
 /// `27 det(G) / tr(G)^3` of a Gram matrix `G = L^T L`: 1 for evenly spread lights, 0 for coplanar ones.

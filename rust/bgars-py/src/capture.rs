@@ -2,11 +2,11 @@
 
 use std::ops::ControlFlow;
 
-use bgars_core::{ImageStack, Lights, Pixel, Radiometry};
-use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use bgars_core::{ImageStack, Lights, Pixel, Radiometry, lights};
+use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::convert::{Stack, slice2, slice3, triples};
+use crate::convert::{Stack, array_of_triples, slice2, slice3, triples};
 use crate::errors::to_python;
 use crate::progress::{on_threads, watched};
 
@@ -89,6 +89,16 @@ impl Capture<'_> {
             work.run(&stack, &lights, &radiometry, &mut |done| report((done,)))
         })
     }
+}
+
+#[pyfunction]
+#[allow(clippy::needless_pass_by_value)]
+pub fn unit_directions<'py>(
+    py: Python<'py>,
+    directions: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let unit = lights::unit_directions(triples(&directions, "light_directions")?).map_err(to_python)?;
+    array_of_triples(py, unit.into_iter().map(Into::into).collect())
 }
 
 #[pyfunction]

@@ -25,6 +25,8 @@ mod _bgars {
     #[pymodule_export]
     use crate::capture::float_full_scale;
     #[pymodule_export]
+    use crate::capture::unit_directions;
+    #[pymodule_export]
     use crate::files::decode_stack;
     #[pymodule_export]
     use crate::files::read_rgb16;
