@@ -12,7 +12,7 @@ use crate::stream;
 /// Bytes of one image in a stretch, at most: a page, which is as far as processors read ahead by themselves.
 const MOST_RUN_BYTES: usize = 1 << 12;
 
-/// Bytes of a stretch, at most: it is to stay in the second cache.
+/// Bytes of the stretches that are held, at most: they are to stay in the second cache.
 const MOST_BYTES: usize = 1 << 18;
 
 /// More images than this with the same place are a crowd: first caches hold 8 to 12 such lines.
@@ -51,9 +51,9 @@ pub(super) fn are_crowded<K>(images: &[&[K]]) -> bool {
     counts.iter().any(|&count| count > MOST_IN_PLACE)
 }
 
-/// Blocks of a stretch of so many images.
-pub(super) fn stretch_blocks<K>(lights: usize) -> usize {
-    (MOST_RUN_BYTES.min(MOST_BYTES / lights) / size_of::<Lanes<K>>()).max(1)
+/// Blocks of a stretch of so many images, of which so many stretches are held at a time.
+pub(super) fn stretch_blocks<K>(lights: usize, stretches: usize) -> usize {
+    (MOST_RUN_BYTES.min(MOST_BYTES / stretches / lights) / size_of::<Lanes<K>>()).max(1)
 }
 
 /// Brings a stretch of blocks of the images together: all images of the first block, then of the second.
@@ -74,6 +74,67 @@ pub(super) fn bring<K: Pixel>(images: &[&[Lanes<K>]], stretch: &Range<usize>, me
     }
 }
 
+/// True where it pays to bring the next stretch together while this one is worked on: of bytes the work is soon done, and of very
+/// many floats too much is brought at a time (measured).
+pub(super) fn should_share<K>(images: &[&[K]]) -> bool {
+    const MUCH: usize = 1 << 14;
+    size_of::<K>() > 1 && images.len() * size_of::<Lanes<K>>() <= MUCH
+}
+
+/// A share of a stretch, to be brought together while something else is worked on.
+pub(super) struct Share<'a, K> {
+    pub images: &'a [&'a [Lanes<K>]],
+    pub stretch: &'a Range<usize>,
+    /// Which of its blocks, counted image by image.
+    pub blocks: Range<usize>,
+    /// Where all of the stretch goes.
+    pub memory: &'a mut [Lanes<K>],
+}
+
+impl<K: Pixel> Share<'_, K> {
+    /// Bytes that are fetched ahead: a first cache's share of one or two images.
+    const AHEAD_BYTES: usize = 6 << 10;
+
+    /// Brings one of so many parts. In turn with it, blocks are fetched that come later: many at once would be waited for.
+    #[inline(always)]
+    pub fn part(&mut self, part: usize, parts: usize) {
+        let (lights, row_len) = (self.images.len(), self.stretch.len());
+        let place = |part: usize| self.blocks.start + part * self.blocks.len() / parts;
+        let mut at = InRows::new(place(part), row_len);
+        let mut ahead = InRows::new(place(part) + Self::AHEAD_BYTES / size_of::<Lanes<K>>(), row_len);
+        for _ in place(part)..place(part + 1) {
+            // Behind the last image come the first ones of the next stretch.
+            let (image, blocks_on) = if ahead.row < lights { (ahead.row, 0) } else { (ahead.row % lights, row_len) };
+            stream::prefetch(&self.images[image][self.stretch.start + ahead.column], blocks_on);
+            self.memory[at.column * lights + at.row] = self.images[at.row][self.stretch.start + at.column];
+            at.step();
+            ahead.step();
+        }
+    }
+}
+
+/// A place in rows of equal length.
+struct InRows {
+    row: usize,
+    column: usize,
+    row_len: usize,
+}
+
+impl InRows {
+    #[inline(always)]
+    fn new(place: usize, row_len: usize) -> Self {
+        Self { row: place / row_len, column: place % row_len, row_len }
+    }
+
+    #[inline(always)]
+    fn step(&mut self) {
+        self.column += 1;
+        if self.column == self.row_len {
+            (self.row, self.column) = (self.row + 1, 0);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -90,13 +151,24 @@ mod tests {
                 })
                 .collect();
             let images: Vec<&[Lanes<u16>]> = images.iter().map(Vec::as_slice).collect();
-            let run = stretch_blocks::<u16>(lights);
+            let run = stretch_blocks::<u16>(lights, 1);
             for first in (0..blocks).step_by(run) {
                 let stretch = first..blocks.min(first + run);
                 let expected: Vec<_> =
                     stretch.clone().flat_map(|block| images.iter().map(move |image| image[block])).collect();
                 bring(&images, &stretch, &mut memory);
                 assert_eq!(memory, expected, "{lights} lights, {stretch:?} of {blocks}");
+                memory.fill([0; LANES]);
+                for (count, parts) in [(1, 1), (3, 4), (stretch.len(), 4)] {
+                    let place = |share: usize| share * expected.len() / count;
+                    for share in 0..count {
+                        let blocks = place(share)..place(share + 1);
+                        let mut share = Share { images: &images, stretch: &stretch, blocks, memory: &mut memory };
+                        (0..parts).for_each(|part| share.part(part, parts));
+                    }
+                    assert_eq!(memory, expected, "{lights} lights, {stretch:?} of {blocks} in {count} shares");
+                    memory.fill([0; LANES]);
+                }
             }
         }
     }

@@ -71,8 +71,19 @@ impl<K: Pixel> Kept<K> {
     }
 
     /// True where a lane keeps a light.
-    pub fn holds(&self, light: usize, lane: usize) -> bool {
+    fn holds(&self, light: usize, lane: usize) -> bool {
         self.bits[light / BYTE_LIGHTS][lane] >> (light % BYTE_LIGHTS) & 1 == 1
+    }
+
+    /// The lights themselves, a flag a light for one lane after the other; asked for seldom.
+    #[inline(never)]
+    pub fn write_sets(&self, used: Option<&[bool]>, sets: &mut [bool]) {
+        for (lane, sets) in sets.chunks_exact_mut(self.keys.len()).enumerate() {
+            let here = used.is_none_or(|used| used[lane]);
+            for (light, set) in sets.iter_mut().enumerate() {
+                *set = here && self.holds(light, lane);
+            }
+        }
     }
 
     /// True where so many pixels, a multiple of eight of them, keep every light from the one at `at` on.

@@ -133,8 +133,8 @@ pub(super) struct Kernel<'a, P> {
 
 /// Memory of one thread, reused from pixel to pixel.
 pub(super) struct Scratch<P> {
-    /// Images that are brought together.
-    memory: Vec<Lanes<P>>,
+    /// Images that are brought together: a stretch of them, and the next one.
+    memory: [Vec<Lanes<P>>; 2],
     values: Vec<f32>,
     clipped: Vec<bool>,
     kept: Vec<bool>,
@@ -147,7 +147,7 @@ impl<P> Scratch<P> {
     fn new(lights: &Lights) -> Self {
         let count = lights.len();
         Self {
-            memory: Vec::new(),
+            memory: Default::default(),
             values: vec![0.0; count],
             clipped: vec![false; count],
             kept: vec![false; count],

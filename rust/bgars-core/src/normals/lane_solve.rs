@@ -4,6 +4,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::ahead::Ahead;
 use super::confidence::PRIOR_RESIDUAL;
 use super::cutoff::{LANES, Lanes, cutoffs};
 use super::finish::{Facets, Finished, all_bits, freedom, freedoms, inverse_length};
@@ -19,7 +20,7 @@ use crate::lights::conditioning;
 use crate::vector::spread::Spread;
 use crate::vector::subset_sums::SubsetSums;
 use crate::vector::{RowTable, Vector};
-use crate::{Lights, Pixel, stream};
+use crate::{Lights, Pixel};
 
 /// Subsets of lights below this [`conditioning`] are solved in `f64`: one refinement in `f32` no longer makes up for rounding.
 const MIN_LANE_CONDITIONING: f64 = 1e-3;
@@ -112,34 +113,14 @@ impl LaneSolver {
 /// What a block of pixels reads.
 pub(super) struct Readings<'a, K> {
     pub keys: &'a [&'a Lanes<K>],
-    /// Those of them whose successors in memory are to be fetched meanwhile.
-    pub ahead: &'a [&'a Lanes<K>],
+    /// What is to be done meanwhile.
+    pub ahead: Ahead<'a, K>,
     /// A bit a light.
     pub clipped: &'a Lanes<u8>,
     /// To be subtracted from every key.
     pub offset: Option<&'a Lanes<f32>>,
     /// To be raised to the keys, where their largest is wanted.
     pub largest: Option<&'a mut Lanes<f32>>,
-}
-
-/// How far ahead so many images are fetched. Streams of floats, or of many lights, are more than processors follow by themselves;
-/// so are eight of bytes where a block lies across two cache lines, as in most arrays (`benches/results.tsv`).
-fn blocks_ahead<K>(images: usize) -> usize {
-    /// Half of a first cache: what is fetched farther ahead is driven out again before it is read.
-    const MOST_BYTES: usize = 1 << 14;
-    const MOST_BLOCKS: usize = 16;
-    (MOST_BYTES / (images * size_of::<Lanes<K>>()).max(1)).clamp(1, MOST_BLOCKS)
-}
-
-/// Has the processor fetch a part of what comes some blocks later: of many reads at once the last ones wait, and the work with them.
-#[inline(always)]
-fn fetch<K>(ahead: &[&Lanes<K>], blocks: usize, part: usize, parts: usize) {
-    if part >= parts {
-        return;
-    }
-    for key in &ahead[part * ahead.len() / parts..(part + 1) * ahead.len() / parts] {
-        stream::prefetch(key, blocks);
-    }
 }
 
 /// Chooses and solves.
@@ -152,13 +133,11 @@ pub(super) fn solve<K: Pixel, V: Vector>(
     out: &mut Finished,
     block: &mut Block<'_>,
 ) {
-    let Readings { keys, ahead, clipped, offset, largest } = readings;
+    let Readings { keys, mut ahead, clipped, offset, largest } = readings;
     (out.careful, out.valid) = (0, 0);
     (out.keep_all, out.finite) = (true, true);
-    let blocks_on = blocks_ahead::<K>(ahead.len());
-    // So little is fetched at once.
-    let parts = if K::CODES.is_some() && ahead.len() <= BYTE_LIGHTS { 1 } else { 2 + LANES / V::WIDTH };
-    fetch(ahead, blocks_on, 0, parts);
+    let parts = ahead.parts(LANES / V::WIDTH);
+    ahead.part(0, parts);
     if K::CODES.is_none() && (keys.len() > BYTE_LIGHTS || matches!(solver.choice, Choice::Window(_))) {
         out.finite = are_finite::<K, V>(keys);
     }
@@ -203,13 +182,13 @@ pub(super) fn solve<K: Pixel, V: Vector>(
             (out.kept, out.keep_all) = (kept.counts(keys.len()), false);
         }
     }
-    fetch(ahead, blocks_on, 1, parts);
+    ahead.part(1, parts);
     // Sums of whole numbers are zero or far from it.
     let any_size = K::CODES.is_none() || offset.is_some();
     let mut squares = V::splat(0.0);
     for step in 0..LANES / V::WIDTH {
         let at = step * V::WIDTH;
-        fetch(ahead, blocks_on, 2 + step, parts);
+        ahead.part(2 + step, parts);
         let facets = if out.keep_all || kept.are_whole(keys.len(), at, V::WIDTH) {
             solve_all(solver, sum_all::<K, V>(solver, keys, offset, at))
         } else {

@@ -6,9 +6,10 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
+use super::ahead::{Ahead, blocks_on};
 use super::cutoff::{LANES, Lanes};
 use super::finish::Finished;
-use super::gather::{are_crowded, bring, should_bring, stretch_blocks};
+use super::gather::{Share, are_crowded, bring, should_bring, should_share, stretch_blocks};
 use super::kept::Kept;
 use super::lane_solve::{BYTE_LIGHTS, Careful, Choice, LaneSolver, Readings, raise, solve, solve_sums};
 use super::out::{Block, Out};
@@ -60,7 +61,7 @@ impl Left {
 /// Where the keys of a block come from.
 enum Source<'a, K> {
     /// The images as they are, and where they are brought together if that pays.
-    Images(&'a [&'a [K]], &'a mut Vec<Lanes<K>>),
+    Images(&'a [&'a [K]], &'a mut [Vec<Lanes<K>>; 2]),
     /// Computed from them.
     Made(&'a Make<'a, K>),
 }
@@ -92,7 +93,7 @@ pub(super) fn run<P: Pixel>(
     input: &Input<'_, P>,
     pixels: Range<usize>,
     out: &mut Out<'_>,
-    memory: &mut Vec<Lanes<P>>,
+    memory: &mut [Vec<Lanes<P>>; 2],
 ) -> Left {
     let Input { planes, radiometry, scales, mask, per_full_scale, is_draft } = *input;
     let plain = radiometry.is_plain();
@@ -168,7 +169,11 @@ fn run_with<K: Pixel, V: Vector>(
                 let keys = a.iter().zip(b).zip(c).zip(d).zip(e).zip(f).zip(g).zip(h);
                 for (number, (out, (((((((a, b), c), d), e), f), g), h))) in blocks.zip(keys).enumerate() {
                     let keys = [a, b, c, d, e, f, g, h];
-                    task.block::<V>(number, &Reads::Keys { keys: &keys, ahead: &keys }, out);
+                    task.block::<V>(
+                        number,
+                        Reads::Keys { keys: &keys, ahead: Ahead::Fetch(&keys, blocks_on::<K>(BYTE_LIGHTS)) },
+                        out,
+                    );
                 }
             } else if planes.len() > BYTE_LIGHTS && matches!(solver.choice, Choice::All) && common.offsets.is_none() {
                 run_sums::<K, V>(&mut task, planes, &pixels, blocks);
@@ -181,7 +186,7 @@ fn run_with<K: Pixel, V: Vector>(
             for (number, out) in blocks.enumerate() {
                 make(&task.pixels(number), &mut made);
                 let keys: Vec<_> = made.iter().collect();
-                task.block::<V>(number, &Reads::Keys { keys: &keys, ahead: &[] }, out);
+                task.block::<V>(number, Reads::Keys { keys: &keys, ahead: Ahead::Nothing }, out);
             }
         }
     }
@@ -209,7 +214,7 @@ fn run_sums<'a, K: Pixel, V: Vector>(
             BlockSums::sum_up::<K, V>(&mut sums, &images, &task.solver.pseudo_inverse, &stretch, is_crowded);
         }
         for ((number, sums), out) in stretch.zip(&sums).zip(blocks.by_ref()) {
-            task.block::<V>(number, &Reads::Sums(sums), out);
+            task.block::<V>(number, Reads::Sums(sums), out);
         }
     }
 }
@@ -221,29 +226,48 @@ fn run_images<'a, K: Pixel, V: Vector>(
     planes: &[&[K]],
     pixels: &Range<usize>,
     mut blocks: impl Iterator<Item = Block<'a>>,
-    memory: &mut Vec<Lanes<K>>,
+    memory: &mut [Vec<Lanes<K>>; 2],
 ) {
     let images: Vec<&[Lanes<K>]> = planes.iter().map(|plane| blocks_of(plane, pixels)).collect();
     let (count, lights, brings) = (pixels.len() / LANES, images.len(), should_bring(planes));
-    let at_once = if brings { stretch_blocks::<K>(lights) } else { count.max(1) };
+    let shares = brings && should_share(planes);
+    let at_once = if brings { stretch_blocks::<K>(lights, if shares { 2 } else { 1 }) } else { count.max(1) };
+    let blocks_on = blocks_on::<K>(lights);
+    let [mut now, mut later] = memory.each_mut();
+    let mut is_brought = false;
     for first in (0..count).step_by(at_once) {
         let stretch = first..count.min(first + at_once);
-        let is_brought = brings && task.uses(&stretch);
-        if is_brought {
-            bring(&images, &stretch, memory);
+        let next = stretch.end..count.min(stretch.end + at_once);
+        if brings && !is_brought && task.uses(&stretch) {
+            bring(&images, &stretch, now);
+            is_brought = true;
         }
+        let shares = shares && is_brought && !next.is_empty() && task.uses(&next);
+        if shares {
+            later.resize(next.len() * lights, [K::ZERO; LANES]);
+        }
+        let share = |block: usize| block * next.len() * lights / stretch.len();
         let mut keys: Vec<&Lanes<K>> = Vec::with_capacity(lights);
-        for (number, out) in stretch.zip(blocks.by_ref()) {
+        for (block, out) in (0..stretch.len()).zip(blocks.by_ref()) {
             keys.clear();
             if is_brought {
-                keys.extend(&memory[(number - first) * lights..][..lights]);
+                keys.extend(&now[block * lights..][..lights]);
             } else {
-                keys.extend(images.iter().map(|blocks| &blocks[number]));
+                keys.extend(images.iter().map(|blocks| &blocks[first + block]));
             }
-            // What is brought has no successors.
-            let ahead = if brings { &[][..] } else { &keys };
-            task.block::<V>(number, &Reads::Keys { keys: &keys, ahead }, out);
+            let ahead = if shares {
+                let blocks = share(block)..share(block + 1);
+                Ahead::Bring(Share { images: &images, stretch: &next, blocks, memory: later })
+            } else if brings {
+                // What is brought has no successors.
+                Ahead::Nothing
+            } else {
+                Ahead::Fetch(&keys, blocks_on)
+            };
+            task.block::<V>(first + block, Reads::Keys { keys: &keys, ahead }, out);
         }
+        std::mem::swap(&mut now, &mut later);
+        is_brought = shares;
     }
 }
 
@@ -254,8 +278,8 @@ fn blocks_of<'a, K>(plane: &'a [K], pixels: &Range<usize>) -> &'a [Lanes<K>] {
 
 /// What a block reads.
 enum Reads<'a, K> {
-    /// Its pixels in every image, and those of them whose successors in memory are to be fetched meanwhile.
-    Keys { keys: &'a [&'a Lanes<K>], ahead: &'a [&'a Lanes<K>] },
+    /// Its pixels in every image, and what is to be done meanwhile.
+    Keys { keys: &'a [&'a Lanes<K>], ahead: Ahead<'a, K> },
     /// What was summed up over all of them.
     Sums(&'a BlockSums),
 }
@@ -312,7 +336,7 @@ impl<'a, K: Pixel> Task<'a, K> {
 
     /// Works on a block.
     #[inline(always)]
-    fn block<V: Vector>(&mut self, number: usize, reads: &Reads<'_, K>, mut out: Block<'_>) {
+    fn block<V: Vector>(&mut self, number: usize, reads: Reads<'_, K>, mut out: Block<'_>) {
         let pixels = self.pixels(number);
         let used = self.common.mask.map(|mask| &mask[pixels.clone()]);
         // A block that is all in, or all out, needs no look at its pixels.
@@ -326,6 +350,10 @@ impl<'a, K: Pixel> Task<'a, K> {
         if count == 0 {
             out.clear(0..LANES);
             sets.fill(false);
+            // Other blocks count on it.
+            if let Reads::Keys { ahead: Ahead::Bring(mut share), .. } = reads {
+                share.part(0, 1);
+            }
             return;
         }
         let used = used.filter(|_| count < LANES);
@@ -338,7 +366,7 @@ impl<'a, K: Pixel> Task<'a, K> {
         let offset = self.common.offsets.map(|_| &self.offset);
         let largest = (K::CODES.is_none() && self.common.is_draft).then_some(&mut self.largest);
         let (per_full_scale, finished) = (self.common.per_full_scale, &mut self.finished);
-        match *reads {
+        match reads {
             Reads::Keys { keys, ahead } => {
                 let readings = Readings { keys, ahead, clipped: &self.clipped, offset, largest };
                 solve::<K, V>(self.solver, readings, &mut self.kept, per_full_scale, finished, &mut out);
@@ -353,25 +381,13 @@ impl<'a, K: Pixel> Task<'a, K> {
         self.left.finite &= self.finished.finite;
         self.finished.write_counts::<V>(&self.all_lights, used, &mut out);
         if !sets.is_empty() {
-            write_sets(&self.kept, used, sets);
+            self.kept.write_sets(used, sets);
         }
         if self.finished.careful != 0 {
             self.left.careful.push((pixels.start, self.finished.careful));
         }
         if K::CODES.is_none() && self.common.is_draft && !self.finished.keep_all {
             self.left.cuts.push((pixels.start, self.finished.least_cut));
-        }
-    }
-}
-
-/// The kept lights themselves; asked for seldom.
-#[inline(never)]
-fn write_sets<K: Pixel>(kept: &Kept<K>, used: Option<&[bool]>, sets: &mut [bool]) {
-    let lights = kept.keys.len();
-    for (lane, sets) in sets.chunks_exact_mut(lights).enumerate() {
-        let here = used.is_none_or(|used| used[lane]);
-        for (light, set) in sets.iter_mut().enumerate() {
-            *set = here && kept.holds(light, lane);
         }
     }
 }

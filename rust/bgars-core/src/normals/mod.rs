@@ -4,6 +4,7 @@
 //! all lights ([`Method::Lambertian`]), the sorted-gap filter ([`Method::SpecularFilter`]), or the best window of sorted
 //! values ([`Method::RobustFilter`]).
 
+mod ahead;
 mod checks;
 mod confidence;
 mod cutoff;
