@@ -170,6 +170,17 @@ mod tests {
     }
 
     #[test]
+    fn directions_of_about_unit_length_become_exact_and_others_are_named() -> Result<()> {
+        let unit = unit_directions(&[[0.6, 0.0, 0.806], [0.0, 0.595, 0.8]])?;
+        assert!(unit.iter().all(|direction| (direction.norm() - 1.0).abs() < 1e-15), "{unit:?}");
+        for wrong in [[0.0, 0.0, 1.02], [0.0, 0.0, 0.0], [f64::NAN, 0.0, 1.0], [f64::INFINITY, 0.0, 0.0]] {
+            let error = unit_directions(&[[0.0, 0.0, 1.0], wrong]).unwrap_err();
+            assert!(matches!(error, Error::NotUnitDirection { index: 1, .. }), "{wrong:?}: {error}");
+        }
+        Ok(())
+    }
+
+    #[test]
     fn coplanar_lights_are_named() {
         let s = 0.5f64.sqrt();
         let error = Lights::directional(&[[s, 0.0, s], [0.0, 0.0, 1.0], [-s, 0.0, s]]).unwrap_err();
