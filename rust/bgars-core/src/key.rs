@@ -21,6 +21,8 @@ pub trait Key: Copy {
     fn largest(self, other: Self) -> Self;
     /// True when `self` is over `below` by more than `gap`; `below` is at most `self`, or the answer is no.
     fn is_over(self, below: Self, gap: Self) -> bool;
+    /// The largest of the keys that are not over `cutoff` by more than `gap`, or `cutoff` where none is larger; of 1, 2, 4 or 8 keys.
+    fn reached<const COUNT: usize>(keys: [Self; COUNT], cutoff: Self, gap: Self) -> Self;
     /// The largest key step that is not over `gap` in values.
     fn gap(gap: f32) -> Self;
     /// The lowest byte.
@@ -53,6 +55,14 @@ macro_rules! integer_key {
             #[inline(always)]
             fn is_over(self, below: Self, gap: Self) -> bool {
                 self.saturating_sub(below) > gap
+            }
+
+            #[inline(always)]
+            fn reached<const COUNT: usize>(keys: [Self; COUNT], cutoff: Self, gap: Self) -> Self {
+                let limit = cutoff.saturating_add(gap);
+                // How far below the limit they are; what is over it wraps around and is farther than all that is not.
+                let nearest = best(keys.map(|key| limit.wrapping_sub(key)), Self::min);
+                limit - nearest.min(limit - cutoff)
             }
 
             fn gap(gap: f32) -> Self {
@@ -98,6 +108,12 @@ impl Key for f32 {
         self - below > gap
     }
 
+    #[inline(always)]
+    fn reached<const COUNT: usize>(keys: [Self; COUNT], cutoff: Self, gap: Self) -> Self {
+        let within = keys.map(|key| if key.is_over(cutoff, gap) { Self::LEAST } else { key });
+        cutoff.largest(best(within, Self::largest))
+    }
+
     fn gap(gap: f32) -> Self {
         gap
     }
@@ -106,4 +122,17 @@ impl Key for f32 {
     fn byte(bits: u32) -> u8 {
         bits as u8
     }
+}
+
+/// One of 1, 2, 4 or 8 keys, by the choice between two. Pair by pair, not one after the other: none waits for long.
+#[inline(always)]
+fn best<K: Copy, const COUNT: usize>(mut keys: [K; COUNT], better: impl Fn(K, K) -> K) -> K {
+    for half in [4, 2, 1] {
+        if half < COUNT {
+            for place in 0..half {
+                keys[place] = better(keys[place], keys[place + half]);
+            }
+        }
+    }
+    keys[0]
 }

@@ -131,26 +131,35 @@ fn grow<K: Key, const N: usize>(
         extremes.see(&parts(&[key], part));
     }
     let Extremes { darkest: [_, _, third], brightest: most } = extremes;
-    (*largest, *brightest) = (third, most);
+    *brightest = most;
+    let (mut cutoffs, mut keep_all) = (third, false);
     // Each round reaches further in at least one pixel, or is the last.
     for _ in 3..=keys.len() {
-        if !is_over_any(brightest, largest) {
-            return true;
+        let mut is_over = false;
+        for lane in 0..N {
+            // Where the brightest is within the gap, so is all between.
+            let is_far = most[lane].is_over(cutoffs[lane], gap);
+            cutoffs[lane] = if is_far { cutoffs[lane] } else { most[lane] };
+            is_over |= is_far;
         }
-        let mut next = *largest;
-        for keys in many {
-            reach(&parts(keys, part), gap, &mut next);
-        }
-        for &key in others {
-            reach(&parts(&[key], part), gap, &mut next);
-        }
-        // Not a question of equality: NaN outside the mask must not go round for ever.
-        if !is_over_any(&next, largest) {
+        keep_all = !is_over;
+        let before = cutoffs;
+        if keep_all {
             break;
         }
-        *largest = next;
+        for keys in many {
+            reach(&parts(keys, part), gap, &mut cutoffs);
+        }
+        for &key in others {
+            reach(&parts(&[key], part), gap, &mut cutoffs);
+        }
+        // Not a question of equality: NaN outside the mask must not go round for ever.
+        if !is_over_any(&cutoffs, &before) {
+            break;
+        }
     }
-    false
+    *largest = cutoffs;
+    keep_all
 }
 
 /// A part of blocks.
@@ -187,24 +196,12 @@ impl<K: Key, const N: usize> Extremes<K, N> {
     }
 }
 
-/// Raises the cutoffs to the largest keys within the gap; of 1, 2, 4 or 8 lights.
+/// Raises the cutoffs to the largest keys within the gap; of as many lights as [`Key::reached`] takes.
 #[inline(always)]
 fn reach<K: Key, const N: usize, const COUNT: usize>(keys: &[[K; N]; COUNT], gap: K, cutoffs: &mut [K; N]) {
     for lane in 0..N {
-        let cutoff = cutoffs[lane];
-        let mut reached: [K; COUNT] = std::array::from_fn(|light| {
-            let key = keys[light][lane];
-            if key.is_over(cutoff, gap) { K::LEAST } else { key }
-        });
-        // Pair by pair, not one after the other: none waits for long.
-        for half in [4, 2, 1] {
-            if half < COUNT {
-                for light in 0..half {
-                    reached[light] = reached[light].largest(reached[light + half]);
-                }
-            }
-        }
-        cutoffs[lane] = cutoff.largest(reached[0]);
+        let keys = std::array::from_fn(|light| keys[light][lane]);
+        cutoffs[lane] = K::reached::<COUNT>(keys, cutoffs[lane], gap);
     }
 }
 
@@ -256,7 +253,9 @@ mod tests {
 
     #[test]
     fn cutoffs_are_those_of_a_sorted_list() {
-        for (lights, gap) in [(3, 0), (4, 20), (5, 50), (8, 0), (8, 50), (8, 255), (9, 30), (24, 10), (96, 3)] {
+        let few = [(3, 0), (4, 20), (5, 50), (8, 0), (8, 50), (8, 255)];
+        let many = [(9, 30), (24, 10), (24, 130), (24, 255), (96, 0), (96, 3)];
+        for (lights, gap) in few.into_iter().chain(many) {
             for seed in 0..50 {
                 let keys = random_keys(lights, seed);
                 let Cutoffs { largest: found, keep_all, .. } = cutoffs(&keys.iter().collect::<Vec<_>>(), gap);

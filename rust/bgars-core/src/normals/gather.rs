@@ -18,18 +18,6 @@ const MOST_BYTES: usize = 1 << 18;
 /// More images than this with the same place are a crowd: first caches hold 8 to 12 such lines.
 const MOST_IN_PLACE: usize = 12;
 
-/// Bytes of a block that are written at a time while others wait.
-const FEW_BYTES: usize = 1 << 9;
-
-/// How many blocks ahead images are fetched that crowd, or are very many: a first cache holds few bytes of each.
-#[inline(always)]
-pub(super) fn few_blocks_ahead<K>() -> usize {
-    /// Of an image.
-    const MOST_BYTES: usize = 1 << 10;
-    const MOST_BLOCKS: usize = 8;
-    (MOST_BYTES / size_of::<Lanes<K>>()).min(MOST_BLOCKS)
-}
-
 /// True where it pays to bring images together: where they crowd, or a block of all of them takes much of the first cache.
 pub(super) fn should_bring<K>(images: &[&[K]]) -> bool {
     /// Measured, like the next one: from 80 images of 16 bit and 64 of floats on it pays.
@@ -59,19 +47,8 @@ pub(super) fn stretch_blocks<K>(lights: usize, stretches: usize) -> usize {
 /// Brings a stretch of blocks of the images together: all images of the first block, then of the second.
 #[inline(always)]
 pub(super) fn bring<K: Pixel>(images: &[&[Lanes<K>]], stretch: &Range<usize>, memory: &mut Vec<Lanes<K>>) {
-    let few = FEW_BYTES / size_of::<Lanes<K>>();
     memory.resize(stretch.len() * images.len(), [K::ZERO; LANES]);
-    for (part, now) in images.chunks(few).enumerate() {
-        let first = part * few;
-        for (block, all) in stretch.clone().zip(memory.chunks_exact_mut(images.len())) {
-            for image in now {
-                stream::prefetch(&image[block], few_blocks_ahead::<K>());
-            }
-            for (to, image) in all[first..].iter_mut().zip(now) {
-                *to = image[block];
-            }
-        }
-    }
+    Share { images, stretch, blocks: 0..memory.len(), memory }.part(0, 1);
 }
 
 /// True where it pays to bring the next stretch together while this one is worked on: of bytes the work is soon done, and of very
@@ -92,8 +69,8 @@ pub(super) struct Share<'a, K> {
 }
 
 impl<K: Pixel> Share<'_, K> {
-    /// Bytes that are fetched ahead: a first cache's share of one or two images.
-    const AHEAD_BYTES: usize = 6 << 10;
+    /// Bytes that are fetched ahead: of one to three images, far less than a first cache (measured).
+    const AHEAD_BYTES: usize = if size_of::<K>() == 1 { 10 << 10 } else { 6 << 10 };
 
     /// Brings one of so many parts. In turn with it, blocks are fetched that come later: many at once would be waited for.
     #[inline(always)]

@@ -4,7 +4,6 @@ use std::borrow::Borrow;
 use std::ops::Range;
 
 use super::cutoff::{LANES, Lanes};
-use super::gather::few_blocks_ahead;
 use crate::vector::Vector;
 use crate::vector::spread::Spread;
 use crate::{Pixel, stream};
@@ -168,4 +167,13 @@ fn part(images: usize) -> usize {
         4.. => 4,
         _ => 1,
     }
+}
+
+/// How many blocks ahead images are fetched that crowd: a first cache holds few bytes of each.
+#[inline(always)]
+fn few_blocks_ahead<K>() -> usize {
+    /// Of an image.
+    const MOST_BYTES: usize = 1 << 10;
+    const MOST_BLOCKS: usize = 8;
+    (MOST_BYTES / size_of::<Lanes<K>>()).min(MOST_BLOCKS)
 }
