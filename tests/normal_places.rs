@@ -4,7 +4,7 @@
 use std::ops::ControlFlow;
 
 use bgars_core::normals::{Method, NormalMap, RobustParams, estimate};
-use bgars_core::{Error, ImageStack, Lights, Radiometry};
+use bgars_core::{Error, ImageStack, Lights, Pixel, Radiometry};
 use bgars_suite::stacks::{estimate_row, tilted_ring};
 
 #[test]
@@ -51,13 +51,20 @@ fn an_image_over_the_size_that_is_streamed_equals_its_two_halves() {
 
 #[test]
 fn images_a_power_of_two_apart_give_the_same_bits() {
+    // Bytes are brought together at once, the others in turn with the work.
+    apart_gives_the_same_bits(|value| value as u8);
+    apart_gives_the_same_bits(|value| value as u16);
+    apart_gives_the_same_bits(|value| value as f32);
+}
+
+fn apart_gives_the_same_bits<P: Pixel>(pixel: impl Fn(usize) -> P) {
     const PIXELS: usize = 4096;
-    let stack = |apart: usize| -> Vec<f32> {
-        let pixel =
-            |at: usize| if at % apart < PIXELS { ((at / apart * 37 + at % apart * 101) % 251) as f32 } else { 0.0 };
-        (0..24 * apart).map(pixel).collect()
+    const LIGHTS: usize = 24;
+    let stack = |apart: usize| -> Vec<P> {
+        let value = |at: usize| if at % apart < PIXELS { (at / apart * 37 + at % apart * 101) % 251 } else { 0 };
+        (0..LIGHTS * apart).map(|at| pixel(value(at))).collect()
     };
-    let lights = Lights::directional(&tilted_ring(24, 40.0)).unwrap();
+    let lights = Lights::directional(&tilted_ring(LIGHTS, 40.0)).unwrap();
     let (crowded, spread) = (stack(PIXELS), stack(PIXELS + 64));
     let middle: Vec<bool> = (0..PIXELS + 64).map(|pixel| (2000..2100).contains(&pixel)).collect();
     let method = Method::SpecularFilter { threshold: 20.0 };
