@@ -127,6 +127,7 @@ impl Key for f32 {
 /// One of 1, 2, 4 or 8 keys, by the choice between two. Pair by pair, not one after the other: none waits for long.
 #[inline(always)]
 fn best<K: Copy, const COUNT: usize>(mut keys: [K; COUNT], better: impl Fn(K, K) -> K) -> K {
+    const { assert!(COUNT.is_power_of_two() && COUNT <= 8, "others would be passed over") };
     for half in [4, 2, 1] {
         if half < COUNT {
             for place in 0..half {

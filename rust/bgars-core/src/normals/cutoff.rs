@@ -143,10 +143,10 @@ fn grow<K: Key, const N: usize>(
             is_over |= is_far;
         }
         keep_all = !is_over;
-        let before = cutoffs;
         if keep_all {
             break;
         }
+        let before = cutoffs;
         for keys in many {
             reach(&parts(keys, part), gap, &mut cutoffs);
         }
@@ -253,6 +253,8 @@ mod tests {
 
     #[test]
     fn cutoffs_are_those_of_a_sorted_list() {
+        // From 0 to the largest.
+        let word = |byte: u8| u16::from(byte) * (u16::MAX / u16::from(u8::MAX));
         let few = [(3, 0), (4, 20), (5, 50), (8, 0), (8, 50), (8, 255)];
         let many = [(9, 30), (24, 10), (24, 130), (24, 255), (96, 0), (96, 3)];
         for (lights, gap) in few.into_iter().chain(many) {
@@ -261,10 +263,10 @@ mod tests {
                 let Cutoffs { largest: found, keep_all, .. } = cutoffs(&keys.iter().collect::<Vec<_>>(), gap);
                 let dropped = (0..LANES).any(|lane| keys.iter().any(|key| key[lane] > found[lane]));
                 assert_eq!(keep_all, !dropped, "{lights} lights, gap {gap}");
-                let wide: Vec<Lanes<u16>> = keys.iter().map(|key| key.map(u16::from)).collect();
+                let wide: Vec<Lanes<u16>> = keys.iter().map(|key| key.map(word)).collect();
                 let float: Vec<Lanes<f32>> = keys.iter().map(|key| key.map(f32::from)).collect();
-                let of_words = cutoffs(&wide.iter().collect::<Vec<_>>(), u16::from(gap));
-                assert_eq!((of_words.largest, of_words.keep_all), (found.map(u16::from), keep_all));
+                let of_words = cutoffs(&wide.iter().collect::<Vec<_>>(), word(gap));
+                assert_eq!((of_words.largest, of_words.keep_all), (found.map(word), keep_all));
                 let of_floats = cutoffs(&float.iter().collect::<Vec<_>>(), f32::from(gap));
                 assert_eq!((of_floats.largest, of_floats.keep_all), (found.map(f32::from), keep_all));
                 for lane in 0..LANES {

@@ -58,18 +58,18 @@ pub(super) fn should_share<K>(images: &[&[K]]) -> bool {
     size_of::<K>() > 1 && images.len() * size_of::<Lanes<K>>() <= MUCH
 }
 
-/// A share of a stretch, to be brought together while something else is worked on.
+/// Blocks of a stretch to be brought together: all of them at once, or a share while something else is worked on.
 pub(super) struct Share<'a, K> {
     pub images: &'a [&'a [Lanes<K>]],
     pub stretch: &'a Range<usize>,
-    /// Which of its blocks, counted image by image.
+    /// Which ones, counted image by image.
     pub blocks: Range<usize>,
     /// Where all of the stretch goes.
     pub memory: &'a mut [Lanes<K>],
 }
 
 impl<K: Pixel> Share<'_, K> {
-    /// Bytes that are fetched ahead: of one to three images, far less than a first cache (measured).
+    /// Bytes that are fetched ahead: far less than a first cache (measured).
     const AHEAD_BYTES: usize = if size_of::<K>() == 1 { 10 << 10 } else { 6 << 10 };
 
     /// Brings one of so many parts. In turn with it, blocks are fetched that come later: many at once would be waited for.
