@@ -19,7 +19,15 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 KEPT = ROOT / "benches" / "instructions.json"
-KERNELS = ("lambertian-u8", "normals-u8", "normals-u16", "normals-f32", "normals-robust-u8", "integrate-6-iterations")
+KERNELS = (
+    "lambertian-u8",
+    "normals-u8",
+    "normals-u8-24-lights",
+    "normals-u16",
+    "normals-f32",
+    "normals-robust-u8",
+    "integrate-6-iterations",
+)
 PIXELS = 256 * 256
 TOLERANCE = 1.10
 

@@ -9,12 +9,11 @@ use bgars_core::normals::{Method, RobustParams, estimate, estimate_into};
 use bgars_core::{ImageStack, Lights, Pixel, Radiometry};
 
 const SIDE: usize = 256;
-const LIGHTS: usize = 8;
 
 /// Grey levels that a fixed congruence makes: dark, bright, and some highlights.
-fn levels() -> Vec<u8> {
+fn levels(lights: usize) -> Vec<u8> {
     let mut state = 1u32;
-    (0..LIGHTS * SIDE * SIDE)
+    (0..lights * SIDE * SIDE)
         .map(|_| {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             let level = (state >> 24) as u8;
@@ -24,15 +23,16 @@ fn levels() -> Vec<u8> {
 }
 
 fn estimate_times<P: Pixel>(images: &[P], full_scale: f32, method: Method, times: usize) {
-    let ring: Vec<[f64; 3]> = (0..LIGHTS)
+    let count = images.len() / (SIDE * SIDE);
+    let ring: Vec<[f64; 3]> = (0..count)
         .map(|light| {
-            let (y, x) = (light as f64 * std::f64::consts::TAU / LIGHTS as f64).sin_cos();
+            let (y, x) = (light as f64 * std::f64::consts::TAU / count as f64).sin_cos();
             [x * 0.5f64.sqrt(), y * 0.5f64.sqrt(), 0.5f64.sqrt()]
         })
         .collect();
     let lights = Lights::directional(&ring).unwrap();
-    let stack = ImageStack::new(images, LIGHTS, SIDE, SIDE).unwrap();
-    let radiometry = Radiometry::linear(LIGHTS, full_scale);
+    let stack = ImageStack::new(images, count, SIDE, SIDE).unwrap();
+    let radiometry = Radiometry::linear(count, full_scale);
     let mut map =
         estimate(&stack, &lights, &radiometry, None, method, false, &mut |_| ControlFlow::Continue(())).unwrap();
     for _ in 1..times {
@@ -68,10 +68,11 @@ fn main() {
     };
     let times = times.parse().unwrap();
     let filter = Method::SpecularFilter { threshold: 50.0 };
-    let levels = levels();
+    let levels = levels(if name == "normals-u8-24-lights" { 24 } else { 8 });
     match name.as_str() {
         "lambertian-u8" => estimate_times(&levels, 255.0, Method::Lambertian, times),
-        "normals-u8" => estimate_times(&levels, 255.0, filter, times),
+        // Images of this size lie a power of two apart: they are looked over, and brought together.
+        "normals-u8" | "normals-u8-24-lights" => estimate_times(&levels, 255.0, filter, times),
         "normals-u16" => {
             let wide: Vec<u16> = levels.iter().map(|&level| u16::from(level) * 257).collect();
             estimate_times(&wide, 65535.0, filter, times);

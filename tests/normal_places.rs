@@ -51,7 +51,7 @@ fn an_image_over_the_size_that_is_streamed_equals_its_two_halves() {
 
 #[test]
 fn images_a_power_of_two_apart_give_the_same_bits() {
-    // Bytes are brought together at once, the others in turn with the work.
+    // Those that crowd are looked over and brought together, the others are worked on where they lie.
     apart_gives_the_same_bits(|value| value as u8);
     apart_gives_the_same_bits(|value| value as u16);
     apart_gives_the_same_bits(|value| value as f32);
@@ -68,9 +68,22 @@ fn apart_gives_the_same_bits<P: Pixel>(pixel: impl Fn(usize) -> P) {
     let (crowded, spread) = (stack(PIXELS), stack(PIXELS + 64));
     let middle: Vec<bool> = (0..PIXELS + 64).map(|pixel| (2000..2100).contains(&pixel)).collect();
     let method = Method::SpecularFilter { threshold: 20.0 };
-    for (method, mask) in [(Method::Lambertian, None), (method, None), (method, Some(&middle[..]))] {
-        let crowded = estimate_row(&crowded, &lights, mask.map(|mask| &mask[..PIXELS]), method, 255.0);
-        let spread = estimate_row(&spread, &lights, mask, method, 255.0);
+    let cases = [
+        (Method::Lambertian, None, 0.0),
+        (Method::Lambertian, None, 5.0),
+        (method, None, 0.0),
+        (method, Some(&middle[..]), 0.0),
+        (method, None, 5.0),
+    ];
+    for (method, mask, black_level) in cases {
+        let radiometry = Radiometry { black_level, ..Radiometry::linear(LIGHTS, 255.0) };
+        let estimate = |images: &[P], mask: Option<&[bool]>| {
+            let stack = ImageStack::new(images, LIGHTS, 1, images.len() / LIGHTS).unwrap();
+            let proceed = &mut |_| ControlFlow::Continue(());
+            estimate(&stack, &lights, &radiometry, mask, method, true, proceed).unwrap()
+        };
+        let crowded = estimate(&crowded, mask.map(|mask| &mask[..PIXELS]));
+        let spread = estimate(&spread, mask);
         assert!(crowded.mask.iter().any(|&solved| solved));
         let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
         assert_eq!(bits(&crowded.normals), bits(&spread.normals[..3 * PIXELS]));
@@ -86,7 +99,7 @@ fn a_value_that_is_not_finite_is_found_wherever_it_is_and_harms_no_other_pixel()
     let proceed = &mut |_| ControlFlow::Continue(());
     // Two whole blocks of the fast kernel and some pixels behind them.
     let pixels = 2 * 64 + 7;
-    for count in [4, 8, 24] {
+    for count in [4, 8, 24, 48] {
         let directions = tilted_ring(count, 40.0);
         let positions: Vec<[f64; 3]> = directions.iter().map(|light| light.map(|along| 5000.0 * along)).collect();
         let images: Vec<f32> = (0..count * pixels).map(|at| (10 + at * 37 % 251) as f32).collect();

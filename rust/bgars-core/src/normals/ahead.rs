@@ -1,7 +1,6 @@
 //! What is done for the next blocks while one is worked on: memory is slow, and would be waited for.
 
 use super::cutoff::Lanes;
-use super::gather::Share;
 use super::lane_solve::BYTE_LIGHTS;
 use crate::{Pixel, stream};
 
@@ -9,8 +8,6 @@ use crate::{Pixel, stream};
 pub(super) enum Ahead<'a, K> {
     /// Of these, what lies so many blocks on in memory is fetched.
     Fetch(&'a [&'a Lanes<K>], usize),
-    /// Images are brought together.
-    Bring(Share<'a, K>),
     /// Nothing is.
     Nothing,
 }
@@ -21,14 +18,14 @@ impl<K: Pixel> Ahead<'_, K> {
     pub fn parts(&self, vectors: usize) -> usize {
         match self {
             Self::Fetch(keys, _) if K::CODES.is_some() && keys.len() <= BYTE_LIGHTS => 1, // so little is fetched at once
+            Self::Fetch(..) => 2 + vectors,
             Self::Nothing => 1,
-            _ => 2 + vectors,
         }
     }
 
     /// Does a part of it; nothing beyond the last one.
     #[inline(always)]
-    pub fn part(&mut self, part: usize, parts: usize) {
+    pub fn part(&self, part: usize, parts: usize) {
         if part >= parts {
             return;
         }
@@ -38,7 +35,6 @@ impl<K: Pixel> Ahead<'_, K> {
                     stream::prefetch(key, *blocks_on);
                 }
             }
-            Self::Bring(share) => share.part(part, parts),
             Self::Nothing => {}
         }
     }

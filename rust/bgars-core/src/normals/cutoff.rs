@@ -2,6 +2,8 @@
 //!
 //! Values up to the cutoff are kept. Ties need no care: a gap over the threshold lies between different values.
 
+use std::borrow::Borrow;
+
 use crate::Pixel;
 use crate::key::Key;
 
@@ -43,8 +45,14 @@ impl<K: Pixel> Cutoffs<K> {
 pub(super) fn cutoffs<K: Key>(keys: &[&Lanes<K>], gap: K) -> Cutoffs<K> {
     match keys.try_into() {
         Ok(keys) => sorted_cutoffs(keys, gap),
-        Err(_) => grown_cutoffs(keys, gap),
+        Err(_) => grown_cutoffs(keys, gap, None),
     }
+}
+
+/// The same of keys whose extremes are known.
+#[inline(always)]
+pub(super) fn cutoffs_within<K: Key>(keys: &[&Lanes<K>], gap: K, extremes: &Extremes<K, LANES>) -> Cutoffs<K> {
+    grown_cutoffs(keys, gap, Some(extremes))
 }
 
 /// Calls a macro with the pairs of places that sort eight values: a network of 19 exchanges (Knuth, The Art of Computer
@@ -89,21 +97,30 @@ fn is_over_any<K: Key, const N: usize>(keys: &[K; N], others: &[K; N]) -> bool {
     over
 }
 
-/// Any number of lights without sorting, as many pixels at once as the registers hold.
+/// Any number of lights without sorting, as many pixels at once as the registers hold; extremes are looked for unless given.
 #[inline(always)]
-fn grown_cutoffs<K: Key>(keys: &[&Lanes<K>], gap: K) -> Cutoffs<K> {
+fn grown_cutoffs<K: Key>(keys: &[&Lanes<K>], gap: K, extremes: Option<&Extremes<K, LANES>>) -> Cutoffs<K> {
     const HALF: usize = LANES / 2;
-    if size_of::<K>() < size_of::<f32>() { grow_by::<K, LANES>(keys, gap) } else { grow_by::<K, HALF>(keys, gap) }
+    if size_of::<K>() < size_of::<f32>() {
+        grow_by::<K, LANES>(keys, gap, extremes)
+    } else {
+        grow_by::<K, HALF>(keys, gap, extremes)
+    }
 }
 
 /// `N` pixels at a time.
 #[inline(always)]
-fn grow_by<K: Key, const N: usize>(keys: &[&Lanes<K>], gap: K) -> Cutoffs<K> {
+fn grow_by<K: Key, const N: usize>(keys: &[&Lanes<K>], gap: K, extremes: Option<&Extremes<K, LANES>>) -> Cutoffs<K> {
     let [mut largest, mut brightest] = [[K::LARGEST; LANES]; 2];
     let parts = largest.as_chunks_mut::<N>().0.iter_mut().zip(brightest.as_chunks_mut::<N>().0);
     let mut keep_all = true;
     for (part, (largest, brightest)) in parts.enumerate() {
-        keep_all &= grow(keys, part, gap, largest, brightest);
+        let extremes = match extremes {
+            Some(extremes) => extremes.part(part),
+            None => Extremes::of(keys, part),
+        };
+        *brightest = extremes.brightest;
+        keep_all &= grow(keys, part, gap, &extremes, largest);
     }
     Cutoffs { largest, brightest, keep_all }
 }
@@ -119,27 +136,19 @@ fn grow<K: Key, const N: usize>(
     keys: &[&Lanes<K>],
     part: usize,
     gap: K,
+    extremes: &Extremes<K, N>,
     largest: &mut [K; N],
-    brightest: &mut [K; N],
 ) -> bool {
     let (many, others) = keys.as_chunks::<AT_ONCE>();
-    let mut extremes = Extremes { darkest: [[K::LARGEST; N]; 3], brightest: [K::LEAST; N] };
-    for keys in many {
-        extremes.see(&parts(keys, part));
-    }
-    for &key in others {
-        extremes.see(&parts(&[key], part));
-    }
-    let Extremes { darkest: [_, _, third], brightest: most } = extremes;
-    *brightest = most;
-    let (mut cutoffs, mut keep_all) = (third, false);
+    let Extremes { darkest: [_, _, third], brightest } = extremes;
+    let (mut cutoffs, mut keep_all) = (*third, false);
     // Each round reaches further in at least one pixel, or is the last.
     for _ in 3..=keys.len() {
         let mut is_over = false;
         for lane in 0..N {
             // Where the brightest is within the gap, so is all between.
-            let is_far = most[lane].is_over(cutoffs[lane], gap);
-            cutoffs[lane] = if is_far { cutoffs[lane] } else { most[lane] };
+            let is_far = brightest[lane].is_over(cutoffs[lane], gap);
+            cutoffs[lane] = if is_far { cutoffs[lane] } else { brightest[lane] };
             is_over |= is_far;
         }
         keep_all = !is_over;
@@ -169,21 +178,50 @@ fn parts<K: Key, const N: usize, const COUNT: usize>(keys: &[&Lanes<K>; COUNT], 
 }
 
 /// The ends of sorted lists that are not sorted.
-struct Extremes<K, const N: usize> {
+#[derive(Clone)]
+pub(super) struct Extremes<K, const N: usize> {
     /// The darkest keys, in order.
     darkest: [[K; N]; 3],
     brightest: [K; N],
 }
 
-impl<K: Key, const N: usize> Extremes<K, N> {
+impl<K: Key> Extremes<K, LANES> {
+    /// Those of a part of the pixels.
     #[inline(always)]
-    fn see<const COUNT: usize>(&mut self, keys: &[[K; N]; COUNT]) {
+    fn part<const N: usize>(&self, part: usize) -> Extremes<K, N> {
+        let [first, second, third] = &self.darkest;
+        let of = |keys: &Lanes<K>| keys.as_chunks::<N>().0[part];
+        Extremes { darkest: [of(first), of(second), of(third)], brightest: of(&self.brightest) }
+    }
+}
+
+impl<K: Key, const N: usize> Extremes<K, N> {
+    /// Of no keys.
+    pub const NOTHING: Self = Self { darkest: [[K::LARGEST; N]; 3], brightest: [K::LEAST; N] };
+
+    /// Of a part of all keys.
+    #[inline(always)]
+    fn of(keys: &[&Lanes<K>], part: usize) -> Self {
+        let (many, others) = keys.as_chunks::<AT_ONCE>();
+        let mut extremes = Self::NOTHING;
+        for keys in many {
+            extremes.see(&parts(keys, part));
+        }
+        for &key in others {
+            extremes.see(&parts(&[key], part));
+        }
+        extremes
+    }
+
+    /// Takes in some more keys.
+    #[inline(always)]
+    pub fn see<B: Borrow<[K; N]>, const COUNT: usize>(&mut self, keys: &[B; COUNT]) {
         let [first, second, third] = &mut self.darkest;
         for lane in 0..N {
             // Single values, or the compiler does not keep them in registers.
             let (mut a, mut b, mut c, mut most) = (first[lane], second[lane], third[lane], self.brightest[lane]);
             for light in 0..COUNT {
-                let key = keys[light][lane];
+                let key = keys[light].borrow()[lane];
                 let over_a = a.largest(key);
                 a = a.least(key);
                 let over_b = b.largest(over_a);

@@ -7,10 +7,11 @@ use rayon::prelude::*;
 
 use super::checks::{check, check_finite};
 use super::confidence::confidence;
-use super::cutoff::{LANES, Lanes};
+use super::cutoff::LANES;
 use super::lane_solve::{Choice, LaneSolver};
 use super::lanes::{self, Input, Left};
 use super::out::{Out, task_pixels};
+use super::overview::Brought;
 use super::robust::{self, RobustFilter, RobustScratch};
 use super::robust_lanes::RobustLanes;
 use super::solve::{Solution, SubsetSolver};
@@ -133,8 +134,8 @@ pub(super) struct Kernel<'a, P> {
 
 /// Memory of one thread, reused from pixel to pixel.
 pub(super) struct Scratch<P> {
-    /// Images that are brought together: a stretch of them, and the next one.
-    memory: [Vec<Lanes<P>>; 2],
+    /// Images that are brought together.
+    memory: Vec<Brought<P>>,
     values: Vec<f32>,
     clipped: Vec<bool>,
     kept: Vec<bool>,
@@ -147,7 +148,7 @@ impl<P> Scratch<P> {
     fn new(lights: &Lights) -> Self {
         let count = lights.len();
         Self {
-            memory: Default::default(),
+            memory: Vec::new(),
             values: vec![0.0; count],
             clipped: vec![false; count],
             kept: vec![false; count],

@@ -6,13 +6,14 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::ahead::Ahead;
 use super::confidence::PRIOR_RESIDUAL;
-use super::cutoff::{LANES, Lanes, cutoffs};
+use super::cutoff::{LANES, Lanes, cutoffs, cutoffs_within};
 use super::finish::{Facets, Finished, all_bits, freedom, freedoms, inverse_length};
 use super::finite::{are_finite, is_finite};
 use super::kept::Kept;
 use super::out::Block;
+use super::overview::{SumsAndExtremes, SumsAndLargest};
 use super::robust_lanes::{self, RobustLanes};
-use super::sums::{BlockSums, Sums};
+use super::sums::Sums;
 use super::symmetric::{
     ENTRIES, Inverse, PrincipalAxes, RayleighQuotient, dot, dot_less, form, inverse_row, outer, spread,
 };
@@ -115,6 +116,8 @@ pub(super) struct Readings<'a, K> {
     pub keys: &'a [&'a Lanes<K>],
     /// What is to be done meanwhile.
     pub ahead: Ahead<'a, K>,
+    /// What is known of the keys.
+    pub overview: Option<&'a SumsAndExtremes<K>>,
     /// A bit a light.
     pub clipped: &'a Lanes<u8>,
     /// To be subtracted from every key.
@@ -133,13 +136,16 @@ pub(super) fn solve<K: Pixel, V: Vector>(
     out: &mut Finished,
     block: &mut Block<'_>,
 ) {
-    let Readings { keys, mut ahead, clipped, offset, largest } = readings;
+    let Readings { keys, ahead, overview, clipped, offset, largest } = readings;
     (out.careful, out.valid) = (0, 0);
     (out.keep_all, out.finite) = (true, true);
     let parts = ahead.parts(LANES / V::WIDTH);
     ahead.part(0, parts);
     if K::CODES.is_none() && (keys.len() > BYTE_LIGHTS || matches!(solver.choice, Choice::Window(_))) {
-        out.finite = are_finite::<K, V>(keys);
+        out.finite = match overview {
+            Some(overview) => overview.sums.are_finite::<V>(),
+            None => are_finite::<K, V>(keys),
+        };
     }
     match &solver.choice {
         Choice::All => {
@@ -150,7 +156,10 @@ pub(super) fn solve<K: Pixel, V: Vector>(
             }
         }
         Choice::UpToGap(gap) => {
-            let cutoffs = cutoffs(keys, K::gap(*gap));
+            let cutoffs = match overview {
+                Some(overview) => cutoffs_within(keys, K::gap(*gap), &overview.extremes),
+                None => cutoffs(keys, K::gap(*gap)),
+            };
             if K::CODES.is_none() {
                 // No sum holds a light that is dropped.
                 out.finite &= cutoffs.brightest.iter().all(|key| key.to_f32() < f32::INFINITY);
@@ -190,7 +199,11 @@ pub(super) fn solve<K: Pixel, V: Vector>(
         let at = step * V::WIDTH;
         ahead.part(2 + step, parts);
         let facets = if out.keep_all || kept.are_whole(keys.len(), at, V::WIDTH) {
-            solve_all(solver, sum_all::<K, V>(solver, keys, offset, at))
+            let sums = match (overview, offset) {
+                (Some(overview), None) => overview.sums.load::<V>(at),
+                _ => sum_all::<K, V>(solver, keys, offset, at),
+            };
+            solve_all(solver, sums)
         } else {
             let (facets, unusable) = solve_kept::<K, V>(solver, kept, keys.len(), offset, at, &out.kept);
             out.careful |= unusable << at;
@@ -206,7 +219,7 @@ pub(super) fn solve<K: Pixel, V: Vector>(
 #[inline(always)]
 pub(super) fn solve_sums<V: Vector>(
     solver: &LaneSolver,
-    sums: &BlockSums,
+    sums: &SumsAndLargest,
     per_full_scale: f32,
     out: &mut Finished,
     block: &mut Block<'_>,
@@ -216,7 +229,7 @@ pub(super) fn solve_sums<V: Vector>(
     let mut squares = V::splat(0.0);
     for step in 0..LANES / V::WIDTH {
         let at = step * V::WIDTH;
-        let facets = solve_all(solver, sums.load::<V>(at));
+        let facets = solve_all(solver, sums.sums.load::<V>(at));
         squares = facets.values_square + squares;
         out.write(at, &facets, per_full_scale, true, block);
     }

@@ -9,11 +9,12 @@ use multiversion::multiversion;
 use super::ahead::{Ahead, blocks_on};
 use super::cutoff::{LANES, Lanes};
 use super::finish::Finished;
-use super::gather::{Share, are_crowded, bring, should_bring, should_share, stretch_blocks};
+use super::gather::should_bring;
 use super::kept::Kept;
 use super::lane_solve::{BYTE_LIGHTS, Careful, Choice, LaneSolver, Readings, raise, solve, solve_sums};
 use super::out::{Block, Out};
-use super::sums::BlockSums;
+use super::overview::{Brought, SumsAndExtremes, SumsAndLargest};
+use super::stretches::Stretches;
 #[cfg(target_arch = "x86_64")]
 use crate::vector::{Avx2, Avx512, Pair};
 use crate::vector::{Portable, Vector};
@@ -58,12 +59,75 @@ impl Left {
     }
 }
 
-/// Where the keys of a block come from.
-enum Source<'a, K> {
-    /// The images as they are, and where they are brought together if that pays.
-    Images(&'a [&'a [K]], &'a mut [Vec<Lanes<K>>; 2]),
-    /// Computed from them.
-    Made(&'a Make<'a, K>),
+/// Where the keys of the blocks come from, and the loop over these. Each has a compiled function of its own: in one for all, every
+/// loop is slower for the others (`benches/results.tsv`).
+pub(super) trait Source<K: Pixel> {
+    /// Works on the blocks of `pixels`.
+    fn work<'a, V: Vector>(
+        self,
+        task: &mut Task<'_, K>,
+        pixels: &Range<usize>,
+        blocks: impl Iterator<Item = Block<'a>>,
+    );
+}
+
+/// Eight images as they lie. Loops over lights are written out then, and bounds are not asked for.
+struct Eight<'a, K>(&'a [&'a [K]; BYTE_LIGHTS]);
+
+impl<K: Pixel> Source<K> for Eight<'_, K> {
+    #[inline(always)]
+    fn work<'a, V: Vector>(
+        self,
+        task: &mut Task<'_, K>,
+        pixels: &Range<usize>,
+        blocks: impl Iterator<Item = Block<'a>>,
+    ) {
+        let [a, b, c, d, e, f, g, h] = self.0.map(|plane| blocks_of(plane, pixels));
+        let keys = a.iter().zip(b).zip(c).zip(d).zip(e).zip(f).zip(g).zip(h);
+        for (number, (out, (((((((a, b), c), d), e), f), g), h))) in blocks.zip(keys).enumerate() {
+            let keys = [a, b, c, d, e, f, g, h];
+            let ahead = Ahead::Fetch(&keys, blocks_on::<K>(BYTE_LIGHTS));
+            task.block::<V>(number, Reads::Keys { keys: &keys, ahead, overview: None }, out);
+        }
+    }
+}
+
+/// Images as they lie.
+struct Images<'a, K>(&'a [&'a [K]]);
+
+impl<K: Pixel> Source<K> for Images<'_, K> {
+    #[inline(always)]
+    fn work<'a, V: Vector>(
+        self,
+        task: &mut Task<'_, K>,
+        pixels: &Range<usize>,
+        blocks: impl Iterator<Item = Block<'a>>,
+    ) {
+        let images: Vec<&[Lanes<K>]> = self.0.iter().map(|plane| blocks_of(plane, pixels)).collect();
+        let blocks_on = blocks_on::<K>(images.len());
+        let mut keys: Vec<&Lanes<K>> = Vec::with_capacity(images.len());
+        for (number, out) in blocks.enumerate() {
+            keys.clear();
+            keys.extend(images.iter().map(|blocks| &blocks[number]));
+            let ahead = Ahead::Fetch(&keys, blocks_on);
+            task.block::<V>(number, Reads::Keys { keys: &keys, ahead, overview: None }, out);
+        }
+    }
+}
+
+/// Keys that are computed from the images.
+struct Made<'a, K>(&'a Make<'a, K>);
+
+impl<K: Pixel> Source<K> for Made<'_, K> {
+    #[inline(always)]
+    fn work<'a, V: Vector>(self, task: &mut Task<'_, K>, _: &Range<usize>, blocks: impl Iterator<Item = Block<'a>>) {
+        let mut made = vec![[K::ZERO; LANES]; task.solver.lights()];
+        for (number, out) in blocks.enumerate() {
+            (self.0)(&task.pixels(number), &mut made);
+            let keys: Vec<_> = made.iter().collect();
+            task.block::<V>(number, Reads::Keys { keys: &keys, ahead: Ahead::Nothing, overview: None }, out);
+        }
+    }
 }
 
 /// Computes the keys of a block.
@@ -88,12 +152,13 @@ struct Common<'a> {
 }
 
 /// Works on the blocks of `pixels` (of the whole image), to which `out` belongs; the pixels behind the last whole one are left.
+/// `memory` is for images that are brought together.
 pub(super) fn run<P: Pixel>(
     solver: &LaneSolver,
     input: &Input<'_, P>,
     pixels: Range<usize>,
     out: &mut Out<'_>,
-    memory: &mut [Vec<Lanes<P>>; 2],
+    memory: &mut Vec<Brought<P>>,
 ) -> Left {
     let Input { planes, radiometry, scales, mask, per_full_scale, is_draft } = *input;
     let plain = radiometry.is_plain();
@@ -113,9 +178,7 @@ pub(super) fn run<P: Pixel>(
     let clips: Option<&Clips<'_>> = if let Choice::Window(_) = solver.choice { Some(&mark_clipped) } else { None };
     let offsets: Option<&Offsets<'_>> = if plain && radiometry.has_offsets() { Some(&load_offsets) } else { None };
     let common = Common { mask, per_full_scale, is_draft, offsets, clips };
-    if plain {
-        run_blocks(solver, &mut Source::Images(planes, memory), common, pixels, out)
-    } else {
+    if !plain {
         let make = |block: &Range<usize>, keys: &mut [Lanes<f32>]| {
             let mut offsets = [0.0; LANES];
             load_offsets(block, &mut offsets);
@@ -125,15 +188,25 @@ pub(super) fn run<P: Pixel>(
                 }
             }
         };
-        run_blocks(solver, &mut Source::Made(&make), common, pixels, out)
+        return run_blocks(solver, Made(&make), common, pixels, out);
+    }
+    let needs_sums_alone = matches!(solver.choice, Choice::All) && offsets.is_none();
+    if let Ok(planes) = planes.try_into() {
+        run_blocks(solver, Eight(planes), common, pixels, out)
+    } else if needs_sums_alone && planes.len() > BYTE_LIGHTS {
+        run_blocks(solver, Stretches::<_, SumsAndLargest>::new(planes, memory), common, pixels, out)
+    } else if should_bring(planes) {
+        run_blocks(solver, Stretches::<_, SumsAndExtremes<_>>::new(planes, memory), common, pixels, out)
+    } else {
+        run_blocks(solver, Images(planes), common, pixels, out)
     }
 }
 
 /// The hot loop, compiled for several instruction sets; one call a task.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl+avx512dq+fma", "x86_64+avx2+fma"))]
-fn run_blocks<K: Pixel>(
+fn run_blocks<K: Pixel, S: Source<K>>(
     solver: &LaneSolver,
-    source: &mut Source<'_, K>,
+    source: S,
     common: Common<'_>,
     pixels: Range<usize>,
     out: &mut Out<'_>,
@@ -141,147 +214,47 @@ fn run_blocks<K: Pixel>(
     #[cfg(target_arch = "x86_64")]
     {
         if multiversion::target::target_cfg_f!(target_feature = "avx512f") {
-            return run_with::<K, Pair<Avx512>>(solver, source, common, pixels, out);
+            return run_with::<K, S, Pair<Avx512>>(solver, source, common, &pixels, out);
         }
         if multiversion::target::target_cfg_f!(target_feature = "avx2") {
-            return run_with::<K, Pair<Avx2>>(solver, source, common, pixels, out);
+            return run_with::<K, S, Pair<Avx2>>(solver, source, common, &pixels, out);
         }
     }
-    run_with::<K, Portable>(solver, source, common, pixels, out)
+    run_with::<K, S, Portable>(solver, source, common, &pixels, out)
 }
 
 #[inline(always)]
-fn run_with<K: Pixel, V: Vector>(
+fn run_with<K: Pixel, S: Source<K>, V: Vector>(
     solver: &LaneSolver,
-    source: &mut Source<'_, K>,
+    source: S,
     common: Common<'_>,
-    pixels: Range<usize>,
+    pixels: &Range<usize>,
     out: &mut Out<'_>,
 ) -> Left {
     out.streamed &= V::STREAMS;
+    let streamed = out.streamed;
     let (blocks, sets) = out.blocks();
     let mut task = Task::new(solver, common, pixels.start, sets);
-    match source {
-        Source::Images(planes, memory) => {
-            if let Ok(planes) = <&[&[K]; BYTE_LIGHTS]>::try_from(*planes) {
-                // Compiled for eight lights once more: loops over lights are written out then, and bounds are not asked for.
-                let [a, b, c, d, e, f, g, h] = planes.map(|plane| blocks_of(plane, &pixels));
-                let keys = a.iter().zip(b).zip(c).zip(d).zip(e).zip(f).zip(g).zip(h);
-                for (number, (out, (((((((a, b), c), d), e), f), g), h))) in blocks.zip(keys).enumerate() {
-                    let keys = [a, b, c, d, e, f, g, h];
-                    task.block::<V>(
-                        number,
-                        Reads::Keys { keys: &keys, ahead: Ahead::Fetch(&keys, blocks_on::<K>(BYTE_LIGHTS)) },
-                        out,
-                    );
-                }
-            } else if planes.len() > BYTE_LIGHTS && matches!(solver.choice, Choice::All) && common.offsets.is_none() {
-                run_sums::<K, V>(&mut task, planes, &pixels, blocks);
-            } else {
-                run_images::<K, V>(&mut task, planes, &pixels, blocks, memory);
-            }
-        }
-        Source::Made(make) => {
-            let mut made = vec![[K::ZERO; LANES]; solver.lights()];
-            for (number, out) in blocks.enumerate() {
-                make(&task.pixels(number), &mut made);
-                let keys: Vec<_> = made.iter().collect();
-                task.block::<V>(number, Reads::Keys { keys: &keys, ahead: Ahead::Nothing }, out);
-            }
-        }
-    }
+    source.work::<V>(&mut task, pixels, blocks);
     let Task { mut left, largest, .. } = task;
     left.largest = largest.into_iter().fold(0.0, f32::max);
-    if out.streamed {
+    if streamed {
         stream::finish();
     }
     left
 }
 
-/// Works on the blocks of many images of which all lights are kept.
-#[inline(always)]
-fn run_sums<'a, K: Pixel, V: Vector>(
-    task: &mut Task<'_, K>,
-    planes: &[&[K]],
-    pixels: &Range<usize>,
-    mut blocks: impl Iterator<Item = Block<'a>>,
-) {
-    let images: Vec<&[Lanes<K>]> = planes.iter().map(|plane| blocks_of(plane, pixels)).collect();
-    let (count, mut sums, is_crowded) = (pixels.len() / LANES, BlockSums::room::<K>(), are_crowded(planes));
-    for first in (0..count).step_by(sums.len()) {
-        let stretch = first..count.min(first + sums.len());
-        if task.uses(&stretch) {
-            BlockSums::sum_up::<K, V>(&mut sums, &images, &task.solver.pseudo_inverse, &stretch, is_crowded);
-        }
-        for ((number, sums), out) in stretch.zip(&sums).zip(blocks.by_ref()) {
-            task.block::<V>(number, Reads::Sums(sums), out);
-        }
-    }
-}
-
-/// Works on the blocks of any number of images.
-#[inline(always)]
-fn run_images<'a, K: Pixel, V: Vector>(
-    task: &mut Task<'_, K>,
-    planes: &[&[K]],
-    pixels: &Range<usize>,
-    mut blocks: impl Iterator<Item = Block<'a>>,
-    memory: &mut [Vec<Lanes<K>>; 2],
-) {
-    let images: Vec<&[Lanes<K>]> = planes.iter().map(|plane| blocks_of(plane, pixels)).collect();
-    let (count, lights, brings) = (pixels.len() / LANES, images.len(), should_bring(planes));
-    let shares = brings && should_share(planes);
-    let at_once = if brings { stretch_blocks::<K>(lights, if shares { 2 } else { 1 }) } else { count.max(1) };
-    let blocks_on = blocks_on::<K>(lights);
-    let [mut now, mut later] = memory.each_mut();
-    let mut is_brought = false;
-    for first in (0..count).step_by(at_once) {
-        let stretch = first..count.min(first + at_once);
-        let next = stretch.end..count.min(stretch.end + at_once);
-        if brings && !is_brought && task.uses(&stretch) {
-            bring(&images, &stretch, now);
-            is_brought = true;
-        }
-        let shares = shares && is_brought && !next.is_empty() && task.uses(&next);
-        if shares {
-            later.resize(next.len() * lights, [K::ZERO; LANES]);
-        }
-        let share = |block: usize| block * next.len() * lights / stretch.len();
-        let mut keys: Vec<&Lanes<K>> = Vec::with_capacity(lights);
-        for (block, out) in (0..stretch.len()).zip(blocks.by_ref()) {
-            keys.clear();
-            if is_brought {
-                keys.extend(&now[block * lights..][..lights]);
-            } else {
-                keys.extend(images.iter().map(|blocks| &blocks[first + block]));
-            }
-            let ahead = if shares {
-                let blocks = share(block)..share(block + 1);
-                Ahead::Bring(Share { images: &images, stretch: &next, blocks, memory: later })
-            } else if brings {
-                // What is brought has no successors.
-                Ahead::Nothing
-            } else {
-                Ahead::Fetch(&keys, blocks_on)
-            };
-            task.block::<V>(first + block, Reads::Keys { keys: &keys, ahead }, out);
-        }
-        std::mem::swap(&mut now, &mut later);
-        is_brought = shares;
-    }
-}
-
 /// The whole blocks of some pixels.
-fn blocks_of<'a, K>(plane: &'a [K], pixels: &Range<usize>) -> &'a [Lanes<K>] {
+pub(super) fn blocks_of<'a, K>(plane: &'a [K], pixels: &Range<usize>) -> &'a [Lanes<K>] {
     plane[pixels.clone()].as_chunks().0
 }
 
 /// What a block reads.
-enum Reads<'a, K> {
-    /// Its pixels in every image, and what is to be done meanwhile.
-    Keys { keys: &'a [&'a Lanes<K>], ahead: Ahead<'a, K> },
+pub(super) enum Reads<'a, K> {
+    /// Its pixels in every image, what is to be done meanwhile, and what is known of them.
+    Keys { keys: &'a [&'a Lanes<K>], ahead: Ahead<'a, K>, overview: Option<&'a SumsAndExtremes<K>> },
     /// What was summed up over all of them.
-    Sums(&'a BlockSums),
+    Sums(&'a SumsAndLargest),
 }
 
 /// What the blocks of a task share.
@@ -289,8 +262,8 @@ enum Reads<'a, K> {
 /// Aligned, and with it the stack of the loop that it lives in: vectors that go there for want of registers would lie across
 /// cache lines and pages, which is slow (`benches/results.tsv`).
 #[repr(align(64))]
-struct Task<'a, K> {
-    solver: &'a LaneSolver,
+pub(super) struct Task<'a, K> {
+    pub solver: &'a LaneSolver,
     common: Common<'a>,
     first_pixel: usize,
     all_lights: Lanes<u16>,
@@ -329,14 +302,14 @@ impl<'a, K: Pixel> Task<'a, K> {
     }
 
     /// True where some pixel of a stretch of blocks is asked for.
-    fn uses(&self, stretch: &Range<usize>) -> bool {
+    pub fn uses(&self, stretch: &Range<usize>) -> bool {
         let pixels = self.pixels(stretch.start).start..self.pixels(stretch.end).start;
         self.common.mask.is_none_or(|mask| mask[pixels].contains(&true))
     }
 
     /// Works on a block.
     #[inline(always)]
-    fn block<V: Vector>(&mut self, number: usize, reads: Reads<'_, K>, mut out: Block<'_>) {
+    pub fn block<V: Vector>(&mut self, number: usize, reads: Reads<'_, K>, mut out: Block<'_>) {
         let pixels = self.pixels(number);
         let used = self.common.mask.map(|mask| &mask[pixels.clone()]);
         // A block that is all in, or all out, needs no look at its pixels.
@@ -350,10 +323,6 @@ impl<'a, K: Pixel> Task<'a, K> {
         if count == 0 {
             out.clear(0..LANES);
             sets.fill(false);
-            // Other blocks count on it.
-            if let Reads::Keys { ahead: Ahead::Bring(mut share), .. } = reads {
-                share.part(0, 1);
-            }
             return;
         }
         let used = used.filter(|_| count < LANES);
@@ -367,8 +336,8 @@ impl<'a, K: Pixel> Task<'a, K> {
         let largest = (K::CODES.is_none() && self.common.is_draft).then_some(&mut self.largest);
         let (per_full_scale, finished) = (self.common.per_full_scale, &mut self.finished);
         match reads {
-            Reads::Keys { keys, ahead } => {
-                let readings = Readings { keys, ahead, clipped: &self.clipped, offset, largest };
+            Reads::Keys { keys, ahead, overview } => {
+                let readings = Readings { keys, ahead, overview, clipped: &self.clipped, offset, largest };
                 solve::<K, V>(self.solver, readings, &mut self.kept, per_full_scale, finished, &mut out);
             }
             Reads::Sums(sums) => {

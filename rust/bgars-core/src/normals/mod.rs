@@ -17,12 +17,14 @@ mod kernel;
 mod lane_solve;
 mod lanes;
 mod out;
+mod overview;
 mod own_scale;
 mod ranked;
 mod robust;
 mod robust_lanes;
 mod solve;
 mod specular;
+mod stretches;
 mod sums;
 mod symmetric;
 
