@@ -71,7 +71,7 @@ fn main() {
     let levels = levels(if name == "normals-u8-24-lights" { 24 } else { 8 });
     match name.as_str() {
         "lambertian-u8" => estimate_times(&levels, 255.0, Method::Lambertian, times),
-        // Images of this size lie a power of two apart: they are looked over, and brought together.
+        // 24 images of this size crowd: they are looked over, and brought together.
         "normals-u8" | "normals-u8-24-lights" => estimate_times(&levels, 255.0, filter, times),
         "normals-u16" => {
             let wide: Vec<u16> = levels.iter().map(|&level| u16::from(level) * 257).collect();

@@ -51,22 +51,28 @@ fn an_image_over_the_size_that_is_streamed_equals_its_two_halves() {
 
 #[test]
 fn images_a_power_of_two_apart_give_the_same_bits() {
-    // Those that crowd are looked over and brought together, the others are worked on where they lie.
+    // By the filter, those that crowd are brought together, and the others are worked on where they lie.
     apart_gives_the_same_bits(|value| value as u8);
     apart_gives_the_same_bits(|value| value as u16);
     apart_gives_the_same_bits(|value| value as f32);
 }
 
 fn apart_gives_the_same_bits<P: Pixel>(pixel: impl Fn(usize) -> P) {
-    const PIXELS: usize = 4096;
+    // More than one task.
+    const PIXELS: usize = 3 * 4096;
     const LIGHTS: usize = 24;
     let stack = |apart: usize| -> Vec<P> {
-        let value = |at: usize| if at % apart < PIXELS { (at / apart * 37 + at % apart * 101) % 251 } else { 0 };
+        let value = |at: usize| match (at / apart, at % apart) {
+            (_, pixel) if pixel >= PIXELS => 0,
+            // By turns half a block of which every pixel drops a light, and half a block of which none does.
+            (light, pixel) if pixel / 32 % 2 == 0 => (light * 37 + pixel * 101) % 251,
+            (light, pixel) => 60 + (light * 7 + pixel * 3) % 90,
+        };
         (0..LIGHTS * apart).map(|at| pixel(value(at))).collect()
     };
     let lights = Lights::directional(&tilted_ring(LIGHTS, 40.0)).unwrap();
     let (crowded, spread) = (stack(PIXELS), stack(PIXELS + 64));
-    let middle: Vec<bool> = (0..PIXELS + 64).map(|pixel| (2000..2100).contains(&pixel)).collect();
+    let middle: Vec<bool> = (0..PIXELS + 64).map(|pixel| (10_000..10_100).contains(&pixel)).collect();
     let method = Method::SpecularFilter { threshold: 20.0 };
     let cases = [
         (Method::Lambertian, None, 0.0),
@@ -85,12 +91,39 @@ fn apart_gives_the_same_bits<P: Pixel>(pixel: impl Fn(usize) -> P) {
         let crowded = estimate(&crowded, mask.map(|mask| &mask[..PIXELS]));
         let spread = estimate(&spread, mask);
         assert!(crowded.mask.iter().any(|&solved| solved));
+        if method != Method::Lambertian && mask.is_none() {
+            let dropping = crowded.lights_kept.iter().filter(|&&kept| usize::from(kept) < LIGHTS).count();
+            assert_eq!(dropping, PIXELS / 2);
+        }
         let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
         assert_eq!(bits(&crowded.normals), bits(&spread.normals[..3 * PIXELS]));
         assert_eq!(bits(&crowded.albedo), bits(&spread.albedo[..PIXELS]));
         assert_eq!(bits(&crowded.confidence), bits(&spread.confidence[..PIXELS]));
         assert_eq!(crowded.mask, spread.mask[..PIXELS]);
+        assert_eq!(crowded.measured, spread.measured[..PIXELS]);
         assert_eq!(crowded.lights_kept, spread.lights_kept[..PIXELS]);
+        assert_eq!(crowded.kept_sets, spread.kept_sets[..PIXELS * LIGHTS]);
+    }
+}
+
+#[test]
+fn a_black_level_counts_like_images_less_it() {
+    for (lights, pixels) in [(9, 70), (24, 4096), (48, 200)] {
+        let value = |at: usize| 60 + (at / pixels * 7 + at % pixels * 3) % 90;
+        let directions = Lights::directional(&tilted_ring(lights, 40.0)).unwrap();
+        let images: Vec<f32> = (0..lights * pixels).map(|at| value(at) as f32).collect();
+        let less: Vec<f32> = images.iter().map(|value| value - 5.0).collect();
+        let stack = ImageStack::new(&images, lights, 1, pixels).unwrap();
+        let radiometry = Radiometry { black_level: 5.0, ..Radiometry::linear(lights, 255.0) };
+        for method in [Method::Lambertian, Method::SpecularFilter { threshold: 20.0 }] {
+            let proceed = &mut |_| ControlFlow::Continue(());
+            let found = estimate(&stack, &directions, &radiometry, None, method, true, proceed).unwrap();
+            let expected = estimate_row(&less, &directions, None, method, 255.0);
+            let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+            assert!(bits(&found.normals) == bits(&expected.normals), "{lights} lights, {method:?}");
+            assert!(bits(&found.confidence) == bits(&expected.confidence), "{lights} lights, {method:?}");
+            assert_eq!(found.kept_sets, expected.kept_sets);
+        }
     }
 }
 

@@ -40,7 +40,7 @@ fn random_images(lights: usize, most: f32) -> Vec<f32> {
 /// One bright pixel, which no sample is likely to see, widens the gap that cuts: a little, or over most steps.
 #[test]
 fn the_largest_value_may_be_told_or_found() {
-    for lights in [4, 8, 13, 24] {
+    for lights in [4, 8, 13, 24, 32] {
         for hot in [100.0, 101.0, 250.0, 900.0] {
             let mut images = random_images(lights, 100.0);
             images[2 * PIXELS + 1000] = hot;
@@ -83,7 +83,7 @@ fn integers_are_of_the_scale_of_their_type() {
 
 #[test]
 fn what_is_not_finite_is_refused_and_work_can_be_cancelled() {
-    for lights in [8, 24] {
+    for lights in [8, 24, 32] {
         for (value, pixel) in [(f32::NAN, 70), (f32::INFINITY, 99_999), (f32::NEG_INFINITY, PIXELS - 1)] {
             let mut images = random_images(lights, 100.0);
             images[PIXELS + pixel] = value;

@@ -51,7 +51,7 @@ pub(super) fn cutoffs<K: Key>(keys: &[&Lanes<K>], gap: K) -> Cutoffs<K> {
 
 /// The same of keys whose extremes are known.
 #[inline(always)]
-pub(super) fn cutoffs_within<K: Key>(keys: &[&Lanes<K>], gap: K, extremes: &Extremes<K, LANES>) -> Cutoffs<K> {
+pub(super) fn cutoffs_from<K: Key>(keys: &[&Lanes<K>], gap: K, extremes: &Extremes<K, LANES>) -> Cutoffs<K> {
     grown_cutoffs(keys, gap, Some(extremes))
 }
 

@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::ahead::Ahead;
 use super::confidence::PRIOR_RESIDUAL;
-use super::cutoff::{LANES, Lanes, cutoffs, cutoffs_within};
+use super::cutoff::{LANES, Lanes, cutoffs, cutoffs_from};
 use super::finish::{Facets, Finished, all_bits, freedom, freedoms, inverse_length};
 use super::finite::{are_finite, is_finite};
 use super::kept::Kept;
@@ -116,7 +116,7 @@ pub(super) struct Readings<'a, K> {
     pub keys: &'a [&'a Lanes<K>],
     /// What is to be done meanwhile.
     pub ahead: Ahead<'a, K>,
-    /// What is known of the keys.
+    /// What is known of the keys, and of the sums over all of them less the offset.
     pub overview: Option<&'a SumsAndExtremes<K>>,
     /// A bit a light.
     pub clipped: &'a Lanes<u8>,
@@ -157,11 +157,11 @@ pub(super) fn solve<K: Pixel, V: Vector>(
         }
         Choice::UpToGap(gap) => {
             let cutoffs = match overview {
-                Some(overview) => cutoffs_within(keys, K::gap(*gap), &overview.extremes),
+                Some(overview) => cutoffs_from(keys, K::gap(*gap), &overview.extremes),
                 None => cutoffs(keys, K::gap(*gap)),
             };
             if K::CODES.is_none() {
-                // No sum holds a light that is dropped.
+                // Of up to eight lights, no sum holds one that is dropped.
                 out.finite &= cutoffs.brightest.iter().all(|key| key.to_f32() < f32::INFINITY);
             }
             let is_draft = largest.is_some();
@@ -199,9 +199,9 @@ pub(super) fn solve<K: Pixel, V: Vector>(
         let at = step * V::WIDTH;
         ahead.part(2 + step, parts);
         let facets = if out.keep_all || kept.are_whole(keys.len(), at, V::WIDTH) {
-            let sums = match (overview, offset) {
-                (Some(overview), None) => overview.sums.load::<V>(at),
-                _ => sum_all::<K, V>(solver, keys, offset, at),
+            let sums = match overview {
+                Some(overview) => overview.sums.load::<V>(at),
+                None => sum_all::<K, V>(solver, keys, offset, at),
             };
             solve_all(solver, sums)
         } else {

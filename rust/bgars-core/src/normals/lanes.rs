@@ -13,7 +13,7 @@ use super::gather::should_bring;
 use super::kept::Kept;
 use super::lane_solve::{BYTE_LIGHTS, Careful, Choice, LaneSolver, Readings, raise, solve, solve_sums};
 use super::out::{Block, Out};
-use super::overview::{Brought, SumsAndExtremes, SumsAndLargest};
+use super::overview::{Brought, Overview, SumsAndExtremes, SumsAndLargest};
 use super::stretches::Stretches;
 #[cfg(target_arch = "x86_64")]
 use crate::vector::{Avx2, Avx512, Pair};
@@ -59,8 +59,8 @@ impl Left {
     }
 }
 
-/// Where the keys of the blocks come from, and the loop over these. Each has a compiled function of its own: in one for all, every
-/// loop is slower for the others (`benches/results.tsv`).
+/// Where the keys of the blocks come from, and the loop over these. Each has a compiled function of its own: in one for all, the
+/// loop over eight images is slower by 1 to 3 % (`benches/results.tsv`).
 pub(super) trait Source<K: Pixel> {
     /// Works on the blocks of `pixels`.
     fn work<'a, V: Vector>(
@@ -93,9 +93,9 @@ impl<K: Pixel> Source<K> for Eight<'_, K> {
 }
 
 /// Images as they lie.
-struct Images<'a, K>(&'a [&'a [K]]);
+struct AsTheyLie<'a, K>(&'a [&'a [K]]);
 
-impl<K: Pixel> Source<K> for Images<'_, K> {
+impl<K: Pixel> Source<K> for AsTheyLie<'_, K> {
     #[inline(always)]
     fn work<'a, V: Vector>(
         self,
@@ -190,15 +190,29 @@ pub(super) fn run<P: Pixel>(
         };
         return run_blocks(solver, Made(&make), common, pixels, out);
     }
-    let needs_sums_alone = matches!(solver.choice, Choice::All) && offsets.is_none();
     if let Ok(planes) = planes.try_into() {
         run_blocks(solver, Eight(planes), common, pixels, out)
-    } else if needs_sums_alone && planes.len() > BYTE_LIGHTS {
-        run_blocks(solver, Stretches::<_, SumsAndLargest>::new(planes, memory), common, pixels, out)
+    } else if matches!(solver.choice, Choice::All) && planes.len() > BYTE_LIGHTS {
+        run_stretches::<P, SumsAndLargest>(solver, planes, memory, common, pixels, out)
     } else if should_bring(planes) {
-        run_blocks(solver, Stretches::<_, SumsAndExtremes<_>>::new(planes, memory), common, pixels, out)
+        run_stretches::<P, SumsAndExtremes<P>>(solver, planes, memory, common, pixels, out)
     } else {
-        run_blocks(solver, Images(planes), common, pixels, out)
+        run_blocks(solver, AsTheyLie(planes), common, pixels, out)
+    }
+}
+
+fn run_stretches<P: Pixel, O: Overview<P>>(
+    solver: &LaneSolver,
+    planes: &[&[P]],
+    memory: &mut Vec<Brought<P>>,
+    common: Common<'_>,
+    pixels: Range<usize>,
+    out: &mut Out<'_>,
+) -> Left {
+    if common.offsets.is_some() {
+        run_blocks(solver, Stretches::<P, O, true>::new(planes, memory), common, pixels, out)
+    } else {
+        run_blocks(solver, Stretches::<P, O, false>::new(planes, memory), common, pixels, out)
     }
 }
 
@@ -307,6 +321,13 @@ impl<'a, K: Pixel> Task<'a, K> {
         self.common.mask.is_none_or(|mask| mask[pixels].contains(&true))
     }
 
+    /// What is to be subtracted from the keys of a block, if anything is.
+    pub fn load_offsets(&self, number: usize, offsets: &mut Lanes<f32>) {
+        if let Some(load) = self.common.offsets {
+            load(&self.pixels(number), offsets);
+        }
+    }
+
     /// Works on a block.
     #[inline(always)]
     pub fn block<V: Vector>(&mut self, number: usize, reads: Reads<'_, K>, mut out: Block<'_>) {
@@ -326,7 +347,7 @@ impl<'a, K: Pixel> Task<'a, K> {
             return;
         }
         let used = used.filter(|_| count < LANES);
-        if let Some(load) = self.common.offsets {
+        if let (Some(load), Reads::Keys { .. }) = (self.common.offsets, &reads) {
             load(&pixels, &mut self.offset);
         }
         if let Some(mark) = self.common.clips {

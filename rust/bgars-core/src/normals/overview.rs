@@ -21,10 +21,12 @@ pub(super) trait Overview<K: Pixel>: Clone {
     /// Whether the images are asked for once more, and are brought together.
     const BRINGS: bool;
 
-    /// Takes in some more images; where these are brought together, `memory` begins with their place.
+    /// Takes in some more images; `offset` is subtracted for the sums. Where images are brought together, `memory` begins with their
+    /// place.
     fn take_in<V: Vector, const COUNT: usize>(
         &mut self,
         keys: &[&Lanes<K>; COUNT],
+        offset: Option<&Lanes<f32>>,
         vectors: &[[Spread; 3]; COUNT],
         memory: &mut [Brought<K>],
     );
@@ -38,7 +40,7 @@ pub(super) trait Overview<K: Pixel>: Clone {
 #[repr(align(64))]
 pub(super) struct SumsAndLargest {
     pub sums: BlockSums,
-    /// The largest value of each pixel; of floats alone.
+    /// The largest key of each pixel, no offset subtracted; of floats alone.
     pub largest: Lanes<f32>,
 }
 
@@ -50,10 +52,11 @@ impl<K: Pixel> Overview<K> for SumsAndLargest {
     fn take_in<V: Vector, const COUNT: usize>(
         &mut self,
         keys: &[&Lanes<K>; COUNT],
+        offset: Option<&Lanes<f32>>,
         vectors: &[[Spread; 3]; COUNT],
         _: &mut [Brought<K>],
     ) {
-        self.sums.add::<K, V, COUNT>(keys, vectors);
+        self.sums.add::<K, V, COUNT>(keys, offset, vectors);
         if K::CODES.is_none() {
             for step in 0..LANES / V::WIDTH {
                 let at = step * V::WIDTH;
@@ -88,10 +91,11 @@ impl<K: Pixel> Overview<K> for SumsAndExtremes<K> {
     fn take_in<V: Vector, const COUNT: usize>(
         &mut self,
         keys: &[&Lanes<K>; COUNT],
+        offset: Option<&Lanes<f32>>,
         vectors: &[[Spread; 3]; COUNT],
         memory: &mut [Brought<K>],
     ) {
-        self.sums.add::<K, V, COUNT>(keys, vectors);
+        self.sums.add::<K, V, COUNT>(keys, offset, vectors);
         let places = &mut memory.as_chunks_mut::<COUNT>().0[0];
         for light in 0..COUNT {
             places[light].0 = *keys[light];
@@ -118,33 +122,43 @@ impl<K> Borrow<Lanes<K>> for Brought<K> {
     }
 }
 
-/// Many images, and what is summed up of them.
+/// Images that are taken in together, at most.
+const AT_ONCE: usize = 8;
+
+/// More than [`AT_ONCE`] images, and what is summed up of them.
 pub(super) struct Images<'a, K> {
     /// Their blocks.
     pub blocks: &'a [&'a [Lanes<K>]],
     /// What their values are multiplied by.
     pub vectors: &'a [[Spread; 3]],
+    /// To be subtracted from every key of a block, one entry for each block of a stretch; empty where nothing is.
+    pub offsets: &'a [Lanes<f32>],
 }
 
 impl<K: Pixel> Images<'_, K> {
     /// Looks over a stretch of blocks, one for each overview. Images that are brought together go to `memory`: all of the first
     /// block, then of the second. What is fetched meanwhile: if `OWN`, later blocks of the same images, else the same blocks of
-    /// the next ones.
+    /// the next ones, and behind the last ones the first of the next stretch.
     #[inline(always)]
-    pub fn look_over<V: Vector, O: Overview<K>, const OWN: bool>(
+    pub fn look_over<V: Vector, O: Overview<K>, const OFFSETS: bool, const OWN: bool>(
         &self,
         stretch: &Range<usize>,
         overviews: &mut [O],
         memory: &mut [Brought<K>],
     ) {
         overviews.fill(O::NOTHING);
+        let lights = self.blocks.len();
+        // As few passes as can be, and as equal: sums are read and written once in each.
+        let passes = lights.div_ceil(AT_ONCE);
         let mut first = 0;
-        while first < self.blocks.len() {
-            let count = at_once(self.blocks.len() - first);
+        for pass in 0..passes {
+            let count = lights / passes + usize::from(pass < lights % passes);
             match count {
-                8 => self.take_in::<V, O, 8, OWN>(first, stretch, overviews, memory),
-                4 => self.take_in::<V, O, 4, OWN>(first, stretch, overviews, memory),
-                _ => self.take_in::<V, O, 1, OWN>(first, stretch, overviews, memory),
+                8 => self.take_in::<V, O, 8, OFFSETS, OWN>(first, stretch, overviews, memory),
+                7 => self.take_in::<V, O, 7, OFFSETS, OWN>(first, stretch, overviews, memory),
+                6 => self.take_in::<V, O, 6, OFFSETS, OWN>(first, stretch, overviews, memory),
+                5 => self.take_in::<V, O, 5, OFFSETS, OWN>(first, stretch, overviews, memory),
+                _ => self.take_in::<V, O, 4, OFFSETS, OWN>(first, stretch, overviews, memory),
             }
             first += count;
         }
@@ -152,7 +166,7 @@ impl<K: Pixel> Images<'_, K> {
 
     /// Takes in a stretch of so many images.
     #[inline(always)]
-    fn take_in<V: Vector, O: Overview<K>, const COUNT: usize, const OWN: bool>(
+    fn take_in<V: Vector, O: Overview<K>, const COUNT: usize, const OFFSETS: bool, const OWN: bool>(
         &self,
         first: usize,
         stretch: &Range<usize>,
@@ -162,32 +176,29 @@ impl<K: Pixel> Images<'_, K> {
         let (lights, end) = (self.blocks.len(), first + COUNT);
         let images = &self.blocks[first..].as_chunks::<COUNT>().0[0];
         let vectors = &self.vectors[first..].as_chunks::<COUNT>().0[0];
-        // Behind the last images come the first ones of the next stretch.
-        let (next, blocks_on) = if end < lights { (end.min(lights - COUNT), 0) } else { (0, overviews.len()) };
-        let next = &self.blocks[next..].as_chunks::<COUNT>().0[0];
+        // Where one image less follows, the last of these is fetched again.
+        let next =
+            if end < lights { &self.blocks[end.min(lights - COUNT)..].as_chunks::<COUNT>().0[0] } else { images };
+        let first_ones = &self.blocks.as_chunks::<AT_ONCE>().0[0];
         for (at, (block, overview)) in stretch.clone().zip(overviews).enumerate() {
             if OWN {
                 for image in images {
                     stream::prefetch(&image[block], blocks_ahead::<K>());
                 }
-            } else {
+            } else if end < lights {
                 for image in next {
-                    stream::prefetch(&image[block], blocks_on);
+                    stream::prefetch(&image[block], 0);
+                }
+            } else {
+                for image in first_ones {
+                    stream::prefetch(&image[block], stretch.len());
                 }
             }
             let keys = std::array::from_fn(|light| &images[light][block]);
             let memory = if O::BRINGS { &mut memory[at * lights + first..] } else { &mut [] };
-            overview.take_in::<V, COUNT>(&keys, vectors, memory);
+            let offset = if OFFSETS { Some(&self.offsets[at]) } else { None };
+            overview.take_in::<V, COUNT>(&keys, offset, vectors, memory);
         }
-    }
-}
-
-/// How many of so many images are taken in at a time.
-fn at_once(images: usize) -> usize {
-    match images {
-        8.. => 8,
-        4.. => 4,
-        _ => 1,
     }
 }
 
@@ -202,7 +213,7 @@ fn blocks_ahead<K>() -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::super::cutoff::{Cutoffs, cutoffs, cutoffs_within};
+    use super::super::cutoff::{Cutoffs, cutoffs, cutoffs_from};
     use super::super::sums::Sums;
     use super::*;
     use crate::vector::{Arithmetic, Portable};
@@ -233,32 +244,45 @@ mod tests {
     }
 
     /// The slow twin: every block for itself, all its images at once.
-    fn check<K: Pixel + PartialEq + std::fmt::Debug, const OWN: bool>(key: impl Fn(u16) -> K) {
+    fn check<K: Pixel + PartialEq + std::fmt::Debug, const OFFSETS: bool, const OWN: bool>(key: impl Fn(u16) -> K) {
         let (mut seen, mut summed) = (Vec::new(), Vec::new());
         // In turn, so that what one task leaves behind meets the next.
         for (lights, blocks) in [(96, 11), (13, 20), (9, 1), (24, 6), (31, 7), (300, 2)] {
             let (images, vectors) = (images(lights, blocks, &key), vectors(lights));
             let blocks_of: Vec<&[Lanes<K>]> = images.iter().map(Vec::as_slice).collect();
-            let looked_at = Images { blocks: &blocks_of, vectors: &vectors };
+            let offsets: Vec<Lanes<f32>> =
+                (0..4).map(|at| std::array::from_fn(|lane| (at * 5 + lane) as f32)).collect();
+            let looked_at = Images { blocks: &blocks_of, vectors: &vectors, offsets: &offsets };
             let mut memory = vec![Brought([K::LARGEST; LANES]); 4 * lights];
             seen.resize(4, SumsAndExtremes::NOTHING);
             summed.resize(4, <SumsAndLargest as Overview<K>>::NOTHING);
             for first in (0..blocks).step_by(4) {
                 let stretch = first..blocks.min(first + 4);
                 let count = stretch.len();
-                looked_at.look_over::<Portable, SumsAndExtremes<K>, OWN>(&stretch, &mut seen[..count], &mut memory);
-                looked_at.look_over::<Portable, SumsAndLargest, OWN>(&stretch, &mut summed[..count], &mut []);
+                looked_at.look_over::<Portable, SumsAndExtremes<K>, OFFSETS, OWN>(
+                    &stretch,
+                    &mut seen[..count],
+                    &mut memory,
+                );
+                looked_at.look_over::<Portable, SumsAndLargest, OFFSETS, OWN>(&stretch, &mut summed[..count], &mut []);
                 for (at, block) in stretch.enumerate() {
                     let keys: Vec<&Lanes<K>> = images.iter().map(|image| &image[block]).collect();
                     let brought: Vec<&Lanes<K>> = memory[at * lights..][..lights].iter().map(Borrow::borrow).collect();
                     assert_eq!(brought, keys, "{lights} lights, block {block}");
-                    let expected = bits(|at| Sums::of(&keys, &vectors, at));
+                    let expected = bits(|lane| {
+                        let offset = if OFFSETS { Portable::load(&offsets[at][lane..]) } else { Portable::splat(0.0) };
+                        let mut sums = Sums::zero();
+                        for (key, vector) in keys.iter().zip(&vectors) {
+                            sums.add(K::load::<Portable>(&key[lane..]) - offset, vector);
+                        }
+                        sums
+                    });
                     assert_eq!(bits(|lane| seen[at].sums.load(lane)), expected, "{lights} lights, block {block}");
                     assert_eq!(bits(|lane| summed[at].sums.load(lane)), expected, "{lights} lights, block {block}");
                     assert!(seen[at].sums.are_finite::<Portable>());
                     for gap in [10.0, 300.0, 900.0] {
                         let parts = |cutoffs: Cutoffs<K>| (cutoffs.largest, cutoffs.brightest, cutoffs.keep_all);
-                        let found = cutoffs_within(&keys, K::gap(gap), &seen[at].extremes);
+                        let found = cutoffs_from(&keys, K::gap(gap), &seen[at].extremes);
                         let expected = cutoffs(&keys, K::gap(gap));
                         assert_eq!(parts(found), parts(expected), "{lights} lights, gap {gap}");
                     }
@@ -273,11 +297,12 @@ mod tests {
 
     #[test]
     fn an_overview_is_what_is_found_block_by_block() {
-        check::<u8, true>(|value| (value / 256) as u8);
-        check::<u16, true>(|value| value);
-        check::<f32, true>(f32::from);
-        check::<u16, false>(|value| value);
-        check::<f32, false>(f32::from);
+        check::<u8, false, true>(|value| (value / 256) as u8);
+        check::<u16, false, true>(|value| value);
+        check::<f32, false, true>(f32::from);
+        check::<u16, false, false>(|value| value);
+        check::<f32, true, false>(f32::from);
+        check::<u8, true, true>(|value| (value / 256) as u8);
     }
 
     #[test]
@@ -289,8 +314,8 @@ mod tests {
                 let blocks: Vec<&[Lanes<f32>]> = images.iter().map(Vec::as_slice).collect();
                 let mut memory = vec![Brought([0.0; LANES]); 13];
                 let mut seen = [SumsAndExtremes::NOTHING];
-                let looked_at = Images { blocks: &blocks, vectors: &vectors(13) };
-                looked_at.look_over::<Portable, _, true>(&(0..1), &mut seen, &mut memory);
+                let looked_at = Images { blocks: &blocks, vectors: &vectors(13), offsets: &[] };
+                looked_at.look_over::<Portable, _, false, true>(&(0..1), &mut seen, &mut memory);
                 assert!(!seen[0].sums.are_finite::<Portable>(), "{bad} at light {light}, pixel {lane}");
             }
         }

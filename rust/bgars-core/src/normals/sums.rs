@@ -61,18 +61,21 @@ pub(super) struct BlockSums {
 impl BlockSums {
     pub const ZERO: Self = Self { vector: [[0.0; LANES]; 3], squares: [0.0; LANES] };
 
-    /// Adds those of some images.
+    /// Adds those of some images, of whose keys `offset` is subtracted.
     #[inline(always)]
     pub fn add<K: Pixel, V: Vector, const COUNT: usize>(
         &mut self,
         keys: &[&Lanes<K>; COUNT],
+        offset: Option<&Lanes<f32>>,
         vectors: &[[Spread; 3]; COUNT],
     ) {
         for step in 0..LANES / V::WIDTH {
             let at = step * V::WIDTH;
             let mut sums = self.load::<V>(at);
             for light in 0..COUNT {
-                sums.add(K::load::<V>(&keys[light][at..]), &vectors[light]);
+                let value = K::load::<V>(&keys[light][at..]);
+                let value = if let Some(offset) = offset { value - V::load(&offset[at..]) } else { value };
+                sums.add(value, &vectors[light]);
             }
             for axis in 0..3 {
                 sums.vector[axis].write(&mut self.vector[axis][at..]);
@@ -91,7 +94,7 @@ impl BlockSums {
         }
     }
 
-    /// False where a value is NaN or infinite, or so large that its square is.
+    /// False where a value is NaN or infinite, or so large that sums of squares are.
     #[inline(always)]
     pub fn are_finite<V: Vector>(&self) -> bool {
         let mut squares = V::splat(0.0);
