@@ -201,6 +201,7 @@ pub(super) fn run<P: Pixel>(
     }
 }
 
+/// [`run`] on many images, of whose blocks `O` is found first.
 fn run_stretches<P: Pixel, O: Overview<P>>(
     solver: &LaneSolver,
     planes: &[&[P]],
