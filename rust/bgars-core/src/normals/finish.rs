@@ -15,6 +15,9 @@ const GRAZING: f32 = 1e-5;
 /// Least `rho^2` that leaves residuals and inverses in the normal range of `f32`, and one over the largest `|rho n|^2`.
 const MIN_SQUARE: f32 = 1e-30;
 
+/// The same for their squares.
+const MIN_PLAIN_SQUARE: f32 = 1e-15;
+
 /// The square of the half-way point of the confidence, radians.
 const HALF2: f64 = (HALF_DEG * std::f64::consts::PI / 180.0) * (HALF_DEG * std::f64::consts::PI / 180.0);
 
@@ -32,10 +35,10 @@ pub(super) struct Facets<V> {
     pub square: V,
     /// `1 / rho`, and not a number where the facet faces away: nothing that is computed from it is one, and no branch is needed.
     pub inverse: V,
-    /// Sum of the squared residuals with the [prior](super::confidence::PRIOR_RESIDUAL), over `rho^2`. Or less than zero, if the
-    /// next one is, too: only their product is asked for.
-    pub variance: V,
-    /// `tr C - n^T C n`, `C` the inverse in use.
+    /// Sum of the squared residuals with the [prior](super::confidence::PRIOR_RESIDUAL). Or less than zero, if the next one is,
+    /// too: only their product is asked for.
+    pub unexplained: V,
+    /// `(tr C) |g|^2 - g^T C g`, `C` the inverse in use.
     pub turning: V,
     /// From [`freedom`].
     pub freedom: V,
@@ -91,16 +94,23 @@ impl Finished {
         block: &mut Block<'_>,
     ) {
         let zero = V::splat(0.0);
-        let Facets { scaled: [x, y, z], square, inverse, variance, turning, freedom, .. } = *facets;
+        let Facets { scaled: [x, y, z], square, inverse, mut unexplained, mut turning, freedom, .. } = *facets;
         let (z2, least) = (z * z, square * V::splat(GRAZING * GRAZING));
+        let mut unit = square;
         // What is zero is not seen from the side.
-        let is_unusual = if any_size { !V::all(is_sound(square, z2, least)) } else { V::any(least.is_over(z2)) };
+        let is_unusual =
+            if any_size { !V::all(is_sound(square, z2, least, MIN_PLAIN_SQUARE)) } else { V::any(least.is_over(z2)) };
         if is_unusual {
-            let sound = is_sound(square, z2, least);
+            let sound = is_sound(square, z2, least, MIN_SQUARE);
             let size = x.at_least(zero - x) + y.at_least(zero - y) + z.at_least(zero - z);
             let is_zero = V::bits(V::splat(LEAST).is_over(size));
             self.careful |= (all_bits::<V>() & !(V::bits(sound) | is_zero)) << at;
+            if any_size {
+                let inverse2 = inverse * inverse;
+                (unexplained, turning, unit) = (unexplained * inverse2, turning * inverse2, unit * inverse2);
+            }
         }
+        let faces = z.is_over(zero);
         let streamed = block.streamed;
         let normals = &mut block.normals[3 * at..3 * (at + V::WIDTH)];
         let [first, second, third] = V::interleaved([x * inverse, y * inverse, z * inverse]);
@@ -108,10 +118,11 @@ impl Finished {
         put(second, &mut normals[V::WIDTH..], streamed);
         put(third, &mut normals[2 * V::WIDTH..], streamed);
         put(square * inverse * V::splat(per_full_scale), &mut block.albedo[at..], streamed);
-        // See `confidence`: over themselves and the squared standard error. Not a number becomes zero.
-        let certainty = (freedom / variance.times_plus(turning, freedom)).at_least(zero);
+        // See `confidence`: over themselves and the squared standard error.
+        let freedom = freedom * unit * unit;
+        let certainty = V::pick(faces, freedom / unexplained.times_plus(turning, freedom), zero);
         put(certainty, &mut block.confidence[at..], streamed);
-        self.valid |= V::bits(z.is_over(zero)) << at;
+        self.valid |= V::bits(faces) << at;
     }
 
     /// Mask and counts of a block, and what its unused pixels say.
@@ -130,16 +141,16 @@ impl Finished {
     }
 }
 
-/// True where `f32` can be trusted: by `|g|^2`, `g_z^2` and the least that this may be; false for NaN.
+/// True where `f32` can be trusted: by `|g|^2`, `g_z^2`, the least that this may be, and the least of `|g|^2`; false for NaN.
 #[inline(always)]
-fn is_sound<V: Vector>(square: V, z2: V, least: V) -> V::Mask {
-    V::both(in_range(square), z2.is_over(least))
+fn is_sound<V: Vector>(square: V, z2: V, least: V, min_square: f32) -> V::Mask {
+    V::both(in_range(square, min_square), z2.is_over(least))
 }
 
-/// True where residuals and inverses are in the normal range of `f32`; false for NaN.
+/// True where a square is neither below the least one nor above one over it; false for NaN.
 #[inline(always)]
-fn in_range<V: Vector>(square: V) -> V::Mask {
-    V::both(square.is_over(V::splat(MIN_SQUARE)), V::splat(1.0 / MIN_SQUARE).is_over(square))
+fn in_range<V: Vector>(square: V, min: f32) -> V::Mask {
+    V::both(square.is_over(V::splat(min)), V::splat(1.0 / min).is_over(square))
 }
 
 /// Copies a block, past the caches if they say so.

@@ -15,7 +15,7 @@ use super::overview::{SumsAndExtremes, SumsAndLargest};
 use super::robust_lanes::{self, RobustLanes};
 use super::sums::Sums;
 use super::symmetric::{
-    ENTRIES, Inverse, PrincipalAxes, RayleighQuotient, dot, dot_less, form, inverse_row, outer, spread,
+    ENTRIES, Inverse, PrincipalAxes, PrincipalForm, dot, dot_less, form, inverse_row, outer, spread,
 };
 use crate::lights::conditioning;
 use crate::vector::spread::Spread;
@@ -60,9 +60,9 @@ pub(super) struct LaneSolver {
     /// `(L^T L)^-1 L^T` of all lights along these axes, a column a light.
     pub pseudo_inverse: Vec<[Spread; 3]>,
     /// Of the [prior](PRIOR_RESIDUAL) less `L^T L`: what is not explained, beside the squares of the values.
-    unexplained: RayleighQuotient,
+    unexplained: PrincipalForm,
     /// Of `(tr C) I - C`, `C = (L^T L)^-1`.
-    turning: RayleighQuotient,
+    turning: PrincipalForm,
     /// Of all lights.
     freedom: Spread,
     /// `(L^T L)^-1` of any of up to eight lights; `None` for more, and where all are kept.
@@ -88,8 +88,8 @@ impl LaneSolver {
             .chunks(BYTE_LIGHTS)
             .map(|lights| SubsetSums::new(&lights.iter().map(outer).collect::<Vec<_>>()))
             .collect();
-        let unexplained = RayleighQuotient::new(axes.values.map(|value| PRIOR_RESIDUAL * PRIOR_RESIDUAL - value));
-        let turning = RayleighQuotient::new(axes.values.map(|value| exact.trace() - 1.0 / value));
+        let unexplained = PrincipalForm::new(axes.values.map(|value| PRIOR_RESIDUAL * PRIOR_RESIDUAL - value));
+        let turning = PrincipalForm::new(axes.values.map(|value| exact.trace() - 1.0 / value));
         let freedom = Spread::new(freedom(directions.len()));
         Some(Self {
             choice,
@@ -274,16 +274,14 @@ fn solve_all<V: Vector>(solver: &LaneSolver, sums: Sums<V>) -> Facets<V> {
     // First what is waited for longest.
     let square = (x2 + y2) + z2;
     let scaled = solver.axes.back(along);
-    let inverse = inverse_length(square, scaled);
-    let inverse2 = inverse * inverse;
     Facets {
         scaled,
         values_square: squares,
         square,
-        inverse,
+        inverse: inverse_length(square, scaled),
         // |I|^2 - |L g|^2; what rounding leaves is far below the prior of 2 %.
-        variance: solver.unexplained.and(squares, [y2, z2], inverse2),
-        turning: solver.turning.and(V::splat(0.0), [y2, z2], inverse2),
+        unexplained: solver.unexplained.and(squares, [x2, y2, z2]),
+        turning: solver.turning.of([x2, y2, z2]),
         freedom: V::repeated(&solver.freedom),
     }
 }
@@ -346,17 +344,15 @@ fn solve_kept<K: Pixel, V: Vector>(
         }
     }
     let square = dot(scaled, scaled);
-    let inverse_length = inverse_length(square, scaled);
-    let inverse2 = inverse_length * inverse_length;
     let trace = inverse.entries[0] + inverse.entries[3] + inverse.entries[5];
     let facets = Facets {
         scaled,
         values_square: sums.squares,
         square,
-        inverse: inverse_length,
+        inverse: inverse_length(square, scaled),
         // Both with the other sign, which takes fewer subtractions.
-        variance: excess.times_minus(inverse2, V::splat((PRIOR_RESIDUAL * PRIOR_RESIDUAL) as f32)),
-        turning: form(inverse.entries, scaled).times_minus(inverse2, trace),
+        unexplained: square.times_plus(V::splat(-(PRIOR_RESIDUAL * PRIOR_RESIDUAL) as f32), excess),
+        turning: form(inverse.entries, scaled) - trace * square,
         freedom: inverse.freedom,
     };
     (facets, unusable)

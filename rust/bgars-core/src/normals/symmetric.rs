@@ -73,27 +73,27 @@ impl PrincipalAxes {
     }
 }
 
-/// `v^T A v / |v|^2` by the squares of `v` along the principal axes of `A`.
+/// `v^T A v` by the squares of `v` along the principal axes of `A`.
 #[derive(Debug)]
-pub(super) struct RayleighQuotient {
-    /// What `A` is along the first axis.
-    first: Spread,
-    /// By how much it is more along the others.
-    others: [Spread; 2],
-}
+pub(super) struct PrincipalForm([Spread; 3]);
 
-impl RayleighQuotient {
+impl PrincipalForm {
     /// Of what `A` is along the axes.
-    pub fn new([x, y, z]: [f64; 3]) -> Self {
-        Self { first: Spread::new(x as f32), others: [y - x, z - x].map(|more| Spread::new(more as f32)) }
+    pub fn new(values: [f64; 3]) -> Self {
+        Self(values.map(|value| Spread::new(value as f32)))
     }
 
-    /// The quotient, and `more / |v|^2`; of the squares along the other axes and `1 / |v|^2`.
+    /// The form.
     #[inline(always)]
-    pub fn and<V: Vector>(&self, more: V, [y2, z2]: [V; 2], inverse2: V) -> V {
-        let [y, z] = &self.others;
-        let beside = z2.times_plus(V::repeated(z), y2.times_plus(V::repeated(y), more));
-        beside.times_plus(inverse2, V::repeated(&self.first))
+    pub fn of<V: Vector>(&self, squares: [V; 3]) -> V {
+        dot(spread(&self.0), squares)
+    }
+
+    /// The form and `more`.
+    #[inline(always)]
+    pub fn and<V: Vector>(&self, more: V, [x2, y2, z2]: [V; 3]) -> V {
+        let [x, y, z] = &self.0;
+        z2.times_plus(V::repeated(z), y2.times_plus(V::repeated(y), x2.times_plus(V::repeated(x), more)))
     }
 }
 
@@ -199,15 +199,15 @@ mod tests {
             let inverses = axes.values.map(f64::recip);
             approx::assert_relative_eq!(of_squares(inverses), vector.dot(&(inverse * vector)), epsilon = 1e-12);
             let back = axes.back([along.x, along.y, along.z].map(|component| Portable::splat(component as f32)));
-            let quotient = |values: [f64; 3], more: f32| {
-                let [inverse2, y2, z2] = [1.0 / along.norm_squared(), along.y * along.y, along.z * along.z]
-                    .map(|value| Portable::splat(value as f32));
-                let mut numbers = [0.0; Portable::WIDTH];
-                RayleighQuotient::new(values).and(Portable::splat(more), [y2, z2], inverse2).write(&mut numbers);
-                f64::from(numbers[0]) * along.norm_squared()
-            };
-            approx::assert_relative_eq!(quotient(axes.values, 0.0), of_squares(axes.values), epsilon = 1e-5);
-            approx::assert_relative_eq!(quotient(inverses, 2.5), of_squares(inverses) + 2.5, epsilon = 1e-5);
+            let squares = [along.x, along.y, along.z].map(|value| Portable::splat((value * value) as f32));
+            for values in [axes.values, inverses] {
+                let form = PrincipalForm::new(values);
+                for (found, more) in [(form.of(squares), 0.0), (form.and(Portable::splat(2.5), squares), 2.5)] {
+                    let mut numbers = [0.0; Portable::WIDTH];
+                    found.write(&mut numbers);
+                    approx::assert_relative_eq!(f64::from(numbers[0]), of_squares(values) + more, epsilon = 1e-5);
+                }
+            }
             for (found, expected) in back.into_iter().zip(&vector) {
                 let mut numbers = [0.0; Portable::WIDTH];
                 found.write(&mut numbers);
