@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import gc
+import subprocess
+import sys
 
 import bgars
 import numpy as np
 import pytest
 from bgars import large_arrays
-from bgars.large_arrays import LARGE_BYTES, MIN_BYTES, any_content
+from bgars.large_arrays import HELD_BYTES, KEPT_ARRAYS, LARGE_BYTES, MIN_BYTES, any_content
 
 of_both_kinds = pytest.mark.parametrize("shape", [(MIN_BYTES // 4, 3), (LARGE_BYTES // 4, 3)])
 
 
 @pytest.fixture(autouse=True)
 def no_pages_kept() -> None:
-    large_arrays._free.clear()
+    large_arrays._held.clear()
+    large_arrays._lent.clear()
 
 
 @of_both_kinds
@@ -63,9 +66,27 @@ def test_a_view_keeps_its_pages(shape: tuple[int, int]) -> None:
 
 
 def test_no_more_pages_are_kept_than_promised() -> None:
-    arrays = [any_content((MIN_BYTES,), np.uint8) for _ in range(large_arrays.KEPT_ARRAYS + 5)]
+    arrays = [any_content((MIN_BYTES,), np.uint8) for _ in range(KEPT_ARRAYS + 5)]
     del arrays
-    assert len(large_arrays._free) == large_arrays.KEPT_ARRAYS
+    assert len(large_arrays._held) == KEPT_ARRAYS
+    assert not large_arrays._lent
+
+
+def test_pages_that_waited_longest_are_lent_to_the_system_and_used_again() -> None:
+    arrays = [any_content((HELD_BYTES // 2,), np.uint8) for _ in range(3)]
+    places = [array.ctypes.data for array in arrays]
+    while arrays:
+        del arrays[0]  # the first one first
+    assert [pages.address for pages in large_arrays._lent] == places[:1]
+    assert [pages.address for pages in large_arrays._held] == places[1:]
+    again = [any_content((HELD_BYTES // 2,), np.uint8) for _ in range(3)]
+    assert [array.ctypes.data for array in again] == [*places[1:], places[0]]
+
+
+def test_arrays_held_to_the_end_of_the_process_say_nothing() -> None:
+    code = "from bgars.large_arrays import any_content as a; kept = [a((1 << 21,), 'u1'), a((1 << 17,), bool)]"
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ended.stderr == ""
 
 
 def test_small_arrays_are_zeros_of_numpy() -> None:

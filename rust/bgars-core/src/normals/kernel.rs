@@ -208,7 +208,7 @@ impl<'a, P: Pixel> Kernel<'a, P> {
 
     /// The result as tasks, by their first pixel.
     pub fn tasks<'o>(&self, out: Out<'o>) -> Vec<(usize, Out<'o>)> {
-        let task_pixels = task_pixels(self.stack.pixels().min(self.band_pixels()));
+        let task_pixels = task_pixels(self.stack.pixels().min(self.band_pixels()), self.stack.lights());
         (0..).step_by(task_pixels).zip(out.split(task_pixels)).collect()
     }
 

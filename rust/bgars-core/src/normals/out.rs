@@ -4,18 +4,26 @@ use std::ops::Range;
 
 use super::NormalMapMut;
 use super::cutoff::{LANES, Lanes};
+use super::lane_solve::BYTE_LIGHTS;
 use crate::stream;
 
-/// Fewest and most pixels of one task: to begin one, and to wait for what it streamed, costs as long as 200 pixels.
-const TASK_PIXELS: [usize; 2] = [1 << 13, 1 << 16];
+/// Fewest pixels of one task.
+const MIN_TASK_PIXELS: usize = 1 << 13;
 
-/// Tasks for each thread: all are to end together.
+/// Most pixels of one task of up to eight lights, and of more: to begin one, to fetch its first pixels, and to wait for what it
+/// streamed, costs as long as a thousand pixels of eight lights.
+const MAX_TASK_PIXELS: [usize; 2] = [1 << 18, 1 << 16];
+
+/// Tasks for each of several threads: all are to end together.
 const TASKS: usize = 32;
 
 /// Pixels of one task of so many, whole blocks. What comes out is the same for any number.
-pub(super) fn task_pixels(pixels: usize) -> usize {
-    let [least, most] = TASK_PIXELS;
-    (pixels / (TASKS * rayon::current_num_threads())).clamp(least, most).next_multiple_of(LANES)
+pub(super) fn task_pixels(pixels: usize, lights: usize) -> usize {
+    let [of_few, of_many] = MAX_TASK_PIXELS;
+    let most = if lights <= BYTE_LIGHTS { of_few } else { of_many };
+    let threads = rayon::current_num_threads();
+    let tasks = if threads == 1 { 1 } else { TASKS * threads };
+    (pixels / tasks).clamp(MIN_TASK_PIXELS, most).next_multiple_of(LANES)
 }
 
 /// What a task writes: the pixels from its first one on.
