@@ -118,10 +118,10 @@ impl Finished {
         put(second, &mut normals[V::WIDTH..], streamed);
         put(third, &mut normals[2 * V::WIDTH..], streamed);
         put(square * inverse * V::splat(per_full_scale), &mut block.albedo[at..], streamed);
-        // See `confidence`: over themselves and the squared standard error.
+        // See `confidence`: over themselves and the squared standard error, which rounding could make less than zero.
         let freedom = freedom * unit * unit;
-        let certainty = V::pick(faces, freedom / unexplained.times_plus(turning, freedom), zero);
-        put(certainty, &mut block.confidence[at..], streamed);
+        let certainty = (freedom / unexplained.times_plus(turning, freedom)).at_least(zero);
+        put(V::pick(faces, certainty, zero), &mut block.confidence[at..], streamed);
         self.valid |= V::bits(faces) << at;
     }
 
