@@ -66,6 +66,7 @@ def test_the_unit_of_float_images_does_not_matter(method: bgars.normals.Method) 
         found = bgars.estimate_normals(scaled, rig.directions, method=method, saturation=2.0 * scale)
         np.testing.assert_array_equal(found.mask, expected.mask)
         np.testing.assert_allclose(found.normals, expected.normals, atol=2e-5)
+        assert np.isfinite(found.confidence).all()
         np.testing.assert_allclose(found.confidence, expected.confidence, atol=5e-3)
     images[:, 3, 3] *= np.float32(1e-25)  # one such pixel among others
     one = bgars.estimate_normals(images, rig.directions, method="lambertian", saturation=2.0)

@@ -28,6 +28,7 @@ pub mod vertex_normals;
 
 pub use error::{Error, Result};
 pub use lights::Lights;
+pub use memory::give_back_by;
 pub use pixel::Pixel;
 pub use radiometry::Radiometry;
 pub use stack::ImageStack;

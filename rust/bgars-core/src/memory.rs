@@ -5,7 +5,7 @@
 
 use std::ops::{Deref, DerefMut};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 use rayon::prelude::*;
 
@@ -27,6 +27,23 @@ pub(crate) struct Aligned<T: Reused> {
     len: usize,
     /// [`ERA`] at its beginning.
     era: usize,
+}
+
+/// What gives the allocator's free pages back to the system.
+static GIVE_BACK: OnceLock<fn()> = OnceLock::new();
+
+/// Has `give_back` called, once a large graph is set up, to give the allocator's free pages back to the system: the solve needs
+/// others at once, and an allocator that keeps them would hold both. Without it, or with what was set first, all is as before.
+pub fn give_back_by(give_back: fn()) {
+    // Who was first stays.
+    let _ = GIVE_BACK.set(give_back);
+}
+
+/// Gives them back, if the program has said how.
+pub(crate) fn give_back_free_pages() {
+    if let Some(give_back) = GIVE_BACK.get() {
+        give_back();
+    }
 }
 
 /// How often everything was forgotten.

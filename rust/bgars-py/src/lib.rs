@@ -74,6 +74,7 @@ mod _bgars {
     #[allow(clippy::unnecessary_wraps)]
     fn set_up(_module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
         crate::allocator::keep_free_pages();
+        bgars_core::give_back_by(crate::allocator::give_free_pages_back);
         Ok(())
     }
 }

@@ -107,6 +107,11 @@ impl Weights {
         weights
     }
 
+    /// Gives them up, and their pages to the system at once.
+    pub fn release(self) {
+        self.sides.into_iter().for_each(Aligned::release);
+    }
+
     /// Weights from one red to the one below.
     #[inline(always)]
     pub fn stride(&self) -> usize {

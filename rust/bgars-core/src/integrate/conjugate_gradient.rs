@@ -16,6 +16,9 @@ use crate::{Error, Result};
 /// A graph of more than one node for so many reds needs much of the memory, and much more time than to make the right side again.
 const LARGE_GRAPH: usize = 16;
 
+/// A graph of more nodes takes so long that the next call may find its pages anew.
+const LONG_GRAPH: usize = 1 << 18;
+
 /// What [`conjugate_gradients`] found.
 pub(super) struct Solution {
     pub reds: Aligned<f64>,
@@ -25,6 +28,8 @@ pub(super) struct Solution {
     pub residual: f64,
     /// False where the iterations did not suffice, or rounding left nothing of one; the rest is then what they came to.
     pub solved: bool,
+    /// True where a large graph was needed, whose memory the allocator may keep for a while.
+    pub had_large_graph: bool,
 }
 
 /// Solves for the reds of `weights`, which have the edges of `bits`, from `start` or from zero, until the norm of what the
@@ -53,15 +58,26 @@ pub(super) fn conjugate_gradients(
     if norm <= target {
         let residual = if norm > 0.0 { norm / scale } else { 0.0 };
         settle(weights, &right, Some(x.end(weights, [&[], &[]])), Some(&mut q), None);
-        return Ok(Solution { reds: x.into_solution(), blacks: q, iterations, residual, solved });
+        return Ok(Solution {
+            reds: x.into_solution(),
+            blacks: q,
+            iterations,
+            residual,
+            solved,
+            had_large_graph: false,
+        });
     }
-    let mut is_large = false;
+    let (mut is_large, mut takes_long) = (false, false);
     let preconditioner = Multigrid::new(weights, bits, |unknowns| {
         is_large = unknowns > size / LARGE_GRAPH;
+        takes_long = unknowns > LONG_GRAPH;
         if is_large {
             right.release();
         }
     });
+    if takes_long {
+        memory::give_back_free_pages();
+    }
     let mut vectors = preconditioner.vectors();
     // A direction may be any; what x and r take along it agrees in `f64`.
     let [mut p, mut previous] = [Aligned::<f32>::any(size), Aligned::any(size)];
@@ -99,7 +115,8 @@ pub(super) fn conjugate_gradients(
             if is_large {
                 [p, previous].into_iter().for_each(Aligned::release);
             }
-            return Ok(Solution { reds: x.into_solution(), blacks: q, iterations, residual: norm / scale, solved });
+            let (reds, blacks, residual) = (x.into_solution(), q, norm / scale);
+            return Ok(Solution { reds, blacks, iterations, residual, solved, had_large_graph: is_large });
         }
         settle(weights, &right, Some(x.end(weights, [&[], &[]])), None, Some(&mut r));
     }

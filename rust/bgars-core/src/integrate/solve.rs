@@ -110,12 +110,17 @@ pub fn integrate_into(
     let bits = fill_corners(&mut weights);
     let again = |rows: Range<usize>, colours: [&mut [f64]; 2]| edges.right_side(rows, colours);
     let scale = right.norm;
-    let Solution { reds, blacks, iterations, residual, solved } =
+    let half = weights.grid.half();
+    let Solution { reds, blacks, iterations, residual, solved, had_large_graph } =
         conjugate_gradients(&weights, bits, Right::Kept(right, Some(&again)), None, scale, params, on_progress)?;
     if !solved {
         return Err(Error::NoConvergence { iterations, residual, tolerance: params.relative_tolerance });
     }
-    let (half, runs) = (weights.grid.half(), Runs::new(mask, field.regions, width));
+    if had_large_graph {
+        // What is written now would come on top of it.
+        weights.release();
+    }
+    let runs = Runs::new(mask, field.regions, width);
     let fill = |row: usize, values: &mut [f64]| {
         let span = row * half..(row + 1) * half;
         join_whole_row(row, &reds[span.clone()], &blacks[span], values);
