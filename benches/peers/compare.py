@@ -62,8 +62,8 @@ def _integrate(*, quick: bool) -> list[Task]:
         found += [Task("integrate", "integrate.py", ("dct", str(side)), threads) for side in _sides(1024, largest)]
     found += [Task("integrate", "integrate.py", ("cg", str(side))) for side in _sides(512, 512 if quick else 1024)]
     found += [Task("integrate", "integrate.py", ("amg", str(side))) for side in _sides(512, 512 if quick else 2048)]
-    for shape in MASKS:
-        found.append(Task("integrate", "memory.py", (shape, str(1024 if quick else 4096)), 2))
+    for side in (512, largest):
+        found += [Task("integrate", "memory.py", (shape, str(side)), 2) for shape in MASKS]
     for shape in ("rectangle", "disc with holes"):
         # The script itself runs bgars in two processes, on one thread and on two.
         sides = _sides(512, 2048 if quick else 8192)

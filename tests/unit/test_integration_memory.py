@@ -11,6 +11,9 @@ import pytest
 
 LIMIT_BYTES = 60.0
 SIDE_PX = 2048
+SMALL_SIDE_PX = 512
+"""What is there once, or with every thread, counts most."""
+LARGE_PAGES = Path("/sys/kernel/mm/transparent_hugepage/enabled")
 
 PROGRAM = """
 import sys
@@ -94,9 +97,15 @@ def _can_measure() -> bool:
 
 
 @pytest.mark.skipif(not _can_measure(), reason="the most that was resident is known on Linux alone")
-@pytest.mark.parametrize("shape", ["rectangle", "dense slits", "many holes", "serpentine"])
-def test_an_integration_needs_at_most_sixty_bytes_a_pixel(shape: str) -> None:
-    command = [sys.executable, "-c", PROGRAM, shape, str(SIDE_PX)]
+@pytest.mark.parametrize(
+    ("shape", "side_px"),
+    [(shape, SIDE_PX) for shape in ("rectangle", "dense slits", "many holes", "serpentine")]
+    + [(shape, SMALL_SIDE_PX) for shape in ("rectangle", "dense slits", "serpentine")],
+)
+def test_an_integration_needs_at_most_sixty_bytes_a_pixel(shape: str, side_px: int) -> None:
+    if side_px == SMALL_SIDE_PX and "[always]" in (LARGE_PAGES.read_text() if LARGE_PAGES.exists() else ""):
+        pytest.skip("the system puts large pages under small arrays, asked or not")
+    command = [sys.executable, "-c", PROGRAM, shape, str(side_px)]
     done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=120)
     # The solution alone takes eight: less would mean that nothing was measured.
     assert 8.0 < float(done.stdout) <= LIMIT_BYTES

@@ -261,8 +261,8 @@ fn lend_pages<T: bytemuck::Zeroable>(memory: &mut [T]) -> bool {
 
 /// Asks for large pages under memory that has not been touched yet.
 pub(crate) fn prefer_large_pages<T>(memory: &mut [T]) {
-    /// Smallest array for which it pays, in bytes.
-    const MIN_BYTES: usize = 4 << 20;
+    /// Smallest array for which it pays, in bytes: that of a large page.
+    const MIN_BYTES: usize = 2 << 20;
     if size_of_val(memory) >= MIN_BYTES {
         #[cfg(target_os = "linux")]
         advise(memory, libc::MADV_HUGEPAGE);
