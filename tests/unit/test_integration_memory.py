@@ -81,8 +81,10 @@ mask = np.random.default_rng(0).random(normals.shape[:2]) > 0.001
 first = faults()
 quiet_calls = 0
 # Beside other work many a call takes pages that none before it took.
-while quiet_calls < 5:
+for _ in range(1000):
     quiet_calls = quiet_calls + 1 if faults() < 10 else 0
+    if quiet_calls == 5:
+        break
 later = 0
 for _ in range(3):
     time.sleep(1.2)
