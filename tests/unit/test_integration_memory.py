@@ -117,6 +117,7 @@ def test_an_integration_needs_at_most_sixty_bytes_a_pixel(shape: str, side_px: i
     assert 8.0 < float(done.stdout) <= LIMIT_BYTES
 
 
+@pytest.mark.alone
 @pytest.mark.skipif(sys.platform != "linux", reason="page faults are counted on Linux alone")
 def test_pages_wait_for_the_next_part() -> None:
     environment = {name: value for name, value in os.environ.items() if not name.startswith("MIMALLOC_")}

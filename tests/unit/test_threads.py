@@ -145,14 +145,16 @@ def placed_by(call, seen):
 def facing(size):
     return np.broadcast_to(np.float32([0, 0, 1]), (size, size, 3))
 
+def placed_quietly(seen):
+    for _ in range(100):  # another process may want the processors just now
+        placed = placed_by(lambda: bgars.integrate_normals(facing(16)), seen)
+        if len(set(map(tuple, placed))) > 1:
+            break
+        time.sleep(0.1)
+    return placed
+
 allowed, seen = sorted(os.sched_getaffinity(0)), places()
-tried = 0
-while True:  # another process may want the processors just now
-    quiet = placed_by(lambda: bgars.integrate_normals(facing(16)), seen)
-    if len(set(map(tuple, quiet))) > 1 or tried == 100:
-        break
-    tried += 1
-    time.sleep(0.1)
+quiet = placed_quietly(seen)
 for task in places():  # as taskset -a does
     os.sched_setaffinity(task, quiet[0])
 placed = placed_by(lambda: bgars.integrate_normals(facing(1500)), seen)
@@ -161,13 +163,19 @@ for task in places():
 busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2 * len(allowed))]
 try:
     crowded = placed_by(lambda: bgars.integrate_normals(facing(1500)), seen)
+    for process in busy[1:]:
+        process.kill()
+    time.sleep(1.5)  # however long it has been busy
+    short = placed_by(lambda: bgars.integrate_normals(facing(16)), seen)
 finally:
     for process in busy:
         process.kill()
-print(json.dumps([quiet, placed, crowded, allowed]))
+        process.wait()
+print(json.dumps([quiet, placed, crowded, short, placed_quietly(seen), allowed]))
 """
 
 
+@pytest.mark.alone
 @pytest.mark.skipif(
     sys.platform != "linux" or len(os.sched_getaffinity(0)) < 2, reason="needs Linux and two processors"
 )
@@ -179,10 +187,14 @@ def test_threads_keep_to_processors_of_their_own_until_others_want_them() -> Non
         check=True,
         env={name: value for name, value in os.environ.items() if name != "RAYON_NUM_THREADS"},
     )
-    quiet, placed, crowded, allowed = json.loads(run.stdout)
-    assert sorted(place for places in quiet for place in places) == allowed, "each processor is one thread's"
+    quiet, placed, crowded, short, quiet_again, allowed = json.loads(run.stdout)
+    assert sorted(place for places in quiet for place in places) == allowed, (
+        "each processor is one thread's, where nothing else runs"
+    )
     assert placed == [quiet[0]] * len(quiet), "where somebody else has put them, they stay"
     assert crowded == [allowed] * len(quiet)
+    assert short == [allowed] * len(quiet), "not even for a short call, which nobody would look at"
+    assert quiet_again == quiet
 
 
 @pytest.mark.parametrize("threads", [0, -1, 1 << 40])

@@ -2,17 +2,13 @@
 //!
 //! The kernel of a virtual machine may take processors that rest for some that its host has lent to others. Threads that wake
 //! up are put on one processor together then, and share it for a hundredth of a second: longer than most calls. So each is
-//! kept to processors of its own, until somebody else wants these too: a thread that waits for its turn on a processor
-//! holds up the others at every step.
+//! kept to processors of its own, but for as long as somebody else wants these too: a thread that waits for its turn on a
+//! processor holds up the others at every step, and gives the turn away whenever it looks for work.
 
 use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
 use std::{fs, process};
 
 use rustix::thread::{CpuSet, Pid, gettid, sched_getaffinity, sched_setaffinity};
-
-/// How long the threads run wherever they may after others have wanted their processors.
-const FREE: Duration = Duration::from_secs(1);
 
 /// Where the threads of a pool run.
 #[derive(Default)]
@@ -25,10 +21,10 @@ struct State {
     process: Option<u32>,
     /// Among how many the processors are shared out; `None` while every thread runs wherever it may.
     shares: Option<usize>,
+    /// How many of them the current call works on.
+    count: usize,
     /// Whether the last look saw others that want the processors.
     seen_crowded: bool,
-    /// When the threads were last let go for that.
-    crowded: Option<Instant>,
 }
 
 struct Thread {
@@ -52,27 +48,25 @@ impl Places {
         });
     }
 
-    /// Keeps each of `count` threads to its share of the processors, unless others want these.
-    pub fn part(&self, count: usize) {
+    /// Begins a call on `count` threads, and keeps each to its share of the processors if nobody else wants these.
+    pub fn begin(&self, count: usize) {
         self.with(|state| {
-            let crowded = state.crowded.is_some_and(|seen| seen.elapsed() < FREE);
-            state.seen_crowded = false;
-            let apart = !crowded && (2..=allowed().count() as usize).contains(&count);
-            state.place(apart.then_some(count));
+            state.count = count;
+            // Whoever called may not have had the time yet to lie down: that others run says nothing now.
+            if state.shares != Some(count) && state.has_room() {
+                state.place(Some(count));
+            }
         });
     }
 
-    /// Lets the threads run wherever they may if others want their processors; to be called now and then while they work.
+    /// Keeps the threads to their shares if nobody else wants the processors, and lets them run wherever they may if others go
+    /// on wanting these; to be called now and then while they work.
     pub fn look(&self) {
-        if self.with(|state| state.shares.is_none()) {
-            return;
-        }
-        // This thread, that runs only to look, is one of those that want one. Not to know is to be careful.
-        let crowded = running().is_none_or(|running| running > allowed().count() as usize + 1);
         self.with(|state| {
-            // Once is nothing: whoever called may not have had the time yet to lie down.
-            if crowded && state.seen_crowded {
-                state.crowded = Some(Instant::now());
+            let crowded = !state.has_room();
+            if !crowded {
+                state.place(Some(state.count));
+            } else if state.seen_crowded {
                 state.place(None);
             }
             state.seen_crowded = crowded;
@@ -90,6 +84,18 @@ impl Places {
 }
 
 impl State {
+    /// Whether there is a processor for each thread beside what others have running; not to know is to be careful.
+    fn has_room(&self) -> bool {
+        let processors = allowed().count() as usize;
+        (2..=processors).contains(&self.count)
+            && running().is_some_and(|running| {
+                // Neither the calling thread, that runs to look, nor those of the pool are others.
+                let others = running.saturating_sub(1);
+                let room = processors - self.count;
+                others <= room || others <= room + self.threads.iter().filter(|thread| thread.runs()).count()
+            })
+    }
+
     fn place(&mut self, shares: Option<usize>) {
         if self.shares == shares || self.process.is_some_and(|owner| owner != process::id()) {
             return;
@@ -118,6 +124,13 @@ impl Thread {
             let share = share(&allowed, self.index, shares);
             self.kept = sched_setaffinity(Some(self.id), &share).is_ok().then_some([share, allowed]);
         }
+    }
+
+    /// Whether it runs, or wants to.
+    fn runs(&self) -> bool {
+        // "11206 (name) R 1 ...", and a name may hold brackets.
+        fs::read_to_string(format!("/proc/self/task/{}/stat", self.id))
+            .is_ok_and(|line| line.rsplit_once(") ").is_some_and(|(_, rest)| rest.starts_with('R')))
     }
 
     fn is_where_kept(&self) -> bool {

@@ -10,7 +10,7 @@ impl Places {
     pub fn enter(&self, _index: usize) {}
 
     /// Nothing, here.
-    pub fn part(&self, _count: usize) {}
+    pub fn begin(&self, _count: usize) {}
 
     /// Nothing, here.
     pub fn look(&self) {}

@@ -50,14 +50,14 @@ impl Pool {
     /// Runs `op` on this thread, and what it spawns on threads of the pool, each on processors of its own unless others want these.
     pub fn in_scope<'scope>(&self, op: impl FnOnce(&Scope<'scope>) + 'scope) {
         let count = self.own.as_ref().map_or_else(rayon::current_num_threads, ThreadPool::current_num_threads);
-        self.places.part(count);
+        self.places.begin(count);
         match &self.own {
             Some(pool) => pool.in_place_scope(op),
             None => rayon::in_place_scope(op),
         }
     }
 
-    /// Lets the threads run wherever they may if others want their processors; to be called now and then during a call.
+    /// Looks where the threads are to run, as long as a call is short; to be called now and then.
     pub fn look(&self) {
         self.places.look();
     }
