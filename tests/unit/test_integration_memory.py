@@ -78,13 +78,7 @@ y, x = np.indices((512, 512), dtype=np.float32) / 25
 normals = np.stack([0.3 * np.sin(x) * np.cos(y), 0.3 * np.cos(x + y), np.zeros_like(x)], axis=-1)
 normals[..., 2] = np.sqrt(1 - np.square(normals).sum(axis=-1))
 mask = np.random.default_rng(0).random(normals.shape[:2]) > 0.001
-first = faults()
-quiet_calls = 0
-# Beside other work many a call takes pages that none before it took.
-for _ in range(1000):
-    quiet_calls = quiet_calls + 1 if faults() < 10 else 0
-    if quiet_calls == 5:
-        break
+first, *_ = (faults() for _ in range(4))
 later = 0
 for _ in range(3):
     time.sleep(1.2)

@@ -2,7 +2,7 @@
 //!
 //! The kernel of a virtual machine may take processors that rest for some that its host has lent to others. Threads that wake
 //! up are put on one processor together then, and share it for a hundredth of a second: longer than most calls. So each is
-//! kept to processors of its own, but for as long as somebody else wants these too: a thread that waits for its turn on a
+//! kept to processors of its own, except while somebody else wants these too: a thread that waits for its turn on a
 //! processor holds up the others at every step, and gives the turn away whenever it looks for work.
 
 use std::sync::{Mutex, PoisonError};
