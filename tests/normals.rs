@@ -3,8 +3,8 @@
 
 use std::ops::ControlFlow;
 
-use bgars_core::normals::{Method, NormalMap, RobustParams, estimate};
-use bgars_core::{Error, ImageStack, Lights, Pixel, Radiometry};
+use bgars_core::normals::{Method, NormalMap, NormalMapMut, RobustParams, estimate, estimate_into};
+use bgars_core::{Error, ImageStack, Lights, Pixel, Radiometry, blind};
 use bgars_suite::stacks::{estimate_row, tilted_ring};
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
@@ -310,6 +310,39 @@ fn a_black_pixel_and_a_coplanar_kept_set_have_no_normal() {
         assert!(map.normals.iter().all(|value| value.is_nan()));
         assert_eq!(map.lights_kept, [kept; PIXELS]);
     }
+}
+
+/// The arrays of a map but for what is measured.
+fn without_measured(map: &mut NormalMap) -> NormalMapMut<'_> {
+    NormalMapMut { measured: &mut [], ..map.as_mut() }
+}
+
+#[test]
+fn what_is_measured_may_be_left_out() {
+    let lights = Lights::directional(&tilted_ring(8, 45.0)).unwrap();
+    let proceed = &mut |_| ControlFlow::Continue(());
+    let radiometry = Radiometry::linear(8, 255.0);
+    // Whole blocks, some pixels behind these, highlights, and black ones that have no normal.
+    let pixels = 3 * 64 + 5;
+    let value = |place: usize| if place % pixels == 70 { 0 } else { 40 + (place * 37 % 151) as u8 };
+    let images: Vec<u8> = (0..8 * pixels).map(value).collect();
+    let stack = ImageStack::new(&images, 8, 1, pixels).unwrap();
+    let used: Vec<bool> = (0..pixels).map(|pixel| pixel % 7 != 3).collect();
+    for method in [Method::Lambertian, Method::SpecularFilter { threshold: 50.0 }] {
+        for mask in [None, Some(&used[..])] {
+            let whole = estimate(&stack, &lights, &radiometry, mask, method, false, proceed).unwrap();
+            assert_eq!(whole.measured, whole.mask);
+            assert!(whole.mask.contains(&true) && !whole.mask[70]);
+            let mut map = NormalMap::zeros(pixels, 0);
+            estimate_into(&stack, &lights, &radiometry, mask, method, proceed, without_measured(&mut map)).unwrap();
+            assert_eq!(map.mask, whole.mask);
+            assert_eq!(map.lights_kept, whole.lights_kept);
+            assert_eq!(map.measured, vec![false; pixels], "nobody wrote to it");
+        }
+    }
+    let mut map = NormalMap::zeros(pixels, 0);
+    let found = blind::estimate_into(&stack, &lights, &radiometry, None, proceed, without_measured(&mut map));
+    assert!(matches!(found, Err(Error::LengthMismatch { argument: "measured", actual: 0, .. })), "{found:?}");
 }
 
 #[test]

@@ -20,7 +20,7 @@ from timing import alternate, median_seconds
 NORMAL_WRITTEN_BYTES = {
     "normal written": 12,
     "albedo written": 4,
-    "mask, measured, confidence, number of lights written": 1 + 1 + 4 + 2,
+    "mask, confidence, number of lights written": 1 + 4 + 2,
 }
 NORMAL_BYTES = {"8 values read": 8, **NORMAL_WRITTEN_BYTES}
 NORMAL_OPERATIONS = {

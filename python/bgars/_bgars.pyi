@@ -11,6 +11,7 @@ from bgars.balls.rim_pixels import RimPixels
 from bgars.inspection.shadow_edges import EdgeSettings
 from bgars.inspection.shadow_map import Casters
 from bgars.kernel_capture import KernelCapture
+from bgars.kernel_outputs import KernelOutputs
 from bgars.material_records import SurfaceMaterial
 from bgars.records import NormalField
 
@@ -81,7 +82,7 @@ def estimate_normals(
     threshold: float,
     threads: int | None,
     progress: Callable[[float], object] | None,
-    out: NormalField,
+    out: KernelOutputs,
 ) -> str | None: ...
 def estimate_reflectance(
     capture: KernelCapture,

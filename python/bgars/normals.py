@@ -151,6 +151,8 @@ def estimate_normals(
         name: PixelwiseMethod,
         share: tuple[float, float] = (0.0, 1.0),
         pixels: NDArray[np.bool_] | None = use,
+        *,
+        fills: bool = False,
     ) -> NormalField:
         return pixelwise_normals(
             capture,
@@ -159,6 +161,7 @@ def estimate_normals(
             threshold=DEFAULT_THRESHOLD if threshold is None else threshold,
             keep_sets=keep_sets,
             out=out,
+            fills=fills,
             threads=threads,
             progress=part(*share),
         )
@@ -177,7 +180,7 @@ def estimate_normals(
         return _because(pixelwise(fallback, (0.3, 1.0)), f"no balls {given} to fit a material on, and none given")
     free = _free_pixels(found, capture.mask.shape) if len(circles_px) else np.ones(capture.mask.shape, np.bool_)
     field = add_reflectance(
-        pixelwise("robust-filter", (0.3, 0.5), _outside(circles_px, use, capture.mask.shape)),
+        pixelwise("robust-filter", (0.3, 0.5), _outside(circles_px, use, capture.mask.shape), fills=True),
         capture,
         circles_px,
         mask=use,

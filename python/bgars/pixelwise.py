@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from bgars import _bgars
 from bgars.errors import InputError
 from bgars.kernel_capture import kernel_capture
-from bgars.large_arrays import any_content
+from bgars.kernel_outputs import fresh_outputs, measured_by, outputs_of
 from bgars.records import Capture, NormalField, every_pixel, float_full_scale, integer_full_scale
 from bgars.rig import LightRig
 
@@ -43,14 +42,22 @@ def pixelwise_normals(
     threshold: float = DEFAULT_THRESHOLD,
     keep_sets: bool = False,
     out: NormalField | None = None,
+    fills: bool = False,
     threads: int | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> NormalField:
     """Estimate every pixel by one of the methods that need no balls; arguments as of :func:`bgars.estimate_normals`.
 
-    `mask` comes from :func:`combined_mask`.
+    `mask` comes from :func:`combined_mask`; `fills` says that somebody will fill in normals that are not measured.
     """
-    field = _result(capture, method, keep_sets, out)
+    lights, *shape = capture.images.shape
+    size = (shape[0], shape[1])
+    set_lights = lights if keep_sets else 0
+    fills = fills or method == "blind"
+    if out is None:
+        outputs = fresh_outputs(size, set_lights, fills=fills)
+    else:
+        outputs = outputs_of(out, size, set_lights, fills=fills)
     choice = _bgars.estimate_normals(
         kernel_capture(capture),
         mask=mask,
@@ -58,36 +65,20 @@ def pixelwise_normals(
         threshold=threshold,
         threads=threads,
         progress=progress,
-        out=field,
+        out=outputs,
     )
-    return replace(field, choice=choice or f"{method}, as asked")
-
-
-def _result(capture: Capture, method: PixelwiseMethod, keep_sets: bool, out: NormalField | None) -> NormalField:
-    """The arrays to be written: fresh ones, or those of an earlier result."""
-    lights, height, width = capture.images.shape
-    sets_shape = (height, width, lights) if keep_sets else None
-    if out is None:
-        shape = (height, width)
-        return NormalField(
-            normals=any_content((*shape, 3), np.float32),
-            albedo=any_content(shape, np.float32),
-            mask=any_content(shape, np.bool_),
-            confidence=any_content(shape, np.float32),
-            measured=any_content(shape, np.bool_),
-            lights_kept=any_content(shape, np.uint16),
-            method=method,
-            pixel_pitch_um=capture.pixel_pitch_um,
-            kept_sets=None if sets_shape is None else any_content(sets_shape, np.bool_),
-        )
-    found = out.normals.shape
-    if found != (height, width, 3):
-        msg = f"out: must be the result for images of {width} x {height} pixels, got one for {found[1]} x {found[0]}"
-        raise InputError(msg)
-    if (None if out.kept_sets is None else out.kept_sets.shape) != sets_shape:
-        msg = "out: must have kept sets, for the same number of lights, exactly when keep_sets is asked for"
-        raise InputError(msg)
-    return replace(out, method=method, choice="", reflectance=None, pixel_pitch_um=capture.pixel_pitch_um)
+    return NormalField(
+        normals=outputs.normals,
+        albedo=outputs.albedo,
+        mask=outputs.mask,
+        confidence=outputs.confidence,
+        measured=measured_by(outputs),
+        lights_kept=outputs.lights_kept,
+        method=method,
+        pixel_pitch_um=capture.pixel_pitch_um,
+        kept_sets=outputs.kept_sets,
+        choice=choice or f"{method}, as asked",
+    )
 
 
 def capture_of(

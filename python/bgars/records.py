@@ -129,7 +129,7 @@ class NormalField:
     confidence : (H, W) float32
         ``1 / (1 + (s / 5 deg)^2)`` with s the standard error of the direction; 0 where invalid.
     measured : (H, W) bool
-        False where a normal is a prior fill or invalid.
+        False where a normal is a prior fill or invalid; of methods that fill nothing in, a read-only view of `mask`.
     lights_kept : (H, W) uint16
         Number of lights that entered the pixel's least squares.
     method : str

@@ -212,6 +212,21 @@ def test_an_exception_of_progress_stops_the_work() -> None:
     assert all(0 <= done < 1 for done in seen)
 
 
+def test_memory_of_an_earlier_result_is_used_again_by_a_method_that_fills_nothing_in() -> None:
+    truth, mask = sphere(32)
+    directions = bgars.LightRig.ring(8, elevation_deg=50.0).directions
+    images = photograph(truth, directions, strength=0.5, roughness=0.35)
+    images[2:, 14:17, 14:17] = 0  # two lights fix no normal
+    expected = bgars.estimate_normals(images, directions, method="blind", mask=mask)
+    assert (expected.measured != expected.mask).any()
+    least_squares = bgars.estimate_normals(images, directions, method="lambertian")
+    blind = bgars.estimate_normals(images, directions, method="blind", mask=mask, out=least_squares)
+    assert blind.normals is least_squares.normals
+    np.testing.assert_array_equal(blind.measured, expected.measured)
+    back = bgars.estimate_normals(images, directions, method="lambertian", out=blind)
+    np.testing.assert_array_equal(back.measured, back.mask)
+
+
 def test_memory_of_an_earlier_result_is_used_again() -> None:
     truth, mask = sphere(32)
     directions = bgars.LightRig.ring(8, elevation_deg=50.0).directions

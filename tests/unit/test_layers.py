@@ -21,6 +21,7 @@ RECORDS = {
     "records": 3,
     "part_result": 3,
     "kernel_capture": 3.5,
+    "kernel_outputs": 3.5,
     "anchoring": 3.5,
     "integration_inputs": 3.5,
 }

@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,8 @@ from bgars.io.images import decode_stack
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from bgars.normals import Method
 
 DIGEST = """
 import hashlib, sys, bgars
@@ -240,6 +243,40 @@ def test_results_go_into_the_memory_of_an_earlier_field() -> None:
     assert again.method == expected.method
     for name in ("normals", "albedo", "mask", "confidence", "measured", "lights_kept", "kept_sets"):
         np.testing.assert_array_equal(getattr(again, name), getattr(expected, name), err_msg=name)
+
+
+@pytest.mark.parametrize("method", ["lambertian", "specular-filter", "robust-filter"])
+def test_what_least_squares_measure_is_a_read_only_view_of_the_mask(method: Method) -> None:
+    directions = bgars.LightRig.ring(8).directions
+    stack, use = noisy_stack(50), np.ones((50, 50), np.bool_)
+    use[10:20, 5:] = False
+    for pixels in (None, use):
+        field = bgars.estimate_normals(stack, directions, method=method, mask=pixels)
+        again = bgars.estimate_normals(stack[::-1].copy(), directions, method=method, out=field)
+        for each in (field, again):
+            assert np.shares_memory(each.measured, each.mask)
+            np.testing.assert_array_equal(each.measured, each.mask)
+            with pytest.raises(ValueError, match="read-only"):
+                each.measured[0, 0] = False
+
+
+def test_measured_is_written_where_an_earlier_result_brings_its_own() -> None:
+    directions = bgars.LightRig.ring(8).directions
+    fresh = bgars.estimate_normals(noisy_stack(50), directions, method="lambertian")
+    own = replace(fresh, measured=np.zeros_like(fresh.measured))
+    again = bgars.estimate_normals(noisy_stack(50), directions, method="lambertian", out=own)
+    assert again.measured is own.measured
+    np.testing.assert_array_equal(again.measured, again.mask)
+
+
+def test_a_read_only_array_of_an_earlier_result_is_named() -> None:
+    directions = bgars.LightRig.ring(8).directions
+    field = bgars.estimate_normals(noisy_stack(50), directions, method="lambertian")
+    for name in ("albedo", "measured"):
+        held = np.zeros_like(getattr(field, name))
+        held.setflags(write=False)
+        with pytest.raises(bgars.InputError, match=f"out: its arrays are overwritten, but {name} is read-only"):
+            bgars.estimate_normals(noisy_stack(50), directions, method="lambertian", out=replace(field, **{name: held}))
 
 
 def test_a_field_of_another_size_is_refused_before_it_is_touched() -> None:

@@ -11,14 +11,15 @@ use crate::capture::{Capture, Work};
 use crate::convert::{slice_mut, slice2};
 use crate::errors::InputError;
 
-/// The arrays to write: normals (H, W, 3), albedo, mask, confidence, measured, lights_kept (H, W), and the kept sets (H, W, L).
+/// The arrays to write: normals (H, W, 3), albedo, mask, confidence, measured, lights_kept (H, W), and the kept sets (H, W, L);
+/// `measured` may be left out where nothing is filled in.
 #[derive(FromPyObject)]
 pub struct Outputs<'py> {
     normals: PyReadwriteArray3<'py, f32>,
     albedo: PyReadwriteArray2<'py, f32>,
     mask: PyReadwriteArray2<'py, bool>,
     confidence: PyReadwriteArray2<'py, f32>,
-    measured: PyReadwriteArray2<'py, bool>,
+    measured: Option<PyReadwriteArray2<'py, bool>>,
     lights_kept: PyReadwriteArray2<'py, u16>,
     kept_sets: Option<PyReadwriteArray3<'py, bool>>,
 }
@@ -31,7 +32,10 @@ impl Outputs<'_> {
             albedo: slice_mut(&mut self.albedo, "out.albedo")?,
             mask: slice_mut(&mut self.mask, "out.mask")?,
             confidence: slice_mut(&mut self.confidence, "out.confidence")?,
-            measured: slice_mut(&mut self.measured, "out.measured")?,
+            measured: match &mut self.measured {
+                Some(measured) => slice_mut(measured, "out.measured")?,
+                None => &mut [],
+            },
             lights_kept: slice_mut(&mut self.lights_kept, "out.lights_kept")?,
             kept_sets: match &mut self.kept_sets {
                 Some(sets) => slice_mut(sets, "out.kept_sets")?,

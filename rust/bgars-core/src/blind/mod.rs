@@ -155,6 +155,7 @@ pub fn estimate_into<P: Pixel>(
     progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
     mut out: NormalMapMut<'_>,
 ) -> Result<Report> {
+    out.check_with_measured(stack.pixels(), stack.lights())?;
     let robust = Method::RobustFilter(RobustParams::DEFAULT);
     let half = AFTER_CLASSICAL / 2.0;
     // The robust filter's result is the output already: what is chosen otherwise overwrites it.

@@ -6,7 +6,6 @@ use super::confidence::HALF_DEG;
 use super::cutoff::{LANES, Lanes};
 use super::lane_solve::Careful;
 use super::out::Block;
-use crate::stream;
 use crate::vector::Vector;
 
 /// `n_z` below which `f32` cannot say whether a facet faces the camera.
@@ -130,9 +129,11 @@ impl Finished {
     pub fn write_counts<V: Vector>(&self, all_lights: &Lanes<u16>, used: Option<&[bool]>, out: &mut Block<'_>) {
         let valid = &V::flags(self.valid);
         let kept = if self.keep_all { all_lights } else { &self.kept };
-        store(kept, out.lights_kept, out.streamed);
-        store(valid, out.mask, out.streamed);
-        store(valid, out.measured, out.streamed);
+        store::<V, _, _>(kept, out.lights_kept, out.streamed);
+        store::<V, _, _>(valid, out.mask, out.streamed);
+        if let Some(measured) = &mut out.measured {
+            store::<V, _, _>(valid, measured, out.streamed);
+        }
         if let Some(used) = used {
             for (lane, _) in used.iter().enumerate().filter(|(_, used)| !**used) {
                 out.clear(lane..lane + 1);
@@ -153,11 +154,11 @@ fn in_range<V: Vector>(square: V, min: f32) -> V::Mask {
     V::both(square.is_over(V::splat(min)), V::splat(1.0 / min).is_over(square))
 }
 
-/// Copies a block, past the caches if they say so.
+/// Copies a block to the caches or past them.
 #[inline(always)]
-fn store<T: NoUninit, const N: usize>(block: &[T; N], out: &mut [T; N], streamed: bool) {
-    if streamed {
-        stream::copy(block, out);
+fn store<V: Vector, T: NoUninit, const N: usize>(block: &[T; N], out: &mut [T; N], streamed: bool) {
+    if V::STREAMS && streamed {
+        V::stream_block(block, out);
     } else {
         *out = *block;
     }

@@ -81,7 +81,7 @@ pub struct NormalMapMut<'a> {
     pub mask: &'a mut [bool],
     /// 1 value a pixel.
     pub confidence: &'a mut [f32],
-    /// 1 value a pixel.
+    /// 1 value a pixel; or empty, for methods that fill nothing in (all but the blind one): it would be `mask` again.
     pub measured: &'a mut [bool],
     /// 1 value a pixel.
     pub lights_kept: &'a mut [u16],
@@ -134,12 +134,13 @@ impl NormalMapMut<'_> {
 
     pub(crate) fn check(&self, pixels: usize, lights: usize) -> Result<()> {
         let kept_sets = if self.kept_sets.is_empty() { 0 } else { pixels * lights };
+        let measured = if self.measured.is_empty() { 0 } else { pixels };
         for (argument, expected, actual) in [
             ("normals", pixels * 3, self.normals.len()),
             ("albedo", pixels, self.albedo.len()),
             ("mask", pixels, self.mask.len()),
             ("confidence", pixels, self.confidence.len()),
-            ("measured", pixels, self.measured.len()),
+            ("measured", measured, self.measured.len()),
             ("lights_kept", pixels, self.lights_kept.len()),
             ("kept_sets", kept_sets, self.kept_sets.len()),
         ] {
@@ -148,5 +149,16 @@ impl NormalMapMut<'_> {
             }
         }
         Ok(())
+    }
+
+    /// [`Self::check`] for methods that fill in what is not measured, and say where.
+    pub(crate) fn check_with_measured(&self, pixels: usize, lights: usize) -> Result<()> {
+        self.check(pixels, lights)?;
+        let actual = self.measured.len();
+        if actual == pixels {
+            Ok(())
+        } else {
+            Err(Error::LengthMismatch { argument: "measured", expected: pixels, actual })
+        }
     }
 }

@@ -32,6 +32,7 @@ pub(super) struct Out<'a> {
     pub albedo: &'a mut [f32],
     pub mask: &'a mut [bool],
     pub confidence: &'a mut [f32],
+    /// Empty where it is not wanted.
     pub measured: &'a mut [bool],
     pub lights_kept: &'a mut [u16],
     /// Empty unless asked for.
@@ -76,7 +77,7 @@ impl<'a> Out<'a> {
             albedo: first!(albedo, pixels),
             mask: first!(mask, pixels),
             confidence: first!(confidence, pixels),
-            measured: first!(measured, pixels),
+            measured: first!(measured, pixels.min(self.measured.len())),
             lights_kept: first!(lights_kept, pixels),
             kept_sets: first!(kept_sets, pixels * set_lights),
             streamed: self.streamed,
@@ -86,18 +87,18 @@ impl<'a> Out<'a> {
     /// The whole blocks, one after the other, and beside them the kept sets of all pixels.
     pub fn blocks(&mut self) -> (impl Iterator<Item = Block<'_>>, &mut [bool]) {
         let streamed = self.streamed;
+        let mut measured = self.measured.as_chunks_mut().0.iter_mut();
         let arrays = (self.normals.as_chunks_mut().0.iter_mut())
             .zip(self.albedo.as_chunks_mut().0)
             .zip(self.mask.as_chunks_mut().0)
             .zip(self.confidence.as_chunks_mut().0)
-            .zip(self.measured.as_chunks_mut().0)
             .zip(self.lights_kept.as_chunks_mut().0);
-        let blocks = arrays.map(move |(((((normals, albedo), mask), confidence), measured), lights_kept)| Block {
+        let blocks = arrays.map(move |((((normals, albedo), mask), confidence), lights_kept)| Block {
             normals,
             albedo,
             mask,
             confidence,
-            measured,
+            measured: measured.next(),
             lights_kept,
             streamed,
         });
@@ -118,7 +119,9 @@ impl<'a> Out<'a> {
         self.albedo[span.clone()].fill(f32::NAN);
         self.confidence[span.clone()].fill(0.0);
         self.mask[span.clone()].fill(false);
-        self.measured[span].fill(false);
+        if let Some(measured) = self.measured.get_mut(span) {
+            measured.fill(false);
+        }
     }
 }
 
@@ -129,7 +132,7 @@ pub(super) struct Block<'a> {
     pub albedo: &'a mut Lanes<f32>,
     pub mask: &'a mut Lanes<bool>,
     pub confidence: &'a mut Lanes<f32>,
-    pub measured: &'a mut Lanes<bool>,
+    pub measured: Option<&'a mut Lanes<bool>>,
     pub lights_kept: &'a mut Lanes<u16>,
     /// Past the caches.
     pub streamed: bool,
@@ -140,7 +143,8 @@ impl Block<'_> {
     pub fn clear(&mut self, span: Range<usize>) {
         let Block { normals, albedo, mask, confidence, measured, lights_kept, streamed } = self;
         let (normals, albedo, confidence) = (&mut normals[..], &mut albedo[..], &mut confidence[..]);
-        let (mask, measured, lights_kept) = (&mut mask[..], &mut measured[..], &mut lights_kept[..]);
+        let (mask, lights_kept) = (&mut mask[..], &mut lights_kept[..]);
+        let measured = measured.as_mut().map_or(&mut [][..], |measured| &mut measured[..]);
         let kept_sets = &mut [];
         let streamed = *streamed;
         Out { normals, albedo, mask, confidence, measured, lights_kept, kept_sets, streamed }.clear(span);

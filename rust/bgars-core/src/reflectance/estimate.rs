@@ -154,7 +154,7 @@ pub fn estimate_into<P: Pixel>(
     mut out: NormalMapMut<'_>,
 ) -> Result<Findings> {
     check(stack, lights, radiometry, &request)?;
-    out.check(stack.pixels(), stack.lights())?;
+    out.check_with_measured(stack.pixels(), stack.lights())?;
     let mut report = |done: f64| if progress(done).is_break() { Err(Error::Cancelled) } else { Ok(()) };
     let reader = Reader::new(stack, radiometry);
     let clip = reader.clip_levels();

@@ -4,13 +4,15 @@ use std::arch::x86_64::{
     __m256, __m512, __m512i, _CMP_GT_OQ, _mm256_castps_pd, _mm512_abs_ps, _mm512_add_pd, _mm512_add_ps,
     _mm512_alignr_epi32, _mm512_castpd_ps, _mm512_castps_pd, _mm512_castps256_ps512, _mm512_cmp_ps_mask,
     _mm512_cvtepi32_ps, _mm512_cvtepu8_epi32, _mm512_cvtepu16_epi32, _mm512_cvtps_pd, _mm512_div_ps, _mm512_fmadd_ps,
-    _mm512_fmsub_ps, _mm512_fnmadd_ps, _mm512_insertf64x4, _mm512_mask_blend_ps, _mm512_maskz_div_ps,
-    _mm512_maskz_mov_ps, _mm512_maskz_set1_epi8, _mm512_max_ps, _mm512_mul_ps, _mm512_permutex2var_ps,
-    _mm512_permutexvar_ps, _mm512_reduce_add_pd, _mm512_rsqrt14_ps, _mm512_set1_epi32, _mm512_set1_ps,
-    _mm512_setzero_ps, _mm512_shuffle_f32x4, _mm512_shuffle_ps, _mm512_sqrt_ps, _mm512_srli_epi32, _mm512_stream_ps,
-    _mm512_sub_epi32, _mm512_sub_ps, _mm512_ternarylogic_epi32, _mm512_test_epi32_mask, _mm512_unpackhi_ps,
-    _mm512_unpacklo_ps,
+    _mm512_fmsub_ps, _mm512_fnmadd_ps, _mm512_insertf64x4, _mm512_loadu_si512, _mm512_mask_blend_ps,
+    _mm512_maskz_div_ps, _mm512_maskz_mov_ps, _mm512_maskz_set1_epi8, _mm512_max_ps, _mm512_mul_ps,
+    _mm512_permutex2var_ps, _mm512_permutexvar_ps, _mm512_reduce_add_pd, _mm512_rsqrt14_ps, _mm512_set1_epi32,
+    _mm512_set1_ps, _mm512_setzero_ps, _mm512_shuffle_f32x4, _mm512_shuffle_ps, _mm512_sqrt_ps, _mm512_srli_epi32,
+    _mm512_stream_ps, _mm512_stream_si512, _mm512_sub_epi32, _mm512_sub_ps, _mm512_ternarylogic_epi32,
+    _mm512_test_epi32_mask, _mm512_unpackhi_ps, _mm512_unpacklo_ps,
 };
+
+use bytemuck::NoUninit;
 
 use super::packed::chunked;
 use super::row_table::{FIRST_TWO, LAST_TWO, QUARTER};
@@ -26,8 +28,8 @@ const WIDTH: usize = 16;
 /// Calls intrinsics where they are compiled in.
 macro_rules! here {
     ($call:expr) => {{
-        // SAFETY: the type is named only where AVX-512F, BW and DQ are compiled in (see `Vector`), and the one store stays
-        // within a slice of WIDTH values and is aligned.
+        // SAFETY: the type is named only where AVX-512F, BW and DQ are compiled in (see `Vector`), and what stores stays
+        // within a slice of WIDTH values (or a block) and is aligned.
         #[allow(unsafe_code)]
         unsafe {
             $call
@@ -137,6 +139,20 @@ impl Vector for Avx512 {
             here!(_mm512_stream_ps(to.as_mut_ptr(), self.0));
         } else {
             self.write(to);
+        }
+    }
+
+    #[inline(always)]
+    fn stream_block<T: NoUninit, const N: usize>(from: &[T; N], to: &mut [T; N]) {
+        let (bytes, place) = (size_of::<[T; N]>(), to.as_mut_ptr().cast::<u8>());
+        if bytes.is_multiple_of(size_of::<Self>()) && place.addr().is_multiple_of(size_of::<Self>()) {
+            let source = from.as_ptr().cast::<u8>();
+            for at in (0..bytes).step_by(size_of::<Self>()) {
+                // Both blocks hold `bytes`, initialised ones (NoUninit); the place gets bytes of its own type.
+                here!(_mm512_stream_si512(place.add(at).cast(), _mm512_loadu_si512(source.add(at).cast())));
+            }
+        } else {
+            *to = *from;
         }
     }
 

@@ -24,6 +24,8 @@ mod tests;
 
 use std::ops::Div;
 
+use bytemuck::NoUninit;
+
 /// Operators of a vector by its intrinsics; `here!` says why they may be called.
 #[cfg(target_arch = "x86_64")]
 macro_rules! operators {
@@ -84,6 +86,11 @@ pub trait Vector: Arithmetic<Number = f32> + Div<Output = Self> {
     #[inline(always)]
     fn stream(self, to: &mut [f32]) {
         self.write(to);
+    }
+    /// Copies values of any type, past the caches where supported, aligned, and whole registers ([`crate::stream::finish`] must follow).
+    #[inline(always)]
+    fn stream_block<T: NoUninit, const N: usize>(from: &[T; N], to: &mut [T; N]) {
+        *to = *from;
     }
     /// `x[0] y[0] z[0] x[1] ...` in three vectors.
     fn interleaved(vectors: [Self; 3]) -> [Self; 3];

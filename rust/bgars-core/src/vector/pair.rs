@@ -2,6 +2,8 @@
 
 use std::ops::{Add, Div, Mul, Sub};
 
+use bytemuck::NoUninit;
+
 use super::spread::Spread;
 use super::subset_sums::SubsetSums;
 use super::{Arithmetic, ROW, RowTable, Vector};
@@ -78,6 +80,11 @@ impl<V: Vector> Vector for Pair<V> {
     fn stream(self, to: &mut [f32]) {
         self.0.stream(to);
         self.1.stream(&mut to[V::WIDTH..]);
+    }
+
+    #[inline(always)]
+    fn stream_block<T: NoUninit, const N: usize>(from: &[T; N], to: &mut [T; N]) {
+        V::stream_block(from, to);
     }
 
     #[inline(always)]

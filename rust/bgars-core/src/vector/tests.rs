@@ -191,12 +191,33 @@ fn check_stores<V: Vector>() {
     }
 }
 
+fn check_blocks<V: Vector>() {
+    #[repr(align(64))]
+    struct Lines([u16; 160]);
+    let from: [u16; 64] = std::array::from_fn(|place| place as u16);
+    for start in [0, 1, 8, 32] {
+        let mut out = Lines([u16::MAX; 160]);
+        V::stream_block(&from, out.0[start..].first_chunk_mut().expect("room for the block"));
+        V::stream_block(&[7; 5], out.0[start + 64..].first_chunk_mut().expect("room for five"));
+        crate::stream::finish();
+        for (at, &value) in out.0.iter().enumerate() {
+            let expected = match at.checked_sub(start) {
+                Some(place @ 0..64) => place as u16,
+                Some(64..69) => 7,
+                _ => u16::MAX,
+            };
+            assert_eq!(value, expected, "at {at}, from {start} on");
+        }
+    }
+}
+
 fn check_vector<V: Vector>() {
     check::<V>();
     check_flags::<V>();
     check_sums::<V>();
     check_rows::<V>();
     check_stores::<V>();
+    check_blocks::<V>();
 }
 
 fn check_all<V: Vector + Packed, Double: Packed<Number = f64>>() {
