@@ -35,6 +35,7 @@ Method = Literal["lambertian", "specular-filter", "robust-filter", "reflectance"
 METHODS: tuple[Method, ...] = ("lambertian", "specular-filter", "robust-filter", "reflectance")
 """The methods that are compared; ``blind`` is what ``reflectance`` does without balls."""
 DEFAULT_METHOD: Method = "reflectance"
+ALL_METHODS: tuple[Method, ...] = get_args(Method)
 
 CIRCLE_VALUES = 3
 RIM_PX = 0.01
@@ -130,8 +131,8 @@ def estimate_normals(
     >>> float(bgars.estimate_normals(images, rig.directions).normals[0, 0, 2])
     1.0
     """
-    if method not in get_args(Method):
-        msg = f"method: must be one of {', '.join(get_args(Method))}; got {method!r}"
+    if method not in ALL_METHODS:
+        msg = f"method: must be one of {', '.join(ALL_METHODS)}; got {method!r}"
         raise InputError(msg)
     for name, value, user in (
         ("threshold", threshold, "specular-filter"),
@@ -145,7 +146,36 @@ def estimate_normals(
         images, light_directions, light_intensities, saturation, threads, needs_full_scale=method == "reflectance"
     )
     use = combined_mask(capture, mask)
-    part = _part_of(progress, method == "reflectance")
+    if method == "reflectance":
+        return _by_reflectance(capture, use, anchors, material, keep_sets, out, threads, progress)
+    return pixelwise_normals(
+        capture,
+        method=method,
+        mask=use,
+        threshold=DEFAULT_THRESHOLD if threshold is None else threshold,
+        keep_sets=keep_sets,
+        out=out,
+        threads=threads,
+        progress=progress,
+    )
+
+
+def _by_reflectance(
+    capture: Capture,
+    use: NDArray[np.bool_] | None,
+    anchors: FoundBalls | ArrayLike | None,
+    material: SurfaceMaterial | None,
+    keep_sets: bool,
+    out: NormalField | None,
+    threads: int | None,
+    progress: Callable[[float], object] | None,
+) -> NormalField:
+    """Method ``reflectance`` where it can work, else what stands in for it."""
+
+    def part(start: float, end: float) -> Callable[[float], object] | None:
+        if progress is None:
+            return None
+        return lambda fraction: progress(start + (end - start) * fraction)
 
     def pixelwise(
         name: PixelwiseMethod,
@@ -158,7 +188,6 @@ def estimate_normals(
             capture,
             method=name,
             mask=pixels,
-            threshold=DEFAULT_THRESHOLD if threshold is None else threshold,
             keep_sets=keep_sets,
             out=out,
             fills=fills,
@@ -166,8 +195,6 @@ def estimate_normals(
             progress=part(*share),
         )
 
-    if method != "reflectance":
-        return pixelwise(method)
     lights = len(capture.rig)
     fallback: PixelwiseMethod = "blind" if lights >= _bgars.BLIND_MIN_LIGHTS else "robust-filter"
     least = _bgars.REFLECTANCE_MIN_LIGHTS
@@ -204,19 +231,6 @@ def estimate_normals(
 def _because(field: NormalField, reason: str) -> NormalField:
     """The field with the reason why its method stands in for reflectance."""
     return replace(field, choice=f"{field.choice.removesuffix(', as asked')}; {reason}")
-
-
-def _part_of(
-    progress: Callable[[float], object] | None, divided: bool
-) -> Callable[[float, float], Callable[[float], object] | None]:
-    """Progress callbacks of the steps of a longer work."""
-
-    def part(start: float, end: float) -> Callable[[float], object] | None:
-        if progress is None or not divided:
-            return progress
-        return lambda fraction: progress(start + (end - start) * fraction)
-
-    return part
 
 
 def _circles(anchors: FoundBalls | ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -256,7 +256,7 @@ def _vectors(values: ArrayLike, name: str) -> NDArray[np.float64]:
 
 def _intensities(values: ArrayLike | None, count: int) -> NDArray[np.float64]:
     if values is None:
-        return np.ones(count)
+        return np.array([1.0] * count)
     intensities = np.ascontiguousarray(values, dtype=np.float64)
     if intensities.shape != (count,):
         msg = f"light_intensities: must have shape ({count},), one a light, got {intensities.shape}"
