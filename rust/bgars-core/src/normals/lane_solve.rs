@@ -158,7 +158,7 @@ pub(super) fn solve<K: Pixel, V: Vector>(
         Choice::UpToGap(gap) => {
             let cutoffs = match overview {
                 Some(overview) => cutoffs_from(keys, K::gap(*gap), &overview.extremes),
-                None => cutoffs(keys, K::gap(*gap)),
+                None => cutoffs(keys, K::gap(*gap), V::HOLDS_BLOCKS),
             };
             if K::CODES.is_none() {
                 // Of up to eight lights, no sum holds one that is dropped.

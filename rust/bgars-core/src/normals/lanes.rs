@@ -7,13 +7,13 @@ use std::ops::Range;
 use multiversion::multiversion;
 
 use super::ahead::{Ahead, blocks_on};
-use super::cutoff::{LANES, Lanes};
+use super::cutoff::{LANES, Lanes, are_sorted};
 use super::finish::Finished;
 use super::gather::should_bring;
 use super::kept::Kept;
 use super::lane_solve::{BYTE_LIGHTS, Careful, Choice, LaneSolver, Readings, raise, solve, solve_sums};
 use super::out::{Block, Out};
-use super::overview::{Brought, Overview, SumsAndExtremes, SumsAndLargest};
+use super::overview::{Brought, Copies, Overview, SumsAndExtremes, SumsAndLargest};
 use super::stretches::Stretches;
 #[cfg(target_arch = "x86_64")]
 use crate::vector::{Avx2, Avx512, Pair};
@@ -194,10 +194,12 @@ pub(super) fn run<P: Pixel>(
         run_blocks(solver, Eight(planes), common, pixels, out)
     } else if matches!(solver.choice, Choice::All) && planes.len() > BYTE_LIGHTS {
         run_stretches::<P, SumsAndLargest>(solver, planes, memory, common, pixels, out)
-    } else if should_bring(planes) {
-        run_stretches::<P, SumsAndExtremes<P>>(solver, planes, memory, common, pixels, out)
-    } else {
+    } else if !should_bring(planes) {
         run_blocks(solver, AsTheyLie(planes), common, pixels, out)
+    } else if are_sorted::<P>(planes.len()) {
+        run_stretches::<P, Copies>(solver, planes, memory, common, pixels, out)
+    } else {
+        run_stretches::<P, SumsAndExtremes<P>>(solver, planes, memory, common, pixels, out)
     }
 }
 

@@ -110,6 +110,34 @@ impl<K: Pixel> Overview<K> for SumsAndExtremes<K> {
     }
 }
 
+/// Nothing: the images are only brought together.
+#[derive(Clone)]
+pub(super) struct Copies;
+
+impl<K: Pixel> Overview<K> for Copies {
+    const NOTHING: Self = Self;
+    const BRINGS: bool = true;
+
+    #[inline(always)]
+    fn take_in<V: Vector, const COUNT: usize>(
+        &mut self,
+        keys: &[&Lanes<K>; COUNT],
+        _: Option<&Lanes<f32>>,
+        _: &[[Spread; 3]; COUNT],
+        memory: &mut [Brought<K>],
+    ) {
+        let places = &mut memory.as_chunks_mut::<COUNT>().0[0];
+        for light in 0..COUNT {
+            places[light].0 = *keys[light];
+        }
+    }
+
+    #[inline(always)]
+    fn reads<'a>(&'a self, keys: &'a [&'a Lanes<K>]) -> Reads<'a, K> {
+        Reads::Keys { keys, ahead: Ahead::Nothing, overview: None }
+    }
+}
+
 /// A block of an image that is brought together with others; aligned, so that no vector of it lies across cache lines.
 #[derive(Clone)]
 #[repr(align(64))]
@@ -265,6 +293,9 @@ mod tests {
                     &mut memory,
                 );
                 looked_at.look_over::<Portable, SumsAndLargest, OFFSETS, OWN>(&stretch, &mut summed[..count], &mut []);
+                let mut copies = vec![Brought([K::LARGEST; LANES]); count * lights];
+                looked_at.look_over::<Portable, Copies, OFFSETS, OWN>(&stretch, &mut vec![Copies; count], &mut copies);
+                assert!(copies.iter().zip(&memory).all(|(copy, brought)| copy.0 == brought.0));
                 for (at, block) in stretch.enumerate() {
                     let keys: Vec<&Lanes<K>> = images.iter().map(|image| &image[block]).collect();
                     let brought: Vec<&Lanes<K>> = memory[at * lights..][..lights].iter().map(Borrow::borrow).collect();
@@ -283,7 +314,7 @@ mod tests {
                     for gap in [10.0, 300.0, 900.0] {
                         let parts = |cutoffs: Cutoffs<K>| (cutoffs.largest, cutoffs.brightest, cutoffs.keep_all);
                         let found = cutoffs_from(&keys, K::gap(gap), &seen[at].extremes);
-                        let expected = cutoffs(&keys, K::gap(gap));
+                        let expected = cutoffs(&keys, K::gap(gap), false);
                         assert_eq!(parts(found), parts(expected), "{lights} lights, gap {gap}");
                     }
                     for lane in (0..LANES).filter(|_| K::CODES.is_none()) {

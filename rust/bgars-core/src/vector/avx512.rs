@@ -121,6 +121,7 @@ impl Packed for Avx512 {
 impl Vector for Avx512 {
     type Mask = u16;
     const STREAMS: bool = true;
+    const HOLDS_BLOCKS: bool = true;
 
     #[inline(always)]
     fn from_bytes(from: &[u8]) -> Self {

@@ -72,6 +72,8 @@ pub trait Vector: Arithmetic<Number = f32> + Div<Output = Self> {
     /// Whether [`Self::stream`] is more than [`Arithmetic::write`]: parts of a cache line that are streamed one by one, between
     /// other lines, are written to memory one by one.
     const STREAMS: bool = false;
+    /// Whether registers hold as many bytes as a block has pixels, and are as many as 24 keys of each pixel want.
+    const HOLDS_BLOCKS: bool = false;
 
     /// The same number everywhere, from memory.
     #[inline(always)]

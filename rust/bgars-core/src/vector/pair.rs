@@ -59,6 +59,7 @@ impl<V: Vector> Arithmetic for Pair<V> {
 impl<V: Vector> Vector for Pair<V> {
     type Mask = (V::Mask, V::Mask);
     const STREAMS: bool = V::STREAMS;
+    const HOLDS_BLOCKS: bool = V::HOLDS_BLOCKS;
 
     #[inline(always)]
     fn repeated(number: &Spread) -> Self {
