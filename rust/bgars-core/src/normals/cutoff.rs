@@ -58,7 +58,8 @@ pub(super) fn cutoffs_from<K: Key>(keys: &[&Lanes<K>], gap: K, extremes: &Extrem
     grown_cutoffs(keys, gap, Some(extremes))
 }
 
-/// True where more than eight lights are sorted: bytes, of which a register holds a block. Measured: of 9 and 10, rounds are as fast.
+/// True where more than eight lights are sorted: bytes, of which a register holds a block. Of 9 and 10, rounds are as fast
+/// (`benches/results.tsv`).
 pub(super) fn are_sorted<K>(lights: usize) -> bool {
     size_of::<K>() == 1 && (11..=MOST_SORTED).contains(&lights)
 }
@@ -66,8 +67,8 @@ pub(super) fn are_sorted<K>(lights: usize) -> bool {
 /// Most lights that are sorted: their keys stay in registers.
 const MOST_SORTED: usize = 24;
 
-/// Calls a macro, after whatever else it is given, with the pairs of places that sort eight values: a network of 19 exchanges (Knuth, The Art of Computer
-/// Programming 3, section 5.3.4).
+/// Calls a macro, with what else it is given first, then the pairs of places that sort eight values: a network of 19 exchanges
+/// (Knuth, The Art of Computer Programming 3, section 5.3.4).
 macro_rules! sort_eight {
     ($exchange:ident $($array:tt)*) => {
         $exchange!($($array)* 0 1, 2 3, 4 5, 6 7, 0 2, 1 3, 4 6, 5 7, 1 2, 5 6, 0 4, 1 5, 2 6, 3 7, 2 4, 3 5, 1 2, 3 4, 5 6)
@@ -133,7 +134,7 @@ macro_rules! sort_by {
                 }
                 (largest[lane], brightest[lane]) = (cutoff, s[$count - 1]);
             }
-            Cutoffs { largest, brightest, keep_all: !is_over_any(&brightest, &largest, K::gap(0.0)) }
+            Cutoffs { largest, brightest, keep_all: !is_over_any(&brightest, &largest) }
         }
     };
 }
@@ -173,12 +174,12 @@ fn brightest_of<K: Key>(keys: &[&Lanes<K>]) -> Lanes<K> {
     brightest
 }
 
-/// True where a key of the first is over that of the second by more than `gap`.
+/// True where a key of the first is over that of the second.
 #[inline(always)]
-fn is_over_any<K: Key, const N: usize>(keys: &[K; N], others: &[K; N], gap: K) -> bool {
+fn is_over_any<K: Key, const N: usize>(keys: &[K; N], others: &[K; N]) -> bool {
     let mut over = false;
     for lane in 0..N {
-        over |= keys[lane].is_over(others[lane], gap);
+        over |= keys[lane].is_over(others[lane], K::gap(0.0));
     }
     over
 }
@@ -249,7 +250,7 @@ fn grow<K: Key, const N: usize>(
             reach(&parts(&[key], part), gap, &mut cutoffs);
         }
         // Not a question of equality: NaN outside the mask must not go round for ever.
-        if !is_over_any(&cutoffs, &before, K::gap(0.0)) {
+        if !is_over_any(&cutoffs, &before) {
             break;
         }
     }
