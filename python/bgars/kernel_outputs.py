@@ -57,8 +57,8 @@ def outputs_of(field: NormalField, shape: tuple[int, int], set_lights: int, *, f
     if found != (height, width, 3):
         msg = f"out: must be the result for images of {width} x {height} pixels, got one for {found[1]} x {found[0]}"
         raise InputError(msg)
-    sets = field.kept_sets
-    if (0 if sets is None else sets.shape[2]) != set_lights:
+    sets_shape = (height, width, set_lights) if set_lights else None
+    if (None if field.kept_sets is None else field.kept_sets.shape) != sets_shape:
         msg = "out: must have kept sets, for the same number of lights, exactly when keep_sets is asked for"
         raise InputError(msg)
     measured: BoolArray | None = field.measured

@@ -16,6 +16,7 @@ mod kept;
 mod kernel;
 mod lane_solve;
 mod lanes;
+mod networks;
 mod out;
 mod overview;
 mod own_scale;

@@ -96,12 +96,8 @@ impl<K: Pixel> Overview<K> for SumsAndExtremes<K> {
         memory: &mut [Brought<K>],
     ) {
         self.sums.add::<K, V, COUNT>(keys, offset, vectors);
-        let places = &mut memory.as_chunks_mut::<COUNT>().0[0];
-        for light in 0..COUNT {
-            places[light].0 = *keys[light];
-        }
         // Not of the keys themselves: a compiler knows that nothing else is where these are.
-        self.extremes.see(places);
+        self.extremes.see(bring(keys, memory));
     }
 
     #[inline(always)]
@@ -126,10 +122,7 @@ impl<K: Pixel> Overview<K> for Copies {
         _: &[[Spread; 3]; COUNT],
         memory: &mut [Brought<K>],
     ) {
-        let places = &mut memory.as_chunks_mut::<COUNT>().0[0];
-        for light in 0..COUNT {
-            places[light].0 = *keys[light];
-        }
+        bring(keys, memory);
     }
 
     #[inline(always)]
@@ -148,6 +141,19 @@ impl<K> Borrow<Lanes<K>> for Brought<K> {
     fn borrow(&self) -> &Lanes<K> {
         &self.0
     }
+}
+
+/// Copies a block of some images to their place, which `memory` begins with.
+#[inline(always)]
+fn bring<'a, K: Copy, const COUNT: usize>(
+    keys: &[&Lanes<K>; COUNT],
+    memory: &'a mut [Brought<K>],
+) -> &'a [Brought<K>; COUNT] {
+    let places = &mut memory.as_chunks_mut::<COUNT>().0[0];
+    for light in 0..COUNT {
+        places[light].0 = *keys[light];
+    }
+    places
 }
 
 /// Images that are taken in together, at most.

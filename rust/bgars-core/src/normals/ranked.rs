@@ -1,7 +1,7 @@
 //! Lights in the order of their values, for some pixels at once.
 
-use super::cutoff::sort_eight;
 use super::lane_solve::BYTE_LIGHTS;
+use super::networks::sort_eight;
 
 /// Pixels worked on at once: their sums over all windows fit into the nearest cache.
 pub(super) const WIDTH: usize = 16;
