@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-rust test-python data lint format accuracy inspection bilateral simulator experiments method schema studies performance instructions clean
+.PHONY: demo test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral simulator experiments method schema studies performance instructions clean
 
 demo: $(VENV)/.installed ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
@@ -41,6 +41,15 @@ accuracy: data $(VENV)/.installed ## Rewrite the tables of docs/accuracy.md (nee
 
 inspection: data $(VENV)/.installed ## Rewrite the inspection tables of docs/accuracy.md (needs BGARS_DATA)
 	$(BIN)/python docs/make_inspection_accuracy.py
+
+SEEDS ?= 1001-1100
+reality-scenes: $(VENV)/.installed ## Render SEEDS into benches/reality/scenes (10 to 60 s a seed; needs an LLVM, see benches/reality)
+	$(BIN)/python -m pip install --quiet --requirement benches/reality/requirements.txt
+	$(BIN)/python benches/reality/make_scenes.py $(SEEDS)
+
+WORKERS ?= 2
+reality: $(VENV)/.installed ## Judge benches/reality/scenes and rewrite its tables of docs/accuracy.md
+	$(BIN)/python docs/make_reality.py --workers $(WORKERS) --keep benches/reality/judged
 
 bilateral: data $(VENV)/.installed ## Rewrite the bilateral tables of docs/accuracy.md, draw their pictures (needs BGARS_DATA)
 	$(BIN)/python docs/make_bilateral.py

@@ -4,7 +4,7 @@
 use std::ops::ControlFlow;
 
 use bgars_core::normals::NormalMap;
-use bgars_core::reflectance::{Circle, Findings, Lobe, Masking, Material, Request, estimate_into};
+use bgars_core::reflectance::{Circle, Findings, Lobe, Masking, Material, Request, Shape, estimate_into};
 use bgars_core::{Error, ImageStack, Lights, Radiometry};
 use bgars_suite::balls::{grid, photograph, solder};
 use nalgebra::Vector3;
@@ -238,5 +238,24 @@ proptest! {
         }
         // The kernel's loss is robust, the search's is not: residuals of a level or two are alike for both.
         prop_assert!(distance(&found) <= 1.5 * best + 4.0, "{} against {best}, truth {truth}", distance(&found));
+    }
+}
+
+#[test]
+fn the_shape_that_all_balls_share_is_found() {
+    let lights = ring(8);
+    let circles = grid(SIDE, 2, 25.0);
+    for shape in [Shape::SPHERE, Shape::Cap(0.85), Shape::Cap(0.7), Shape::Ellipsoid(0.9)] {
+        let shaped: Vec<Circle> = circles.iter().map(|&circle| Circle { shape, ..circle }).collect();
+        let images = photograph(SIDE, &lights, &shaped, &solder(8), sphere);
+        let (map, found) = run(&images, &lights, anchored(&circles)).unwrap();
+        let (Shape::Cap(expected) | Shape::Ellipsoid(expected)) = shape;
+        let (Shape::Cap(ratio) | Shape::Ellipsoid(ratio)) = found.shape.shape;
+        assert_eq!(std::mem::discriminant(&found.shape.shape), std::mem::discriminant(&shape), "{shape:?}: {found:?}");
+        approx::assert_abs_diff_eq!(ratio, expected, epsilon = 0.01);
+        assert!(found.shape.u_ratio < 0.02, "{shape:?}: {:?}", found.shape);
+        let errors = errors_deg(&map, &shaped[0], |normal| normal);
+        let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+        assert!(mean < 0.4, "{shape:?}: {mean} degrees");
     }
 }

@@ -29,6 +29,7 @@ __all__ = [
     "integrate_bilateral",
     "integrate_normals",
     "measure_edges",
+    "predict_left_out",
     "read_rgb16",
     "rim_bands",
     "rim_profiles",
@@ -84,6 +85,9 @@ def estimate_normals(
     progress: Callable[[float], object] | None,
     out: KernelOutputs,
 ) -> str | None: ...
+def predict_left_out(
+    capture: KernelCapture, *, mask: NDArray[np.bool_] | None, threads: int | None
+) -> tuple[float, float, float, float] | None: ...
 def estimate_reflectance(
     capture: KernelCapture,
     *,

@@ -146,7 +146,7 @@ class FoundBalls:
     balls : tuple of FoundBall
         In reading order: by row, then column; balls off the lattice last.
     missing : tuple of (str, int, int)
-        Name, row and column of each place of the lattice without a ball.
+        Name, row and column of each place of the lattice without a ball that was measured.
     bridges : tuple of (str, str)
         Names of neighbours that are joined.
     rows, cols : int
@@ -159,6 +159,9 @@ class FoundBalls:
         Place (row 0, col 0) of the lattice, x and y as above.
     odd_sizes : tuple of (str, float)
         Name and radius over the median radius of each ball that differs from it by more than a quarter.
+    unclear : tuple of str
+        Names of those missing places that are not seen to be empty: something is there whose silhouette could not be
+        fitted, or the place is clipped, masked or not wholly in the image.
     """
 
     balls: tuple[FoundBall, ...]
@@ -170,6 +173,7 @@ class FoundBalls:
     angle_deg: float
     origin_px: tuple[float, float]
     odd_sizes: tuple[tuple[str, float], ...] = ()
+    unclear: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -194,6 +198,8 @@ class MeasuredBall:
         Lights whose shadow was usable.
     reasons : tuple of str
         Why something was not measured, or is doubtful; empty when all is well.
+    budget : dict of dict of float
+        By reading (``x_um y_um diameter_um top_um``) and cause: standard uncertainty by that cause alone, um.
     """
 
     name: str
@@ -216,6 +222,7 @@ class MeasuredBall:
     lights_used: int
     kind: BallKind = "ball"
     reasons: tuple[str, ...] = ()
+    budget: dict[str, dict[str, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,6 +246,15 @@ class BallMeasurement:
         Covariance of `board_coefficients_um`, in their units; None when unknown.
     doubts : tuple of str
         Why the numbers may be wrong by more than they say: with any, nothing passes.
+    shared_um : dict of (N, M) float64
+        By reading (``x_um y_um top_um``): what M independent sources of error put each ball off by, all of them
+        together; part of the balls' uncertainties.
+    causes : tuple of str
+        Names of the M sources; several sources may have one name.
+    corner_um : float
+        Distance of the image's corner from its middle.
+    u_pixel_pitch : float or None
+        Relative standard uncertainty of the pixel pitch, where it was declared.
     """
 
     balls: tuple[MeasuredBall, ...]
@@ -249,3 +265,7 @@ class BallMeasurement:
     warnings: tuple[str, ...] = field(default=())
     board_covariance: NDArray[np.float64] | None = None
     doubts: tuple[str, ...] = field(default=())
+    shared_um: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    causes: tuple[str, ...] = ()
+    corner_um: float = math.nan
+    u_pixel_pitch: float | None = None

@@ -99,7 +99,7 @@ def inspect(
         found = _found(capture, recipe, threads, report)
         report("find", 1.0)
         board = started.result()
-        measurement, field = _measured(capture, found, board, method, material, threads, report)
+        measurement, field = _measured(capture, found, board, method, material, recipe, threads, report)
     report("measure", 1.0)
     files = capture_files(capture) + (() if recipe is None or recipe.file is None else (recipe.file,))
     result = judge_part(
@@ -167,6 +167,7 @@ def _measured(
     field: NormalField | None,
     method: Method,
     material: SurfaceMaterial | None,
+    recipe: PartRecipe | None,
     threads: int | None,
     report: Callable[[InspectionStage, float], None],
 ) -> tuple[BallMeasurement, NormalField | None]:
@@ -180,6 +181,7 @@ def _measured(
     if not (balls & capture.mask).any():
         return measure_balls(capture, found, field=field, threads=threads), None
     anchors = found if method == "reflectance" else None
+    roundness = None if recipe is None or recipe.q is None or recipe.u_q is None else (recipe.q, recipe.u_q)
     with ThreadPoolExecutor(1) as background:
         normals = background.submit(
             estimate_normals,
@@ -195,6 +197,7 @@ def _measured(
             found,
             field=field,
             ball_field=normals.result,
+            roundness=roundness,
             threads=threads,
             progress=lambda fraction: report("measure", fraction),
         )

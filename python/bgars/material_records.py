@@ -122,6 +122,14 @@ class ReflectanceFit:
         Root mean square angle of each ball's normals to its circle's sphere, the errors of the normals taken off.
     flat_radius : tuple of (float or None)
         Radius of each ball's flat top in its radii; None where it has none.
+    shape : {"sphere", "cap", "ellipsoid"}
+        What the balls have in common: half a ball over its circle; a cap lower than half a ball; an ellipsoid.
+    shape_ratio : float
+        Radius of the circle over that of the cap's sphere; height of the ellipsoid over its radius; 1 for spheres.
+    u_shape_ratio : float
+        Its standard uncertainty; the standard errors of the normals hold it.
+    refusal : str
+        Why the fit was not accepted.
     """
 
     material: SurfaceMaterial
@@ -132,6 +140,19 @@ class ReflectanceFit:
     residuals_learnt: bool
     deviation_deg: tuple[float, ...]
     flat_radius: tuple[float | None, ...]
+    shape: Literal["sphere", "cap", "ellipsoid"] = "sphere"
+    shape_ratio: float = 1.0
+    u_shape_ratio: float = 0.0
+    refusal: str = ""
+
+    @property
+    def shape_in_words(self) -> str:
+        """The shape for messages; empty for spheres."""
+        if self.shape == "cap":
+            return f", which are caps of spheres of {1.0 / self.shape_ratio:.2f} times their circles' radii"
+        if self.shape == "ellipsoid":
+            return f", which are {self.shape_ratio:.2f} times as high as half balls"
+        return ""
 
 
 def loss_in_words(loss: float, *, accepted: bool) -> str:

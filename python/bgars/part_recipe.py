@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
 from bgars.ball_names import ball_name, mirrored_name
 from bgars.ball_records import BallLayout
+from bgars.errors import InputError
 
 __all__ = ["BALL_LIMITS", "PART_LIMITS", "BallPlace", "Limits", "PartRecipe", "View", "layout_places"]
 
@@ -15,6 +17,10 @@ View = Literal["bottom", "top"]
 Range = tuple[float, float]
 BALL_LIMITS = ("true_position_um", "diameter_um", "height_um", "q", "flat_um")
 PART_LIMITS = ("pitch_um", "seating_coplanarity_um", "regression_coplanarity_um", "warpage_um")
+Q_RANGE = (0.2, 2.0)
+"""Nominal q of what can be called a ball: from a low cap to an egg on end."""
+DEFAULT_U_Q = 0.01
+"""Where q alone is given: the balls of one lot share their shape, and package balls are round, within about 1 %."""
 
 
 @dataclass(frozen=True)
@@ -131,6 +137,21 @@ class PartRecipe:
         Material fitted on an earlier capture.
     file : Path or None
         Where the recipe was read from.
+    q, u_q : float or None
+        Vertical over horizontal radius that the part's balls have in common, a ratio, and its standard uncertainty;
+        q alone takes a `u_q` of 0.01, `u_q` alone a q of 1. Both None: not stated.
+    pitch_u_um : float or None
+        Standard uncertainty of the lattice's pitch.
+
+    Raises
+    ------
+    InputError
+        q outside 0.2 to 2, an uncertainty that is not above 0, or one of the pitch with a list of positions.
+
+    Examples
+    --------
+    >>> PartRecipe("coined", BallLayout(rows=2, cols=3, pitch_um=800.0), q=0.9).u_q
+    0.01
     """
 
     name: str
@@ -142,6 +163,27 @@ class PartRecipe:
     gravity_um: tuple[float, float] | None = None
     material_file: Path | None = None
     file: Path | None = None
+    q: float | None = None
+    u_q: float | None = None
+    pitch_u_um: float | None = None
+
+    def __post_init__(self) -> None:
+        """Complete q by its uncertainty or the other way round, and check them."""
+        if self.q is None and self.u_q is not None:
+            object.__setattr__(self, "q", 1.0)
+        if self.u_q is None and self.q is not None:
+            object.__setattr__(self, "u_q", DEFAULT_U_Q)
+        lowest, highest = Q_RANGE
+        if self.q is not None and not lowest <= self.q <= highest:
+            msg = f"q: must be from {lowest:g} to {highest:g}, got {self.q:g}"
+            raise InputError(msg)
+        for name, value in (("u_q", self.u_q), ("pitch_u_um", self.pitch_u_um)):
+            if value is not None and not (math.isfinite(value) and value > 0):
+                msg = f"{name}: must be finite and above 0, got {value:g}"
+                raise InputError(msg)
+        if self.pitch_u_um is not None and self.layout.positions:
+            msg = f"pitch_u_um: goes with rows, cols and pitch_um; a list has no pitch, got {self.pitch_u_um:g}"
+            raise InputError(msg)
 
     @property
     def image_layout(self) -> BallLayout:

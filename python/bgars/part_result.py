@@ -21,7 +21,7 @@ __all__ = ["FORMAT", "FORMAT_VERSION", "BallResult", "PartCheck", "PartResult", 
 
 Verdict = Literal["pass", "fail", "undecided"]
 FORMAT = "bgars-result"
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 """Rises with every change of the keys of result.json, or of their meaning (docs/result.schema.json)."""
 DIGITS = 6
 CSV_DIGITS = 3
@@ -76,6 +76,8 @@ class BallResult:
     verdict : {"pass", "fail", "undecided"}
     reasons : tuple of str
         Why it is not "pass".
+    budget : dict of dict of float
+        Of ``x_um y_um diameter_um top_um``: standard uncertainty by cause, um, largest first.
     """
 
     name: str
@@ -106,6 +108,7 @@ class BallResult:
     seating_deviation_um: float = math.nan
     regression_deviation_um: float = math.nan
     lights_used: int = 0
+    budget: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the record as plain Python values; None where something was not measured."""
@@ -197,6 +200,8 @@ class PartResult:
         Shape of the board, see :class:`bgars.ball_records.BallMeasurement`.
     shadow_residual_rms : float
         Of the shadow fit, over the contrast.
+    seating_budget : dict of float
+        What `u_seating_coplanarity_um` is made of: standard uncertainty by cause, um, largest first.
     warnings : tuple of str
         What to look at although numbers are right.
     recipe : PartRecipe or None
@@ -254,6 +259,7 @@ class PartResult:
     capture: str = ""
     serial: str = ""
     inspected_utc: str = ""
+    seating_budget: dict[str, float] = field(default_factory=dict)
     surface: PartSurface | None = field(default=None, repr=False)
 
     def to_dict(self) -> dict[str, Any]:
@@ -277,7 +283,7 @@ class PartResult:
     def to_csv(self) -> str:
         """Return the balls as CSV text, one line a ball; empty cells where something was not measured."""
         text = io.StringIO()
-        names = [entry.name for entry in fields(BallResult)]
+        names = [entry.name for entry in fields(BallResult) if entry.name != "budget"]
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(names)
         for ball in self.balls:

@@ -71,22 +71,20 @@ class Capture:
         The L lights, in the order of the images.
     mask : (H, W) bool
         True = use.
-    pixel_pitch_um : float or None
-        Size of a pixel on the board; None when unknown (lengths then stay in pixels).
+    pixel_pitch_um, pixel_pitch_u_um : float or None
+        Size of a pixel on the board, None when unknown (lengths then stay in pixels); its standard uncertainty.
+    camera_distance_mm : float or None
+        Entrance pupil to board along the optical axis; infinite for a telecentric lens, None when not stated.
     dark : (H, W) of the images' dtype, or None
         Image with all lights off.
     response : (256,) or (65536,) float32, or None
         Linear grey level of every code (the camera's inverse response); None for a linear camera.
-    black_level : float
-        Grey level of no light, used where there is no dark frame.
-    saturation : float
-        Grey level at and above which a pixel counts as clipped.
+    black_level, saturation : float
+        Grey level of no light, used where there is no dark frame; that at and above which a pixel counts as clipped.
     full_scale : float
         Grey level of full scale; thresholds "of 255" scale with it and albedo 1 means it. NaN: the kernels find it.
-    files : tuple of Path
-        The image files, for messages and reports.
-    folder : Path or None
-        Where the capture was read from.
+    files, folder : tuple of Path, Path or None
+        The image files, for messages and reports; where the capture was read from.
     """
 
     images: PixelArray
@@ -100,6 +98,8 @@ class Capture:
     full_scale: float = 255.0
     files: tuple[Path, ...] = ()
     folder: Path | None = None
+    pixel_pitch_u_um: float | None = None
+    camera_distance_mm: float | None = None
 
     @property
     def name(self) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from bgars import _bgars
 from bgars.kernel_capture import kernel_capture
 from bgars.material_records import ReflectanceFit, SurfaceLobe, SurfaceMaterial
+from bgars.normals_choice import contest
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -54,7 +55,7 @@ def add_reflectance(
     Returns
     -------
     NormalField
-        With `reflectance`; unchanged but for that where the fit was not accepted.
+        With `reflectance`; where the fit was not accepted, its normals on balls mean nothing.
     """
     found = _bgars.estimate_reflectance(
         kernel_capture(capture),
@@ -75,14 +76,24 @@ def add_reflectance(
         gains=tuple(found["gains"]),
         standard_errors={name: error for name, error in found["standard_errors"] or () if error > 0},
     )
+    shape, ratio, u_ratio = found["shape"]
+    most = _bgars.REFLECTANCE_MAX_LOSS
+    refusal = "" if found["accepted"] else f"loss {found['loss']:.2f}, at most {most:g} is accepted"
+    compared = contest(capture, found["left_out"], circles_px, mask=mask, threads=threads)
+    if compared is not None and compared.lost:
+        refusal = str(compared)
     fit = ReflectanceFit(
         material=fitted,
         loss=found["loss"],
-        accepted=found["accepted"],
+        accepted=not refusal,
         circles_px=tuple((float(x), float(y), float(radius)) for x, y, radius in circles_px[:, :3]),
         own_material=tuple(found["own_material"]),
         residuals_learnt=found["residuals_learnt"],
         deviation_deg=tuple(found["deviation_deg"]),
         flat_radius=tuple(found["flat_radius"]),
+        shape=shape,
+        shape_ratio=ratio,
+        u_shape_ratio=u_ratio,
+        refusal=refusal,
     )
     return replace(field, method="reflectance" if fit.accepted else field.method, reflectance=fit)

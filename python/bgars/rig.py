@@ -39,6 +39,9 @@ class LightRig:
         Near rig: the distance at which the intensities hold.
     files : tuple of str
         Image file of each light, where the rig came with names (``.lp``).
+    u_deg : (L,) float64 or None
+        Standard uncertainty of each direction, on either of the two axes across it, in degrees; near lights: as seen
+        from the image centre on the board. None when unknown.
     """
 
     directions: NDArray[np.float64]
@@ -46,6 +49,7 @@ class LightRig:
     positions_um: NDArray[np.float64] | None = None
     intensity_distance_um: NDArray[np.float64] | None = None
     files: tuple[str, ...] = ()
+    u_deg: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         return len(self.directions)
@@ -75,6 +79,7 @@ class LightRig:
         elevation_deg: float = 45.0,
         azimuth0_deg: float = 0.0,
         intensities: ArrayLike | None = None,
+        u_deg: ArrayLike | None = None,
     ) -> LightRig:
         """Build a ring of distant lights, evenly spaced, counter-clockwise from +x.
 
@@ -88,6 +93,8 @@ class LightRig:
             Azimuth of the first light.
         intensities : (count,) array_like, optional
             Relative intensities; 1 by default.
+        u_deg : float or (count,) array_like, optional
+            Standard uncertainty of the directions in degrees, of every constructor; unknown by default.
 
         Raises
         ------
@@ -103,10 +110,13 @@ class LightRig:
             msg = f"count: a ring needs at least {MIN_LIGHTS} lights, got {count}"
             raise InputError(msg)
         azimuths_deg = azimuth0_deg + 360.0 / count * np.arange(count)
-        return cls.from_angles(np.column_stack([azimuths_deg, np.full(count, elevation_deg)]), intensities=intensities)
+        angles_deg = np.column_stack([azimuths_deg, np.full(count, elevation_deg)])
+        return cls.from_angles(angles_deg, intensities=intensities, u_deg=u_deg)
 
     @classmethod
-    def from_angles(cls, angles_deg: ArrayLike, *, intensities: ArrayLike | None = None) -> LightRig:
+    def from_angles(
+        cls, angles_deg: ArrayLike, *, intensities: ArrayLike | None = None, u_deg: ArrayLike | None = None
+    ) -> LightRig:
         """Build distant lights from (L, 2) pairs (azimuth, elevation) in degrees.
 
         Raises
@@ -119,11 +129,16 @@ class LightRig:
         >>> LightRig.from_angles([[0, 45], [120, 45], [240, 90]]).directions[2].round(6).tolist()
         [-0.0, -0.0, 1.0]
         """
-        return cls.from_directions(directions_from_angles(angles_deg), intensities=intensities)
+        return cls.from_directions(directions_from_angles(angles_deg), intensities=intensities, u_deg=u_deg)
 
     @classmethod
     def from_directions(
-        cls, directions: ArrayLike, *, intensities: ArrayLike | None = None, files: tuple[str, ...] = ()
+        cls,
+        directions: ArrayLike,
+        *,
+        intensities: ArrayLike | None = None,
+        files: tuple[str, ...] = (),
+        u_deg: ArrayLike | None = None,
     ) -> LightRig:
         """Build distant lights from (L, 3) unit vectors, surface to light.
 
@@ -138,7 +153,8 @@ class LightRig:
         3
         """
         vectors = _bgars.unit_directions(_rows(directions, "light_directions"))
-        return cls(vectors, _intensities(intensities, len(vectors)), files=files)
+        count = len(vectors)
+        return cls(vectors, _intensities(intensities, count), files=files, u_deg=_uncertainties(u_deg, count))
 
     @classmethod
     def from_positions(
@@ -147,6 +163,7 @@ class LightRig:
         *,
         intensities: ArrayLike | None = None,
         intensity_distance_um: float | None = None,
+        u_deg: ArrayLike | None = None,
     ) -> LightRig:
         """Build near point lights from (L, 3) LED positions in micrometres.
 
@@ -158,6 +175,8 @@ class LightRig:
             Irradiance on a facing plane at `intensity_distance_um`; 1 by default.
         intensity_distance_um : float, optional
             Distance at which the intensities hold; by default each light's own distance from the origin.
+        u_deg : float or (L,) array_like, optional
+            Standard uncertainty of the directions from the origin, in degrees; unknown by default.
 
         Raises
         ------
@@ -184,10 +203,19 @@ class LightRig:
         else:
             msg = f"intensity_distance_um: must be finite and above 0, got {intensity_distance_um:g}"
             raise InputError(msg)
-        return cls(positions / distances[:, None], _intensities(intensities, len(positions)), positions, reference)
+        count = len(positions)
+        return cls(
+            positions / distances[:, None],
+            _intensities(intensities, count),
+            positions,
+            reference,
+            u_deg=_uncertainties(u_deg, count),
+        )
 
     @classmethod
-    def from_lp(cls, path: str | PathLike[str], *, intensities: ArrayLike | None = None) -> LightRig:
+    def from_lp(
+        cls, path: str | PathLike[str], *, intensities: ArrayLike | None = None, u_deg: ArrayLike | None = None
+    ) -> LightRig:
         """Read an RTI light position file: a count, then ``file x y z`` a line (vectors are normalised).
 
         Raises
@@ -198,7 +226,7 @@ class LightRig:
             Fewer than 3 lights.
         """
         directions, files = read_lp(path)
-        return cls.from_directions(directions, intensities=intensities, files=files)
+        return cls.from_directions(directions, intensities=intensities, files=files, u_deg=u_deg)
 
     def take(self, indices: NDArray[np.intp]) -> LightRig:
         """Return the lights at `indices`, in that order."""
@@ -208,11 +236,22 @@ class LightRig:
             None if self.positions_um is None else self.positions_um[indices],
             None if self.intensity_distance_um is None else self.intensity_distance_um[indices],
             tuple(self.files[index] for index in indices) if self.files else (),
+            None if self.u_deg is None else self.u_deg[indices],
         )
 
     def with_intensities(self, intensities: ArrayLike, *, files: tuple[str, ...] = ()) -> LightRig:
         """Return the same lights with other intensities and image file names."""
         return replace(self, intensities=_intensities(intensities, len(self)), files=files)
+
+    def with_u_deg(self, u_deg: ArrayLike | None) -> LightRig:
+        """Return the same lights with one uncertainty of direction for all, or one a light, in degrees.
+
+        Examples
+        --------
+        >>> LightRig.ring(4).with_u_deg(0.05).u_deg.tolist()
+        [0.05, 0.05, 0.05, 0.05]
+        """
+        return replace(self, u_deg=_uncertainties(u_deg, len(self)))
 
 
 def directions_from_angles(angles_deg: ArrayLike) -> NDArray[np.float64]:
@@ -267,3 +306,21 @@ def _intensities(values: ArrayLike | None, count: int) -> NDArray[np.float64]:
         msg = f"light_intensities[{index}]: must be finite and above 0, got {intensities[index]:g}"
         raise InputError(msg)
     return intensities
+
+
+def _uncertainties(u_deg: ArrayLike | None, count: int) -> NDArray[np.float64] | None:
+    """One standard uncertainty a light; None when unknown."""
+    if u_deg is None:
+        return None
+    values = np.array(u_deg, dtype=np.float64)
+    if values.ndim == 0:
+        values = np.repeat(values, count)
+    if values.shape != (count,):
+        msg = f"u_deg: must be one number, or have shape ({count},), one a light, got {values.shape}"
+        raise InputError(msg)
+    wrong = np.flatnonzero(~(np.isfinite(values) & (values > 0)))
+    if wrong.size:
+        index = int(wrong[0])
+        msg = f"u_deg[{index}]: must be finite and above 0, got {values[index]:g}"
+        raise InputError(msg)
+    return values

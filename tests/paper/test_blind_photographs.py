@@ -18,6 +18,8 @@ LIMITS_DEG = {
     ("dil_cat", "ring8.txt"): 6.0,
     ("dil_cat", None): 5.4,
 }
+WITHIN = (0.58, 0.86)
+"""Share of the pixels of a photograph that must be within their stated error: 68 % and the worst that was seen."""
 SCENES = ["A_one_ball_diffuse", "B_one_ball_paper_id100", "C_grid_4x4_paper", "H_bridge", "K2_ball_variation"]
 
 
@@ -41,6 +43,17 @@ def test_photographs(data_folder: Path, name: str, images: str | None) -> None:
     found = means_deg(capture, bgars.read_truth(folder))
     assert found["blind"] <= LIMITS_DEG[name, images], found
     assert found["blind"] <= min(found["lambertian"], found["robust-filter"]) + ALLOWED_DEG, found
+
+
+@pytest.mark.parametrize(("name", "images"), LIMITS_DEG)
+def test_stated_errors_hold_what_the_model_misses(data_folder: Path, name: str, images: str | None) -> None:
+    folder = data_folder / "real" / name
+    capture = bgars.read_capture(folder, images=read_filenames(folder / images) if images else None)
+    truth, field = bgars.read_truth(folder), bgars.estimate_normals(capture)
+    judged = truth.mask & field.measured
+    assert judged.sum() > 0.9 * truth.mask.sum()
+    error_deg = bgars.angular_error_deg(field.normals[judged], truth.normals[judged])
+    assert WITHIN[0] < (error_deg <= field.standard_error_deg[judged]).mean() < WITHIN[1]
 
 
 @pytest.mark.parametrize("scene", SCENES)

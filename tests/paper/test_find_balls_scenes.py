@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import bgars
@@ -64,6 +65,24 @@ def test_every_ball_of_a_scene_is_found_and_nothing_else(data_folder: Path, name
     u_radius = np.array([ball.u_radius_px for ball in found.balls])
     assert np.sqrt(np.mean((error[:, :2] / u_centre[:, None]) ** 2)) < 1.5
     assert np.sqrt(np.mean((error[:, 2] / u_radius) ** 2)) < 1.5
+
+
+@pytest.mark.parametrize("seed", range(1, 25))
+def test_every_ball_of_a_part_that_deviates_is_found_and_named(data_folder: Path, seed: int) -> None:
+    folder = data_folder / "reality" / str(seed)
+    capture = bgars.read_capture(folder)
+    rows = list(csv.DictReader((folder / "balls.csv").read_text().splitlines()))
+    recipe = bgars.read_part_recipe(folder / "part.toml")
+    layout = replace(recipe.image_layout, depopulated=())
+    found = bgars.find_balls(capture, layout=layout)
+    assert [ball.name for ball in found.balls] == [row["name"] for row in rows]
+    assert {name for name, _, _ in found.missing} == set(recipe.layout.depopulated)
+    assert found.unclear == ()
+    pixel_mm = capture.pixel_pitch_um / 1000.0
+    for ball, row in zip(found.balls, rows, strict=True):
+        x_px, y_px, radius_px = (float(row[key]) / pixel_mm for key in ("x_mm", "y_mm", "radius_mm"))
+        assert np.hypot(ball.x_px - x_px, ball.y_px - y_px) < 0.1 * radius_px
+        assert ball.radius_px == pytest.approx(radius_px, rel=0.06)
 
 
 def test_a_photographed_sphere_is_one_ball(data_folder: Path) -> None:

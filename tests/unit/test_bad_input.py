@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 RING = "[lights]\nring = { count = 4, elevation_deg = 45.0 }\n"
+PITCH = "pixel_pitch_um = 10.0\n"
 
 
 def recipe(folder: Path, text: str) -> None:
@@ -37,6 +38,29 @@ def refused(folder: Path, error: type[Exception], *words: str) -> None:
         ("response = { gama = 2.2 }\n" + RING, ["gama", "'gamma'"]),
         ("pixel_pitch_um = -3\n" + RING, ["pixel_pitch_um", "greater than 0", "-3"]),
         ('pixel_pitch_um = "wide"\n' + RING, ["pixel_pitch_um", "number", "wide"]),
+        ("pixel_pitch_u_um = 0.1\n" + RING, ["pixel_pitch_u_um: goes with pixel_pitch_um", "got 0.1"]),
+        (PITCH + "pixel_pitch_u_um = 1.01\n" + RING, ["pixel_pitch_u_um", "a tenth of pixel_pitch_um (1)", "got 1.01"]),
+        (PITCH + "pixel_pitch_u_um = 0\n" + RING, ["pixel_pitch_u_um", "greater than 0", "got 0"]),
+        (PITCH + "pixel_pitch_u_um = nan\n" + RING, ["pixel_pitch_u_um", "finite", "got nan"]),
+        (PITCH + "pixel_pitch_u_um = true\n" + RING, ["pixel_pitch_u_um", "number", "got True"]),
+        ('camera = "entocentric"\n' + RING, ['camera: must be "telecentric" or { distance_mm', "got 'entocentric'"]),
+        ("camera = 150\n" + RING, ["camera: must be", "distance_mm", "got 150"]),
+        ("camera = { distance_um = 5 }\n" + RING, ["unknown key 'camera.distance_um'", "'distance_mm'"]),
+        ("camera = {}\n" + RING, ["camera.distance_mm", "required"]),
+        ("camera = { distance_mm = -150 }\n" + RING, ["camera.distance_mm: ", "greater than 0", "got -150"]),
+        ("camera = { distance_mm = nan }\n" + RING, ["camera.distance_mm: ", "greater than 0", "got nan"]),
+        ('camera = { distance_mm = "150" }\n' + RING, ["camera.distance_mm: ", "number", "got '150'"]),
+        (RING + "u_deg = 0\n", ["lights.u_deg: ", "greater than 0", "got 0"]),
+        (RING + "u_deg = inf\n", ["lights.u_deg: ", "finite", "got inf"]),
+        (RING + "u_deg = true\n", ["lights.u_deg: ", "number", "got True"]),
+        (RING + 'u_deg = "0.05"\n', ["lights.u_deg: ", "number", "got '0.05'"]),
+        (RING + "u_deg = [0.1, 0.1, -0.1, 0.1]\n", ["lights.u_deg.2: ", "greater than 0", "got -0.1"]),
+        (RING + "u_deg = [0.1, 0.1, 0.1]\n", ["(lights.u_deg): 3 uncertainties", "4 lights"]),
+        (RING + "u_deg = []\n", ["(lights.u_deg): 0 uncertainties", "4 lights"]),
+        ("u_deg = 0.05\n" + RING, ["unknown key 'u_deg'"]),
+        ("response = { gamma = -1 }\n" + RING, ["response.gamma: ", "greater than 0", "got -1"]),
+        ("response = { table = 5 }\n" + RING, ["response.table: ", "string", "got 5"]),
+        (RING + 'intensities = [1, "x", 1, 1]\n', ["lights.intensities.1: ", "number", "got 'x'"]),
         ("black_level = 300\n" + RING, ["black_level", "255", "300"]),
         ("[lights]\nring = { count = 2 }\n", ["lights.ring.count", "3", "2"]),
         ("[lights]\nring = { count = 4, elevation_deg = 95 }\n", ["elevation_deg", "90", "95"]),
@@ -207,6 +231,9 @@ def test_arrays() -> None:
             "threshold.*got 0",
         ),
         (lambda: bgars.LightRig.ring(2), "at least 3"),
+        (lambda: bgars.LightRig.ring(4, u_deg=-0.1), r"u_deg\[0\].*above 0, got -0.1"),
+        (lambda: bgars.LightRig.ring(4, u_deg=[0.1, 0.1]), r"u_deg.*\(4,\), one a light, got \(2,\)"),
+        (lambda: rig.with_u_deg([0.1, 0.1, np.nan, 0.1]), r"u_deg\[2\].*finite and above 0, got nan"),
         (lambda: bgars.integrate_normals(np.zeros((2, 2))), r"\(H, W, 3\)"),
         (lambda: bgars.integrate_normals(np.full((2, 2, 3), np.nan)), "no pixel"),
         (

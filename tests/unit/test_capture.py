@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import bgars
@@ -81,6 +82,73 @@ def test_diligent_layout_with_mask_and_intensities(capture_folder: Path) -> None
 def test_a_subset_of_images_brings_its_own_lights(capture_folder: Path) -> None:
     capture = bgars.read_capture(capture_folder, images=["img3.png", "img0.png", "img1.png"])
     np.testing.assert_allclose(capture.rig.azimuths_deg, [270, 0, 90], atol=1e-9)
+
+
+@pytest.mark.parametrize("text", ["0.05", "[0.05, 0.05, 0.05, 0.05]"])
+def test_the_uncertainty_of_the_lights_goes_with_them(capture_folder: Path, text: str) -> None:
+    recipe(capture_folder, f"{RING}u_deg = {text}\n")
+    np.testing.assert_array_equal(bgars.read_capture(capture_folder).rig.u_deg, [0.05] * 4)
+    recipe(capture_folder, RING + "u_deg = [0.1, 0.2, 0.3, 0.4]\n")
+    rig = bgars.read_capture(capture_folder, images=["img3.png", "img0.png", "img1.png"]).rig
+    np.testing.assert_array_equal(rig.u_deg, [0.4, 0.1, 0.2])
+    recipe(capture_folder, RING)
+    assert bgars.read_capture(capture_folder).rig.u_deg is None
+
+
+def test_the_uncertainties_follow_an_lp_file_that_names_the_images_in_another_order(capture_folder: Path) -> None:
+    directions = bgars.LightRig.ring(4).directions
+    lines = [f"img{index}.png " + " ".join(map(str, directions[index])) for index in (2, 0, 3, 1)]
+    (capture_folder / "l.lp").write_text("4\n" + "\n".join(lines) + "\n", encoding="utf-8")
+    images = 'images = ["img0.png", "img1.png", "img2.png", "img3.png"]\n'
+    recipe(capture_folder, images + '[lights]\nlp = "l.lp"\nu_deg = [0.3, 0.1, 0.4, 0.2]\n')
+    np.testing.assert_array_equal(bgars.read_capture(capture_folder).rig.u_deg, [0.1, 0.2, 0.3, 0.4])
+
+
+def test_every_rig_takes_one_uncertainty_or_one_a_light(tmp_path: Path) -> None:
+    ring = bgars.LightRig.ring(3)
+    lines = [f"{index}.png " + " ".join(map(str, vector)) for index, vector in enumerate(ring.directions)]
+    (tmp_path / "l.lp").write_text("3\n" + "\n".join(lines) + "\n", encoding="utf-8")
+    for u_deg in (0.5, [0.5, 0.5, 0.5], np.float32(0.5)):
+        for rig in (
+            bgars.LightRig.ring(3, u_deg=u_deg),
+            bgars.LightRig.from_angles([[0, 45], [120, 45], [240, 45]], u_deg=u_deg),
+            bgars.LightRig.from_directions(ring.directions, u_deg=u_deg),
+            bgars.LightRig.from_positions(ring.directions * 40_000.0, u_deg=u_deg),
+            bgars.LightRig.from_lp(tmp_path / "l.lp", u_deg=u_deg),
+            ring.with_u_deg(u_deg),
+        ):
+            assert rig.u_deg is not None
+            assert rig.u_deg.dtype == np.float64
+            np.testing.assert_array_equal(rig.u_deg, [0.5, 0.5, 0.5])
+            np.testing.assert_array_equal(rig.with_intensities([1, 2, 3]).u_deg, rig.u_deg)
+            assert "u_deg=array([0.5, 0.5, 0.5])" in repr(rig)
+            assert rig.with_u_deg(None).u_deg is None
+
+
+@pytest.mark.parametrize(
+    ("text", "u_um", "distance_mm"),
+    [
+        ("", None, None),
+        ('camera = "telecentric"\n', None, math.inf),
+        ("pixel_pitch_u_um = 0.01\ncamera = { distance_mm = 150 }\n", 0.01, 150.0),
+        ("pixel_pitch_u_um = 1.0\n", 1.0, None),
+    ],
+)
+def test_what_is_known_of_scale_and_camera(
+    capture_folder: Path, text: str, u_um: float | None, distance_mm: float | None
+) -> None:
+    recipe(capture_folder, f"pixel_pitch_um = 10.0\n{text}{RING}")
+    capture = bgars.read_capture(capture_folder)
+    assert capture.pixel_pitch_um == 10.0
+    assert capture.pixel_pitch_u_um == u_um
+    assert capture.camera_distance_mm == distance_mm
+    bgars.estimate_normals(capture, method="lambertian")
+
+
+@pytest.mark.parametrize("pitch_um", [0.7, 3.0, 9.6, 12.3])
+def test_a_tenth_of_the_pitch_is_allowed_in_the_digits_of_the_file(capture_folder: Path, pitch_um: float) -> None:
+    recipe(capture_folder, f"pixel_pitch_um = {pitch_um}\npixel_pitch_u_um = {pitch_um / 10:.3g}\n{RING}")
+    assert bgars.read_capture(capture_folder).pixel_pitch_u_um == pytest.approx(pitch_um / 10)
 
 
 def test_led_positions_in_mm_make_a_near_rig(capture_folder: Path) -> None:

@@ -45,6 +45,34 @@ def test_a_whole_recipe(tmp_path: Path) -> None:
     assert recipe.material_file == tmp_path / "solder.json"
 
 
+@pytest.mark.parametrize(
+    ("text", "stated"),
+    [
+        ("", (None, None, None)),
+        ("q = 0.95\nu_q = 0.02\npitch_u_um = 0.5\n", (0.95, 0.02, 0.5)),
+        ("q = 1\n", (1.0, 0.01, None)),
+        ("u_q = 0.003\n", (1.0, 0.003, None)),
+    ],
+)
+def test_what_is_known_of_the_balls_and_the_lattice(
+    tmp_path: Path, text: str, stated: tuple[float | None, ...]
+) -> None:
+    recipe = bgars.read_part_recipe(write(tmp_path, LATTICE + text))
+    assert (recipe.q, recipe.u_q, recipe.pitch_u_um) == stated
+    values = recipe.to_dict()
+    assert (values["q"], values["u_q"], values["pitch_u_um"]) == stated
+
+
+def test_a_recipe_made_in_python_obeys_the_same_rules() -> None:
+    layout = bgars.BallLayout(rows=2, cols=2, pitch_um=1000.0)
+    assert bgars.PartRecipe("p", layout, q=0.9).u_q == 0.01
+    assert bgars.PartRecipe("p", layout, u_q=0.02).q == 1.0
+    wrong = ({"q": float("nan")}, {"u_q": -1.0}, {"pitch_u_um": float("inf")})
+    for values in wrong:
+        with pytest.raises(bgars.InputError, match=f"{next(iter(values))}: must be "):
+            bgars.PartRecipe("p", layout, **values)
+
+
 def test_positions_instead_of_a_lattice(tmp_path: Path) -> None:
     (tmp_path / "balls.csv").write_text("name,x_um,y_um\nA1, -500, 0\nA2,500,0\n\nB7,0,800\n", encoding="utf-8")
     recipe = bgars.read_part_recipe(write(tmp_path, 'name = "p"\npositions = "balls.csv"\nview = "top"\n'))
@@ -75,6 +103,17 @@ def test_positions_instead_of_a_lattice(tmp_path: Path) -> None:
         (LATTICE + "[limits]\nwarpage_um = true\n", ["limits.warpage_um", "True"]),
         (LATTICE + "[limit]\nwarpage_um = 5\n", ["unknown key 'limit'", "'limits'"]),
         ('name = "p"\nrows = 4\ncols = 5\n', ["missing: pitch_um"]),
+        (LATTICE + "q = 0.19\n", ["q: must be from 0.2 to 2", "got 0.19"]),
+        (LATTICE + "q = 2.1\n", ["q: must be from 0.2 to 2", "got 2.1"]),
+        (LATTICE + "q = nan\n", ["q: ", "finite", "nan"]),
+        (LATTICE + "q = [0.9, 1.1]\n", ["q: ", "number", "[0.9, 1.1]"]),
+        (LATTICE + "q = true\n", ["q: ", "number", "True"]),
+        (LATTICE + "u_q = 0\n", ["u_q: ", "greater than 0", "0"]),
+        (LATTICE + "u_q = inf\n", ["u_q: ", "finite", "inf"]),
+        (LATTICE + 'u_q = "1 %"\n', ["u_q: ", "number", "1 %"]),
+        (LATTICE + "q = 0.9\n[limits]\nq = [0.95, 1.05]\n", ["q: ", "within limits.q (0.95 to 1.05)", "got 0.9"]),
+        (LATTICE + "pitch_u_um = -1\n", ["pitch_u_um: ", "greater than 0", "-1"]),
+        (LATTICE + "u_pitch_um = 1\n", ["unknown key 'u_pitch_um'", "nearest known key is 'pitch_u"]),
         ('name = "p"\n', ["rows, cols and pitch_um, or positions"]),
         (GRID, ["name", "required"]),
         (LATTICE + 'positions = "b.csv"\n', ["contradicting layout", "positions goes without rows, cols, pitch_um"]),
@@ -136,6 +175,12 @@ def test_a_pitch_limit_needs_a_pitch(tmp_path: Path) -> None:
         "limits.pitch_um",
         "positions",
     )
+
+
+def test_an_uncertainty_of_the_pitch_needs_a_pitch(tmp_path: Path) -> None:
+    (tmp_path / "b.csv").write_text("name,x_um,y_um\nA1,0,0\n", encoding="utf-8")
+    path = write(tmp_path, 'name = "p"\npositions = "b.csv"\npitch_u_um = 0.5\n')
+    refused(path, "part.toml: pitch_u_um: goes with rows, cols and pitch_um", "got 0.5")
 
 
 def test_files_that_are_none(tmp_path: Path) -> None:

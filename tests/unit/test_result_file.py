@@ -74,6 +74,24 @@ def test_the_published_schema_is_the_generated_one() -> None:
                 assert " um" in entry["description"] or "um " in entry["description"], key
 
 
+def test_what_a_recipe_knows_of_balls_and_lattice_comes_back(tmp_path: Path) -> None:
+    result = judged(replace(RECIPE, q=0.98, u_q=0.02, pitch_u_um=0.5))
+    text = result.to_json()
+    assert '"q": 0.98' in text
+    (tmp_path / "result.json").write_text(text, encoding="utf-8")
+    again = bgars.read_result(tmp_path)
+    assert again.recipe == result.recipe
+    assert again.to_json() == text
+
+
+def test_a_result_from_before_recipes_could_state_q_is_read(tmp_path: Path) -> None:
+    values = json.loads(judged().to_json())
+    for key in ("q", "u_q", "pitch_u_um"):
+        assert values["recipe"].pop(key) is None
+    (tmp_path / "result.json").write_text(json.dumps(values), encoding="utf-8")
+    assert bgars.read_result(tmp_path).recipe == RECIPE
+
+
 def change(key: str, value: object) -> Callable[[dict[str, Any]], object]:
     return lambda values: values.update({key: value})
 
@@ -90,6 +108,7 @@ SPOILT: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     "one light too few": (lambda v: v["light_change_deg"].pop(), "light_change_deg: must have one number for each"),
     "no pitch": (change("pixel_pitch_um", None), "pixel_pitch_um: Input should be a valid number"),
     "contradicting layout": (lambda v: v["recipe"]["layout"].update(rows=None), "recipe: layout.rows: must be above 0"),
+    "impossible q": (lambda v: v["recipe"].update(q=5.0), "recipe: q: must be from 0.2 to 2, got 5"),
     "checksum": (lambda v: v["files"][0].update(sha256="abc"), "files.0.sha256"),
     "material's unit": (lambda v: v["material"]["parameters"][0].update(unit="cd"), "material.parameters.0.unit"),
     "time": (change("inspected_utc", "yesterday"), "inspected_utc"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -149,6 +150,26 @@ def test_rigs_of_any_kind_come_back_to_the_bit(tmp_path: Path) -> None:
         again = bgars.read_scene(tmp_path / str(index) / "scene.json")
         np.testing.assert_array_equal(again.rig.directions, rig.directions)
         same((made, truth), bgars.simulate(again.scene, again.rig, again.material, again.camera, seed=again.seed))
+
+
+@pytest.mark.parametrize("rig", [RIG, NEAR], ids=["far", "near"])
+@pytest.mark.parametrize("distance_mm", [math.inf, 151.5])
+def test_what_is_known_of_lights_scale_and_camera_travels_along(
+    tmp_path: Path, rig: bgars.LightRig, distance_mm: float
+) -> None:
+    u_deg = np.linspace(0.05, 0.1, len(rig))
+    made, truth = bgars.simulate(bgars.Scene.ball(), rig.with_u_deg(u_deg), MATERIAL, bgars.Camera())
+    told = replace(made, pixel_pitch_u_um=0.0123, camera_distance_mm=distance_mm)
+    bgars.write_simulation(told, truth, tmp_path / "part")
+    read = bgars.read_capture(tmp_path / "part")
+    assert read.pixel_pitch_u_um == 0.0123
+    assert read.camera_distance_mm == distance_mm
+    np.testing.assert_array_equal(read.rig.u_deg, u_deg)
+    np.testing.assert_array_equal(bgars.read_scene(tmp_path / "part" / "scene.json").rig.u_deg, u_deg)
+    bgars.write_simulation(made, truth, tmp_path / "part")
+    plain = bgars.read_capture(tmp_path / "part")
+    assert plain.pixel_pitch_u_um is None
+    assert plain.camera_distance_mm is None, "not stated"
 
 
 def test_an_albedo_map_travels_along(tmp_path: Path) -> None:

@@ -1,14 +1,13 @@
 """All balls, all lights and the board from measured points of shadow edges: robust Gauss-Newton with Schur complement.
 
-Unknowns: of each ball x, y, z, radius, q; of each light two small turns; five coefficients of the board. Balls meet
-only
-through lights and board, so the normal matrix is an arrow: blocks of 5 x 5, a border of 2 L + 5 (Triggs et al., "Bundle
-adjustment - a modern synthesis", 2000, section 6.1).
+Unknowns: of each ball x, y, z, radius, q; of each light two small turns and the shift of its image; five coefficients of
+the board, and what all balls and lights share (:mod:`bgars.inspection.common_terms`). Balls meet only through lights,
+board and common terms, so the normal matrix is an arrow: blocks of 5 x 5, a border (Triggs et al., "Bundle adjustment - a
+modern synthesis", 2000, section 6.1).
 
-Gaussian priors: the lights stand as the rig says, the board is nearly flat, balls are where their silhouettes are, q
-is 1.
-Heights, elevations and q trade against each other (with all q raised and all lights lowered the shadows stay the same),
-and a population of solder balls is round on the whole; which balls are not, the caller decides (`population`).
+Priors are normal: each light stands where the rig says, turned by what all lights are turned by; the board is nearly
+flat; each ball is as round as all balls are; outlines are where the camera sees balls, aside by height over distance
+where it is near, and as large as the part of a ball above the board (a cap's outline is its foot).
 """
 
 from __future__ import annotations
@@ -20,20 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.inspection.board import SHAPE_TERMS, Board
-from bgars.inspection.shadow_model import (
-    BALL_TERMS,
-    Balls,
-    Lights,
-    ball_derivatives,
-    board_derivatives,
-    light_derivatives,
-    rays,
-)
+from bgars.inspection.bundle_model import EdgeModel, State, linearise_edges, outline_rows, tangents, turned
+from bgars.inspection.common_terms import AZIMUTH, COMMON_TERMS, ELEVATION, ROUNDNESS
+from bgars.inspection.misfit import relief_px, scatter_factors
+from bgars.inspection.shadow_model import BALL_TERMS
 
 if TYPE_CHECKING:
     from bgars.inspection.shadow_edges import Edges
 
-__all__ = ["Priors", "Solution", "angles_rad", "solve_bundle"]
+__all__ = ["LIGHT_TERMS", "Priors", "Solution", "angles_rad", "solve_bundle"]
 
 Array = NDArray[np.float64]
 
@@ -42,68 +36,88 @@ STEP_TOLERANCE_PX = 1e-4
 Q_TOLERANCE = 1e-5
 CAUCHY = 2.5
 MIN_Q, MAX_Q = 0.2, 2.0
+LARGEST_STEP, LARGEST_TURN_RAD, LARGEST_Q_STEP = 0.3, 0.1, 0.15
+"""Of one round: in radii, and for lights and q. Farther the linear model does not reach."""
+LIGHT_TERMS = 4
+"""Turn along the azimuth, turn up, shift of the image along x and y."""
+SHARED_TERMS = SHAPE_TERMS + COMMON_TERMS
 
 
 class Priors(NamedTuple):
     """Where unknowns are expected: values and standard deviations.
 
-    `balls` (N, 5) values and `u_balls` (N, 5) deviations (inf = free);
-    `vectors` (L, 3) the rig's, `u_light_rad`; `board` (5,) and `u_board` (5,).
+    `outlines` (N, 3) x, y, radius as the camera sees them, and `u_outlines` of each alone; `u_q` (N,) of each ball's
+    q around that of all; `vectors` (L, 3) the rig's, `u_light_rad` (L,) of each light around what all are turned by;
+    `shifts_px` (L, 2) and `u_shifts_px` of the images; `board` (5,) and `u_board`; `common` (COMMON_TERMS,) and
+    `u_common`.
     """
 
-    balls: Array
-    u_balls: Array
+    outlines: Array
+    u_outlines: Array
+    u_q: Array
     vectors: Array
-    u_light_rad: float
+    u_light_rad: Array
+    shifts_px: Array
+    u_shifts_px: Array
     board: Array
     u_board: Array
+    common: Array
+    u_common: Array
+
+    def of_balls(self, index: NDArray[np.intp]) -> Priors:
+        """Priors of some of the balls."""
+        return self._replace(outlines=self.outlines[index], u_outlines=self.u_outlines[index], u_q=self.u_q[index])
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Balls (N, 5), lights (L, 3), board and what is known of their uncertainty.
+    """Balls (N, 5), lights (L, 3), board, common terms, and their uncertainty.
 
-    `covariance` (N, 5, 5) of each ball, lights and board included; `u_light_rad` (L,); `residual_px` (N, L, S) distance
-    of each point to its edge, NaN where none; `weight` (N, L, S); `iterations`; `board_covariance` (5, 5) of the
-    coefficients of `board`; `common_covariance` (5, 5), a part of `covariance`: by how much lights and board put all
-    balls off together.
+    The covariance of ball i is ``alone[i] + lever[i] border lever[i]^T``: `alone` (N, 5, 5) with everything shared
+    known, `lever` (N, 5, B) how the ball follows the B shared unknowns, `border` (B, B) their covariance; first four of
+    each light (:data:`LIGHT_TERMS`), then board, then common terms. `q_alone` (N,) is the part of `u_q` in
+    `alone`. `residual_px` (N, L, S) distance of each point to its edge, NaN where none; `weight` (N, L, S);
+    `relief` (N, 5) what relief of the board adds to the variances, part of `alone`; `excess_px` scatter of the points beyond their own; `factor` (N,) by how much more than points scatter whole
+    shadows of a ball do (variances); `iterations`.
     """
 
     balls: Array
     vectors: Array
     board: Board
-    covariance: Array
-    u_light_rad: Array
+    shifts_px: Array
+    common: Array
+    alone: Array
+    lever: Array
+    border: Array
     residual_px: Array
     weight: Array
     excess_px: float
+    factor: Array
+    relief: Array
     iterations: int
-    board_covariance: Array
-    common_covariance: Array
-    edge_response: Array
-    flank_response: Array
 
+    @property
+    def state(self) -> State:
+        """Values of all unknowns."""
+        return State(self.balls, self.vectors, self.shifts_px, self.board.coefficients, self.common)
 
-def tangents(vectors: Array) -> Array:
-    """(L, 2, 3) changes per radian: first along the azimuth, then up."""
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    unit = vectors / length
-    side = np.column_stack([-unit[:, 1], unit[:, 0], np.zeros(len(unit))])
-    level = np.linalg.norm(side, axis=1, keepdims=True)
-    side = np.where(level > 1e-6, side / np.maximum(level, 1e-6), [1.0, 0.0, 0.0])  # noqa: PLR2004 - the zenith
-    up = np.column_stack(
-        [-unit[:, 2] * side[:, 1], unit[:, 2] * side[:, 0], unit[:, 0] * side[:, 1] - unit[:, 1] * side[:, 0]]
-    )
-    changes: Array = np.stack([side, up], axis=1) * length[:, None]
-    return changes
+    @property
+    def covariance(self) -> Array:
+        """(N, 5, 5) of each ball, everything included."""
+        return self.alone + self.lever @ self.border @ self.lever.transpose(0, 2, 1)
 
+    @property
+    def u_light_rad(self) -> Array:
+        """(L,) standard uncertainties of both axes together; NaN where a fit that ran away has no variance."""
+        lights = len(self.vectors)
+        variance = np.diag(self.border)[: LIGHT_TERMS * lights].reshape(lights, LIGHT_TERMS)[:, :2].sum(axis=1)
+        return np.sqrt(np.where(variance >= 0, variance, np.nan))
 
-def turned(vectors: Array, turns: Array) -> Array:
-    """Lights after small turns (L, 2); their length stays."""
-    moved = vectors + np.einsum("lk,lkc->lc", turns, tangents(vectors))
-    lengths = np.linalg.norm(vectors, axis=1, keepdims=True) / np.linalg.norm(moved, axis=1, keepdims=True)
-    scaled: Array = moved * lengths
-    return scaled
+    @property
+    def board_covariance(self) -> Array:
+        """(5, 5) of the coefficients of `board`."""
+        part = slice(LIGHT_TERMS * len(self.vectors), LIGHT_TERMS * len(self.vectors) + SHAPE_TERMS)
+        return self.border[part, part]
 
 
 def angles_rad(first: Array, second: Array) -> Array:
@@ -115,127 +129,133 @@ def angles_rad(first: Array, second: Array) -> Array:
 
 def solve_bundle(
     edges: Edges,
-    start: Array,
-    vectors: Array,
+    start: State,
     near: bool,
-    board: Board,
     priors: Priors,
     *,
     redescend: float | None,
     rounds: int = MAX_ROUNDS,
 ) -> Solution:
-    """Fit balls, lights and board to measured edge points.
+    """Fit balls, lights, board and common terms to measured edge points.
 
     Parameters
     ----------
     edges : Edges
         Measured points.
-    start : (N, 5) float64
-    vectors : (L, 3) float64
+    start : State
     near : bool
-    board : Board
+        Whether lights are positions.
     priors : Priors
     redescend : float or None
         Points this many standard deviations off count a quarter, those far off nothing (Geman & McClure 1985): relief
-        of
-        the board puts whole stretches of edge elsewhere. None for Cauchy weights, which find the way from farther off.
+        of the board puts whole stretches of edge elsewhere. None for Cauchy weights, which find the way from farther
+        off.
     rounds : int
         Most steps.
     """
-    table, vectors, coefficients = start.copy(), vectors.copy(), board.coefficients.copy()
-    lights = edges.x.shape[1]
-    excess = 0.0
-    iterations = 0
+    state = start
+    known = np.isfinite(edges.u_px)
+    excess, iterations = 0.0, 0
+    variance = np.ones(known.shape)
+    weight = np.zeros(known.shape)
     for iteration in range(1, rounds + 1):
         iterations = iteration
-        board = Board(coefficients)
-        residual, derivatives = _linearise(edges, table, vectors, near, board)
-        known = np.isfinite(edges.u_px)
-        excess = _excess(residual[known], edges.u_px[known])
+        model = linearise_edges(edges, state, near)
+        excess = _excess(model.residual[known], edges.u_px[known])
         variance = np.where(known, edges.u_px**2 + excess**2, 1.0)
-        if redescend is None:
-            loss = 1.0 + residual**2 / (CAUCHY**2 * variance)
-        else:
-            loss = (1.0 + residual**2 / (redescend**2 * variance)) ** 2
-        weight = np.where(known, 1.0 / (variance * loss), 0.0)
-        normal, cross, corner, right, right_border = _normal(
-            derivatives, residual, weight, table, vectors, coefficients, priors
-        )
-        inverse = np.linalg.inv(normal)
-        lever = inverse @ cross
-        reduced = corner - np.tensordot(cross, lever, axes=((0, 1), (0, 1)))
-        step_border = np.linalg.solve(reduced, right_border - np.tensordot(lever, right, axes=((0, 1), (0, 1))))
-        step = np.einsum("nij,nj->ni", inverse, right - cross @ step_border)
-        limit = 0.3 * table[:, 3]
-        step[:, :4] = np.clip(step[:, :4], -limit[:, None], limit[:, None])
-        step[:, 4] = np.clip(step[:, 4], -0.15, 0.15)
-        table = table + step
-        table[:, 4] = np.clip(table[:, 4], MIN_Q, MAX_Q)
-        vectors = turned(vectors, np.clip(step_border[: 2 * lights].reshape(lights, 2), -0.1, 0.1))
-        coefficients = coefficients + step_border[2 * lights :]
+        weight = _weights(model.residual, variance, known, redescend)
+        normal = _normal(model, weight, state, priors)
+        table_step, border_step = _step(normal)
+        state = _moved(state, table_step, border_step)
         if (
-            np.abs(step[:, :4]).max(initial=0.0) < STEP_TOLERANCE_PX
-            and np.abs(step[:, 4]).max(initial=0.0) < Q_TOLERANCE
+            np.abs(table_step[:, :4]).max(initial=0.0) < STEP_TOLERANCE_PX
+            and np.abs(table_step[:, 4]).max(initial=0.0) < Q_TOLERANCE
         ):
             break
-    board = Board(coefficients)
-    residual, derivatives = _linearise(edges, table, vectors, near, board)
-    honest = _honest_weights(residual, variance, known, redescend)
-    at = (honest, table, vectors, coefficients, priors)
-    normal, cross, corner, *_ = _normal(derivatives, residual, *at)
-    inverse = np.linalg.inv(normal)
-    lever = inverse @ cross
-    border_covariance = np.linalg.inv(corner - np.tensordot(cross, lever, axes=((0, 1), (0, 1))))
-    *_, by_priors, border_by_priors = _normal(derivatives, np.zeros_like(residual), *at)
-
-    def response(shift_px: Array) -> Array:
-        """(N, 5) change of the balls when measured points lie so much farther out: linear, priors as they are."""
-        *_, right, right_border = _normal(derivatives, shift_px, *at)
-        right, right_border = right - by_priors, right_border - border_by_priors
-        turn = border_covariance @ (right_border - np.tensordot(lever, right, axes=((0, 1), (0, 1))))
-        changed: Array = np.einsum("nij,nj->ni", inverse, right - cross @ turn)
-        return changed
-
-    covariance = inverse + lever @ border_covariance @ lever.transpose(0, 2, 1)
-    mean_lever = lever.mean(axis=0)
-    board_covariance: Array = border_covariance[2 * lights :, 2 * lights :].astype(np.float64)
-    u_light = _u_lights(border_covariance.astype(np.float64), lights)
+    model = linearise_edges(edges, state, near)
+    honest = _honest_weights(model.residual, variance, known, redescend)
+    factor = scatter_factors(model, honest)
+    normal = _normal(model, honest / factor[:, None, None], state, priors)
+    inverse = np.linalg.inv(normal.balls)
+    lever = -inverse @ normal.cross
+    reduced = normal.corner + np.tensordot(normal.cross, lever, axes=((0, 1), (0, 1)))
+    relief = _relief(model.residual, edges.u_px, state.vectors)
     return Solution(
-        table,
-        vectors,
-        board,
-        covariance,
-        u_light,
-        np.where(known, residual, np.nan),
+        state.balls,
+        state.vectors,
+        Board(state.board),
+        state.shifts_px,
+        state.common,
+        inverse + relief[:, :, None] * np.eye(BALL_TERMS),
+        lever,
+        _inverse(reduced),
+        np.where(known, model.residual, np.nan),
         np.where(known, weight * variance, 0.0),
         excess,
+        factor,
+        relief,
         iterations,
-        board_covariance,
-        mean_lever @ border_covariance @ mean_lever.T,
-        response(np.ones_like(residual)),
-        response(_flanks(edges, table, vectors, near, board)),
     )
 
 
-def _u_lights(border_covariance: Array, lights: int) -> Array:
-    """(L,) standard uncertainties of both axes together; NaN where a fit that ran away has no variance."""
-    variance = np.diag(border_covariance)[: 2 * lights].reshape(lights, 2).sum(axis=1)
-    u_light: Array = np.sqrt(np.where(variance >= 0, variance, np.nan))
-    return u_light
+def _relief(residual: Array, u_px: Array, vectors: Array) -> Array:
+    """(N, 5) variances by relief of the board: heights follow it by the tangent of the lights, places by their mean."""
+    square = np.square(relief_px(np.where(np.isfinite(u_px), residual, np.nan), u_px))
+    rise = float(np.median(vectors[:, 2] / np.maximum(np.hypot(vectors[:, 0], vectors[:, 1]), 1e-6)))
+    aside = square / (2.0 * len(vectors))
+    return np.column_stack([aside, aside, rise**2 * square, aside, np.zeros_like(square)])
 
 
-def _flanks(edges: Edges, table: Array, vectors: Array, near: bool, board: Board) -> Array:
-    """(N, L, S) 1 where the edge of a shadow runs at 45 degrees to its light, 0 at tips and sides."""
-    beam = rays(
-        edges.x, edges.y, Balls.from_table(table).spread(2), Lights.from_table(vectors, near).spread(1, 1), board
+class _Normal(NamedTuple):
+    """Blocks of the normal equations and their right sides: balls (N, 5, 5), cross (N, 5, B), corner (B, B)."""
+
+    balls: Array
+    cross: Array
+    corner: Array
+    right: Array
+    right_border: Array
+
+
+def _step(normal: _Normal) -> tuple[Array, Array]:
+    """Steps of the balls (N, 5), within limits, and of the border (B,)."""
+    inverse = np.linalg.inv(normal.balls)
+    lever = inverse @ normal.cross
+    reduced = normal.corner - np.tensordot(normal.cross, lever, axes=((0, 1), (0, 1)))
+    right = normal.right_border - np.tensordot(lever, normal.right, axes=((0, 1), (0, 1)))
+    border = _inverse(reduced) @ right
+    return np.einsum("nij,nj->ni", inverse, normal.right - normal.cross @ border), border
+
+
+def _inverse(matrix: Array) -> Array:
+    """Inverse of a symmetric matrix whose unknowns have different units."""
+    size = np.sqrt(np.maximum(np.diag(matrix), 1e-30))
+    inverse: Array = np.linalg.inv(matrix / np.outer(size, size)) / np.outer(size, size)
+    return inverse
+
+
+def _moved(state: State, table_step: Array, border_step: Array) -> State:
+    """The state after one round."""
+    lights = len(state.vectors)
+    limit = LARGEST_STEP * state.balls[:, 3:4]
+    balls = state.balls.copy()
+    balls[:, :4] += np.clip(table_step[:, :4], -limit, limit)
+    balls[:, 4] = np.clip(balls[:, 4] + np.clip(table_step[:, 4], -LARGEST_Q_STEP, LARGEST_Q_STEP), MIN_Q, MAX_Q)
+    of_lights = border_step[: LIGHT_TERMS * lights].reshape(lights, LIGHT_TERMS)
+    shared = border_step[LIGHT_TERMS * lights :]
+    return State(
+        balls,
+        turned(state.vectors, np.clip(of_lights[:, :2], -LARGEST_TURN_RAD, LARGEST_TURN_RAD)),
+        state.shifts_px + of_lights[:, 2:],
+        state.board + shared[:SHAPE_TERMS],
+        state.common + shared[SHAPE_TERMS:],
     )
-    level = np.maximum(np.hypot(beam.toward_x, beam.toward_y), 1e-9)
-    cosine = (beam.toward_x * beam.gradient_x + beam.toward_y * beam.gradient_y) / (
-        level * np.maximum(beam.slope, 1e-3)
-    )
-    tips = np.square(cosine)
-    flanks: Array = 4.0 * tips * (1.0 - tips)
-    return flanks
+
+
+def _weights(residual: Array, variance: Array, known: NDArray[np.bool_], redescend: float | None) -> Array:
+    """(N, L, S) robust weights over variances."""
+    square = residual**2 / variance
+    loss = 1.0 + square / CAUCHY**2 if redescend is None else (1.0 + square / redescend**2) ** 2
+    return np.where(known, 1.0 / (variance * loss), 0.0)
 
 
 def _honest_weights(residual: Array, variance: Array, known: NDArray[np.bool_], redescend: float | None) -> Array:
@@ -266,60 +286,80 @@ def _excess(residual: Array, u_px: Array) -> float:
     return float(np.sqrt(max(spread**2 - float(np.median(u_px)) ** 2, 0.0)))
 
 
-def _linearise(edges: Edges, table: Array, vectors: Array, near: bool, board: Board) -> tuple[Array, Array]:
-    """Distance (N, L, S) of every point to its predicted edge; derivatives (N, L, S, 12) by ball, light and board."""
-    balls = Balls.from_table(table).spread(2)
-    lamps = Lights.from_table(vectors, near).spread(1, 1)
-    beam = rays(edges.x, edges.y, balls, lamps, board)
-    slope = np.maximum(beam.slope, 1e-3)
-    ways = tangents(vectors)
-    by_light = light_derivatives(beam, balls, (ways[None, :, None, 0], ways[None, :, None, 1]))
-    by_ball = ball_derivatives(beam, balls, board)
-    by_board = board_derivatives(edges.x, edges.y, beam, balls)
-    derivatives = np.concatenate([by_ball, by_light, by_board], axis=-1) / slope[..., None]
-    return (beam.distance - balls.radius) / slope, derivatives
-
-
-def _normal(
-    derivatives: Array,
-    residual: Array,
-    weight: Array,
-    table: Array,
-    vectors: Array,
-    coefficients: Array,
-    priors: Priors,
-) -> tuple[Array, Array, Array, Array, Array]:
-    """Blocks of the normal equations: (N, 5, 5), (N, 5, B), (B, B), and their right sides; priors in."""
-    count, lights = residual.shape[:2]
-    border = 2 * lights + SHAPE_TERMS
-    weighted = (derivatives * weight[..., None]).swapaxes(-1, -2)
-    shadows = weighted @ derivatives  # of every shadow, (N, L, 12, 12)
-    sides = -(weighted @ residual[..., None])[..., 0]
-    ball, lamp, shape = slice(BALL_TERMS), slice(BALL_TERMS, BALL_TERMS + 2), slice(BALL_TERMS + 2, None)
+def _normal(model: EdgeModel, weight: Array, state: State, priors: Priors) -> _Normal:
+    """Normal equations of edge points and priors."""
+    count, lights = model.residual.shape[:2]
+    first_shared = LIGHT_TERMS * lights
+    border = first_shared + SHARED_TERMS
+    weighted = (model.derivatives * weight[..., None]).swapaxes(-1, -2)
+    shadows = weighted @ model.derivatives  # of every shadow, (N, L, T, T)
+    sides = -(weighted @ model.residual[..., None])[..., 0]
+    ball, lamp = slice(BALL_TERMS), slice(BALL_TERMS, BALL_TERMS + LIGHT_TERMS)
+    shared = slice(BALL_TERMS + LIGHT_TERMS, None)
     of_balls, of_lights = shadows[:, :, ball].sum(axis=1), shadows.sum(axis=0)
-    normal, right = of_balls[:, :, ball], sides[:, :, ball].sum(axis=1)
-    by_light = shadows[:, :, ball, lamp].swapaxes(1, 2).reshape(count, BALL_TERMS, 2 * lights)
-    cross = np.concatenate([by_light, of_balls[:, :, shape]], axis=2)
+    by_light = shadows[:, :, ball, lamp].swapaxes(1, 2).reshape(count, BALL_TERMS, first_shared)
+    cross = np.concatenate([by_light, of_balls[:, :, shared]], axis=2)
     corner = np.zeros((border, border))
     for light in range(lights):
-        part = slice(2 * light, 2 * light + 2)
+        part = slice(LIGHT_TERMS * light, LIGHT_TERMS * (light + 1))
         corner[part, part] = of_lights[light, lamp, lamp]
-        corner[part, 2 * lights :] = of_lights[light, lamp, shape]
-        corner[2 * lights :, part] = of_lights[light, shape, lamp]
-    corner[2 * lights :, 2 * lights :] = of_lights[:, shape, shape].sum(axis=0)
+        corner[part, first_shared:] = of_lights[light, lamp, shared]
+        corner[first_shared:, part] = of_lights[light, shared, lamp]
+    corner[first_shared:, first_shared:] = of_lights[:, shared, shared].sum(axis=0)
     border_sides = sides.sum(axis=0)
-    right_border = np.concatenate([border_sides[:, lamp].reshape(-1), border_sides[:, shape].sum(axis=0)])
+    right_border = np.concatenate([border_sides[:, lamp].reshape(-1), border_sides[:, shared].sum(axis=0)])
+    normal = _Normal(of_balls[:, :, ball], cross, corner, sides[:, :, ball].sum(axis=1), right_border)
+    _add_ball_priors(normal, state, priors)
+    _add_light_priors(normal, state, priors)
+    return normal
 
-    off = priors.balls - table
-    pull = 1.0 / priors.u_balls**2
-    normal[:, range(5), range(5)] += pull + 1e-9
-    right += pull * off
-    ways = tangents(vectors)
-    length = np.linalg.norm(vectors, axis=1)
-    away = np.einsum("lc,lkc->lk", priors.vectors - vectors, ways) / np.square(length)[:, None]
-    corner[range(border), range(border)] += np.concatenate(
-        [np.full(2 * lights, priors.u_light_rad**-2.0), priors.u_board**-2.0]
-    )
-    right_border[: 2 * lights] += away.reshape(-1) / priors.u_light_rad**2
-    right_border[2 * lights :] += (priors.board - coefficients) / priors.u_board**2
-    return normal, cross, corner, right, right_border
+
+def _add_ball_priors(normal: _Normal, state: State, priors: Priors) -> None:
+    """Outlines, heights somewhere near the radius, and q around that of all balls."""
+    first = normal.corner.shape[0] - COMMON_TERMS
+    residual, by_ball, by_common = outline_rows(state, priors.outlines)
+    weight = priors.u_outlines**-2.0
+    normal.balls[:] += np.einsum("nki,nk,nkj->nij", by_ball, weight, by_ball)
+    normal.right[:] -= np.einsum("nki,nk,nk->ni", by_ball, weight, residual)
+    normal.cross[:, :, first:] += np.einsum("nki,nk,nkj->nij", by_ball, weight, by_common)
+    normal.corner[first:, first:] += np.einsum("nki,nk,nkj->ij", by_common, weight, by_common)
+    normal.right_border[first:] -= np.einsum("nki,nk,nk->i", by_common, weight, residual)
+    pull = 1.0 / priors.outlines[:, 2] ** 2
+    normal.balls[:, 2, 2] += pull
+    normal.right[:, 2] -= pull * state.balls[:, 2]
+    pull = priors.u_q**-2.0
+    off = state.balls[:, 4] - 1.0 - state.common[ROUNDNESS]
+    normal.balls[:, 4, 4] += pull
+    normal.right[:, 4] -= pull * off
+    normal.cross[:, 4, first + ROUNDNESS] -= pull
+    normal.corner[first + ROUNDNESS, first + ROUNDNESS] += pull.sum()
+    normal.right_border[first + ROUNDNESS] += (pull * off).sum()
+    normal.balls[:, range(BALL_TERMS), range(BALL_TERMS)] += 1e-9
+
+
+def _add_light_priors(normal: _Normal, state: State, priors: Priors) -> None:
+    """Each light around what all are turned by, shifts of images, board, common terms."""
+    lights = len(state.vectors)
+    corner, right = normal.corner, normal.right_border
+    first = len(right) - COMMON_TERMS
+    ways = tangents(state.vectors)
+    length = np.linalg.norm(state.vectors, axis=1)
+    turn = np.einsum("lc,lkc->lk", state.vectors - priors.vectors, ways) / np.square(length)[:, None]
+    for axis, term in ((0, AZIMUTH), (1, ELEVATION)):
+        own = LIGHT_TERMS * np.arange(lights) + axis
+        pull = priors.u_light_rad**-2.0
+        off = turn[:, axis] - state.common[term]
+        corner[own, own] += pull
+        corner[own, first + term] -= pull
+        corner[first + term, own] -= pull
+        corner[first + term, first + term] += pull.sum()
+        right[own] -= pull * off
+        right[first + term] += (pull * off).sum()
+        own = LIGHT_TERMS * np.arange(lights) + 2 + axis
+        pull = priors.u_shifts_px[:, axis] ** -2.0
+        corner[own, own] += pull
+        right[own] += pull * (priors.shifts_px - state.shifts_px)[:, axis]
+    shared = np.arange(LIGHT_TERMS * lights, len(right))
+    pull = np.concatenate([priors.u_board, priors.u_common]) ** -2.0
+    corner[shared, shared] += pull
+    right[shared] += pull * np.concatenate([priors.board - state.board, priors.common - state.common])

@@ -23,7 +23,16 @@ if TYPE_CHECKING:
     from bgars.inspection.shadow_edges import Edges
     from bgars.records import Capture
 
-__all__ = ["Complaint", "check_shifts", "displaced_images", "explain_dark_steps", "refuse_misfits", "refuse_repeated"]
+__all__ = [
+    "Complaint",
+    "ImageShifts",
+    "check_shifts",
+    "displaced_images",
+    "explain_dark_steps",
+    "image_shifts",
+    "refuse_misfits",
+    "refuse_repeated",
+]
 
 Array = NDArray[np.float64]
 
@@ -263,26 +272,29 @@ def _best_shift(problem: Problem, table: Array, chosen: NDArray[np.intp], light:
     return float(steps[best]), float(dx[best]), float(dy[best])
 
 
-def check_shifts(outlines: Outlines, files: Sequence[Path] = ()) -> tuple[str, ...]:
-    """Find images that are shifted by little, from the outlines of the balls in each.
+class ImageShifts(NamedTuple):
+    """(L, 2) how far each image is shifted against the others, px, and its standard uncertainty (L,); inf: unknown."""
+
+    move_px: Array
+    u_px: Array
+
+
+def image_shifts(outlines: Outlines) -> ImageShifts:
+    """Shifts of images from the outlines of the balls in each.
 
     Under one light an outline is seen on one side only, and how its shading moves the edge is the same under every
     light: what differs between lights is a shift.
-
-    Raises
-    ------
-    CalibrationError
-        A shift of a pixel or more.
     """
+    lights = len(outlines.azimuths_rad)
+    shifts = ImageShifts(np.zeros((lights, 2)), np.full(lights, np.inf))
     weight = np.where(np.isfinite(outlines.u_shift_px), 1.0, 0.0)
     shift = np.where(weight > 0, outlines.shift_px, np.nan)
-    if weight.sum() < MIN_STRETCHES * len(outlines.azimuths_rad):
-        return ()
+    if weight.sum() < MIN_STRETCHES * lights:
+        return shifts
     # A place of the outline that no light shows has no usual shift.
     shown: NDArray[np.bool_] = np.asarray(np.isfinite(shift).any(axis=(0, 1)))
     usual = np.full(len(shown), np.nan)
     usual[shown] = np.nanmedian(shift[:, :, shown], axis=(0, 1))
-    warnings = []
     for light, azimuth in enumerate(outlines.azimuths_rad):
         off = shift[:, light] - usual[None, :]
         known = np.isfinite(off)
@@ -292,10 +304,23 @@ def check_shifts(outlines: Outlines, files: Sequence[Path] = ()) -> tuple[str, .
         system, found = np.column_stack([np.cos(angle), np.sin(angle)]), off[known]
         spread = max(1.4826 * float(np.median(np.abs(found - np.median(found)))), 1e-3)
         keep = np.abs(found - np.median(found)) < 4.0 * spread
-        move = np.linalg.lstsq(system[keep], found[keep], rcond=None)[0]
-        u_move = spread / np.sqrt(max(int(keep.sum()), 1) / 2.0)
+        shifts.move_px[light] = np.linalg.lstsq(system[keep], found[keep], rcond=None)[0]
+        shifts.u_px[light] = spread / np.sqrt(max(int(keep.sum()), 1) / 2.0)
+    return shifts
+
+
+def check_shifts(shifts: ImageShifts, files: Sequence[Path] = ()) -> tuple[str, ...]:
+    """Name images that are shifted by little.
+
+    Raises
+    ------
+    CalibrationError
+        A shift of a pixel or more.
+    """
+    warnings = []
+    for light, (move, u_move) in enumerate(zip(shifts.move_px, shifts.u_px, strict=True)):
         size = float(np.hypot(*move))
-        if size < max(SHIFT_WARNING_PX, SHIFT_SIGMAS * u_move):
+        if not np.isfinite(u_move) or size < max(SHIFT_WARNING_PX, SHIFT_SIGMAS * u_move):
             continue
         name = light_name(light, files, what="image")
         text = f"{name} is shifted by ({move[0]:+.1f}, {move[1]:+.1f}) pixels (x right, y up) against the others"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bgars.inspection.facets import hull_facets
 from bgars.inspection.planes import ReferencePlane, off_lines, regression_plane, seating_planes
 
-__all__ = ["Coplanarity", "measure_coplanarity", "quiet_heights"]
+__all__ = ["Coplanarity", "measure_coplanarity", "quiet_heights", "seating_budget"]
 
 Array = NDArray[np.float64]
 DRAWS = 256
@@ -22,6 +22,8 @@ MIN_BALLS = 3
 OUTLIER = 4.0
 """Residuals beyond this many standard deviations are defects, not noise."""
 MAD_TO_SIGMA = 1.4826
+WORTH_TELLING = 0.05
+"""Causes of less than this share of an uncertainty are not listed."""
 MAX_LOST = 0.01
 """Share of draws in which the part may fall over before its coplanarity has no uncertainty."""
 
@@ -56,22 +58,30 @@ class Coplanarity:
 
 
 def measure_coplanarity(
-    apexes_um: Array, u_apexes_um: Array, gravity_um: Array, *, draws: int = DRAWS, seed: int = SEED
+    apexes_um: Array,
+    u_apexes_um: Array,
+    gravity_um: Array,
+    shared_um: Array | None = None,
+    *,
+    draws: int = DRAWS,
+    seed: int = SEED,
 ) -> Coplanarity:
     """Measure coplanarity from apexes and their standard uncertainties.
 
     Monte Carlo (JCGM 101:2008): noise of the stated size is added to a quiet part (:func:`quiet_heights`) `draws`
     times. The spread of its coplanarity is the standard uncertainty, the mean less the quiet part's own is the bias.
-    The noise of the apexes is taken as independent: an error that all share moves no plane against them.
+    An error that all apexes share moves no plane against them; one that grows from ball to ball does.
 
     Parameters
     ----------
     apexes_um : (n, 3) float64
         Tops of the balls in the world.
     u_apexes_um : (n, 3) float64
-        Standard uncertainties; NaN = unknown, which leaves uncertainty and bias NaN.
+        Standard uncertainties of each alone; NaN = unknown, which leaves uncertainty and bias NaN.
     gravity_um : (2,) float64
         Centre of gravity.
+    shared_um : (n, M) float64, optional
+        What M independent sources of standard deviation 1 put the heights off by.
     draws : int
         Number of noisy parts.
     seed : int
@@ -99,6 +109,8 @@ def measure_coplanarity(
     for first in range(0, draws, at_once):
         noise = random.standard_normal((min(at_once, draws - first), *apexes_um.shape))
         noisy_um = quiet_um + noise * u_apexes_um
+        if shared_um is not None:
+            noisy_um[:, :, 2] += random.standard_normal((len(noise), shared_um.shape[1])) @ shared_um.T
         leaned_um.append(_regression_um(quiet_um, noisy_um[:, :, 2]))
         if seating:
             stood_um.append(_seating_um(noisy_um, gravity_um))
@@ -113,6 +125,38 @@ def measure_coplanarity(
         regression_um,
         *_spread(np.concatenate(leaned_um), quiet_regression_um),
     )
+
+
+def seating_budget(
+    coplanarity: Coplanarity, apexes_um: Array, gravity_um: Array, shared_um: Array, causes: tuple[str, ...], rest: str
+) -> dict[str, float]:
+    """Standard uncertainty of the seating coplanarity by cause, um, largest first.
+
+    Each source is moved by its standard deviation alone (JCGM 100:2008, 5.1.3, note 2); `rest` is the name of what
+    they leave of the Monte Carlo's.
+
+    Parameters
+    ----------
+    coplanarity : Coplanarity
+        Of these apexes.
+    apexes_um, gravity_um, shared_um
+        As for :func:`measure_coplanarity`.
+    causes : tuple of str
+        Names of the M sources.
+    rest : str
+    """
+    u_um = coplanarity.u_seating_um
+    if not math.isfinite(u_um) or not shared_um.shape[1]:
+        return {}
+    moved_um = np.repeat(apexes_um[None], shared_um.shape[1], axis=0)
+    moved_um[:, :, 2] += shared_um.T
+    change_um = np.nan_to_num(_seating_um(moved_um, gravity_um) - coplanarity.seating_um)
+    parts: dict[str, float] = {}
+    for name, change in zip(causes, change_um.tolist(), strict=True):
+        parts[name] = parts.get(name, 0.0) + change**2
+    parts[rest] = max(u_um**2 - sum(parts.values()), 0.0)
+    kept = {name: math.sqrt(part) for name, part in parts.items() if part >= (WORTH_TELLING * u_um) ** 2}
+    return dict(sorted(kept.items(), key=lambda pair: -pair[1]))
 
 
 def quiet_heights(apexes_um: Array, u_z_um: Array) -> Array:

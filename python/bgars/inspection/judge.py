@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bgars.inspection.coplanarity import Coplanarity, measure_coplanarity
+from bgars.inspection.coplanarity import Coplanarity, measure_coplanarity, seating_budget
 from bgars.inspection.decision import COVERAGE_FACTOR, worst
 from bgars.inspection.judge_ball import Position, judge_ball, true_position
 from bgars.inspection.judge_part import part_checks, part_reasons
+from bgars.inspection.lens_scale import PIXEL_PITCH
 from bgars.inspection.odd_sizes import odd_sizes
 from bgars.inspection.places import Slot, match_balls
 from bgars.inspection.position import GridFit, fit_grid
+from bgars.inspection.to_scale import lens_scale, to_scale
 from bgars.inspection.warpage import board_height_um, board_terms, warpage
 from bgars.light_names import light_name
 from bgars.part_result import BallResult, PartResult, SeatingResult
@@ -33,6 +35,10 @@ __all__ = ["judge_part"]
 
 OWN_PITCH = "no recipe: true positions are against a grid of the part's own pitch"
 MIN_ROCKING = 2
+SEEN_SHARE = 0.5
+"""Of the places of a part: with fewer balls than that the finder, or the set-up, has failed."""
+MIN_GRID = 3
+EACH_BALL = "each ball by itself"
 MAX_LIGHT_CHANGE_DEG = 5.0
 """Beyond this nothing that rests on the lights may pass."""
 
@@ -78,17 +84,24 @@ def judge_part(
         Records that do not belong together.
     """
     slots = match_balls(found, measurement, recipe)
+    pitch_um, u_pitch_um = _pitch(_grid(slots, recipe)[0], recipe, measurement)
+    lens = lens_scale(slots, measurement, recipe)
+    if lens is not None:
+        measurement = to_scale(measurement, lens)
+        slots = match_balls(found, measurement, recipe)
     fit, nominal_um = _grid(slots, recipe)
-    coplanarity, rows = _coplanarity(slots, measurement, recipe, fit, nominal_um)
+    coplanarity, rows, budget = _coplanarity(slots, measurement, recipe, fit, nominal_um)
     limits = None if recipe is None else recipe.limits
     names = {
         slot.name: slot.name if recipe is None else recipe.name_of(slot.name, slot.row, slot.col) for slot in slots
     }
+    doubts = (*_strayed_lights(measurement.light_change_deg, light_files), *measurement.doubts)
+    is_seen = _is_seen(slots)
+    positions = _positions(slots, nominal_um, measurement)
     balls = []
-    for index, slot in enumerate(slots):
-        partners = _partners(slot.name, found.bridges)
-        position = _position(slot, nominal_um[index])
-        verdict, reasons = judge_ball(slot, position, limits, tuple(names.get(each, each) for each in partners))
+    for index, (slot, position) in enumerate(zip(slots, positions, strict=True)):
+        partners = tuple(names.get(each, each) for each in _partners(slot.name, found.bridges))
+        verdict, reasons = judge_ball(slot, position, limits, partners, doubts, is_seen=is_seen)
         ball = _ball(slot, names[slot.name], nominal_um[index], position)
         balls.append(replace(ball, verdict=verdict, reasons=reasons))
     for row, index in enumerate(rows):
@@ -98,7 +111,6 @@ def judge_part(
         if coplanarity.regression is not None:
             deviation_um = float(coplanarity.regression.deviations_um[row])
             balls[index] = replace(balls[index], regression_deviation_um=deviation_um)
-    pitch_um, u_pitch_um = _pitch(fit, recipe)
     warpage_um, u_warpage_um = warpage(
         measurement.board_coefficients_um, measurement.board_covariance, _finite_centres(slots)
     )
@@ -110,16 +122,15 @@ def judge_part(
     checks = part_checks(coplanarity, (pitch_um, u_pitch_um), (warpage_um, u_warpage_um), limits, unmeasured=unmeasured)
     bridges = tuple((names.get(one, one), names.get(two, two)) for one, two in found.bridges)
     verdicts = [ball.verdict for ball in balls] + [check.verdict for check in checks if check.verdict is not None]
-    if bridges or not any(ball.present for ball in balls):
+    if bridges:
         verdicts.append("fail")
-    doubts = (*_strayed_lights(measurement.light_change_deg, light_files), *measurement.doubts)
-    if doubts or not limits:
+    if doubts or not limits or not is_seen:
         verdicts.append("undecided")
     return PartResult(
         name=name if recipe is None else recipe.name,
         balls=tuple(balls),
         verdict=worst(verdicts),
-        reasons=(*part_reasons(balls, checks, bridges, has_limits=bool(limits)), *doubts),
+        reasons=(*part_reasons(balls, checks, bridges, has_limits=bool(limits), is_seen=is_seen), *doubts),
         pitch_um=pitch_um,
         u_pitch_um=u_pitch_um,
         grid_angle_deg=math.nan if fit is None else math.degrees(fit.angle_rad),
@@ -147,6 +158,7 @@ def judge_part(
         light_change_deg=measurement.light_change_deg,
         board_coefficients_um=measurement.board_coefficients_um,
         shadow_residual_rms=measurement.shadow_residual_rms,
+        seating_budget=budget,
         warnings=(*warnings, *measurement.warnings, *_own_warnings(recipe, fit, coplanarity, balls)),
         recipe=recipe,
         pixel_pitch_um=pixel_pitch_um,
@@ -210,18 +222,54 @@ def _grid(slots: tuple[Slot, ...], recipe: PartRecipe | None) -> tuple[GridFit |
     return fit, places_um
 
 
-def _pitch(fit: GridFit | None, recipe: PartRecipe | None) -> tuple[float, float]:
+def _pitch(fit: GridFit | None, recipe: PartRecipe | None, measurement: BallMeasurement) -> tuple[float, float]:
+    """Pitch by the declared size of a pixel, not by the recipe's grid, and its standard uncertainty."""
     if fit is None or (recipe is not None and recipe.layout.pitch_um is None):
         return math.nan, math.nan
     unit_um = 1.0 if recipe is None else float(recipe.layout.pitch_um or math.nan)
-    return fit.free_scale * unit_um, fit.u_free_scale * unit_um
+    u_pixel = PIXEL_PITCH.spread if measurement.u_pixel_pitch is None else measurement.u_pixel_pitch
+    u_scale = math.hypot(fit.u_free_scale, fit.free_scale * u_pixel)
+    return fit.free_scale * unit_um, u_scale * unit_um
 
 
-def _position(slot: Slot, nominal_um: Array) -> Position:
-    if slot.measured is None or slot.nominal is None:
-        return Position(math.nan, math.nan)
-    centre_um = np.array([slot.measured.x_um, slot.measured.y_um])
-    return true_position(centre_um - nominal_um, np.array([slot.measured.u_x_um, slot.measured.u_y_um]))
+def _is_seen(slots: tuple[Slot, ...]) -> bool:
+    """Whether most places show a ball: where they do not, the set-up is to be looked at, not the part."""
+    wanted = [slot for slot in slots if slot.kind != "extra"]
+    return bool(wanted) and sum(slot.found for slot in wanted) > SEEN_SHARE * len(wanted)
+
+
+def _positions(slots: tuple[Slot, ...], nominal_um: Array, measurement: BallMeasurement) -> list[Position]:
+    """True positions; what shifts or turns all balls together moves the grid with them, and is in none."""
+    places = {ball.name: place for place, ball in enumerate(measurement.balls)}
+    positions = []
+    shared = {name: measurement.shared_um.get(name) for name in ("x_um", "y_um")}
+    left = {name: None if part is None else _off_grid(part, measurement, name) for name, part in shared.items()}
+    for slot, place_um in zip(slots, nominal_um, strict=True):
+        ball = slot.measured
+        if ball is None or slot.nominal is None:
+            positions.append(Position(math.nan, math.nan))
+            continue
+        u_um = [ball.u_x_um, ball.u_y_um]
+        for axis, name in enumerate(("x_um", "y_um")):
+            part, rest = shared[name], left[name]
+            if part is not None and rest is not None:
+                row = places[ball.name]
+                alone = max(u_um[axis] ** 2 - float(np.square(part[row]).sum()), 0.0)
+                u_um[axis] = math.sqrt(alone + float(np.square(rest[row]).sum()))
+        positions.append(true_position(np.array([ball.x_um, ball.y_um]) - place_um, np.array(u_um)))
+    return positions
+
+
+def _off_grid(shared_um: Array, measurement: BallMeasurement, name: str) -> Array:
+    """(N, M) errors that balls share, less the shift along this axis and the turn that a grid follows."""
+    across = np.array([ball.y_um if name == "x_um" else ball.x_um for ball in measurement.balls], dtype=np.float64)
+    seen = np.square(shared_um).sum(axis=1) > 0
+    if seen.sum() < MIN_GRID:
+        return shared_um
+    design = np.column_stack([np.ones(len(across)), across / max(float(np.abs(across[seen]).max()), 1e-9)])
+    fitted = np.linalg.lstsq(design[seen], shared_um[seen], rcond=None)[0]
+    off: Array = np.where(seen[:, None], shared_um - design @ fitted, 0.0)
+    return off
 
 
 def _coplanarity(
@@ -230,8 +278,8 @@ def _coplanarity(
     recipe: PartRecipe | None,
     fit: GridFit | None,
     nominal_um: Array,
-) -> tuple[Coplanarity, list[int]]:
-    """Coplanarity of the apexes in the world, and the slots that have one."""
+) -> tuple[Coplanarity, list[int], dict[str, float]]:
+    """Coplanarity of the apexes in the world, the slots that have one, and the budget of the seating one."""
     coefficients_um = measurement.board_coefficients_um
     rows, tops = [], []
     for index, slot in enumerate(slots):
@@ -249,7 +297,18 @@ def _coplanarity(
     gravity_um = _gravity_um(recipe, fit, nominal_um, slots)
     if not np.isfinite(gravity_um).all():  # a single ball, or a single whole one
         apexes_um, u_um, gravity_um = apexes_um[:0], u_um[:0], np.zeros(2)
-    return measure_coplanarity(apexes_um, u_um, gravity_um), rows
+    shared_um = None
+    if rows and measurement.shared_um:
+        places = {ball.name: place for place, ball in enumerate(measurement.balls)}
+        shared_um = measurement.shared_um["top_um"][[places[slots[index].name] for index in rows]]
+        u_um[:, 2] = np.sqrt(np.maximum(np.square(u_um[:, 2]) - np.square(shared_um).sum(axis=1), 0.0))
+    if len(apexes_um) != len(rows):
+        shared_um = None
+    coplanarity = measure_coplanarity(apexes_um, u_um, gravity_um, shared_um)
+    if shared_um is None:
+        return coplanarity, rows, {}
+    causes = measurement.causes
+    return coplanarity, rows, seating_budget(coplanarity, apexes_um, gravity_um, shared_um, causes, EACH_BALL)
 
 
 def _u_board_um(measurement: BallMeasurement, table: Array) -> Array:
@@ -314,4 +373,5 @@ def _ball(slot: Slot, name: str, nominal_um: Array, position: Position) -> BallR
         flat_um=ball.flat_um,
         u_flat_um=ball.u_flat_um,
         lights_used=ball.lights_used,
+        budget=ball.budget,
     )

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from bgars.part_recipe import Limits
     from bgars.part_result import Verdict
 
-__all__ = ["NO_LIMITS", "Position", "judge_ball", "true_position"]
+__all__ = ["NO_LIMITS", "UNCLEAR", "Position", "judge_ball", "true_position"]
 
 NO_LIMITS = "no limits given"
 WORDS = {
@@ -32,6 +32,8 @@ WORDS = {
     "flat_um": "flat top",
 }
 MISSING = "no ball at its place"
+UNCLEAR = "something is at its place, but it was not measured"
+UNJUDGED = "no ball found, in a set-up that shows too few of them to judge by"
 EXTRA = "a ball where none should be"
 NOT_MEASURED = "found, but not measured"
 
@@ -59,7 +61,13 @@ def true_position(off_um: NDArray[np.float64], u_um: NDArray[np.float64]) -> Pos
 
 
 def judge_ball(
-    slot: Slot, position: Position, limits: Limits | None, partners: tuple[str, ...] = ()
+    slot: Slot,
+    position: Position,
+    limits: Limits | None,
+    partners: tuple[str, ...] = (),
+    doubts: tuple[str, ...] = (),
+    *,
+    is_seen: bool = True,
 ) -> tuple[Verdict, tuple[str, ...]]:
     """Judge a ball and say why it does not pass.
 
@@ -73,9 +81,15 @@ def judge_ball(
         None or empty: presence is judged, nothing else.
     partners : tuple of str
         Balls that it is joined to.
+    doubts : tuple of str
+        Of the whole part: with any, no ball passes, and none fails by its numbers.
+    is_seen : bool
+        False where so few balls were found that what is missing says more of the set-up than of the part.
     """
     if not slot.found:
-        return "fail", (MISSING,)
+        if slot.unclear:
+            return "undecided", (UNCLEAR,)
+        return ("fail", (MISSING,)) if is_seen else ("undecided", (UNJUDGED,))
     failed, open_ = [], []
     if slot.kind == "extra":
         failed.append(EXTRA)
@@ -92,10 +106,13 @@ def judge_ball(
                 if allowed is None:
                     continue
                 verdict, reason = decide(WORDS[name], value, u, allowed, unit="" if name == "q" else "um")
+                if verdict == "fail" and doubts:
+                    verdict = "undecided"
                 if verdict != "pass":
                     (failed if verdict == "fail" else open_).append(reason)
     if not limits:
         open_.append(NO_LIMITS)
+    open_ += doubts
     reasons = tuple(dict.fromkeys([*failed, *open_]))
     if failed:
         return "fail", reasons

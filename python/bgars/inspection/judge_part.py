@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from bgars.inspection.decision import decide
-from bgars.inspection.judge_ball import NO_LIMITS
+from bgars.inspection.judge_ball import NO_LIMITS, UNCLEAR
 from bgars.part_result import BallResult, PartCheck
 
 if TYPE_CHECKING:
@@ -19,6 +19,10 @@ MAX_NAMES = 8
 MAX_TOLD = 4
 """Balls that are named with their reasons."""
 HOW_TO_LIMIT = f"{NO_LIMITS}: for a verdict, give a recipe with a [limits] table"
+LOOK_AT = (
+    "this cannot be judged; look at the order of lights and images (mirrored, counted clockwise), the exposure, "
+    "pixel_pitch_um and pitch_um, and the mask"
+)
 FALLS = "the part does not stand: its centre of gravity is outside its balls"
 FEW = "it takes three balls that are not in one line"
 WORDS = {
@@ -81,16 +85,25 @@ def part_reasons(
     bridges: tuple[tuple[str, str], ...],
     *,
     has_limits: bool,
+    is_seen: bool,
 ) -> tuple[str, ...]:
-    """Say why a part does not pass, the worst first; empty for one that does."""
+    """Say why a part does not pass, the worst first; empty for one that does.
+
+    `is_seen`: whether most of the balls were found; otherwise what is missing is a question to the set-up.
+    """
     reasons = []
-    if not any(ball.present for ball in balls):
-        reasons.append("no ball was found")
-    missing = [ball.name for ball in balls if not ball.present]
+    missing = [ball.name for ball in balls if not ball.present and ball.verdict == "fail"]
+    unclear = [ball.name for ball in balls if not ball.present and UNCLEAR in ball.reasons]
+    if not is_seen:
+        count = sum(ball.present for ball in balls)
+        seen = "no ball was found" if count == 0 else f"only {_count(count, 'ball')} of {len(balls)} were found"
+        reasons.append(f"{seen}: {LOOK_AT}")
     extra = [ball.name for ball in balls if ball.kind == "extra"]
     failing = [ball for ball in balls if ball.verdict == "fail" and ball.present and ball.kind == "ball"]
     if missing:
         reasons.append(f"{_count(len(missing), 'ball')} missing: {_listed(missing)}")
+    if unclear:
+        reasons.append(f"{_count(len(unclear), 'place')} not clear, neither ball nor empty: {_listed(unclear)}")
     if extra:
         reasons.append(f"{_count(len(extra), 'ball')} where none should be: {_listed(extra)}")
     joined = {name for pair in bridges for name in pair}
@@ -102,7 +115,7 @@ def part_reasons(
         worst = [f"{ball.name} ({ball.reasons[0]})" for ball in failing]
         reasons.append(f"{_count(len(failing), 'ball')} outside limits: {_listed(worst, ';', MAX_TOLD)}")
     reasons += [check.reason for check in checks if check.verdict == "fail"]
-    open_ = [ball for ball in balls if ball.verdict == "undecided" and ball.reasons != (NO_LIMITS,)]
+    open_ = [ball for ball in balls if ball.present and ball.verdict == "undecided" and ball.reasons != (NO_LIMITS,)]
     if open_:
         why = [f"{ball.name} ({next(r for r in ball.reasons if r != NO_LIMITS)})" for ball in open_]
         reasons.append(f"{_count(len(open_), 'ball')} undecided: {_listed(why, ';', MAX_TOLD)}")

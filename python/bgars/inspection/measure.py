@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 from bgars.errors import InputError
 from bgars.inspection.checks import refuse_repeated
 from bgars.inspection.flat_top import flat_tops
-from bgars.inspection.highlights import read_highlights
 from bgars.inspection.problem import make_problem, thread_count
 from bgars.inspection.results import measurement
 from bgars.inspection.shadow_fit import fit_shadows
@@ -28,6 +27,7 @@ def measure_balls(
     field: NormalField | None = None,
     ball_field: Callable[[], NormalField] | None = None,
     refine_lights: bool = True,
+    roundness: tuple[float, float] | None = None,
     threads: int | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> BallMeasurement:
@@ -50,6 +50,8 @@ def measure_balls(
         that these normals may be made meanwhile.
     refine_lights : bool
         Also fit where the lights are; the rig is the prior. Otherwise the rig is taken as exact.
+    roundness : (float, float), optional
+        Usual q of these balls and its standard uncertainty, common to all; by default spheres, with doubts.
     threads : int, optional
         Most threads to work on; by default what ``RAYON_NUM_THREADS`` says, else one a core. The result does not depend
         on it.
@@ -94,16 +96,12 @@ def measure_balls(
     workers = thread_count(threads)
     report = progress or _quiet
     refuse_repeated(capture)
-    problem = make_problem(capture, found)
+    problem = make_problem(capture, found, roundness)
     fit = fit_shadows(problem, field, refine_lights=refine_lights, threads=workers, progress=report)
-    highlights = None
-    if fit is not None and fit.solution is not None:
-        solution = fit.solution
-        highlights = read_highlights(problem.radiance, solution.balls, solution.vectors, problem.near)
     tops = field if ball_field is None else ball_field()
     flats = None if tops is None or fit is None or fit.solution is None else flat_tops(tops, fit.solution.balls)
     report(1.0)
-    return measurement(found, problem, fit, flats, highlights)
+    return measurement(found, problem, fit, flats)
 
 
 def check_shadows(capture: Capture, found: FoundBalls, *, threads: int | None = None) -> tuple[str, ...]:

@@ -30,6 +30,8 @@ class Slot:
         Its place in the ideal grid: um with a recipe, pitches without; None off the layout.
     found : bool
         True when a ball is there.
+    unclear : bool
+        True when none was found, and the place is not seen to be empty either.
     kind : {"ball", "extra", "bridged"}
     measured : MeasuredBall or None
         None also for a ball that was found, but not measured.
@@ -42,6 +44,7 @@ class Slot:
     found: bool
     kind: BallKind
     measured: MeasuredBall | None
+    unclear: bool = False
 
 
 def match_balls(found: FoundBalls, measurement: BallMeasurement, recipe: PartRecipe | None) -> tuple[Slot, ...]:
@@ -72,7 +75,7 @@ def match_balls(found: FoundBalls, measurement: BallMeasurement, recipe: PartRec
     for name, row, col, nominal in _places(found, recipe):
         ball = balls.get(name)
         if ball is None or ball.kind == "extra":
-            slots.append(Slot(name, row, col, nominal, False, "ball", None))
+            slots.append(Slot(name, row, col, nominal, False, "ball", None, unclear=name in found.unclear))
             continue
         reading = measured.get(name)
         is_joined = name in joined or (reading is not None and reading.kind == "bridged")

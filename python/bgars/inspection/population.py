@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars.inspection.common_terms import ROUNDNESS
+
 if TYPE_CHECKING:
     from bgars.inspection.bundle import Solution
 
@@ -25,7 +27,7 @@ ROUNDS = 10
 
 
 def q_spread(solution: Solution, u_prior: Array) -> Array:
-    """(N,) standard deviations of the priors of q around 1: one for all round balls, wide for a ball that is not round.
+    """(N,) standard deviations of the priors of q around that of all balls: one for like balls, wide for one that is not.
 
     Parameters
     ----------
@@ -37,9 +39,9 @@ def q_spread(solution: Solution, u_prior: Array) -> Array:
     -----
     Empirical Bayes: the scatter s of the round ones is where ``mean of (q - 1)^2 - u^2`` has it, within bounds.
     """
-    information = 1.0 / solution.covariance[:, 4, 4]
+    information = 1.0 / solution.alone[:, 4, 4]
     by_shadow = np.maximum(information - 1.0 / u_prior**2, 1e-3 * information)
-    off = (solution.balls[:, 4] - 1.0) * information / by_shadow
+    off = (solution.balls[:, 4] - 1.0 - solution.common[ROUNDNESS]) * information / by_shadow
     variance = 1.0 / by_shadow
     excess_square = np.median(np.square(off) - variance * MEDIAN_CHI_SQUARE) / MEDIAN_CHI_SQUARE
     scatter = float(np.clip(np.sqrt(max(float(excess_square), 0.0)), *LIMITS))

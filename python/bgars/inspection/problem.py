@@ -47,6 +47,14 @@ class Problem:
     irradiance : (N, L) float64
         Of the board at each ball, relative.
     pitch_um : float
+    u_rig_deg : (L,) float64 or None
+        Standard uncertainty of each light's direction, where it was declared.
+    camera_distance_mm : float or None
+        Of the camera from the board, where it was declared; inf for a telecentric lens.
+    u_pixel_pitch : float or None
+        Relative standard uncertainty of the pixel pitch, where it was declared.
+    q, u_q : float, float or None
+        Usual vertical over horizontal radius of balls like these, and its standard uncertainty, where it was declared.
     """
 
     radiance: Radiance
@@ -59,6 +67,11 @@ class Problem:
     near: bool
     irradiance: Array
     pitch_um: float
+    u_rig_deg: Array | None = None
+    camera_distance_mm: float | None = None
+    u_pixel_pitch: float | None = None
+    q: float = 1.0
+    u_q: float | None = None
 
     def stand_ins(self, table: Array) -> Array:
         """Stand-ins for bridges as high as balls usually are here."""
@@ -75,7 +88,7 @@ class Problem:
         return near
 
 
-def make_problem(capture: Capture, found: FoundBalls) -> Problem:
+def make_problem(capture: Capture, found: FoundBalls, roundness: tuple[float, float] | None = None) -> Problem:
     """Bring capture and found balls to pixels.
 
     Raises
@@ -119,6 +132,10 @@ def make_problem(capture: Capture, found: FoundBalls) -> Problem:
         rig.is_near,
         _irradiance(rig, table, capture.pixel_pitch_um),
         float(capture.pixel_pitch_um),
+        rig.u_deg,
+        capture.camera_distance_mm,
+        None if capture.pixel_pitch_u_um is None else capture.pixel_pitch_u_um / capture.pixel_pitch_um,
+        *(roundness or (1.0, None)),
     )
 
 

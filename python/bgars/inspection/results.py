@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bgars.ball_records import BallMeasurement, MeasuredBall
+from bgars.inspection.budget import reading_budget
 from bgars.inspection.bundle import angles_rad
-from bgars.inspection.highlights import sharpen_centres
-from bgars.inspection.plateaus import edge_bias_px
-from bgars.inspection.radii import sharpen_radii
-from bgars.inspection.shape_or_lights import shape_or_lights, silhouettes_or_shadows
-from bgars.inspection.spread import SHARP_PX
+from bgars.inspection.shape_or_lights import silhouettes_or_shadows, what_is_odd
 from bgars.light_names import light_name
 
 if TYPE_CHECKING:
     from bgars.ball_records import FoundBall, FoundBalls
+    from bgars.inspection.budget import Budget
     from bgars.inspection.bundle import Solution
     from bgars.inspection.flat_top import FlatTops
-    from bgars.inspection.highlights import Highlights
     from bgars.inspection.problem import Problem
     from bgars.inspection.shadow_edges import Edges
     from bgars.inspection.shadow_fit import Fit
@@ -39,21 +35,19 @@ MIN_CONTRAST_NOISE = 0.7
 FLAT_SIGMAS = 3.0
 FLAT_SHARE = 0.01
 """A flat top is taken off the height where it is significant and more than this share of the radius."""
+FLAT_MODEL = 0.15
+"""Relative standard uncertainty of a flat top's depth: its edge is rounded, normals blend it with the slope beside."""
+FLAT_BALLS, DEEPEST_FLAT = 0.05, 0.25
+"""Balls that are flat at all, one in twenty, by up to so many radii: what is believed of a top before it was looked at."""
+UNSEEN_TOP = 0.04
+"""Of the radius: where a top is known no better, a flat one would pass for a round one."""
+FLAT_TOP = "flat top"
 POOR_SHARE = 0.02
 MANY_OUTLIERS = 0.4
-MODEL_CENTRE_PX, MODEL_RADIUS_PX = 0.0010, 0.0030
-MODEL_HEIGHT_PER_RADIUS = -1.2
-"""Scatter of simulated balls beyond the fit's own uncertainty (docs/make_inspection_accuracy.py prints both), for sharp
-edges; it grows with the root of their spread. Height and radius err against each other: the tip of the shadow stays.
-"""
-MODEL_FLANK_PX, FLANK_SHARE = 0.001, 0.7
-"""What edges between tip and side of a shadow are off by against both, and its share of what all edges are off by:
-heights hang on that where the rig is free.
-"""
-GRID_SHARE = 0.1
-"""The same of images of few samples a pixel: share of what points of edges scatter beyond their own uncertainty."""
 CLIPPED_SHARE = 0.5
 LIGHT_WARNING_DEG = 5.0
+WORTH_TELLING = 0.05
+"""Causes of less than this share of an uncertainty are not listed: together they are a few thousandths of it."""
 
 
 class Usability(NamedTuple):
@@ -77,54 +71,62 @@ def judge_balls(edges: Edges) -> Usability:
     return Usability(usable, strong.sum(axis=1), np.where(seen.any(axis=1), mean, np.nan))
 
 
-def measurement(
-    found: FoundBalls, problem: Problem, fit: Fit | None, flats: FlatTops | None, highlights: Highlights | None
-) -> BallMeasurement:
+def measurement(found: FoundBalls, problem: Problem, fit: Fit | None, flats: FlatTops | None) -> BallMeasurement:
     """Put everything into records."""
     pitch = problem.pitch_um
     unit = problem.vectors / np.linalg.norm(problem.vectors, axis=1, keepdims=True)
     solution = None if fit is None else fit.solution
     looked_at = {} if fit is None else {int(ball): place for place, ball in enumerate(fit.index)}
     fitted: dict[int, int] = {}
+    budgets: dict[str, Budget] = {}
     if fit is not None and solution is not None:
         fitted = {int(ball): place for place, ball in enumerate(fit.index[fit.usability.usable])}
-        fit = _with_silhouettes(_with_highlights(fit, solution, highlights))
+        budgets = _budgets(fit, solution, flats)
     balls = []
     for index, ball in enumerate(found.balls):
         if index in fitted and fit is not None:
             lights = int(fit.usability.lights[looked_at[index]])
-            missing = highlights is not None and bool(highlights.missing[fitted[index]])
-            balls.append(_measured(ball, fit, fitted[index], lights, flats, missing, pitch))
+            balls.append(_measured(ball, fit, fitted[index], lights, flats, budgets, pitch))
         else:
             balls.append(_unmeasured(ball, index, problem, fit, looked_at, pitch))
-    if solution is None:
-        warnings = () if fit is None else fit.warnings
+    warnings = () if fit is None else fit.warnings
+    half = np.hypot(problem.radiance.width, problem.radiance.height) / 2.0
+    corner_um, u_pitch = float(half * pitch), problem.u_pixel_pitch
+    if fit is None or solution is None:
         unknown = np.full(6, np.nan)
-        return BallMeasurement(tuple(balls), unknown, unit, np.zeros(len(unit)), float("nan"), warnings)
+        no_change = np.zeros(len(unit))
+        return BallMeasurement(
+            tuple(balls), unknown, unit, no_change, float("nan"), warnings, corner_um=corner_um, u_pixel_pitch=u_pitch
+        )
     c1, c2, c3, c4, c5 = solution.board.coefficients
     moved = np.degrees(angles_rad(solution.vectors, problem.vectors))
-    refined = solution.vectors / np.linalg.norm(solution.vectors, axis=1, keepdims=True)
-    warnings = fit.warnings if fit is not None else ()
     files = problem.radiance.capture.files
-    doubts = fit.doubts if fit is not None else ()
-    doubts += shape_or_lights(solution.balls[:, 4], problem.vectors, solution.vectors)
-    if fit is not None:
-        doubts += silhouettes_or_shadows(problem.table[fit.index[fit.usability.usable], 3], solution.balls[:, 3])
+    outlines = problem.table[fit.index[fit.usability.usable], 3]
+    doubts = fit.doubts + silhouettes_or_shadows(outlines, _foot(solution.balls))
+    if fit.settled is not None:
+        warnings += what_is_odd(fit.settled, problem.pitch_um)
     warnings += tuple(
         f"{light_name(light, files)}: its shadows say that it stands {moved[light]:.1f} degrees from where the rig says"
         for light in map(int, np.flatnonzero(moved > LIGHT_WARNING_DEG))
     )
-    contrast = float(np.nanmedian(fit.edges.contrast_levels)) if fit is not None else float("nan")
-    noise = float(np.sqrt(np.nanmean(np.square(fit.edges.noise_levels)))) if fit is not None else float("nan")
+    rows = np.array([fitted.get(index, -1) for index in range(len(balls))])
+    shared = {
+        name: np.where(rows[:, None] >= 0, budgets[name].shared[rows], 0.0) * pitch
+        for name in ("x_um", "y_um", "top_um")
+    }
     return BallMeasurement(
         tuple(balls),
         np.array([0.0, c1, c2, c3 / pitch, c4 / pitch, c5 / pitch]),
-        refined,
+        solution.vectors / np.linalg.norm(solution.vectors, axis=1, keepdims=True),
         moved,
-        noise / contrast,
+        float(np.sqrt(np.nanmean(np.square(fit.edges.noise_levels))) / np.nanmedian(fit.edges.contrast_levels)),
         warnings,
         board_covariance_um(solution.board_covariance, pitch),
         doubts,
+        shared_um=shared,
+        causes=budgets["top_um"].causes,
+        corner_um=corner_um,
+        u_pixel_pitch=u_pitch,
     )
 
 
@@ -136,97 +138,120 @@ def board_covariance_um(covariance_px: Array, pitch_um: float) -> Array:
     return covariance
 
 
-def _with_highlights(fit: Fit, solution: Solution, highlights: Highlights | None) -> Fit:
-    """The fit with centres sharpened by highlights."""
-    if highlights is None:
-        return fit
-    u_centre = np.sqrt(np.stack([solution.covariance[:, 0, 0], solution.covariance[:, 1, 1]], axis=1))
-    here = solution.balls[:, :2]
-    u_common = np.sqrt(np.diag(solution.common_covariance)[:2])
-    centres, u_sharp = sharpen_centres(highlights, here, here, u_centre, u_common)
-    balls, covariance = solution.balls.copy(), solution.covariance.copy()
-    balls[:, :2] = centres
-    for axis in (0, 1):
-        share = u_sharp[:, axis] / u_centre[:, axis]
-        covariance[:, axis, :] *= share[:, None]
-        covariance[:, :, axis] *= share[:, None]
-    return replace(fit, solution=replace(solution, balls=balls, covariance=covariance))
+def _foot(balls: Array) -> Array:
+    """(N,) horizontal radius of what is above the board: of a cap, that of its foot."""
+    depth = np.minimum(balls[:, 2], 0.0) / balls[:, 4]
+    foot: Array = np.sqrt(np.maximum(np.square(balls[:, 3]) - np.square(depth), 0.0))
+    return foot
 
 
-def _with_silhouettes(fit: Fit) -> Fit:
-    """The fit with radii sharpened by silhouettes; its covariance holds what all balls have in common, too."""
-    if fit.solution is None:
-        return fit
-    chosen = fit.index[fit.usability.usable]
-    balls, covariance = sharpen_radii(fit.solution, fit.problem.table[chosen, 3], fit.problem.u_radius[chosen])
-    bias_px = edge_bias_px(fit.problem.radiance, fit.edges, fit.spread.sharp_px)
-    flank_px = np.hypot(MODEL_FLANK_PX * np.sqrt(fit.spread.sharp_px / SHARP_PX), FLANK_SHARE * bias_px)
-    for size_px, response in ((bias_px, fit.solution.edge_response), (flank_px, fit.solution.flank_response)):
-        together = size_px * response
-        covariance += together[:, :, None] * together[:, None, :]
-    covariance += _model_error(fit.spread.sharp_px, GRID_SHARE * fit.solution.excess_px)
-    return replace(fit, solution=replace(fit.solution, balls=balls, covariance=covariance))
+def _budgets(fit: Fit, solution: Solution, flats: FlatTops | None) -> dict[str, Budget]:
+    """Budgets of all readings, px and ratios, by name; flat tops are in that of the tops."""
+    assert fit.settled is not None
+    assert fit.priors is not None
+    _, _, z, radius, q = solution.balls.T
+    zero, one = np.zeros_like(z), np.ones_like(z)
+    foot = np.maximum(_foot(solution.balls), 1e-6)
+    depth = np.minimum(z, 0.0) / q
+    by_ball = {
+        "x_um": (one, zero, zero, zero, zero),
+        "y_um": (zero, one, zero, zero, zero),
+        "diameter_um": (zero, zero, -2.0 * depth / (q * foot), 2.0 * radius / foot, 2.0 * depth**2 / (q * foot)),
+        "centre_z_um": (zero, zero, one, zero, zero),
+        "top_um": (zero, zero, one, q, radius),
+        "q": (zero, zero, zero, zero, one),
+    }
+    priors = fit.priors.of_balls(fit.index[fit.usability.usable])
+    budgets = {}
+    for name, columns in by_ball.items():
+        budgets[name] = reading_budget(fit.settled, priors, np.stack(columns, axis=1))
+    u_flat = _u_flat(flats, radius)
+    tops = budgets["top_um"]
+    budgets["top_um"] = tops._replace(alone=np.hypot(tops.alone, u_flat), alone_by={**tops.alone_by, FLAT_TOP: u_flat})
+    return budgets
 
 
-def _model_error(sharp_px: float, grid_px: float) -> Array:
-    """(5, 5) covariance of what no residual shows: blurred texture, pixels that straddle an edge."""
-    size = np.sqrt(sharp_px / SHARP_PX)
-    centre, radius = size * MODEL_CENTRE_PX, size * MODEL_RADIUS_PX
-    together = radius * np.array([0.0, 0.0, MODEL_HEIGHT_PER_RADIUS, 1.0, 0.0])
-    covariance: Array = np.diag(np.square([centre, centre, grid_px, grid_px, 0.0])) + np.outer(together, together)
-    return covariance
+def _u_flat(flats: FlatTops | None, radius: Array) -> Array:
+    """(N,) what a flat top, seen or not, makes the height uncertain by, px.
+
+    A depth that was not found significant is uncertain by u only if the ball is flat at all: with a share p of flat
+    balls, deep evenly up to d, about ``p u sqrt(pi / 2) / d`` of those that look round within u are (Bayes' rule).
+    """
+    deepest = DEEPEST_FLAT * radius
+    if flats is None:
+        return np.sqrt(FLAT_BALLS / 3.0) * deepest
+    found = np.nan_to_num(flats.height_px)
+    u = np.where(np.isfinite(flats.u_height_px), flats.u_height_px, deepest)
+    still_flat = FLAT_BALLS * np.minimum(1.0, u * np.sqrt(np.pi / 2.0) / deepest)
+    return np.where(_is_flat(flats, radius), np.hypot(u, FLAT_MODEL * found), np.sqrt(still_flat) * u)
+
+
+def _is_flat(flats: FlatTops, radius: Array) -> NDArray[np.bool_]:
+    """(N,) whether a flat top is significant, and deep enough to be taken off the height."""
+    found = np.nan_to_num(flats.height_px)
+    flat: NDArray[np.bool_] = (found > FLAT_SIGMAS * np.nan_to_num(flats.u_height_px)) & (found > FLAT_SHARE * radius)
+    return flat
 
 
 def _measured(
-    ball: FoundBall, fit: Fit, place: int, lights: int, flats: FlatTops | None, missing: bool, pitch: float
+    ball: FoundBall,
+    fit: Fit,
+    place: int,
+    lights: int,
+    flats: FlatTops | None,
+    budgets: dict[str, Budget],
+    pitch: float,
 ) -> MeasuredBall:
     """A ball with its numbers."""
     solution = fit.solution
     assert solution is not None
     x, y, z, radius, q = solution.balls[place]
-    covariance = solution.covariance[place]
-    u = np.sqrt(np.diag(covariance))
-    by_top = np.array([0.0, 0.0, 1.0, q, radius])
-    u_top = float(np.sqrt(by_top @ covariance @ by_top))
+    u = {name: float(budget.total()[place]) for name, budget in budgets.items()}
     top = z + q * radius
     reasons = []
-    flat, u_flat = float("nan"), float("nan")
+    flat = u_flat = float("nan")
     if flats is not None:
         flat, u_flat = float(flats.height_px[place]), float(flats.u_height_px[place])
-        if np.isfinite(flat) and flat > FLAT_SIGMAS * u_flat and flat > FLAT_SHARE * radius:
+        if _is_flat(flats, solution.balls[:, 3])[place]:
             top -= flat
-            u_top = float(np.hypot(u_top, u_flat))
             reasons.append(f"flat top: {flat * pitch:.0f} um are missing")
-    elif missing:
-        reasons.append("flat top, or of another material: its highlights are missing")
+        elif not u_flat <= UNSEEN_TOP * radius:
+            reasons.append("its top was not seen well enough (clipped, or too dark): a flat one would look the same")
     known = np.isfinite(solution.residual_px[place])
     outliers = float((solution.weight[place][known] < 0.1).mean()) if known.any() else 1.0  # noqa: PLR2004
     if outliers > MANY_OUTLIERS:
         reasons.append(f"doubtful: {100 * outliers:.0f} % of its shadow's edge does not fit a ball")
-    if u_top > POOR_SHARE * radius:
-        reasons.append(f"doubtful: the height is uncertain by {u_top * pitch:.1f} um")
     return MeasuredBall(
         name=ball.name,
         row=ball.row,
         col=ball.col,
         x_um=float(x * pitch),
         y_um=float(y * pitch),
-        diameter_um=float(2.0 * radius * pitch),
+        diameter_um=float(2.0 * _foot(solution.balls[place : place + 1])[0] * pitch),
         centre_z_um=float(z * pitch),
         top_um=float(top * pitch),
         q=float(q),
         flat_um=flat * pitch,
-        u_x_um=float(u[0] * pitch),
-        u_y_um=float(u[1] * pitch),
-        u_diameter_um=float(2.0 * u[3] * pitch),
-        u_centre_z_um=float(u[2] * pitch),
-        u_top_um=u_top * pitch,
-        u_q=float(u[4]),
+        u_x_um=u["x_um"] * pitch,
+        u_y_um=u["y_um"] * pitch,
+        u_diameter_um=u["diameter_um"] * pitch,
+        u_centre_z_um=u["centre_z_um"] * pitch,
+        u_top_um=u["top_um"] * pitch,
+        u_q=u["q"],
         u_flat_um=u_flat * pitch,
         lights_used=lights,
         kind=ball.kind,
         reasons=tuple(reasons),
+        budget={name: _causes_um(budgets[name], place, pitch) for name in ("x_um", "y_um", "diameter_um", "top_um")},
     )
+
+
+def _causes_um(budget: Budget, place: int, pitch: float) -> dict[str, float]:
+    """Causes of one ball's uncertainty, largest first, without those that hardly count."""
+    parts = {name: float(part[place]) * pitch for name, part in budget.by_cause().items()}
+    least = WORTH_TELLING * float(budget.total()[place]) * pitch
+    kept = {name: part for name, part in parts.items() if part >= least}
+    return dict(sorted(kept.items(), key=lambda pair: -pair[1]))
 
 
 def _unmeasured(

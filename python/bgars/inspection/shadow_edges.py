@@ -13,6 +13,12 @@ the edge), and to first order a displacement a and a change b of the spread:
 
 linear in four unknowns: least squares, then once more with Cauchy weights.
 
+Light that balls throw on the board beside them is not the same under all lights: T, a mean over lights, has too much of
+it on the far side of a ball, so that the lit level grows outward by a share g a pixel. A stretch knows its own g badly,
+all shadows of a part together know it well as a function of the place along the edge: a fifth column ``hi T g d Phi`` is
+fitted for it, and the displacement is that of four columns with the usual g of its place taken out (exact, for least
+squares are linear).
+
 That holds for displacements below s. The coarse search goes by area: with H the unit step and r the reach,
 
     I = lo T (1 - H) + hi T H - (hi - lo) a T [|d| < r/2] / r
@@ -32,6 +38,7 @@ from numpy.typing import NDArray
 from bgars import _bgars
 from bgars.inspection.shadow_map import Casters
 from bgars.inspection.shadow_model import Balls, Lights, edge_at, rays
+from bgars.inspection.spread import EdgeSpread, lamp_gradients, lamp_shift_px
 from bgars.kernel_capture import kernel_capture
 
 if TYPE_CHECKING:
@@ -51,18 +58,23 @@ MAX_LINES = 96
 FEW_LINES = 48
 FEWEST_LINES = 12
 LINES_A_STRETCH = 3
+REACH_SIGMAS, REACH_PX = 3.2, 1.2
+"""How far pixels across an edge reach: spreads, and pixels more."""
+MIN_GROWTHS = 24
+"""Stretches at one place of the edge whose median growth is worth more than none: each knows it to a per cent a pixel."""
 
 
 class EdgeSettings(NamedTuple):
     """How edges are looked for.
 
-    Spread of a sharp edge, growth of the spread along the ray, distance to look to on both sides, distance of pixels.
-    `coarse`: by area instead, see the head of this file; finds edges up to half of `reach_px` away.
+    Spread of a sharp edge; size of the lamps, standard deviations along the azimuth and up; largest distance to look to on
+    both sides; distance of pixels. `coarse`: by area instead, see the head of this file; finds edges up to half of `reach_px` away.
     `thorough`: more lines across the edges of large balls.
     """
 
     spread_px: float
-    lamp_spread_rad: float
+    lamp_azimuth_rad: float
+    lamp_elevation_rad: float
     reach_px: float
     stride_px: int = 1
     coarse: bool = False
@@ -80,6 +92,7 @@ class Edges:
     u_px : standard uncertainty of the displacement; inf where nothing was measured
     spread_px, u_spread_px : measured spread of the edge
     way_px : way of the light from the tangent point to the board, over the slope of D: penumbra per radian of lamp
+    lamp_azimuth_px, lamp_elevation_px : the same of a lamp that is wide along its azimuth, or high
     low, high : shadow and lit level over the board's texture
     contrast_levels : high - low in grey levels of 255
     noise_levels : (N, L) residual of the fit in grey levels of 255
@@ -93,6 +106,8 @@ class Edges:
     spread_px: Array
     u_spread_px: Array
     way_px: Array
+    lamp_azimuth_px: Array
+    lamp_elevation_px: Array
     low: Array
     high: Array
     contrast_levels: Array
@@ -122,6 +137,7 @@ def measure_edges(
     gains: Array,
     settings: EdgeSettings,
     threads: int,
+    lamp: EdgeSpread | None = None,
 ) -> Edges:
     """Measure the edges of the shadows of all balls under all lights.
 
@@ -140,16 +156,19 @@ def measure_edges(
         Irradiance of the board around each ball under each light, relative.
     settings : EdgeSettings
     threads : int
+    lamp : EdgeSpread, optional
+        How wide and high the lamps are: edges are then those of their middles.
     """
     radius = float(np.median(table[:, 3]))
     most = MAX_LINES if settings.thorough else FEW_LINES
     count = int(np.clip(2.0 * WIDEST_RAD * radius / LINE_SPACING_PX, FEWEST_LINES, most))
     sectors = int(np.clip(count // LINES_A_STRETCH, FEWEST_SECTORS, SECTORS))
+    angles_rad = (np.arange(count) + 0.5) / count * 2.0 * WIDEST_RAD - WIDEST_RAD
     stretches, noise = _bgars.measure_edges(
         kernel_capture(radiance.capture),
         Casters.of(table, vectors, near, board),
-        settings,
-        angles_rad=((np.arange(count) + 0.5) / count * 2.0 * WIDEST_RAD - WIDEST_RAD).tolist(),
+        _lines(angles_rad, np.median(table, axis=0), vectors, near, board, settings),
+        angles_rad=angles_rad.tolist(),
         sectors=sectors,
         gains=gains.astype(np.float32),
         step=shadows.step,
@@ -160,8 +179,35 @@ def measure_edges(
     )
     shape = (len(table), len(vectors), sectors)
     fit = Stretches(*np.moveaxis(stretches, -1, 0).reshape(-1, *shape))
-    balls, lights = Balls.from_table(table).spread(2), Lights.from_table(vectors, near).spread(1, 1)
-    return _edges(fit, noise, balls, lights, board, settings, radiance.scale)
+    balls = Balls.from_table(table).spread(2)
+    return _edges(fit, noise, balls, vectors, near, board, settings, lamp or EdgeSpread(0.0, 0.0), radiance.scale)
+
+
+class _Lines(NamedTuple):
+    """Settings of the kernel: the same of all lines across edges, and lists with a value for each."""
+
+    spread_px: float
+    lamp_spread_rad: list[float]
+    reach_px: list[float]
+    stride_px: int
+    coarse: bool
+
+
+def _lines(angles_rad: Array, ball: Array, vectors: Array, near: bool, board: Board, settings: EdgeSettings) -> _Lines:
+    """How wide a usual ball's edges are, by the place along them: a lamp may be wider than it is high."""
+    balls, lights = Balls.from_table(ball[None]).spread(2), Lights.from_table(vectors, near).spread(1, 1)
+    edge = edge_at(angles_rad, balls, lights, board)
+    beam = rays(edge.x, edge.y, balls, lights, board)
+    along, up = lamp_gradients(beam, balls, vectors)
+    blurred = np.square(along * settings.lamp_azimuth_rad) + np.square(up * settings.lamp_elevation_rad)
+    blurred_px = np.sqrt(blurred.mean(axis=(0, 1)))
+    way_px = np.maximum(np.abs(beam.along / np.maximum(beam.slope, 1e-3)).mean(axis=(0, 1)), 1e-3)
+    reach_px = np.full(len(angles_rad), settings.reach_px)
+    if not settings.coarse:
+        reach_px = np.minimum(reach_px, REACH_SIGMAS * np.hypot(settings.spread_px, blurred_px) + REACH_PX)
+    return _Lines(
+        settings.spread_px, (blurred_px / way_px).tolist(), reach_px.tolist(), settings.stride_px, settings.coarse
+    )
 
 
 class Stretches(NamedTuple):
@@ -169,8 +215,8 @@ class Stretches(NamedTuple):
 
     Coefficients (shadow and lit level, displacement and change of the spread times the contrast) and their standard
     uncertainties; mean texture and its relative growth outward per pixel; means over the lines of the tangent point's
-    angle, the way of the light and the spread, weighted by what they say about the displacement; 1 where there was
-    enough to see, else 0.
+    angle, the way of the light and the spread, weighted by what they say about the displacement; growth of the lit level
+    outward per pixel where it is free, and the displacement then; 1 where there was enough to see, else 0.
     """
 
     low: Array
@@ -186,17 +232,28 @@ class Stretches(NamedTuple):
     angle_rad: Array
     way_px: Array
     spread_px: Array
+    lit_growth: Array
+    moved_with_growth: Array
     looked_at: Array
 
 
 def _edges(
-    fit: Stretches, noise: Array, balls: Balls, lights: Lights, board: Board, settings: EdgeSettings, scale: float
+    fit: Stretches,
+    noise: Array,
+    balls: Balls,
+    vectors: Array,
+    near: bool,
+    board: Board,
+    settings: EdgeSettings,
+    lamp: EdgeSpread,
+    scale: float,
 ) -> Edges:
     """Points on the edges; `scale` in grey levels per level of 255."""
     contrast = fit.high - fit.low
     looked_at = fit.looked_at > 0
     measured = looked_at & (contrast > 0)
     safe = np.where(measured, contrast, 1.0)
+    lights = Lights.from_table(vectors, near).spread(1, 1)
     edge = edge_at(fit.angle_rad, balls, lights, board)
     beam = rays(edge.x, edge.y, balls, lights, board)
     widened, u_widened = fit.spread_px, np.full(contrast.shape, np.inf)
@@ -207,8 +264,12 @@ def _edges(
     tangent_along = (beam.toward_y * beam.gradient_x - beam.toward_x * beam.gradient_y) / beam.slope
     curvature = (1.0 - tangent_along**2) / (beam.distance * beam.slope)
     # And texture that grows outward by g a pixel, blurred with the shadow, moves its edge inward by g s^2.
-    blurred = settings.spread_px**2 * fit.growth
-    shift = blurred + 0.5 * fit.spread_px**2 * curvature - np.where(measured, fit.moved / safe, 0.0)
+    blurred = settings.spread_px**2 * (fit.growth + 0.5 * curvature)
+    if lamp.lamp_rad > 0.0:
+        blurred = blurred + lamp_shift_px(edge.x, edge.y, balls, vectors, near, board, lamp)
+    moved = fit.moved if settings.coarse else _without_growth(fit, measured)
+    shift = blurred - np.where(measured, moved / safe, 0.0)
+    along, up = lamp_gradients(beam, balls, vectors)
     return Edges(
         x=np.where(measured, edge.x + shift * beam.gradient_x / beam.slope, 0.0),
         y=np.where(measured, edge.y + shift * beam.gradient_y / beam.slope, 0.0),
@@ -217,9 +278,25 @@ def _edges(
         spread_px=np.where(measured, widened, np.nan),
         u_spread_px=u_widened,
         way_px=fit.way_px,
+        lamp_azimuth_px=along,
+        lamp_elevation_px=up,
         low=np.where(measured, fit.low, np.nan),
         high=np.where(measured, fit.high, np.nan),
         contrast_levels=np.where(measured, contrast * fit.texture / scale, np.nan),
         noise_levels=noise / scale,
         looked_at=looked_at,
     )
+
+
+def _without_growth(fit: Stretches, measured: NDArray[np.bool_]) -> Array:
+    """(N, L, S) displacements times contrast without what the usual growth of the lit level outward adds to them."""
+    per_growth = np.where(fit.lit_growth != 0.0, fit.moved - fit.moved_with_growth, 0.0)
+    per_growth = per_growth / np.where(fit.lit_growth != 0.0, fit.lit_growth, 1.0)
+    share = np.where(measured, fit.lit_growth / np.where(measured, fit.high, 1.0), np.nan)
+    count = np.isfinite(share).sum(axis=(0, 1))
+    # Left and right of the tip are alike.
+    both = np.concatenate([share, share[..., ::-1]], axis=0)
+    known = (count + count[::-1]) >= MIN_GROWTHS
+    usual = np.where(known, np.nanmedian(np.where(known, both, 0.0), axis=(0, 1)), 0.0)
+    without: Array = fit.moved - per_growth * usual * np.where(measured, fit.high, 0.0)
+    return without

@@ -8,29 +8,41 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bgars.inspection.board import SHAPE_TERMS, Board, board_from_normals, outside_balls
+from bgars.inspection.board import Board
 from bgars.inspection.bundle import Priors, Solution, angles_rad, solve_bundle
+from bgars.inspection.bundle_model import State
 from bgars.inspection.checks import (
     MIN_WITNESSES,
     Complaint,
     check_shifts,
     displaced_images,
     explain_dark_steps,
+    image_shifts,
     refuse_misfits,
 )
+from bgars.inspection.common_terms import PERSPECTIVE
 from bgars.inspection.in_view import lights_in_view, unjudged_lights
 from bgars.inspection.outline import Outlines, outline_centres
-from bgars.inspection.population import q_spread
-from bgars.inspection.radii import MIN_POPULATION
+from bgars.inspection.plateaus import edge_bias_px
+from bgars.inspection.priors import (
+    COARSE_SPREAD_PX,
+    common_mixtures,
+    first_priors,
+    refined_priors,
+    with_edges,
+    with_shifts,
+)
 from bgars.inspection.results import Usability, judge_balls
-from bgars.inspection.shadow_edges import Edges, EdgeSettings, measure_edges
+from bgars.inspection.settle import Settled, settle
+from bgars.inspection.shadow_edges import REACH_PX, REACH_SIGMAS, Edges, EdgeSettings, measure_edges
 from bgars.inspection.shadow_map import Casters, ShadowMap
 from bgars.inspection.spread import EdgeSpread, fit_spread
-from bgars.inspection.start import first_heights
+from bgars.inspection.start import first_heights, radius_at
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from bgars.inspection.checks import ImageShifts
     from bgars.inspection.problem import Problem
     from bgars.records import NormalField
 
@@ -51,19 +63,8 @@ FIRST_SPREAD_PX = 0.5
 SPREADS_PX = (0.3, 0.5, 0.8, 1.3, 2.0)
 SPREAD_BALLS = 5
 SMALL_SPREAD_CHANGE = 0.15
-REACH_SIGMAS = 3.2
-REACH_PX = 1.2
 TYPICAL_WAY = 2.0
 """Way of the light from a ball to the edge of its shadow, in radii."""
-RIG_DEG = 0.3
-"""Lights may be this far from where the rig says (standard deviation of each axis), before their scatter says more."""
-CERTAIN_RIG_DEG = 1e-4
-RIG_LIMITS_DEG = (0.003, 2.0)
-FIRST_Q_SPREAD = 0.02
-TILT = 0.003
-BOW_SLOPE = 0.02
-STEEPEST_BOARD = 0.05
-"""Prior standard deviations of the board: tilt, and slope by bow at the edge of the image."""
 EMPIRICAL_ROUNDS = 5
 SETTLED = 0.1
 SHORT_ROUNDS, LONG_ROUNDS = 8, 20
@@ -71,8 +72,6 @@ REDESCEND_FIRST, REDESCEND = 8.0, 3.5
 OUTLINE_SAFETY = 1.5
 SHIFT_BALLS = 24
 OUTLINE_FLOOR_PX = 0.01
-FREE_RADIUS = 10.0
-"""Factor of the finder's uncertainty where silhouettes enter after the fit, all balls together."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +90,8 @@ class Fit:
     spread: EdgeSpread
     warnings: tuple[str, ...]
     doubts: tuple[str, ...] = ()
+    priors: Priors | None = None
+    settled: Settled | None = None
 
 
 def fit_shadows(
@@ -115,12 +116,13 @@ def fit_shadows(
         [problem.neighbours(index) for index in range(len(table))],
         threads,
     )
-    table[:, 2] = heights
+    table[:, 2], table[:, 3] = heights, radius_at(heights, table[:, 3])
     in_view, files = lights_in_view(problem, table), problem.radiance.capture.files
     no_light = np.zeros_like(in_view)
     complaints = explain_dark_steps(problem, table, steps, in_view)
     progress(0.1)
-    priors = _priors(problem, table, field, refine_lights)
+    priors = first_priors(problem, table, field, refine_lights)
+    shifts_px, common = np.zeros((len(vectors), 2)), priors.common.copy()
     spread = EdgeSpread(FIRST_SPREAD_PX, 0.0)
     gains = problem.irradiance.copy()
     index = np.flatnonzero(~problem.bridged)
@@ -128,29 +130,49 @@ def fit_shadows(
         return None
     passes = len(COARSE) + FINE_PASSES
     turn, last, finished, change = 0, False, False, np.inf
-    wide: Outlines | None = None
+    excess_px = 0.0
+    wide: ImageShifts | None = None
+    outlines: Outlines | None = None
     while not finished:
         last = last or turn >= passes - 1 or (turn > len(COARSE) and change < SMALL_CHANGE_PX)
         radius = float(np.median(table[:, 3]))
         settings = _settings(turn, radius, spread, last)
         shadows = ShadowMap(
             problem.radiance,
-            Casters.of(np.concatenate([table, problem.stand_ins(table)]), vectors, problem.near, board),
+            Casters.of(
+                _as_seen(np.concatenate([table, problem.stand_ins(table)]), common), vectors, problem.near, board
+            ),
             silhouette_margin_px=min(settings.reach_px, 0.1 * radius + 2.0),
             shadow_margin_px=settings.reach_px + 1.0,
             threads=threads,
         )
         if last and wide is None:
-            priors = _with_free_radii(_with_outlines(problem, priors, shadows, table, spread))
-            wide = _wide_outlines(problem, shadows, table, vectors, spread)
+            seen = _as_seen(table, common)
+            priors = _with_outlines(problem, priors, shadows, seen, spread)
+            outlines = _wide_outlines(problem, shadows, seen, vectors, spread)
+            wide = image_shifts(outlines)
+            priors = with_shifts(priors, wide)
         edges = measure_edges(
-            problem.radiance, shadows, table[index], vectors, problem.near, board, gains[index], settings, threads
+            problem.radiance,
+            shadows,
+            table[index],
+            vectors,
+            problem.near,
+            board,
+            gains[index],
+            settings,
+            threads,
+            spread if turn > len(COARSE) else None,
         )
         usability = judge_balls(edges)
         chosen = index[usability.usable]
         used = edges.take(usability.usable)
-        start = (table[chosen], vectors, board)
-        solution, priors = _solve(used, start, problem.near, priors, chosen, turn, last, refine_lights)
+        bias_px = edge_bias_px(problem.radiance, used, spread.sharp_px) if last else 0.0
+        width_px = COARSE_SPREAD_PX if settings.coarse else _typical_spread_px(spread, radius)
+        priors = with_edges(priors, width_px, radius, excess_px, bias_px, free_rig=turn > len(COARSE))
+        start = State(table[chosen], vectors, shifts_px, board.coefficients, common)
+        fixed_rig = not refine_lights or problem.u_rig_deg is not None
+        solution, priors = _solve(used, start, problem.near, priors, chosen, turn, last, fixed_rig)
         if solution is None:
             warnings = _warnings(problem, complaints, edges, None, in_view if len(table) >= MIN_WITNESSES else no_light)
             return Fit(problem, index, usability, None, edges, spread, warnings)
@@ -158,6 +180,7 @@ def fit_shadows(
         drift = abs(float((solution.balls - table[chosen])[:, 2].mean()))
         finished = last and (drift < DRIFT_PX or turn >= passes + LAST_PASSES - 2)
         table[chosen], vectors, board = solution.balls, solution.vectors, solution.board
+        shifts_px, common, excess_px = solution.shifts_px, solution.common, solution.excess_px
         gains[index] = edges.lit_levels(gains[index])
         before = spread
         if turn >= len(COARSE):
@@ -169,10 +192,21 @@ def fit_shadows(
         turn += 1
         progress(0.1 + 0.8 * (1.0 if finished else min(turn / passes, 0.95)))
     assert wide is not None
+    assert outlines is not None
+    assert solution is not None
+    settled = settle(solution, priors, common_mixtures(problem, priors, refine_lights))
     # First heights may be wrong, and what lies in the image with them.
     warnings = _warnings(problem, complaints, used, solution, in_view & lights_in_view(problem, table))
     warnings += check_shifts(wide, files)
-    return Fit(problem, index, usability, solution, edges, spread, warnings, displaced_images(wide, files))
+    doubts = displaced_images(outlines, files)
+    return Fit(problem, index, usability, settled.solution, edges, spread, warnings, doubts, priors, settled)
+
+
+def _as_seen(table: Array, common: Array) -> Array:
+    """Balls where a near camera sees them; their shadows stay on the board, within the margins of the maps."""
+    seen = table.copy()
+    seen[:, :2] *= 1.0 + common[PERSPECTIVE] * np.maximum(table[:, 2:3], 0.0)
+    return seen
 
 
 def _warnings(
@@ -212,7 +246,7 @@ def _first_spread(
     few = slice(0, None, max(1, len(table) // SPREAD_BALLS))
     noise = []
     for spread_px in SPREADS_PX:
-        tried = EdgeSettings(spread_px, 0.0, settings.reach_px)
+        tried = EdgeSettings(spread_px, 0.0, 0.0, settings.reach_px)
         edges = measure_edges(
             problem.radiance, shadows, table[few], vectors, problem.near, board, gains[few], tried, threads
         )
@@ -224,30 +258,15 @@ def _settings(turn: int, radius: float, spread: EdgeSpread, last: bool) -> EdgeS
     """Coarse first, then as sharp as the edges are."""
     if turn < len(COARSE):
         reach = COARSE[turn] * radius + COARSE_EXTRA_PX
-        return EdgeSettings(1.0, 0.0, reach, max(1, int(reach / COARSE_STEPS)), coarse=True)
-    widest = float(np.hypot(spread.sharp_px, TYPICAL_WAY * spread.lamp_rad * radius))
-    return EdgeSettings(spread.sharp_px, spread.lamp_rad, REACH_SIGMAS * widest + REACH_PX, thorough=last)
+        return EdgeSettings(1.0, 0.0, 0.0, reach, max(1, int(reach / COARSE_STEPS)), coarse=True)
+    widest = max(spread.lamp_azimuth_rad, spread.lamp_elevation_rad)
+    reach_px = REACH_SIGMAS * float(np.hypot(spread.sharp_px, TYPICAL_WAY * widest * radius)) + REACH_PX
+    return EdgeSettings(spread.sharp_px, spread.lamp_azimuth_rad, spread.lamp_elevation_rad, reach_px, thorough=last)
 
 
-def _priors(problem: Problem, table: Array, field: NormalField | None, refine_lights: bool) -> Priors:
-    """What is known before: the finder's circles, the rig, a board that is nearly flat."""
-    radiance = problem.radiance
-    half = max(radiance.height, radiance.width) / 2.0
-    u_board = np.array([TILT, TILT, BOW_SLOPE / half, BOW_SLOPE / half, BOW_SLOPE / half])
-    board = np.zeros(SHAPE_TERMS)
-    if field is not None:
-        outside = outside_balls(radiance.height, radiance.width, table)
-        fitted = board_from_normals(field, outside)
-        if fitted is not None:
-            # Where few normals are good, the quadratic is anything: a board that steep is none.
-            steepest = np.abs(fitted) * [1.0, 1.0, 2.0 * half, half, 2.0 * half]
-            # Its tilt is that of wrong lights, too; its bow is the board's.
-            board[2:] = fitted[2:] if steepest.max() < STEEPEST_BOARD else 0.0
-    u_balls = np.column_stack(
-        [problem.u_centre, problem.u_centre, table[:, 3], problem.u_radius, np.full(len(table), FIRST_Q_SPREAD)]
-    )
-    rig = np.radians(RIG_DEG if refine_lights else CERTAIN_RIG_DEG)
-    return Priors(table.copy(), u_balls, problem.vectors.copy(), float(rig), board, u_board)
+def _typical_spread_px(spread: EdgeSpread, radius: float) -> float:
+    """Spread of an edge between tip and side of a shadow."""
+    return float(np.hypot(spread.sharp_px, TYPICAL_WAY * spread.lamp_rad * radius))
 
 
 def _with_outlines(problem: Problem, priors: Priors, shadows: ShadowMap, table: Array, spread: EdgeSpread) -> Priors:
@@ -264,13 +283,13 @@ def _with_outlines(problem: Problem, priors: Priors, shadows: ShadowMap, table: 
     common = _apart(problem.table[:, :2] - centres, problem.u_centre, u_outline, known) ** 2
     by_outline = np.where(known, 1.0 / (OUTLINE_FLOOR_PX**2 + u_outline**2 + common), 0.0)
     by_finder = 1.0 / (problem.u_centre**2 + common)
-    balls, u_balls = priors.balls.copy(), priors.u_balls.copy()
+    given, u_given = priors.outlines.copy(), priors.u_outlines.copy()
     weight = by_outline + by_finder
     for axis in (0, 1):
         outline = np.where(known, centres[:, axis], 0.0)
-        balls[:, axis] = (by_outline * outline + by_finder * problem.table[:, axis]) / weight
-        u_balls[:, axis] = 1.0 / np.sqrt(weight)
-    return priors._replace(balls=balls, u_balls=u_balls)
+        given[:, axis] = (by_outline * outline + by_finder * problem.table[:, axis]) / weight
+        u_given[:, axis] = 1.0 / np.sqrt(weight)
+    return priors._replace(outlines=given, u_outlines=u_given)
 
 
 def _apart(off: Array, u_finder: Array, u_outline: Array, known: NDArray[np.bool_]) -> float:
@@ -285,28 +304,17 @@ def _apart(off: Array, u_finder: Array, u_outline: Array, known: NDArray[np.bool
     return float(np.sqrt(known.sum() * max(apart**2 - stated**2, 0.0)))
 
 
-def _with_free_radii(priors: Priors) -> Priors:
-    """Radii nearly free, where a population has them (:mod:`bgars.inspection.radii`).
-
-    Silhouettes err alike on all balls, and a prior takes the errors of all for independent ones.
-    """
-    u_balls = priors.u_balls.copy()
-    if len(u_balls) >= MIN_POPULATION:
-        u_balls[:, 3] *= FREE_RADIUS
-    return priors._replace(u_balls=u_balls)
-
-
 def _solve(
     edges: Edges,
-    start: tuple[Array, Array, Board],
+    start: State,
     near: bool,
     priors: Priors,
     chosen: NDArray[np.intp],
     turn: int,
     last: bool,
-    refine_lights: bool,
+    fixed_rig: bool,
 ) -> tuple[Solution | None, Priors]:
-    """Bundle; once edges are sharp, the scatter of lights and of q is taken from the result (empirical Bayes).
+    """Bundle; once edges are sharp, the scatter of lights, q and outlines is taken from the result (empirical Bayes).
 
     None where there is nothing to fit, or so little that the fit ran away.
     """
@@ -315,25 +323,18 @@ def _solve(
     sharp = turn >= len(COARSE)
     redescend = (REDESCEND if turn > len(COARSE) else REDESCEND_FIRST) if sharp else None
 
-    def bundle(at: tuple[Array, Array, Board], rounds: int) -> Solution:
-        own = priors._replace(balls=priors.balls[chosen], u_balls=priors.u_balls[chosen])
-        return solve_bundle(edges, *at[:2], near, at[2], own, redescend=redescend, rounds=rounds)
+    def bundle(at: State, rounds: int) -> Solution:
+        return solve_bundle(edges, at, near, priors.of_balls(chosen), redescend=redescend, rounds=rounds)
 
     solution = bundle(start, LONG_ROUNDS if last else SHORT_ROUNDS)
     for _ in range(EMPIRICAL_ROUNDS if last else 1):
         before = priors
-        u_balls = priors.u_balls.copy()
-        u_balls[chosen, 4] = q_spread(solution, priors.u_balls[chosen, 4])
-        priors = priors._replace(u_balls=u_balls)
-        if refine_lights:
-            turns = np.square(angles_rad(solution.vectors, priors.vectors)) + np.square(solution.u_light_rad)
-            scatter = float(np.clip(np.sqrt(turns.mean() / 2.0), *np.radians(RIG_LIMITS_DEG)))
-            priors = priors._replace(u_light_rad=scatter)
+        priors = refined_priors(priors, solution, chosen, fixed_rig)
         if not last:
             break
-        solution = bundle((solution.balls, solution.vectors, solution.board), SHORT_ROUNDS)
-        if np.isclose(before.u_light_rad, priors.u_light_rad, rtol=SETTLED) and np.allclose(
-            before.u_balls[:, 4], priors.u_balls[:, 4], rtol=SETTLED
+        solution = bundle(solution.state, SHORT_ROUNDS)
+        if np.allclose(before.u_light_rad, priors.u_light_rad, rtol=SETTLED) and np.allclose(
+            before.u_q, priors.u_q, rtol=SETTLED
         ):
             break
     return (solution if np.isfinite(solution.balls).all() else None), priors

@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from bgars.inspection.board import Board
     from bgars.inspection.radiance import Radiance
 
-__all__ = ["edge_steps", "first_heights"]
+__all__ = ["edge_steps", "first_heights", "radius_at"]
 
 Array = NDArray[np.float64]
 
-HEIGHTS = np.linspace(0.0, 1.15, 24)
-"""Heights of the centre that are tried, in radii."""
+HEIGHTS = np.linspace(-0.6, 1.15, 36)
+"""Heights of the centre that are tried, in radii of the outline; below 0 the outline is the foot of a cap."""
 ANGLES = np.radians(np.linspace(-60.0, 60.0, 13))
 BESIDE = 0.09
 """Points inside and outside lie this share of the radius off the edge."""
@@ -125,6 +125,7 @@ def first_heights(
         row = table[index]
         tried = np.repeat(row[None, :], len(HEIGHTS), axis=0)
         tried[:, 2] = HEIGHTS * row[3]
+        tried[:, 3] = radius_at(tried[:, 2], row[3])
         step = edge_steps(
             radiance,
             Balls.from_table(tried).spread(1),
@@ -147,6 +148,12 @@ def first_heights(
         heights[index] = height * row[3]
         steps[index] = seen[index, int(np.argmin(np.abs(HEIGHTS - height)))]
     return heights, steps
+
+
+def radius_at(height: Array, outline: Array | float) -> Array:
+    """Radius of a sphere by the height of its centre and its outline: that of a cap is its foot."""
+    radius: Array = np.hypot(outline, np.minimum(height, 0.0))
+    return radius
 
 
 def _middle(score: Array) -> float:

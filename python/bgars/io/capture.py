@@ -143,6 +143,8 @@ def _load(
         rig=rig,
         mask=mask,
         pixel_pitch_um=recipe.pixel_pitch_um,
+        pixel_pitch_u_um=recipe.pixel_pitch_u_um,
+        camera_distance_mm=None if recipe.camera is None else recipe.camera.distance_mm,
         dark=dark,
         response=table if images.dtype.kind == "u" else None,
         black_level=levels.black_level,

@@ -107,6 +107,11 @@ def read_lights(folder: Path, recipe: CaptureRecipe) -> Lights:
     except InputError as error:
         msg = f"{source}: {error}"
         raise InputError(msg) from error
+    if isinstance(lights.u_deg, list) and len(lights.u_deg) != len(rig):
+        where_u = f"{folder / RECIPE_NAME} (lights.u_deg)"
+        msg = f"{where_u}: {len(lights.u_deg)} uncertainties, but {source} gives {len(rig)} lights"
+        raise InputError(msg)
+    rig = rig.with_u_deg(lights.u_deg)
     intensities = _intensity_rows(folder, lights.intensities, len(rig), source)
     return Lights(rig, intensities, source)
 

@@ -50,6 +50,8 @@ def write_parquet(result: PartResult, path: str | PathLike[str]) -> None:
         about = str(ResultTable.model_fields[name].description)
         columns.append((PREFIX + name, about, [getattr(result, name)] * len(result.balls)))
     for entry in fields(BallResult):
+        if entry.name == "budget":
+            continue
         about = str(BallTable.model_fields[entry.name].description)
         columns.append((entry.name, about, [_cell(getattr(ball, entry.name)) for ball in result.balls]))
     schema = pyarrow.schema(

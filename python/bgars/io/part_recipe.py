@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -82,12 +83,20 @@ class PartTable(StrictNumbers):
     rows: Annotated[int, Field(ge=1, le=MAX_BALLS)] | None = Field(None, description="rows of the lattice")
     cols: Annotated[int, Field(ge=1, le=MAX_BALLS)] | None = Field(None, description="columns of the lattice")
     pitch_um: Positive | None = Field(None, description="distance of neighbours in the lattice")
+    pitch_u_um: Positive | None = Field(
+        None, description="standard uncertainty of pitch_um, of the whole lattice alike; not known by default"
+    )
     depopulated: list[str] | None = Field(None, description='names of lattice places without a ball, such as ["C3"]')
     positions: str | None = Field(
         None, description="instead of the lattice: CSV file with the columns name, x_um, y_um (x right, y up)"
     )
     diameter_um: Positive | None = Field(None, description="nominal horizontal diameter")
     height_um: Positive | None = Field(None, description="nominal height of the tops above the board")
+    q: Number | None = Field(
+        None,
+        description="vertical over horizontal radius that all balls share (a ratio), 0.2 to 2; 1 with u_q alone",
+    )
+    u_q: Positive | None = Field(None, description="standard uncertainty of q, of all balls alike; 0.01 with q alone")
     gravity_um: list[Number] | None = Field(
         None, description="[x, y] of the centre of gravity against the middle; the mean of the places by default"
     )
@@ -141,21 +150,24 @@ def read_part_recipe(path: str | PathLike[str]) -> PartRecipe:
     table = checked(PartTable, read_values(path), path)
     try:
         layout = _layout(table, path)
-        _check_sizes(table)
+        recipe = PartRecipe(
+            name=table.name,
+            layout=layout,
+            view=table.view,
+            limits=Limits(**table.limits.model_dump()),
+            diameter_um=table.diameter_um,
+            height_um=table.height_um,
+            q=table.q,
+            u_q=table.u_q,
+            pitch_u_um=table.pitch_u_um,
+            file=path,
+        )
+        _check_sizes(table, recipe.q)
     except InputError as error:
         msg = f"{path}: {error}"
         raise InputError(msg) from None
-    return PartRecipe(
-        name=table.name,
-        layout=layout,
-        view=table.view,
-        limits=Limits(**table.limits.model_dump()),
-        diameter_um=table.diameter_um,
-        height_um=table.height_um,
-        gravity_um=None if table.gravity_um is None else (table.gravity_um[0], table.gravity_um[1]),
-        material_file=_material(table, path),
-        file=path,
-    )
+    gravity_um = None if table.gravity_um is None else (table.gravity_um[0], table.gravity_um[1])
+    return replace(recipe, gravity_um=gravity_um, material_file=_material(table, path))
 
 
 def recipe_keys() -> Iterator[tuple[str, str]]:
@@ -197,7 +209,7 @@ def _layout(table: PartTable, path: Path) -> BallLayout:
     return BallLayout(rows, cols, pitch_um, tuple(table.depopulated or ()))
 
 
-def _check_sizes(table: PartTable) -> None:
+def _check_sizes(table: PartTable, q: float | None) -> None:
     if table.gravity_um is not None and len(table.gravity_um) != len("xy"):
         msg = f"gravity_um: must be [x, y], got {table.gravity_um}"
         raise InputError(msg)
@@ -206,6 +218,7 @@ def _check_sizes(table: PartTable) -> None:
         ("diameter_um", table.diameter_um),
         ("height_um", table.height_um),
         ("pitch_um", table.pitch_um),
+        ("q", q),
     ):
         limit = getattr(limits, name)
         if nominal is not None and limit is not None and not limit[0] <= nominal <= limit[1]:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from bgars.io.strict_toml import Strict, checked, read_values
 
 __all__ = [
     "RECIPE_NAME",
+    "CameraRecipe",
     "CaptureRecipe",
     "ChannelName",
     "GammaResponse",
@@ -23,7 +25,10 @@ RECIPE_NAME = "capture.toml"
 
 ChannelName = Literal["luminance", "mean", "red", "green", "blue"]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Uncertainty = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
 Vector = tuple[float, float, float]
+PITCH_OVER_U = 10.0
+"""Least ratio of the pixel pitch to its standard uncertainty: below it the pitch is a guess, or the unit is wrong."""
 
 
 class GammaResponse(Strict):
@@ -46,6 +51,12 @@ class RingRecipe(Strict):
     azimuth0_deg: float = 0.0
 
 
+class CameraRecipe(Strict):
+    """Camera at a distance; infinite for a telecentric lens."""
+
+    distance_mm: Annotated[float, Field(gt=0, strict=True)]
+
+
 class LightsRecipe(Strict):
     """The ``[lights]`` table: exactly one of the first five keys."""
 
@@ -56,6 +67,7 @@ class LightsRecipe(Strict):
     ring: RingRecipe | None = None
     intensities: str | list[float] | list[Vector] | None = None
     intensity_distance_mm: Positive | None = None
+    u_deg: Uncertainty | list[Uncertainty] | None = None
 
     @model_validator(mode="after")
     def _one_source(self) -> LightsRecipe:
@@ -74,6 +86,8 @@ class CaptureRecipe(Strict):
     """The whole of ``capture.toml``; file names are relative to its folder."""
 
     pixel_pitch_um: Positive | None = None
+    pixel_pitch_u_um: Uncertainty | None = None
+    camera: CameraRecipe | None = None
     images: Annotated[list[str], Field(min_length=1)] | None = None
     channel: ChannelName = "luminance"
     dark: str | None = None
@@ -82,6 +96,32 @@ class CaptureRecipe(Strict):
     black_level: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
     saturation: Positive | None = None
     lights: LightsRecipe | None = None
+
+    @field_validator("camera", mode="before")
+    @classmethod
+    def _telecentric(cls, value: Any) -> Any:  # noqa: ANN401 - whatever the file holds
+        if value == "telecentric":
+            return {"distance_mm": math.inf}
+        if not isinstance(value, dict):
+            msg = 'must be "telecentric" or { distance_mm = ... }'
+            raise ValueError(msg)
+        return value
+
+    @model_validator(mode="after")
+    def _pitch_is_known(self) -> CaptureRecipe:
+        if self.pixel_pitch_u_um is None:
+            return self
+        if self.pixel_pitch_um is None:
+            msg = f"pixel_pitch_u_um: goes with pixel_pitch_um only, got {self.pixel_pitch_u_um:g}"
+            raise ValueError(msg)
+        most_um = self.pixel_pitch_um / PITCH_OVER_U
+        if self.pixel_pitch_u_um > most_um and not math.isclose(self.pixel_pitch_u_um, most_um):
+            msg = (
+                f"pixel_pitch_u_um: must be at most a tenth of pixel_pitch_um ({most_um:g}), "
+                f"got {self.pixel_pitch_u_um:g}"
+            )
+            raise ValueError(msg)
+        return self
 
 
 def read_recipe(path: Path) -> CaptureRecipe:

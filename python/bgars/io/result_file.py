@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 __all__ = ["RESULT_NAME", "read_result"]
 
 RESULT_NAME = "result.json"
+OLDEST_VERSION = 2
+READABLE_VERSIONS = range(OLDEST_VERSION, FORMAT_VERSION + 1)
 
 
 def read_result(path: str | PathLike[str]) -> PartResult:
@@ -89,9 +91,9 @@ def _check_format(path: Path, values: object) -> None:
             msg += " (made before results had a format: inspect the capture again)"
         raise FileFormatError(msg)
     version = values.get("format_version")
-    if version != FORMAT_VERSION or isinstance(version, bool):
+    if version not in READABLE_VERSIONS or isinstance(version, bool):
         msg = (
-            f"{path}: format_version: this bgars reads {FORMAT_VERSION}, got {version!r} "
+            f"{path}: format_version: this bgars reads {OLDEST_VERSION} to {FORMAT_VERSION}, got {version!r} "
             f"(written by bgars {values.get('version')})"
         )
         raise FileFormatError(msg)
@@ -149,6 +151,9 @@ def _recipe(table: RecipeTable) -> PartRecipe:
         gravity_um=None if table.gravity_um is None else (table.gravity_um[0], table.gravity_um[1]),
         material_file=None if table.material_file is None else Path(table.material_file),
         file=None if table.file is None else Path(table.file),
+        q=table.q,
+        u_q=table.u_q,
+        pitch_u_um=table.pitch_u_um,
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, Strict
+from pydantic import BaseModel, ConfigDict, Field, Strict, model_validator
 
 from bgars.ball_records import BallKind
 from bgars.part_recipe import View
@@ -19,6 +19,8 @@ Reading = Number | None
 Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Count = Annotated[int, Field(ge=0)]
+Causes = dict[str, Annotated[float, Field(allow_inf_nan=False, ge=0)]]
+"""Standard uncertainty (k = 1) by cause, in um."""
 Checksum = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 
 
@@ -59,6 +61,15 @@ class BallTable(Table):
     seating_deviation_um: Reading = Field(description="distance of the top below the seating plane, in um")
     regression_deviation_um: Reading = Field(description="distance of the top below the regression plane, in um")
     lights_used: Count = Field(description="lights whose shadow of this ball was usable")
+    budget: dict[Literal["x_um", "y_um", "diameter_um", "top_um"], Causes] = Field(
+        description="standard uncertainty (k = 1) of readings by cause, in um, largest first"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _earlier(cls, values: Any) -> Any:  # noqa: ANN401 - whatever the file holds
+        """Results of version 2 had no budgets."""
+        return {"budget": {}} | values if isinstance(values, dict) else values
 
 
 class CheckTable(Table):
@@ -122,6 +133,17 @@ class RecipeTable(Table):
     gravity_um: Pair | None = Field(description="centre of gravity, in um; null = the mean of the places")
     material_file: str | None = Field(description="file of a material fitted earlier")
     file: str | None = Field(description="file that the recipe was read from")
+    q: Reading = Field(description="vertical over horizontal radius that all balls share, a ratio; null = not stated")
+    u_q: Reading = Field(description="standard uncertainty (k = 1) of q, a ratio; null = not stated")
+    pitch_u_um: Reading = Field(
+        description="standard uncertainty (k = 1) of the grid's pitch, in um; null = not stated"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _earlier(cls, values: Any) -> Any:  # noqa: ANN401 - whatever the file holds
+        """Recipes of results written before these keys existed could not state them."""
+        return {"q": None, "u_q": None, "pitch_u_um": None} | values if isinstance(values, dict) else values
 
 
 class ParameterTable(Table):
@@ -159,7 +181,7 @@ class ResultTable(Table):
     """The result of one inspection; lengths in um, angles in degrees, null = not measured."""
 
     format: Literal["bgars-result"] = Field(description="says that this file is a result of bgars")
-    format_version: Literal[2] = Field(description="rises with every change of the keys or their meaning")
+    format_version: Literal[2, 3] = Field(description="rises with every change of the keys or their meaning")
     name: str = Field(description="name of the part (recipe), else of the capture")
     balls: list[BallTable] = Field(description="places in reading order, missing ones too; balls off the layout last")
     verdict: Verdict = Field(
@@ -206,6 +228,15 @@ class ResultTable(Table):
         description="when the command inspected it: ISO 8601, UTC, such as 2026-01-31T12:00:00Z; empty = not stamped",
         pattern=r"^(\d{4}-\d{2}-\d{2}T\d{2}:\d{2}:\d{2}Z)?$",
     )
+    seating_budget: Causes = Field(
+        description="what u_seating_coplanarity_um is made of: standard uncertainty (k = 1) by cause, in um"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _earlier(cls, values: Any) -> Any:  # noqa: ANN401 - whatever the file holds
+        """Results of version 2 had no budgets."""
+        return {"seating_budget": {}} | values if isinstance(values, dict) else values
 
 
 def result_schema() -> dict[str, Any]:

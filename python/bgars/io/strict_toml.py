@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
 import sys
 from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
@@ -19,10 +20,13 @@ else:
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from pydantic_core import ErrorDetails
+
 __all__ = ["Strict", "checked", "read_values"]
 
 Model = TypeVar("Model", bound=BaseModel)
 SCALARS = {"str", "int", "float", "bool"}
+SCALAR_WANTED = {"string_type", "float_type", "int_type", "bool_type", "literal_error"}
 
 
 class Strict(BaseModel):
@@ -72,8 +76,7 @@ def checked(model: type[Model], values: dict[str, Any], path: Path) -> Model:
 
 def _explain(model: type[BaseModel], path: Path, error: ValidationError) -> str:
     """One line for the first mistake, unknown keys first: they are usually the cause of the others."""
-    details = sorted(error.errors(include_url=False), key=lambda detail: detail["type"] != "extra_forbidden")
-    first = details[0]
+    first = min(error.errors(include_url=False), key=lambda detail: _rank(model, detail))
     is_unknown = first["type"] == "extra_forbidden"
     keys, known = _walk(model, first["loc"][:-1] if is_unknown else first["loc"])
     if is_unknown:
@@ -85,6 +88,15 @@ def _explain(model: type[BaseModel], path: Path, error: ValidationError) -> str:
     value = "" if isinstance(first["input"], dict) else f", got {first['input']!r}"
     # A rule over several keys names them itself.
     return ": ".join([str(path), *([".".join(keys)] if keys else []), f"{reason}{value}"])
+
+
+def _rank(model: type[BaseModel], detail: ErrorDetails) -> int:
+    """How late a mistake is told: pydantic tries every branch of a union, and blames what belongs to another one."""
+    if detail["type"] == "extra_forbidden":
+        return 4 if detail["loc"][-1] in _walk(model, detail["loc"][:-1])[1] else 0
+    if detail["type"] in SCALAR_WANTED and isinstance(detail["input"], dict | list):
+        return 3
+    return 2 if detail["type"] == "missing" else 1
 
 
 def _walk(model: type[BaseModel], location: tuple[int | str, ...]) -> tuple[list[str], list[str]]:
@@ -100,7 +112,7 @@ def _walk(model: type[BaseModel], location: tuple[int | str, ...]) -> tuple[list
         elif any(_is_tag(at, part) for at in models):
             models = [at for at in models if _is_tag(at, part)]
             continue
-        elif part in SCALARS or part in {at.__name__ for at in models} or "[" in str(part):
+        elif part in SCALARS or part in {at.__name__ for at in models} or re.search(r"\[|^constrained-", str(part)):
             continue
         keys.append(str(part))
     known = dict.fromkeys(name for at in models for name in at.model_fields)

@@ -49,12 +49,16 @@ def _board_values(board: Board) -> dict[str, Any]:
 
 
 def _rig_values(rig: LightRig) -> dict[str, Any]:
+    values = {
+        "intensities": rig.intensities.tolist(),
+        "u_deg": None if rig.u_deg is None else rig.u_deg.tolist(),
+    }
     if rig.positions_um is None or rig.intensity_distance_um is None:
-        return {"directions": rig.directions.tolist(), "intensities": rig.intensities.tolist()}
+        return {"directions": rig.directions.tolist(), **values}
     return {
         "positions_um": rig.positions_um.tolist(),
-        "intensities": rig.intensities.tolist(),
         "intensity_distance_um": rig.intensity_distance_um.tolist(),
+        **values,
     }
 
 

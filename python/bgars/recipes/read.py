@@ -91,7 +91,7 @@ def read_scene(recipe: str | PathLike[str]) -> SimulationSetup:
     try:
         return SimulationSetup(
             scene=_scene(values.scene, path.parent),
-            rig=_rig(values.rig),
+            rig=_rig(values.rig).with_u_deg(values.rig.u_deg),
             material=_material(values.material),
             camera=_camera(values),
             seed=values.seed,

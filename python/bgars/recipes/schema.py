@@ -208,6 +208,7 @@ class RigRecipe(Strict):
     positions_um: list[Vector] | None = None
     intensities: list[float] | None = None
     intensity_distance_um: float | list[float] | None = None
+    u_deg: float | list[float] | None = None
 
 
 class CameraRecipe(Strict):

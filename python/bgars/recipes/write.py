@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from dataclasses import asdict, fields
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
@@ -99,6 +100,7 @@ def _capture_toml(capture: Capture, truth: SimulatedTruth, names: list[str]) -> 
     intensities = rig.intensities
     lines = [
         f"pixel_pitch_um = {float(camera.pixel_pitch_um)!r}",
+        *_declared(capture),
         f"images = {json.dumps(names)}",
         f"response = {response}",
         f"black_level = {float(capture.black_level)!r}",
@@ -115,7 +117,21 @@ def _capture_toml(capture: Capture, truth: SimulatedTruth, names: list[str]) -> 
         lines.append(f"positions_mm = {json.dumps((rig.positions_um / 1000.0).tolist())}")
         lines.append(f"intensity_distance_mm = {distance_um / 1000.0!r}")
     lines.append(f"intensities = {json.dumps(intensities.tolist())}")
+    if rig.u_deg is not None:
+        lines.append(f"u_deg = {json.dumps(rig.u_deg.tolist())}")
     return "\n".join(lines) + "\n"
+
+
+def _declared(capture: Capture) -> list[str]:
+    """What a capture states of its scale and camera."""
+    lines = []
+    if capture.pixel_pitch_u_um is not None:
+        lines.append(f"pixel_pitch_u_um = {float(capture.pixel_pitch_u_um)!r}")
+    distance_mm = capture.camera_distance_mm
+    if distance_mm is not None:
+        camera = '"telecentric"' if math.isinf(distance_mm) else f"{{ distance_mm = {float(distance_mm)!r} }}"
+        lines.append(f"camera = {camera}")
+    return lines
 
 
 def _write_truth(path: Path, truth: SimulatedTruth) -> None:

@@ -6,7 +6,6 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from bgars.inspection.judge import MAX_LIGHT_CHANGE_DEG
-from bgars.inspection.shape_or_lights import MIN_RAISE_DEG
 from bgars.report.page_words import (
     NOT_MEASURED,
     PART_WORDS,
@@ -174,7 +173,7 @@ def raised_together(source: PageSource) -> str:
         for (x, y, z), lamp in zip(rows, source.lamps, strict=True)
     ]
     mean = _signed(sum(raised) / len(raised))
-    return f"by {mean}° on average; nothing passes where it is clearly over {MIN_RAISE_DEG:g}°"
+    return f"by {mean}° on average; what that makes heights uncertain by is part of their U"
 
 
 def _signed(value: float | None) -> str:

@@ -47,6 +47,8 @@ mod _bgars {
     #[pymodule_export]
     use crate::normals::estimate_normals;
     #[pymodule_export]
+    use crate::normals::predict_left_out;
+    #[pymodule_export]
     use crate::reflectance::estimate_reflectance;
     #[pymodule_export]
     use crate::rims::eliminate_rims;

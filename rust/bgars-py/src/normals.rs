@@ -104,3 +104,36 @@ pub fn estimate_normals<'py>(
     let out = out.as_map()?;
     capture.work(py, threads, progress.as_ref(), Estimate { mask, method, out })
 }
+
+/// A comparison of the methods that need no balls.
+struct Predict<'a> {
+    mask: Option<&'a [bool]>,
+}
+
+impl Work for Predict<'_> {
+    type Output = Option<(blind::Predictions, f64)>;
+
+    fn run<P: Pixel>(
+        self,
+        stack: &ImageStack<'_, P>,
+        lights: &Lights,
+        radiometry: &Radiometry<'_, P>,
+        _: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    ) -> bgars_core::Result<Self::Output> {
+        blind::predict(stack, lights, radiometry, self.mask)
+    }
+}
+
+#[pyfunction]
+#[pyo3(signature = (capture, *, mask, threads))]
+#[allow(clippy::needless_pass_by_value)]
+pub fn predict_left_out<'py>(
+    py: Python<'py>,
+    capture: Capture<'py>,
+    mask: Option<PyReadonlyArray2<'py, bool>>,
+    threads: Option<i64>,
+) -> PyResult<Option<(f64, f64, f64, f64)>> {
+    let mask = mask.as_ref().map(|mask| slice2(mask, "mask")).transpose()?;
+    let found = capture.work(py, threads, None, Predict { mask })?;
+    Ok(found.map(|(costs, noise)| (costs.lambertian, costs.robust_filter, costs.reflectance, noise)))
+}

@@ -3,7 +3,9 @@
 use std::ops::ControlFlow;
 
 use bgars_core::normals::NormalMapMut;
-use bgars_core::reflectance::{Circle, Findings, Lobe, Masking, Material, Request, estimate_into, parameter_names};
+use bgars_core::reflectance::{
+    Circle, Findings, Lobe, Masking, Material, Request, Shape, estimate_into, parameter_names,
+};
 use bgars_core::{ImageStack, Lights, Pixel, Radiometry};
 use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
@@ -89,7 +91,13 @@ pub fn estimate_reflectance<'py>(
     progress: Option<Py<PyAny>>,
     mut out: Outputs<'py>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let circle = |&[x_px, y_px, radius_px, u_radius_px]: &[f64; 4]| Circle { x_px, y_px, radius_px, u_radius_px };
+    let circle = |&[x_px, y_px, radius_px, u_radius_px]: &[f64; 4]| Circle {
+        x_px,
+        y_px,
+        radius_px,
+        u_radius_px,
+        shape: Shape::SPHERE,
+    };
     let circles: Vec<Circle> = rows(&circles, "circles")?.iter().map(circle).collect();
     let material = material.map(|given| given.material()).transpose()?;
     let request = Request {
@@ -125,6 +133,14 @@ fn described<'py>(py: Python<'py>, findings: &Findings) -> PyResult<Bound<'py, P
     });
     found.set_item("standard_errors", errors)?;
     found.set_item("loss", findings.loss)?;
+    let (shape, ratio) = match findings.shape.shape {
+        Shape::Cap(ratio) => (if findings.shape.shape == Shape::SPHERE { "sphere" } else { "cap" }, ratio),
+        Shape::Ellipsoid(ratio) => ("ellipsoid", ratio),
+    };
+    found.set_item("shape", (shape, ratio, findings.shape.u_ratio))?;
+    let left_out: Vec<[f32; 3]> =
+        findings.left_out.iter().map(|light| [light.difference, light.value, light.mean]).collect();
+    found.set_item("left_out", left_out)?;
     found.set_item("accepted", findings.accepted)?;
     found.set_item("own_material", findings.own_material.clone())?;
     found.set_item("residuals_learnt", findings.residuals_learnt)?;

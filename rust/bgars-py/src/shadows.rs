@@ -58,8 +58,8 @@ pub fn draw_shadows<'py>(
 #[derive(FromPyObject)]
 pub struct Lines {
     spread_px: f64,
-    lamp_spread_rad: f64,
-    reach_px: f64,
+    lamp_spread_rad: Vec<f64>,
+    reach_px: Vec<f64>,
     stride_px: usize,
     coarse: bool,
 }
@@ -96,8 +96,15 @@ pub fn measure_edges<'py>(
     let gains = slice2(&gains, "gains")?;
     let Lines { spread_px, lamp_spread_rad, reach_px, stride_px, coarse } = settings;
     let settings = EdgeSettings { spread_px, lamp_spread_rad, reach_px, stride_px, coarse, angles_rad, sectors };
-    if settings.stride_px == 0 || !settings.reach_px.is_finite() || settings.sectors == 0 || step == 0 {
-        return Err(InputError::new_err("stride_px, sectors, step: must be at least 1, reach_px finite"));
+    if settings.stride_px == 0 || settings.sectors == 0 || step == 0 {
+        return Err(InputError::new_err("stride_px, sectors, step: must be at least 1"));
+    }
+    let lines = settings.angles_rad.len();
+    if settings.lamp_spread_rad.len() != lines || settings.reach_px.len() != lines {
+        return Err(InputError::new_err("lamp_spread_rad, reach_px: must have one value for each of angles_rad"));
+    }
+    if !settings.reach_px.iter().all(|reach| reach.is_finite()) {
+        return Err(InputError::new_err("reach_px: must be finite"));
     }
     let job = Job { silhouettes, balls, lamps, board, gains, settings };
     let edges = capture.work(py, threads, None, job)?;

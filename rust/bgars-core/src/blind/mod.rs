@@ -32,6 +32,9 @@ use passes::Passes;
 /// Pixels that the material is fitted to.
 const SAMPLE_PIXELS: usize = 2000;
 
+/// The same where methods are only compared.
+const COMPARED_PIXELS: usize = 600;
+
 /// Pixels among them on which the methods predict left-out lights.
 const JUDGED_PIXELS: usize = 500;
 
@@ -169,17 +172,7 @@ pub fn estimate_into<P: Pixel>(
     })?;
     let mut reader = Reader::new(stack, lights, radiometry);
     let pixels: Vec<usize> = (0..stack.pixels()).filter(|&pixel| mask.is_none_or(|mask| mask[pixel])).collect();
-    let places = spread(&pixels, SAMPLE_PIXELS);
-    reader.measure_noise(&places, &lambertian);
-    let sample: Vec<Specimen> = places
-        .into_par_iter()
-        .map(|pixel| {
-            let mut observation = reader.room();
-            reader.read(pixel, &mut observation);
-            let starts = [&lambertian.normals[..], &*out.normals].map(|normals| pixel::start(normals, pixel));
-            Specimen { observation, starts }
-        })
-        .collect();
+    let sample = specimens(&mut reader, &spread(&pixels, SAMPLE_PIXELS), &lambertian, out.normals);
     let fitted = material::fit(&sample);
     let predictions = judge::predictions(&spread(&sample, JUDGED_PIXELS), &fitted);
     if progress(AFTER_MATERIAL).is_break() {
@@ -206,6 +199,50 @@ pub fn estimate_into<P: Pixel>(
         }
     }
     Ok(report)
+}
+
+/// Mean cost of a left-out light under each method over the pixels of a mask, and the standard deviation of a value that is reckoned
+/// with, in grey levels of 255 at unit light intensity; `None` with fewer than five lights.
+///
+/// # Errors
+/// Those of [`estimate`].
+pub fn predict<P: Pixel>(
+    stack: &ImageStack<'_, P>,
+    lights: &Lights,
+    radiometry: &Radiometry<'_, P>,
+    mask: Option<&[bool]>,
+) -> Result<Option<(Predictions, f64)>> {
+    if stack.lights() < MIN_LIGHTS {
+        return Ok(None);
+    }
+    let [lambertian, filtered] = [Method::Lambertian, Method::RobustFilter(RobustParams::DEFAULT)].map(|method| {
+        normals::estimate(stack, lights, radiometry, mask, method, false, &mut |_| ControlFlow::Continue(()))
+    });
+    let (lambertian, filtered) = (lambertian?, filtered?);
+    let mut reader = Reader::new(stack, lights, radiometry);
+    let pixels: Vec<usize> = (0..stack.pixels()).filter(|&pixel| mask.is_none_or(|mask| mask[pixel])).collect();
+    let sample = specimens(&mut reader, &spread(&pixels, COMPARED_PIXELS), &lambertian, &filtered.normals);
+    let fitted = material::fit(&sample);
+    let predictions = judge::predictions(&spread(&sample, JUDGED_PIXELS), &fitted);
+    Ok(Some((predictions, 255.0 * reader.albedo_scale * reader.noise)))
+}
+
+/// Some pixels as the fit sees them, with the normals of both classical methods; measures the noise on them.
+fn specimens<P: Pixel>(
+    reader: &mut Reader<'_, P>,
+    places: &[usize],
+    lambertian: &NormalMap,
+    filtered: &[f32],
+) -> Vec<Specimen> {
+    reader.measure_noise(places, lambertian);
+    let reader = &*reader;
+    let one = |&pixel: &usize| {
+        let mut observation = reader.room();
+        reader.read(pixel, &mut observation);
+        let starts = [&lambertian.normals[..], filtered].map(|normals| pixel::start(normals, pixel));
+        Specimen { observation, starts }
+    };
+    places.par_iter().map(one).collect()
 }
 
 /// The method of the lowest prediction cost, with a margin in favour of the material.

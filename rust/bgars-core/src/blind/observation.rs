@@ -42,8 +42,10 @@ pub(super) struct Observation {
     pub lights: Vec<Light>,
     /// What a difference is multiplied with: 1 / root of squared mean value and squared noise over scale.
     pub weight: f64,
-    /// Standard deviation of a value, of full scale.
+    /// Standard deviation of a value that is reckoned with, of full scale.
     pub noise: f64,
+    /// The same as it was measured, of full scale.
+    pub sigma: f64,
 }
 
 impl Observation {
@@ -86,6 +88,8 @@ pub(super) struct Reader<'a, P> {
     pub albedo_scale: f64,
     /// Standard deviation of a value, of full scale: one grey level of 255, or more where the images are noisier.
     pub noise: f64,
+    /// The same as it was measured; 0 before.
+    pub sigma: f64,
 }
 
 impl<'a, P: Pixel> Reader<'a, P> {
@@ -94,7 +98,7 @@ impl<'a, P: Pixel> Reader<'a, P> {
         let albedo_scale = inverse.iter().sum::<f64>() / inverse.len() as f64;
         let unit = albedo_scale * f64::from(radiometry.full_scale_of(stack));
         let scales = inverse.iter().map(|scale| scale / unit).collect();
-        Self { stack, lights, radiometry, scales, albedo_scale, noise: NOISE }
+        Self { stack, lights, radiometry, scales, albedo_scale, noise: NOISE, sigma: 0.0 }
     }
 
     /// Room for a pixel, with the lights of the image centre.
@@ -106,6 +110,7 @@ impl<'a, P: Pixel> Reader<'a, P> {
             lights: (0..count).map(|light| Light::new(self.lights.at(light, 0.0, 0.0).0)).collect(),
             weight: 1.0,
             noise: self.noise,
+            sigma: self.sigma,
         }
     }
 
@@ -166,6 +171,7 @@ impl<P: Pixel> Reader<'_, P> {
         if differences.is_empty() {
             return;
         }
-        self.noise = f64::max(NOISE, NOISE_FACTOR * median(&mut differences, f64::total_cmp) / spread);
+        self.sigma = median(&mut differences, f64::total_cmp) / spread;
+        self.noise = f64::max(NOISE, NOISE_FACTOR * self.sigma);
     }
 }

@@ -6,7 +6,7 @@ use super::facet::{self, Facet, Pull, equations, tangents};
 use super::lobe::Material;
 use super::material::turning_variance;
 use super::observation::{Kind, Observation, SCALE};
-use crate::normals::confidence_of;
+use crate::normals::{confidence_of, misfit_freedom};
 
 /// Fewest lights within the noise that speak for the robust filter, whatever the number of lights.
 const MIN_MATCHED: usize = 4;
@@ -19,6 +19,12 @@ const MAX_ERROR_DEG: f64 = 30.0;
 
 /// Residual that a fit is assumed to have at least, relative to the pixel's mean value.
 const PRIOR_RESIDUAL: f64 = 0.02;
+
+/// Unknowns of a pixel: two of the direction, and the albedo.
+const UNKNOWNS: f64 = 3.0;
+
+/// Lights that are reckoned with at least: below, nothing is over that a misfit could show itself in.
+const LEAST_LIGHTS: f64 = 2.2;
 
 /// Residuals up to so many times the scale of the loss: the light was used.
 const USED: f64 = 3.0;
@@ -97,22 +103,29 @@ pub(super) struct Trust {
 
 /// The trust in a facet, and the lights it used (written to `used`).
 ///
-/// s^2 = sigma^2 (C_11 + C_22), C the inverse of the normal equations with robust weights scaled to 1 at no residual, and
-/// sigma^2 the weighted mean squared residual with a 2 % prior, as for the other methods.
+/// s^2 = sigma^2 (C_11 + C_22), C the inverse of the normal equations with robust weights scaled to 1 at no residual. Of the
+/// weighted mean squared residual, sigma^2 takes what noise explains (and its own standard deviation) for noise, and the rest, with
+/// a 2 % prior, for a misfit of the model, of which more is hidden than seen ([`misfit_freedom`]).
 pub(super) fn trust(observation: &Observation, material: &Material, facet: &Facet, used: &mut [bool]) -> Trust {
     let frame = tangents(&facet.normal);
     let albedo = facet.log_albedo.exp();
-    let (mut squares, mut lights) = (PRIOR_RESIDUAL * PRIOR_RESIDUAL, 0.0);
+    let (mut squares, mut weights, mut lights) = (0.0, 1e-9, 0.0);
     for (index, used) in used.iter_mut().enumerate() {
         let model = albedo * material.shade(&facet.normal, &observation.lights[index]);
         let ratio = observation.residual(index, model) / SCALE;
         let weight = observation.share(index) / (1.0 + ratio * ratio);
         squares += weight * (ratio * SCALE).powi(2);
-        lights += weight;
+        weights += weight;
+        lights += observation.share(index);
         *used = ratio.abs() <= USED;
     }
     let information = equations(observation, material, facet, &frame).matrix * (SCALE * SCALE);
-    let variance = squares / f64::max(lights - 2.0, 0.2);
+    let noise = (observation.sigma * observation.weight).powi(2);
+    let over = (lights - UNKNOWNS).max(LEAST_LIGHTS - 2.0);
+    let of_noise = noise * over / lights * (1.0 + (2.0 / over).sqrt());
+    let unexplained = (squares / weights - of_noise).max(0.0);
+    let misfit = (lights * unexplained + PRIOR_RESIDUAL * PRIOR_RESIDUAL) / misfit_freedom(lights.max(LEAST_LIGHTS));
+    let variance = noise + misfit;
     let Some(turning) = turning_variance(&information) else { return Trust { confidence: 0.0, measured: false } };
     let error_deg = (variance * turning).sqrt().to_degrees();
     // Never quite 0: that is what a pixel without a normal has.

@@ -2,7 +2,7 @@
 
 use bytemuck::NoUninit;
 
-use super::confidence::HALF_DEG;
+use super::confidence::{HALF_DEG, HIDDEN_MISFIT, MISFIT_MODES, misfit_freedom};
 use super::cutoff::{LANES, Lanes};
 use super::lane_solve::Careful;
 use super::out::Block;
@@ -45,13 +45,14 @@ pub(super) struct Facets<V> {
 
 /// Degrees of freedom of the residuals of so many kept lights (see [`super::confidence`]), by the square of its half-way point.
 pub(super) fn freedom(kept: usize) -> f32 {
-    ((kept as f64 - 2.0) * HALF2) as f32
+    (misfit_freedom(kept as f64) * HALF2) as f32
 }
 
 /// [`freedom`] of many pixels.
 #[inline(always)]
 pub(super) fn freedoms<V: Vector>(kept: V) -> V {
-    kept.times_minus(V::splat(HALF2 as f32), V::splat((2.0 * HALF2) as f32))
+    let (one, most) = (HALF2 / HIDDEN_MISFIT, V::splat((HALF2 * (MISFIT_MODES + 1.0) / HIDDEN_MISFIT) as f32));
+    most - (most - kept.times_minus(V::splat(one as f32), V::splat((2.0 * one) as f32))).at_least(V::splat(0.0))
 }
 
 /// What is still to be written of a block of pixels.

@@ -33,7 +33,7 @@ use crate::memory::zeros;
 use crate::{Error, Result};
 
 pub(crate) use checks::check_finite;
-pub(crate) use confidence::confidence_of;
+pub(crate) use confidence::{confidence_of, misfit_freedom};
 pub use kernel::{estimate, estimate_into};
 pub use robust::{RobustParams, robust_filter};
 pub use specular::specular_filter;

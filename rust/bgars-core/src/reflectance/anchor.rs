@@ -21,6 +21,40 @@ pub struct Circle {
     pub radius_px: f64,
     /// Standard uncertainty of the radius; 0 for a circle that is right.
     pub u_radius_px: f64,
+    /// What stands on it.
+    pub shape: Shape,
+}
+
+/// The surface over a circle of radius R.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// Part of a sphere of radius R over this ratio: `n_xy = ratio (p - c) / R`. 1: half a ball, seen to its equator; below 1, a
+    /// cap lower than half a ball, whose outline is where it meets the board.
+    Cap(f64),
+    /// Half an ellipsoid whose height is this ratio of R.
+    Ellipsoid(f64),
+}
+
+impl Shape {
+    /// Half a ball.
+    pub const SPHERE: Self = Self::Cap(1.0);
+
+    /// Normal at a place `(p - c) / R`; `None` outside.
+    fn normal(self, x: f64, y: f64) -> Option<Vector3<f64>> {
+        let z2 = 1.0 - x * x - y * y;
+        // False for a circle without a radius: z2 is then minus infinity, or not a number at its centre.
+        if z2 <= 0.0 || z2.is_nan() {
+            return None;
+        }
+        match self {
+            Self::Cap(ratio) => {
+                let (x, y) = (ratio * x, ratio * y);
+                let z2 = 1.0 - x * x - y * y;
+                (z2 > 0.0).then(|| Vector3::new(x, y, z2.sqrt()))
+            }
+            Self::Ellipsoid(ratio) => Some(Vector3::new(ratio * x, ratio * y, z2.sqrt()).normalize()),
+        }
+    }
 }
 
 impl Circle {
@@ -30,7 +64,7 @@ impl Circle {
     /// A circle that is right.
     #[must_use]
     pub const fn exact(x_px: f64, y_px: f64, radius_px: f64) -> Self {
-        Self { x_px, y_px, radius_px, u_radius_px: 0.0 }
+        Self { x_px, y_px, radius_px, u_radius_px: 0.0, shape: Shape::SPHERE }
     }
 
     /// Standard angle in radian by which the error of the radius turns a normal of its sphere: `n_xy = (p - c) / R` moves
@@ -41,14 +75,11 @@ impl Circle {
         normal.x.hypot(normal.y) * self.u_radius_px / (self.radius_px * normal.z.max(MIN_N_Z))
     }
 
-    /// Normal of the sphere at a point of the image: `n_xy = (p - c) / R`; `None` outside.
+    /// Normal of its [`Shape`] at a point of the image, of a sphere `n_xy = (p - c) / R`; `None` outside.
     #[must_use]
     #[inline]
     pub fn normal(&self, x_px: f64, y_px: f64) -> Option<Vector3<f64>> {
-        let (x, y) = ((x_px - self.x_px) / self.radius_px, (y_px - self.y_px) / self.radius_px);
-        let z2 = 1.0 - x * x - y * y;
-        // False for a circle without a radius: z2 is then minus infinity, or not a number at its centre.
-        (z2 > 0.0).then(|| Vector3::new(x, y, z2.sqrt()))
+        self.shape.normal((x_px - self.x_px) / self.radius_px, (y_px - self.y_px) / self.radius_px)
     }
 
     /// Rows and columns of an image that the circle can touch.

@@ -163,11 +163,28 @@ impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
         }
     }
 
+    /// The bent level of one light by the normal that the others give.
+    pub fn predicted(&self, pixel: usize, light: usize, scratch: &mut Scratch) -> f32 {
+        self.look_at(pixel, scratch);
+        let (group, lane) = (light / GROUP, light % GROUP);
+        scratch.seen.weight[group][lane] = 0.0;
+        let best = self.minimum_of_seen(Search::Deepest, scratch);
+        self.table.at(best.point, group).value[lane]
+    }
+
     fn minimum(&self, pixel: usize, search: Search, scratch: &mut Scratch) -> Minimum {
+        self.look_at(pixel, scratch);
+        self.minimum_of_seen(search, scratch)
+    }
+
+    fn look_at(&self, pixel: usize, scratch: &mut Scratch) {
         let (height, width) = self.reader.size();
         let (x, y) = pixel_centre(pixel / width, pixel % width, height, width);
         scratch.anchor = self.ball.circle.normal(x, y).map(|normal| to_disc(&normal).map(|v| v as f32));
         self.observe(pixel, scratch);
+    }
+
+    fn minimum_of_seen(&self, search: Search, scratch: &mut Scratch) -> Minimum {
         let lights = self.reader.lights();
         // The disc is 1 / sqrt 2 of a radian at its centre.
         let weight = COMPONENTS.sqrt() * DISC_RADIAN / self.ball.prior_rad;

@@ -2,17 +2,20 @@
 
 use std::ops::ControlFlow;
 
-use super::anchor::{Circle, pixel_centre};
+use super::anchor::{Circle, Shape};
 use super::ball::Ball;
+use super::ball_pixels::{core_of, inside, paired, samples, with_shape};
 use super::choose::best_material;
 use super::fit::{Free, MaterialFit, fit_from};
 use super::flat_top::FlatTop;
+use super::left_out::{LeftOut, left_out};
 use super::material::Material;
 use super::observe::Reader;
 use super::regions::{Region, Regions};
 use super::residuals::learnt_corrections;
-use super::samples::{FIT_MIN_N_Z, Samples, spaced};
+use super::samples::FIT_MIN_N_Z;
 use super::scale::bend;
+use super::shape::{CommonShape, common_shape};
 use super::spread::Spread;
 use super::variation::ball_materials;
 use crate::normals::{NormalMapMut, check_finite};
@@ -34,6 +37,12 @@ const RESIDUAL_MIN_N_Z: f64 = 0.1;
 
 /// Mean loss of a light above which a material explains nothing.
 pub const MAX_LOSS: f64 = 2.0;
+
+/// Pixels that a shape is told by, at least of each ball.
+const SHAPE_PIXELS: usize = 1500;
+
+/// Mean loss of a light above which other methods may know better: a grey level of residual.
+const DOUBTED_LOSS: f64 = 0.1;
 
 /// Rounds in which the spread is learnt.
 const SPREAD_ROUNDS: usize = 2;
@@ -61,8 +70,12 @@ pub struct Findings {
     pub material: Material,
     /// Its fit; `None` where the material was given.
     pub fit: Option<MaterialFit>,
+    /// The shape that the balls have in common.
+    pub shape: CommonShape,
     /// Mean loss of a light over the pixels of known normal, with the material alone.
     pub loss: f64,
+    /// Predictions of lights left out, where the loss leaves room for doubt.
+    pub left_out: Vec<LeftOut>,
     /// False where that is too bad: then nothing was written.
     pub accepted: bool,
     /// True for balls with a material of their own.
@@ -77,11 +90,13 @@ pub struct Findings {
 
 impl Findings {
     /// A material that does not explain the balls.
-    fn refused(material: Material, fit: Option<MaterialFit>, loss: f64, balls: usize) -> Self {
+    fn refused(material: Material, fit: Option<MaterialFit>, shape: CommonShape, loss: f64, balls: usize) -> Self {
         Self {
             material,
             fit,
+            shape,
             loss,
+            left_out: Vec::new(),
             accepted: false,
             own_material: vec![false; balls],
             residuals_learnt: false,
@@ -99,8 +114,9 @@ impl Findings {
 /// right and y up from the image centre.
 ///
 /// # Method
-/// 1. The material is fitted to pixels of known normal, `n_xy = (p - c) / R`: [`best_material`]; to each ball its own
-///    where that explains clearly more: [`ball_materials`].
+/// 1. The material is fitted to pixels of known normal, `n_xy = (p - c) / R`: [`best_material`]; again where all balls are
+///    something flatter than spheres: [`common_shape`]; to each ball its own where that explains clearly more:
+///    [`ball_materials`].
 /// 2. Residuals of the other balls, as a smooth table over the normals: [`learnt_corrections`].
 /// 3. How far observations lie from the model, and normals from the circles: [`Regions`].
 /// 4. Each pixel: `sum log(1 + (r / 3 s)^2)` over the lights and a weak pull to the circle's normal, minimised by
@@ -163,20 +179,38 @@ pub fn estimate_into<P: Pixel>(
         .iter()
         .map(|circle| inside(circle, reader.size(), |pixel| request.mask.is_none_or(|mask| mask[pixel])))
         .collect();
+    let core = core_of(request.circles, &inside, reader.size());
     let balls = request.circles.len();
     let of_each = (FIT_PIXELS / balls.max(1)).max(FIT_PIXELS_OF_BALL);
-    let sampled =
-        |count: usize, min_n_z: f64| samples(&reader, lights, request.circles, &inside, &clip, count, min_n_z);
-    let some = sampled(of_each, FIT_MIN_N_Z);
-    let fit = (request.material.is_none() && balls > 0).then(|| best_material(&some));
+    let sampled = |circles: &[Circle], count: usize, min_n_z: f64| {
+        samples(&reader, lights, circles, &inside, &clip, count, min_n_z)
+    };
+    let mut circles = request.circles.to_vec();
+    let mut some = sampled(&circles, of_each, FIT_MIN_N_Z);
+    let mut fit = (request.material.is_none() && balls > 0).then(|| best_material(&some));
+    let mut shape = CommonShape { shape: Shape::SPHERE, u_ratio: 0.0 };
+    if let Some(of_spheres) = &fit {
+        let count = (SHAPE_PIXELS / balls).max(FIT_PIXELS_OF_BALL);
+        let pairs: Vec<Vec<usize>> = core.iter().map(|pixels| paired(pixels, count / 2)).collect();
+        let shaped = |shape: Shape| {
+            let circles = with_shape(request.circles, CommonShape { shape, u_ratio: 0.0 });
+            samples(&reader, lights, &circles, &pairs, &clip, usize::MAX, f64::NEG_INFINITY)
+        };
+        shape = common_shape(&shaped, &of_spheres.material);
+        circles = with_shape(request.circles, shape);
+        if shape.shape != Shape::SPHERE {
+            some = sampled(&circles, of_each, FIT_MIN_N_Z);
+            fit = Some(best_material(&some));
+        }
+    }
     let material = request.material.or(fit.as_ref().map(|fit| &fit.material)).cloned().ok_or(Error::NoMaterial)?;
     let loss = fit_from(&some, &material, Free::NOTHING, 0).cost;
     if loss > MAX_LOSS {
-        return Ok(Findings::refused(material, fit, loss, balls));
+        return Ok(Findings::refused(material, fit, shape, loss, balls));
     }
     report(0.2)?;
     let (least, most) = RESIDUAL_PIXELS_OF_BALL;
-    let many = sampled((RESIDUAL_PIXELS / balls.max(1)).clamp(least, most), RESIDUAL_MIN_N_Z);
+    let many = sampled(&circles, (RESIDUAL_PIXELS / balls.max(1)).clamp(least, most), RESIDUAL_MIN_N_Z);
     let materials = if fit.is_some() { ball_materials(&many, &material, balls) } else { vec![material.clone(); balls] };
     let corrections = learnt_corrections(&many, &materials);
     let residuals_learnt = corrections.is_some();
@@ -185,14 +219,16 @@ pub fn estimate_into<P: Pixel>(
     let own_material: Vec<bool> = materials.iter().map(|own| *own != material).collect();
     let mut corrections = corrections.into_iter().flatten();
     let mut known: Vec<Region> = Vec::with_capacity(balls + 1);
-    for ((&circle, own), pixels) in request.circles.iter().zip(materials).zip(inside) {
+    let clip: Vec<f32> = clip.iter().map(|&level| bend(level) as f32).collect();
+    let left_out =
+        if loss > DOUBTED_LOSS { left_out(&reader, lights, &clip, &material, &circles, &core) } else { Vec::new() };
+    for ((&circle, own), pixels) in circles.iter().zip(materials).zip(inside) {
         known.push(Region { ball: Ball::new(circle, own, corrections.next()), pixels, free: false });
     }
     let free = free_pixels(&request, &known);
     if !free.is_empty() {
         known.push(Region { ball: Ball::new(Circle::NOWHERE, material.clone(), None), pixels: free, free: true });
     }
-    let clip: Vec<f32> = clip.iter().map(|&level| bend(level) as f32).collect();
     let mut regions = Regions::new(&reader, lights, &clip, known);
     let mut spread = Spread::constant(FIRST_SIGMA);
     for _ in 0..SPREAD_ROUNDS {
@@ -204,7 +240,9 @@ pub fn estimate_into<P: Pixel>(
     regions.estimate(&spread, &mut out, &mut |done| report(0.5 + 0.5 * done))?;
     let known = &regions.all[..balls];
     Ok(Findings {
+        shape,
         loss,
+        left_out,
         accepted: true,
         material,
         fit,
@@ -269,18 +307,6 @@ fn check<P: Pixel>(
 /// Smallest radius of a ball in pixels: below, no pixel is free of the rim.
 const MIN_RADIUS_PX: f64 = 3.0;
 
-/// Usable pixels inside a circle.
-fn inside(circle: &Circle, (height, width): (usize, usize), usable: impl Fn(usize) -> bool) -> Vec<usize> {
-    let (rows, cols) = circle.window(height, width);
-    rows.flat_map(|row| cols.clone().map(move |col| (row, col)))
-        .filter(|&(row, col)| {
-            let (x, y) = pixel_centre(row, col, height, width);
-            circle.normal(x, y).is_some() && usable(row * width + col)
-        })
-        .map(|(row, col)| row * width + col)
-        .collect()
-}
-
 /// Free pixels that are usable and in no circle.
 fn free_pixels(request: &Request<'_>, known: &[Region]) -> Vec<usize> {
     let Some(free) = request.free else { return Vec::new() };
@@ -291,29 +317,4 @@ fn free_pixels(request: &Request<'_>, known: &[Region]) -> Vec<usize> {
         }
     }
     (0..wanted.len()).filter(|&pixel| wanted[pixel] && request.mask.is_none_or(|mask| mask[pixel])).collect()
-}
-
-/// Some pixels of each ball with the normals of its circle.
-fn samples<P: Pixel>(
-    reader: &Reader<'_, '_, P>,
-    lights: &Lights,
-    circles: &[Circle],
-    inside: &[Vec<usize>],
-    clip: &[f64],
-    of_each: usize,
-    min_n_z: f64,
-) -> Samples {
-    let mut samples = Samples::new(clip);
-    let mut bent = vec![0.0; reader.lights()];
-    let (height, width) = reader.size();
-    for (ball, (circle, pixels)) in circles.iter().zip(inside).enumerate() {
-        for &pixel in spaced(pixels, of_each) {
-            let (x, y) = pixel_centre(pixel / width, pixel % width, height, width);
-            if let Some(normal) = circle.normal(x, y).filter(|normal| normal.z > min_n_z) {
-                reader.read(pixel, &mut bent);
-                samples.push(ball, circle, normal, &bent, lights);
-            }
-        }
-    }
-    samples
 }

@@ -2,12 +2,14 @@
 
 mod anchor;
 mod ball;
+mod ball_pixels;
 mod cells;
 mod choose;
 mod disc;
 mod estimate;
 mod fit;
 mod flat_top;
+mod left_out;
 mod material;
 mod observe;
 mod odd;
@@ -16,12 +18,15 @@ mod regions;
 mod residuals;
 mod samples;
 mod scale;
+mod shape;
 mod spread;
 mod table;
 mod variation;
 
-pub use anchor::Circle;
+pub use anchor::{Circle, Shape};
 pub use estimate::{Findings, MAX_LOSS, MIN_LIGHTS, Request, estimate_into};
 pub use fit::{MaterialFit, parameter_names};
 pub use flat_top::FlatTop;
+pub use left_out::LeftOut;
 pub use material::{Facet, Lobe, Masking, Material};
+pub use shape::CommonShape;

@@ -166,6 +166,11 @@ fn minimise(table: &Signatures, pixel: &Observation, prior: Prior, start: [f32; 
         let [ga, gb] = state.gradient;
         let step = [(hbb * ga - hab * gb) / determinant, (haa * gb - hab * ga) / determinant];
         let length = (step[0] * step[0] + step[1] * step[1]).sqrt();
+        if !length.is_finite() {
+            // One light alone fixes one direction, so firmly that the damping is lost in rounding.
+            damping = (damping * 6.0).max(1e-3);
+            continue;
+        }
         let shorten = (0.2 / length.max(1e-12)).min(1.0);
         let next = into_disc([point[0] + shorten * step[0], point[1] + shorten * step[1]]);
         let next_state = evaluate(table, pixel, prior, next);
@@ -227,4 +232,27 @@ fn candidates(table: &Signatures, pixel: &Observation, lights: usize, distances:
         }
     }
     [first, points[second.1]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_light_that_tells_all_it_can_leaves_a_normal() {
+        // Its information is so large and so one-sided that the determinant of the normal equations is lost in rounding.
+        let table = Signatures::tabulate(1, |normal, levels| levels.fill((900.0 * normal.x) as f32));
+        for weight in [1e2, 1e5, 1e9, 1e15] {
+            let lane = |value: f32| {
+                let mut group = [0.0; GROUP];
+                group[0] = value;
+                vec![group]
+            };
+            let pixel = Observation { bent: lane(-300.0), weight: lane(weight), clip: vec![[f32::INFINITY; GROUP]] };
+            let prior = Prior { point: [0.4, 0.3], weight: 0.0 };
+            for found in [nearest(&table, &pixel, prior), deepest(&table, &pixel, 1, prior, &mut Vec::new())] {
+                assert!(found.point.iter().all(|value| value.is_finite()), "weight {weight}: {found:?}");
+            }
+        }
+    }
 }

@@ -151,14 +151,16 @@ impl<'a, 'b, 'c, P: Pixel> Regions<'a, 'b, 'c, P> {
         let telling: Vec<Vec<BallPixel>> =
             found.iter().map(|pixels| pixels.iter().filter(|pixel| tells(pixel)).copied().collect()).collect();
         let factor = calibration(&telling);
-        let common = deviation(&telling.concat(), factor).unwrap_or((FIRST_PRIOR_DEG.to_radians(), 0.0));
+        let common = deviation(&telling.concat(), factor);
         let (least, most) = PRIOR_LIMITS_DEG;
         for (((region, found), odd), telling) in self.all.iter_mut().zip(&found).zip(odd_places(&found)).zip(&telling) {
             let ball = &mut region.ball;
-            let (own, error) = deviation(telling, factor).unwrap_or(common);
+            let told = deviation(telling, factor).or(common);
+            let (own, error) = told.unwrap_or((FIRST_PRIOR_DEG.to_radians(), 0.0));
             ball.flat = flat_top(found);
             ball.odd = odd.filter(|_| ball.flat.is_none());
-            ball.deviation_rad = own;
+            // Where nothing tells, a ball is let go farther than it is expected to be: its roundness is in its circle's doubt.
+            ball.deviation_rad = told.map_or(least.to_radians(), |_| own);
             ball.prior_rad = own.max(error).clamp(least.to_radians(), most.to_radians());
         }
         spread.scaled(factor)

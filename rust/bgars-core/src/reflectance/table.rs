@@ -143,10 +143,13 @@ impl Signatures {
     /// The signature at a place of the disc for one group of lights, by cubic convolution (Keys 1981, eq. 3 with a = -1/2).
     #[must_use]
     #[inline(always)]
+    #[allow(clippy::manual_clamp)]
     pub fn at(&self, [a, b]: [f32; 2], group: usize) -> Signature {
         let limit = (FULL_SIDE - 3) as f32;
-        let col = ((a + 1.0) * DENSITY + MARGIN as f32).clamp(1.0, limit);
-        let row = ((b + 1.0) * DENSITY + MARGIN as f32).clamp(1.0, limit);
+        // Not `clamp`, which would let a NaN through, to a node that does not exist.
+        let inside = |position: f32| position.max(1.0).min(limit);
+        let col = inside((a + 1.0) * DENSITY + MARGIN as f32);
+        let row = inside((b + 1.0) * DENSITY + MARGIN as f32);
         let (first_col, first_row) = (col as usize, row as usize);
         let (wa, da) = weights(col - first_col as f32);
         let (wb, db) = weights(row - first_row as f32);
@@ -188,6 +191,14 @@ fn weights(t: f32) -> ([f32; 4], [f32; 4]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_place_that_is_not_a_number_is_no_place_outside_the_table() {
+        let table = Signatures::tabulate(3, |normal, levels| levels.fill(normal.z as f32));
+        for place in [[f32::NAN, 0.0], [0.0, f32::NAN], [f32::INFINITY, f32::NEG_INFINITY]] {
+            let _ = table.at(place, 0);
+        }
+    }
 
     #[test]
     fn a_smooth_signature_and_its_slope_come_back() {

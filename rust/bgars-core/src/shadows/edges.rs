@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::model::{Ball, Board, Lamp, Shadow};
 use super::normal_curve::{density, distribution};
-use super::stretch::{Line, Part, Pixel, Stretch, fit};
+use super::stretch::{COLUMNS, Line, Part, Pixel, Stretch, fit};
 use crate::{ImageStack, Radiometry};
 
 const MIN_LIGHTS_LIT: usize = 2;
@@ -18,10 +18,10 @@ const LOWEST_TANGENT: f64 = 0.08;
 pub struct EdgeSettings {
     /// Spread of a sharp edge, pixels.
     pub spread_px: f64,
-    /// Growth of the spread along the ray.
-    pub lamp_spread_rad: f64,
-    /// Distance to look to on both sides.
-    pub reach_px: f64,
+    /// Growth of the spread along the ray, one for each of `angles_rad`: lamps may be wider than high.
+    pub lamp_spread_rad: Vec<f64>,
+    /// Distance to look to on both sides, one for each of `angles_rad`.
+    pub reach_px: Vec<f64>,
     /// Distance of pixels on a line.
     pub stride_px: usize,
     /// By area instead of by shape: finds edges up to half of `reach_px` away.
@@ -140,21 +140,22 @@ impl<P: crate::Pixel> Scene<'_, P> {
                 continue;
             }
             let way_px = ray.along / ray.slope();
-            let spread_px = settings.spread_px.hypot(settings.lamp_spread_rad * way_px);
+            let spread_px = settings.spread_px.hypot(settings.lamp_spread_rad[place] * way_px);
+            let reach_px = settings.reach_px[place];
             let nearby = shadow.near_edge(point.x, point.y, &ray);
             let before = pixels.len();
             // Pixels on the row or column that crosses the edge more steeply.
             let along_cols = ray.gradient[0].abs() >= ray.gradient[1].abs();
-            let steps = (settings.reach_px / settings.stride_px as f64).ceil() as i64;
+            let steps = (reach_px / settings.stride_px as f64).ceil() as i64;
             for offset in (-steps..=steps).map(|step| step * settings.stride_px as i64) {
                 let (row, col) = if along_cols { (row, col + offset) } else { (row + offset, col) };
                 let Some(at) = self.place(row, col) else { continue };
                 let across_px = nearby.distance(self.x(col) - point.x, self.y(row) - point.y);
-                if across_px.abs() > settings.reach_px {
+                if across_px.abs() > reach_px {
                     continue;
                 }
                 if let Some((value, texture)) = self.read(at, light, gains) {
-                    let columns = self.columns(across_px, spread_px, texture);
+                    let columns = self.columns(across_px, spread_px, reach_px, texture);
                     let scaled = across_px / spread_px;
                     pixels.push(Pixel { columns, value, texture, scaled, across_px, line: lines.len(), weight: 1.0 });
                 }
@@ -173,19 +174,18 @@ impl<P: crate::Pixel> Scene<'_, P> {
         if settings.coarse { fit::<3>(&mut parts, lines, false, out) } else { fit::<4>(&mut parts, lines, true, out) }
     }
 
-    /// Columns of the model: shadow, light, displacement, spread.
-    fn columns(&self, across_px: f64, spread_px: f64, texture: f64) -> [f64; 4] {
+    /// Columns of the model: shadow, light, displacement, spread, growth of the light outward.
+    fn columns(&self, across_px: f64, spread_px: f64, reach: f64, texture: f64) -> [f64; COLUMNS] {
         if self.settings.coarse {
-            let reach = self.settings.reach_px;
             let lit = if across_px >= 0.0 { texture } else { 0.0 };
             let box_ = if across_px.abs() < 0.5 * reach { texture / reach } else { 0.0 };
-            return [texture - lit, lit, box_, 0.0];
+            return [texture - lit, lit, box_, 0.0, 0.0];
         }
         let scaled = across_px / spread_px;
         let density = density(scaled);
         let lit = distribution(scaled, density);
         let bell = density / spread_px * texture;
-        [texture * (1.0 - lit), texture * lit, bell, bell * scaled]
+        [texture * (1.0 - lit), texture * lit, bell, bell * scaled, texture * lit * across_px]
     }
 
     /// Value under the shadow's light, and texture: the mean of the lights that reach the pixel, each over its gain.

@@ -14,13 +14,16 @@ const RIDGE: f64 = 1e-9;
 const MAX_GROWTH: f64 = 0.3;
 
 /// Numbers that [`Stretch::numbers`] gives.
-pub const STRETCH_FIELDS: usize = 14;
+pub const STRETCH_FIELDS: usize = 16;
+
+/// Columns at most: shadow level, lit level, displacement, change of spread, growth of the lit level outward.
+pub(super) const COLUMNS: usize = 5;
 
 /// A usable pixel near an edge.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pixel {
-    /// Columns of the model; the last is 0 where it has three.
-    pub columns: [f64; 4],
+    /// Columns of the model; the last ones are 0 where it has three.
+    pub columns: [f64; COLUMNS],
     pub value: f64,
     pub texture: f64,
     /// Signed distance to the edge over its spread, and in pixels.
@@ -46,15 +49,17 @@ pub(super) struct Line {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Stretch {
     /// Shadow level, lit level, displacement and change of spread, both times the contrast.
-    pub solution: [f64; 4],
+    pub solution: [f64; COLUMNS],
     /// Their standard uncertainties.
-    pub deviation: [f64; 4],
+    pub deviation: [f64; COLUMNS],
     /// Mean texture of the board.
     pub texture: f64,
     /// Relative growth of the texture per pixel across the edge, outward.
     pub growth: f64,
     /// Means over the lines, weighted by what they say about the displacement: angle, way and spread.
     pub mean: [f64; 3],
+    /// With the lit level free to grow outward: this growth per pixel, and the displacement, times the contrast.
+    pub grown: [f64; 2],
     /// Whether it has pixels enough.
     pub looked_at: bool,
 }
@@ -64,12 +69,13 @@ impl Stretch {
     #[must_use]
     pub fn numbers(&self) -> [f64; STRETCH_FIELDS] {
         let mut numbers = [0.0; STRETCH_FIELDS];
-        numbers[..4].copy_from_slice(&self.solution);
-        numbers[4..8].copy_from_slice(&self.deviation);
+        numbers[..4].copy_from_slice(&self.solution[..4]);
+        numbers[4..8].copy_from_slice(&self.deviation[..4]);
         numbers[8] = self.texture;
         numbers[9] = self.growth;
         numbers[10..13].copy_from_slice(&self.mean);
-        numbers[13] = f64::from(u8::from(self.looked_at));
+        numbers[13..15].copy_from_slice(&self.grown);
+        numbers[15] = f64::from(u8::from(self.looked_at));
         numbers
     }
 }
@@ -96,7 +102,7 @@ pub(super) fn fit<const C: usize>(parts: &mut [Part<'_>], lines: &[Line], robust
                     pixel.weight = 1.0 / (1.0 + off * off);
                 }
             }
-            solve::<C>(part, stretch);
+            (stretch.solution, stretch.deviation) = solve::<C>(part.pixels);
             for pixel in &*part.pixels {
                 let off = residual::<C>(pixel, &stretch.solution);
                 square += pixel.weight * off * off;
@@ -111,20 +117,22 @@ pub(super) fn fit<const C: usize>(parts: &mut [Part<'_>], lines: &[Line], robust
         summarise(part, lines, stretch);
         if C == 4 {
             stretch.growth = growth(part.pixels);
+            let (with_growth, _) = solve::<COLUMNS>(part.pixels);
+            stretch.grown = [with_growth[4], with_growth[2]];
         }
     }
     noise
 }
 
-fn residual<const C: usize>(pixel: &Pixel, solution: &[f64; 4]) -> f64 {
+fn residual<const C: usize>(pixel: &Pixel, solution: &[f64; COLUMNS]) -> f64 {
     (0..C).fold(pixel.value, |rest, c| rest - solution[c] * pixel.columns[c])
 }
 
-/// One round of least squares: the solution, and its standard uncertainty for noise of 1.
-fn solve<const C: usize>(part: &Part<'_>, stretch: &mut Stretch) {
+/// One round of least squares by the first `C` columns: the solution, and its standard uncertainty for noise of 1.
+fn solve<const C: usize>(pixels: &[Pixel]) -> ([f64; COLUMNS], [f64; COLUMNS]) {
     let mut normal = SMatrix::<f64, C, C>::zeros();
     let mut right = SVector::<f64, C>::zeros();
-    for pixel in &*part.pixels {
+    for pixel in pixels {
         for i in 0..C {
             let weighted = pixel.weight * pixel.columns[i];
             right[i] += weighted * pixel.value;
@@ -138,14 +146,15 @@ fn solve<const C: usize>(part: &Part<'_>, stretch: &mut Stretch) {
         let (low, high) = (i.max(j), i.min(j));
         normal[(low, high)] / (scale[i] * scale[j]) + if i == j { RIDGE } else { 0.0 }
     });
-    (stretch.solution, stretch.deviation) = ([0.0; 4], [0.0; 4]);
+    let (mut solution, mut deviation) = ([0.0; COLUMNS], [0.0; COLUMNS]);
     // What is singular in spite of the ridge is not measured, and has no pixels enough.
-    let Some(inverse) = scaled.cholesky().map(|factor| factor.inverse()) else { return };
+    let Some(inverse) = scaled.cholesky().map(|factor| factor.inverse()) else { return (solution, deviation) };
     let scaled_solution = inverse * right.component_div(&scale);
     for i in 0..C {
-        stretch.solution[i] = scaled_solution[i] / scale[i];
-        stretch.deviation[i] = inverse[(i, i)].max(0.0).sqrt() / scale[i];
+        solution[i] = scaled_solution[i] / scale[i];
+        deviation[i] = inverse[(i, i)].max(0.0).sqrt() / scale[i];
     }
+    (solution, deviation)
 }
 
 /// Means over a stretch.
@@ -165,7 +174,7 @@ fn summarise(part: &Part<'_>, lines: &[Line], stretch: &mut Stretch) {
     stretch.mean = mean.map(|sum| sum / information.max(1e-30));
     stretch.looked_at = weight >= MIN_PIXELS;
     if information <= 0.0 {
-        stretch.solution = [0.0; 4]; // no contrast: the edge is elsewhere
+        stretch.solution = [0.0; COLUMNS]; // no contrast: the edge is elsewhere
     }
 }
 

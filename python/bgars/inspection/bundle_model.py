@@ -1,0 +1,145 @@
+"""The rows of the bundle: distances of measured points to predicted edges, and outlines, with their derivatives."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bgars.inspection.board import Board
+from bgars.inspection.common_terms import COMMON_TERMS, EDGE_TERMS, OUTLINE, OUTLINE_X, OUTLINE_Y, PERSPECTIVE
+from bgars.inspection.shadow_model import (
+    Balls,
+    Lights,
+    Rays,
+    ball_derivatives,
+    board_derivatives,
+    light_derivatives,
+    rays,
+)
+
+if TYPE_CHECKING:
+    from bgars.inspection.shadow_edges import Edges
+
+__all__ = ["EdgeModel", "State", "linearise_edges", "outline_rows", "tangents", "turned"]
+
+Array = NDArray[np.float64]
+LEAST_FOOT = 0.1
+"""Of the radius: a cap whose foot is smaller is none."""
+
+
+class State(NamedTuple):
+    """Values of all unknowns: balls (N, 5) as x, y, z, radius, q; lights (L, 3); shifts of images (L, 2); board (5,);
+    common terms (COMMON_TERMS,).
+    """
+
+    balls: Array
+    vectors: Array
+    shifts_px: Array
+    board: Array
+    common: Array
+
+    def take(self, index: NDArray[np.intp]) -> State:
+        """Some of the balls."""
+        return self._replace(balls=self.balls[index])
+
+
+class EdgeModel(NamedTuple):
+    """Of every measured point (N, L, S): distance to its edge; derivatives (..., T) by ball, light and what is shared;
+    place on the edge, the angle from its tip (rad).
+    """
+
+    residual: Array
+    derivatives: Array
+    angle_rad: Array
+
+
+def tangents(vectors: Array) -> Array:
+    """(L, 2, 3) changes per radian: first along the azimuth, then up."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    unit = vectors / length
+    side = np.column_stack([-unit[:, 1], unit[:, 0], np.zeros(len(unit))])
+    level = np.linalg.norm(side, axis=1, keepdims=True)
+    side = np.where(level > 1e-6, side / np.maximum(level, 1e-6), [1.0, 0.0, 0.0])  # noqa: PLR2004 - the zenith
+    up = np.column_stack(
+        [-unit[:, 2] * side[:, 1], unit[:, 2] * side[:, 0], unit[:, 0] * side[:, 1] - unit[:, 1] * side[:, 0]]
+    )
+    changes: Array = np.stack([side, up], axis=1) * length[:, None]
+    return changes
+
+
+def turned(vectors: Array, turns: Array) -> Array:
+    """Lights after small turns (L, 2); their length stays."""
+    moved = vectors + np.einsum("lk,lkc->lc", turns, tangents(vectors))
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True) / np.linalg.norm(moved, axis=1, keepdims=True)
+    scaled: Array = moved * lengths
+    return scaled
+
+
+def linearise_edges(edges: Edges, state: State, near: bool) -> EdgeModel:
+    """Distances of measured points to predicted edges, and their derivatives.
+
+    Derivatives are those of the edge, at the point of it next to the measured one: at the measured point itself they
+    would go with its error, and the products of both would not average out (errors in variables; Fuller 1987, ch. 3).
+    """
+    balls = Balls.from_table(state.balls).spread(2)
+    lamps = Lights.from_table(state.vectors, near).spread(1, 1)
+    board = Board(state.board)
+    x, y = edges.x - state.shifts_px[None, :, None, 0], edges.y - state.shifts_px[None, :, None, 1]
+    off = rays(x, y, balls, lamps, board)
+    rough = (off.distance - balls.radius) / np.maximum(off.slope, 1e-3) ** 2
+    x, y = x - rough * off.gradient_x, y - rough * off.gradient_y
+    beam = rays(x, y, balls, lamps, board)
+    slope = np.maximum(beam.slope, 1e-3)
+    # What is left at the foot, and the way to it by the mean slope: exact to second order.
+    distance = (off.distance - beam.distance) * 2.0 / (slope + np.maximum(off.slope, 1e-3))
+    distance = distance + (beam.distance - balls.radius) / slope
+    ways = tangents(state.vectors)
+    by_light = light_derivatives(beam, balls, (ways[None, :, None, 0], ways[None, :, None, 1]))
+    by_shift = np.stack([-beam.gradient_x, -beam.gradient_y], axis=-1)
+    by_common = np.zeros((*beam.distance.shape, COMMON_TERMS))
+    angle_rad = _angle(beam)
+    for wave, term in enumerate(EDGE_TERMS):
+        by_common[..., term] = -np.cos(wave * angle_rad)
+    by_board = board_derivatives(x, y, beam, balls)
+    geometry = np.concatenate([ball_derivatives(beam, balls, board), by_light, by_shift, by_board], axis=-1)
+    residual = distance + by_common @ state.common
+    return EdgeModel(residual, np.concatenate([geometry / slope[..., None], by_common], axis=-1), angle_rad)
+
+
+def _angle(beam: Rays) -> Array:
+    """Angle of the edge's normal against the way of the light on the board: 0 at the tip, +-pi/2 at the sides."""
+    along = -(beam.toward_x * beam.gradient_x + beam.toward_y * beam.gradient_y)
+    across = beam.toward_x * beam.gradient_y - beam.toward_y * beam.gradient_x
+    angle: Array = np.arctan2(across, along)
+    return angle
+
+
+def outline_rows(state: State, outlines: Array) -> tuple[Array, Array, Array]:
+    """(N, 3) predicted less given outlines (x, y, radius); derivatives (N, 3, 5) by ball and (N, 3, COMMON_TERMS).
+
+    A camera at distance 1 / k sees what is z high at (1 + k z) times its place. The outline of a ball whose centre lies
+    below the board is its foot, of radius ``sqrt(R^2 - (z / q)^2)``.
+    """
+    x, y, z, radius, q = state.balls.T
+    k = state.common[PERSPECTIVE]
+    depth = np.minimum(z, 0.0) / q
+    foot = np.sqrt(np.maximum(radius**2 - depth**2, np.square(LEAST_FOOT * radius)))
+    size = 1.0 + k * np.maximum(z, 0.0)
+    aside = state.common[[OUTLINE_X, OUTLINE_Y, OUTLINE]]
+    seen = np.column_stack([x * size, y * size, foot * size]) + aside
+    by_ball = np.zeros((len(x), 3, 5))
+    by_ball[:, 0, 0] = by_ball[:, 1, 1] = size
+    above = np.where(z > 0, k, 0.0)
+    by_ball[:, 0, 2], by_ball[:, 1, 2] = x * above, y * above
+    by_ball[:, 2, 2] = foot * above - depth / (q * foot)
+    by_ball[:, 2, 3] = radius / foot
+    by_ball[:, 2, 4] = depth**2 / (q * foot)
+    by_common = np.zeros((len(x), 3, COMMON_TERMS))
+    high = np.maximum(z, 0.0)
+    by_common[:, 0, PERSPECTIVE], by_common[:, 1, PERSPECTIVE] = x * high, y * high
+    by_common[:, 2, PERSPECTIVE] = foot * high
+    for row, term in enumerate((OUTLINE_X, OUTLINE_Y, OUTLINE)):
+        by_common[:, row, term] = 1.0
+    return seen - outlines, by_ball, by_common

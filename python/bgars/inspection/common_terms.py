@@ -1,0 +1,102 @@
+r"""What all balls and lights share, and the priors with long tails of the terms that shadows alone cannot settle.
+
+Shadows fix ``q cot(e)`` of every light well and neither of both: with all balls flattened by a share and all lights
+lowered to match, every shadow stays where it is. Which it was, the priors say. Each is a mixture of two normal
+distributions: a narrow one, a set-up as it should be, and a wide one, a set-up that is not. The likelihood of the
+common terms is normal (the bundle's), so the posterior is a mixture of normals, too, with weights in closed form
+(Bishop, "Pattern Recognition and Machine Learning", 2006, eqs. 2.113 to 2.117). Where both explanations remain, its
+spread holds both.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "AZIMUTH",
+    "COMMON_TERMS",
+    "EDGE",
+    "EDGE_TERMS",
+    "ELEVATION",
+    "OUTLINE",
+    "OUTLINE_X",
+    "OUTLINE_Y",
+    "PERSPECTIVE",
+    "ROUNDNESS",
+    "Mixture",
+    "posterior",
+]
+
+Array = NDArray[np.float64]
+
+ELEVATION, AZIMUTH, ROUNDNESS, PERSPECTIVE, EDGE, EDGE_1, EDGE_2, EDGE_3, OUTLINE, OUTLINE_X, OUTLINE_Y = range(11)
+"""Elevation and azimuth of all lights together (rad), q - 1 of all balls together, 1 / camera distance (1 / px); how far
+out edges of shadows are measured: all, and by cos a, cos 2a, cos 3a, a the angle from the tip (px); how far out all
+outlines are, and how far aside along x and y (px)."""
+COMMON_TERMS = 11
+EDGE_TERMS = (EDGE, EDGE_1, EDGE_2, EDGE_3)
+
+
+class Mixture(NamedTuple):
+    """A prior around 0: standard deviations of a set-up as it should be and of one that is not, share of the latter."""
+
+    narrow: float
+    wide: float
+    share: float
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the whole."""
+        return float(np.sqrt((1.0 - self.share) * self.narrow**2 + self.share * self.wide**2))
+
+
+def posterior(mean: Array, covariance: Array, u_prior: Array, mixtures: list[Mixture]) -> tuple[Array, Array, Array]:
+    """Mean (C,), covariance (C, C) and probability (C,) of the wide part, of C common terms under their mixtures.
+
+    Parameters
+    ----------
+    mean, covariance : (C,), (C, C) float64
+        Posterior under independent normal priors around 0.
+    u_prior : (C,) float64
+        Standard deviations of these priors.
+    mixtures : list of Mixture
+        Priors to put in their place.
+
+    Examples
+    --------
+    >>> wide = Mixture(0.1, 10.0, 0.1)
+    >>> mean, _, doubt = posterior(np.array([3.0]), np.array([[0.01]]), np.array([100.0]), [wide])
+    >>> bool(mean[0] > 2.9), bool(doubt[0] > 0.99)
+    (True, True)
+    """
+    precision = np.linalg.inv(covariance)
+    likelihood = precision - np.diag(u_prior**-2.0)
+    information = precision @ mean
+    logs, means, covariances, picks = [], [], [], []
+    for pick in product((False, True), repeat=len(mixtures)):
+        u = np.array(
+            [mixture.wide if is_wide else mixture.narrow for mixture, is_wide in zip(mixtures, pick, strict=True)]
+        )
+        share = np.prod([m.share if is_wide else 1.0 - m.share for m, is_wide in zip(mixtures, pick, strict=True)])
+        if share <= 0.0:
+            continue
+        here = np.linalg.inv(likelihood + np.diag(u**-2.0))
+        middle = here @ information
+        logs.append(
+            float(np.log(share) - np.log(u).sum() + 0.5 * np.linalg.slogdet(here)[1] + 0.5 * information @ middle)
+        )
+        means.append(middle)
+        covariances.append(here)
+        picks.append(pick)
+    weight = np.exp(np.array(logs) - max(logs))
+    weight /= weight.sum()
+    each = np.array(means)
+    total = weight @ each
+    off = each - total
+    spread = np.einsum("c,ci,cj->ij", weight, off, off) + np.einsum("c,cij->ij", weight, np.array(covariances))
+    wide = weight @ np.array(picks, dtype=np.float64)
+    return total, spread, wide
