@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.balls.rim_pixels import RimPixels
-from bgars.inspection.shadow_edges import EdgeSettings
+from bgars.inspection.shadow_edges import Lines
 from bgars.inspection.shadow_map import Casters
 from bgars.kernel_capture import KernelCapture
 from bgars.kernel_outputs import KernelOutputs
@@ -135,7 +135,7 @@ def integrate_normals(
 def measure_edges(
     capture: KernelCapture,
     casters: Casters,
-    settings: EdgeSettings,
+    settings: Lines,
     *,
     angles_rad: list[float],
     sectors: int,

@@ -220,12 +220,12 @@ def _by_reflectance(
     source = "given" if material is not None else f"fitted on {balls} ball{'s' if balls != 1 else ''} {given}"
     fit = field.reflectance
     if fit is not None and not fit.accepted:
-        most = _bgars.REFLECTANCE_MAX_LOSS
-        reason = f"the material {source} does not explain the balls: loss {fit.loss:.2f}, at most {most:g} is accepted"
+        reason = f"the material {source} does not explain the balls: {fit.refusal}"
         return replace(_because(pixelwise(fallback, (0.5, 1.0)), reason), reflectance=fit)
     where = "on balls, robust-filter elsewhere" if balls else "where it explains the pixel, robust-filter elsewhere"
+    shape = "" if fit is None else fit.shape_in_words
     checked = f"loss {0.0 if fit is None else fit.loss:.3f}" if balls else "no balls to check it by"
-    return replace(field, choice=f"reflectance {where}: material {source}, {checked}")
+    return replace(field, choice=f"reflectance {where}: material {source}{shape}, {checked}")
 
 
 def _because(field: NormalField, reason: str) -> NormalField:

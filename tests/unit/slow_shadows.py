@@ -11,12 +11,16 @@ from bgars.inspection.radiance import Radiance
 from bgars.inspection.shadow_edges import (
     FEWEST_SECTORS,
     LINES_A_STRETCH,
+    MIN_GROWTHS,
     SECTORS,
+    STEEPEST_GROWTH,
     WIDEST_RAD,
     EdgeSettings,
+    edge_lines,
 )
 from bgars.inspection.shadow_map import ShadowMap
 from bgars.inspection.shadow_model import Balls, Lights, Rays, edge_at, near_edge, rays
+from bgars.inspection.spread import lamp_gradients
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
@@ -75,11 +79,16 @@ def slow_edges(
     pick = (ball, light, place)
     here = Rays(*(np.broadcast_to(part, keep.shape)[pick] for part in beam))
     way = here.along / here.slope
-    spread = np.sqrt(settings.spread_px**2 + (settings.lamp_spread_rad * way) ** 2)
+    lines = edge_lines(angles, np.median(table, axis=0), vectors, near, board, settings)
+    spread = np.sqrt(settings.spread_px**2 + (np.array(lines.lamp_spread_rad)[place] * way) ** 2)
+    reach = np.array(lines.reach_px)[place]
     point = (edge.x[pick], edge.y[pick])
-    pixels = _pixels(radiance, shadows, balls, board, gains, settings, here, point, ball, light, spread)
+    pixels = _pixels(radiance, shadows, balls, board, gains, settings, here, point, ball, light, spread, reach)
     sector = (ball * len(vectors) + light) * sectors + place * sectors // len(angles)
-    return _solve(radiance, pixels, sector, angles[place], way, spread, shape, wide_balls, wide_lights, board, settings)
+    solved = _solve(
+        radiance, pixels, sector, angles[place], way, spread, shape, wide_balls, wide_lights, vectors, board, settings
+    )
+    return solved
 
 
 class _Pixels(NamedTuple):
@@ -103,10 +112,11 @@ def _pixels(
     ball: Index,
     light: Index,
     spread: Array,
+    reach: Array,
 ) -> _Pixels:
     """Pixels across the edge at points (M,), on the row or column that crosses it more steeply."""
     row, col = np.rint(radiance.row(point[1])).astype(np.intp), np.rint(radiance.col(point[0])).astype(np.intp)
-    steps = int(np.ceil(settings.reach_px / settings.stride_px))
+    steps = int(np.ceil(reach.max() / settings.stride_px))
     offsets = (np.arange(-steps, steps + 1) * settings.stride_px)[:, None]
     along_cols = np.abs(beam.gradient_x) >= np.abs(beam.gradient_y)
     rows = row[None, :] + np.where(along_cols[None, :], 0, offsets)
@@ -129,7 +139,7 @@ def _pixels(
     total = values.sum(axis=0)
     weight_sum = np.einsum("lom,lm->om", lit, gains[ball].T.astype(np.float32))
     usable &= (lit.sum(axis=0, dtype=np.uint8) >= MIN_LIGHTS_LIT) & (counts[line] <= 1) & np.isfinite(value)
-    usable &= ~shadows.hidden.reshape(-1)[at] & (np.abs(distance) <= settings.reach_px)
+    usable &= ~shadows.hidden.reshape(-1)[at] & (np.abs(distance) <= reach[None, :])
     texture = np.where(usable, total / np.maximum(weight_sum, 1e-9), 0.0).astype(np.float64)
     usable &= texture > 0
     weight = usable.astype(np.float64)
@@ -146,6 +156,7 @@ def _solve(
     shape: tuple[int, int, int],
     balls: Balls,
     lights: Lights,
+    vectors: Array,
     board: Board,
     settings: EdgeSettings,
 ) -> list[Array]:
@@ -187,9 +198,11 @@ def _solve(
     blurred = (
         0.0 if coarse_px is not None else sharp_px**2 * _texture_growth(pixels, spread, sector, size).reshape(shape)
     )
-    shift = (
-        blurred + 0.5 * mean_spread**2 * curvature - np.where(measured, fit.solution[:, 2].reshape(shape) / safe, 0.0)
-    )
+    moved = fit.solution[:, 2].reshape(shape)
+    if coarse_px is None:
+        moved = moved - _by_growth(columns, pixels, spread, fit.weight, fit.solution, sector, shape, measured)
+    shift = blurred + 0.5 * settings.spread_px**2 * curvature - np.where(measured, moved / safe, 0.0)
+    along, up = lamp_gradients(beam, balls, vectors)
     bad = ~measured
     return [
         np.where(bad, 0.0, edge.x + shift * beam.gradient_x / beam.slope),
@@ -199,6 +212,8 @@ def _solve(
         np.where(bad, np.nan, widened),
         u_widened,
         mean_way,
+        along,
+        up,
         np.where(bad, np.nan, fit.solution[:, 0].reshape(shape)),
         np.where(bad, np.nan, fit.solution[:, 1].reshape(shape)),
         np.where(bad, np.nan, contrast * texture / radiance.scale),
@@ -220,3 +235,37 @@ def _texture_growth(pixels: _Pixels, spread: Array, sector: Index, size: int) ->
     growth = (mixed - first * level / total) / np.maximum(variance, 1e-9)
     relative: Array = np.where((variance > 0) & (level > 0), growth * total / np.maximum(level, 1e-9), 0.0)
     return np.clip(relative, -MAX_GROWTH, MAX_GROWTH)
+
+
+def _by_growth(
+    columns: list[Array],
+    pixels: _Pixels,
+    spread: Array,
+    weight: Array,
+    solution: Array,
+    sector: Index,
+    shape: tuple[int, int, int],
+    measured: NDArray[np.bool_],
+) -> Array:
+    """(N, L, S) what the usual growth of the lit level, at each place along the edge, adds to the displacements."""
+    size = shape[0] * shape[1] * shape[2]
+    grown = [*columns, columns[1] * pixels.distance * spread[None, :]]
+    per_growth, share = np.zeros(size), np.full(size, np.nan)
+    for stretch in np.flatnonzero(measured.reshape(-1)):
+        mine = sector == stretch
+        root = np.sqrt(weight[:, mine].ravel())
+        system = np.stack([column[:, mine].ravel() for column in grown], axis=1) * root[:, None]
+        free = np.linalg.lstsq(system, pixels.value[:, mine].ravel() * root, rcond=None)[0]
+        growth = free[4] / solution[stretch, 1]
+        if abs(growth) < STEEPEST_GROWTH:
+            per_growth[stretch] = (solution[stretch, 2] - free[2]) / free[4]
+            share[stretch] = growth
+    share = share.reshape(shape)
+    lit = np.where(measured, solution[:, 1].reshape(shape), 0.0)
+    added = np.zeros(shape)
+    for place in range(shape[2]):
+        alike = np.concatenate([share[..., place].ravel(), share[..., shape[2] - 1 - place].ravel()])
+        alike = alike[np.isfinite(alike)]
+        if len(alike) >= MIN_GROWTHS:
+            added[..., place] = per_growth.reshape(shape)[..., place] * np.median(alike) * lit[..., place]
+    return added

@@ -84,5 +84,6 @@ def measured_part(
             np.full(len(setup.rig), 0.02),
             0.03,
             board_covariance=np.diag([0.1, 1e-10, 1e-10, 1e-16, 1e-16, 1e-16]),
+            u_pixel_pitch=1e-5,
         ),
     )

@@ -201,7 +201,7 @@ def test_a_light_as_dark_as_the_dark_frame_is_black(quick: Path) -> None:
     check_capture(replace(capture, images=images))
 
 
-def test_a_capture_with_no_ball_fails(quick: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_capture_with_no_ball_is_undecided(quick: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     nothing = FoundBalls((), (), (), 0, 0, None, 0.0, (0.0, 0.0))
     measurement = BallMeasurement((), np.full(6, np.nan), np.eye(4, 3), np.zeros(4), float("nan"))
     monkeypatch.setattr(inspection_pipeline, "_found", lambda *_: nothing)
@@ -209,8 +209,8 @@ def test_a_capture_with_no_ball_fails(quick: Path, tmp_path: Path, monkeypatch: 
     for options in (["--recipe", recipe(quick)], []):
         code, text = command(quick, *options, "-o", tmp_path / "out")
         assert code == 1
-        assert "FAIL" in text
-        assert "no ball was found" in text
+        assert "UNDECIDED" in text
+        assert "no ball was found: this cannot be judged" in text
     values = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
     assert values["seating_coplanarity_um"] is None
     assert values["balls"] == []

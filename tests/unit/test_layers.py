@@ -24,6 +24,7 @@ RECORDS = {
     "kernel_outputs": 3.5,
     "anchoring": 3.5,
     "integration_inputs": 3.5,
+    "normals_choice": 3.6,
 }
 BASE = {"errors": 0, "large_arrays": 0, "light_files": 1, "light_names": 1, "rig": 2, "scalar_checks": 1, **RECORDS}
 STAGES = dict.fromkeys(("io", "pixelwise", "reflectance", "integrate", "mesh", "balls", "inspection"), 4)

@@ -17,8 +17,8 @@ from slow_shadows import shadowed, slow_edges
 
 Array = NDArray[np.float64]
 PITCH_UM = 11.0
-SHARP = EdgeSettings(0.5, 0.02, 4.0)
-COARSE = EdgeSettings(1.0, 0.0, 9.0, 2, coarse=True)
+SHARP = EdgeSettings(0.5, 0.02, 0.01, 4.0)
+COARSE = EdgeSettings(1.0, 0.0, 0.0, 9.0, 2, coarse=True)
 BOWED = Board(np.array([2e-3, -1e-3, 2e-5, 1e-5, -3e-5]))
 SLIGHTLY = Board(0.1 * BOWED.coefficients)
 """So that the board and its tangent plane under a ball are less apart than a window is wider than its shadow."""

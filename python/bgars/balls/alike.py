@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bgars.balls.highlights import HighlightCircles, highlight_circles
+from bgars.balls.pooled_rim import COST_SCALE, POOLED_ERROR, RATIO_ERROR, pooled_ratio
 from bgars.balls.rim_fit import Circles, fit_rims, rim_costs
 
 if TYPE_CHECKING:
@@ -25,6 +26,12 @@ MIN_SUPPORT = 0.5
 SHOULDER, SHOULDER_OF_USUAL, SHOULDER_OF_FEW = 0.8, 0.93, 0.75
 """Of the highlights' radius: smaller circles are shoulders of highlights. Wide lobes make that radius 13 % too large;
 a ball flattened to 0.8 would look the same among few."""
+SLIPPED = 0.04
+"""Difference from the ratio of all rims together, as a fraction, of a fit that ended at another edge."""
+START_ERROR = 0.04
+"""What circles to start from are wrong by in common, as a fraction of their radius."""
+SHOULDER_CLEAR = 0.84
+"""Of the highlights' radius: metal mirrors the horizon at 0.71 and the nearest board up to here."""
 FLATTENED = 0.7
 USUAL = 0.04
 HALF_VECTOR_BIAS = 0.06
@@ -42,8 +49,12 @@ BETTER_SUPPORT = 0.1
 REPLACED_U = 2.0
 WORTH_A_TRY_PX = 0.05
 """Distance from the highlights' centre from which on a fit that starts there may end elsewhere."""
-COST_SCALE = 20.0
-"""Difference of costs that speaks clearly for one of two circles: residuals of neighbouring pixels are alike."""
+
+
+def _fit_again(levels: Levels, circles: Circles, row: Array, col: Array, radius_px: Array) -> Circles:
+    """Fit rims from other starts, with the blur and the sectors of `circles`."""
+    sectors = circles.offsets_px.shape[1]
+    return fit_rims(levels, row, col, radius_px, blur_px=circles.blur_px, sectors=sectors)
 
 
 def fit_alike(levels: Levels, row: Array, col: Array, radius_px: Array) -> Circles:
@@ -59,38 +70,79 @@ def fit_alike(levels: Levels, row: Array, col: Array, radius_px: Array) -> Circl
     row, col, radius_px : (N,) float64
         Circles to start from, good to a tenth of the radius, most of them.
     """
-    circles = fit_rims(levels, row, col, radius_px)
     if not len(row):
-        return circles
-    shine = _highlights(levels, row, col, radius_px)
-    every = shine
-    shine = _of_usual_size(shine)
+        return fit_rims(levels, row, col, radius_px)
+    start_px = radius_px
+    every = _highlights(levels, row, col, radius_px)
+    shine = _of_usual_size(every)
     shines = np.isfinite(shine.radius_px)
+    pooled = None
+    circles = fit_rims(levels, row, col, radius_px)
+    if shines.sum() >= max(ENOUGH, MIN_SUPPORT * len(row)) and not _clear(circles, shine):
+        pooled = pooled_ratio(levels, HighlightCircles(*(column[shines] for column in shine)))
+        row, col = np.where(shines, shine.row, row), np.where(shines, shine.col, col)
+        radius_px = np.where(shines, pooled * shine.radius_px, radius_px)
+        circles = fit_rims(levels, row, col, radius_px)
+        _take_back_slips(levels, circles, row, col, radius_px, shines)
     if shines.any():
-        ratio = circles.radius_px / shine.radius_px
-        usual = float(np.nanmedian(ratio))
-        few = shines.sum() < ENOUGH
-        far = shines & (ratio < (SHOULDER_OF_FEW if few else max(SHOULDER, SHOULDER_OF_USUAL * usual)))
-        odd = np.isfinite(every.radius_px) & ~shines
-        far |= odd & (circles.radius_px < FLATTENED * usual * every.radius_px)
-        for factor in (1.0, 1.0 - HALF_VECTOR_BIAS, 0.8):
-            index = np.flatnonzero(far)
-            again = fit_rims(
-                levels, every.row[index], every.col[index], factor * every.radius_px[index], blur_px=circles.blur_px
-            )
-            # The silhouette is the outermost circle: shoulders of highlights lie inside it.
-            better = (
-                (again.support >= MIN_SUPPORT)
-                & (again.radius_px > 1.04 * circles.radius_px[index])
-                & (again.radius_px > FLATTENED * every.radius_px[index])
-            )
-            better &= again.support >= circles.support[index] - BETTER_SUPPORT
-            circles.put(index[better], again.take(np.flatnonzero(better)))
+        _past_shoulders(levels, circles, every, shine, pooled)
     if shines.sum() >= ENOUGH:
-        _agree_with_highlights(levels, circles, shine)
+        _agree_with_highlights(levels, circles, shine, pooled)
     _agree_with_centres(levels, circles, every, np.isfinite(every.radius_px) & ~shines)
+    if pooled is not None:
+        _rely_on_highlights(circles, every, pooled, float(np.median(shine.radius_px[shines])))
     _agree_with_radius(levels, circles, shines if shines.sum() >= ENOUGH else np.zeros_like(shines))
+    if pooled is None:
+        # Rims that all lie elsewhere than the edges looked for first may be the ends of shadows close by.
+        moved = abs(float(np.median(circles.radius_px / start_px)) - 1.0)
+        circles.u_radius_px = np.hypot(circles.u_radius_px, max(moved - START_ERROR, 0.0) * circles.radius_px)
     return circles
+
+
+def _clear(circles: Circles, shine: HighlightCircles) -> bool:
+    """Whether rims are complete, and all in one ratio to the highlights that is no shoulder's."""
+    shines = np.isfinite(shine.radius_px)
+    ratio = circles.radius_px[shines] / shine.radius_px[shines]
+    usual = float(np.median(ratio))
+    alike = float(np.mean(np.abs(ratio / usual - 1.0) < SLIPPED))
+    return float(np.median(circles.support[shines])) >= UNSURE and alike >= UNSURE and usual > SHOULDER_CLEAR
+
+
+def _past_shoulders(
+    levels: Levels, circles: Circles, every: HighlightCircles, shine: HighlightCircles, pooled: float | None
+) -> None:
+    """Fit circles once more, from their highlights' size, that are so much smaller that they are shoulders."""
+    shines = np.isfinite(shine.radius_px)
+    ratio = circles.radius_px / shine.radius_px
+    usual = float(np.nanmedian(ratio)) if pooled is None else pooled
+    few = shines.sum() < ENOUGH
+    far = shines & (ratio < (SHOULDER_OF_FEW if few else max(SHOULDER, SHOULDER_OF_USUAL * usual)))
+    odd = np.isfinite(every.radius_px) & ~shines
+    far = (far & (pooled is None)) | (odd & (circles.radius_px < FLATTENED * usual * every.radius_px))
+    for factor in (1.0, 1.0 - HALF_VECTOR_BIAS, 0.8):
+        index = np.flatnonzero(far)
+        again = _fit_again(levels, circles, every.row[index], every.col[index], factor * every.radius_px[index])
+        # The silhouette is the outermost circle: shoulders of highlights lie inside it.
+        better = (
+            (again.support >= MIN_SUPPORT)
+            & (again.radius_px > 1.04 * circles.radius_px[index])
+            & (again.radius_px > FLATTENED * every.radius_px[index])
+        )
+        better &= again.support >= circles.support[index] - BETTER_SUPPORT
+        circles.put(index[better], again.take(np.flatnonzero(better)))
+
+
+def _take_back_slips(
+    levels: Levels, circles: Circles, row: Array, col: Array, radius_px: Array, shines: NDArray[np.bool_]
+) -> None:
+    """Put circles of highlights back to where they started that explain their pixels worse than before the fit."""
+    nothing, offsets = np.zeros_like(row), np.full_like(circles.offsets_px, np.nan)
+    u_px = RATIO_ERROR * radius_px
+    start = Circles(row, col, radius_px, u_px, u_px, nothing, offsets, blur_px=circles.blur_px)
+    costs = rim_costs(levels, row, col, radius_px, [start, circles])
+    far = np.abs(circles.radius_px / radius_px - 1.0) > 2.0 * POOLED_ERROR
+    slipped = np.flatnonzero(shines & far & (costs[1] > costs[0]))
+    circles.put(slipped, start.take(slipped))
 
 
 def _agree_with_centres(levels: Levels, circles: Circles, shine: HighlightCircles, odd: NDArray[np.bool_]) -> None:
@@ -99,7 +151,7 @@ def _agree_with_centres(levels: Levels, circles: Circles, shine: HighlightCircle
     index = np.flatnonzero(odd & (off > np.maximum(CENTRE_DIFFERS * circles.radius_px, 3.0 * circles.u_centre_px)))
     if not len(index):
         return
-    again = fit_rims(levels, shine.row[index], shine.col[index], shine.radius_px[index], blur_px=circles.blur_px)
+    again = _fit_again(levels, circles, shine.row[index], shine.col[index], shine.radius_px[index])
     closer = np.hypot(again.row - shine.row[index], again.col - shine.col[index]) < 0.5 * off[index]
     closer &= (again.support >= circles.support[index] - BETTER_SUPPORT) & (again.support >= MIN_SUPPORT)
     circles.put(index[closer], again.take(np.flatnonzero(closer)))
@@ -107,6 +159,18 @@ def _agree_with_centres(levels: Levels, circles: Circles, shine: HighlightCircle
     circles.row[index], circles.col[index] = shine.row[index], shine.col[index]
     circles.u_radius_px[index] = np.hypot(circles.u_radius_px[index], off[index])
     circles.u_centre_px[index] = np.hypot(shine.u_centre_px[index], SHAPE * shine.radius_px[index])
+
+
+def _rely_on_highlights(circles: Circles, every: HighlightCircles, pooled: float, usual_px: float) -> None:
+    """Give circles without a rim those of their highlights: a smaller ball's, or between a larger and a flat one's."""
+    ratio = every.radius_px / usual_px
+    index = np.flatnonzero((circles.support < MIN_SUPPORT) & (ratio > FLATTENED) & (ratio < 1.0 / FLATTENED))
+    flat_px = np.maximum(every.radius_px[index] - usual_px, 0.0)
+    circles.row[index], circles.col[index] = every.row[index], every.col[index]
+    circles.radius_px[index] = pooled * (every.radius_px[index] - flat_px / 2.0)
+    circles.u_radius_px[index] = np.hypot(RATIO_ERROR * every.radius_px[index], flat_px / 2.0)
+    circles.u_centre_px[index] = np.hypot(every.u_centre_px[index], SHAPE * every.radius_px[index])
+    circles.support[index] = MIN_SUPPORT
 
 
 def _of_usual_size(shine: HighlightCircles) -> HighlightCircles:
@@ -131,11 +195,11 @@ def _highlights(levels: Levels, row: Array, col: Array, radius_px: Array) -> Hig
     return shine
 
 
-def _agree_with_highlights(levels: Levels, circles: Circles, shine: HighlightCircles) -> None:
+def _agree_with_highlights(levels: Levels, circles: Circles, shine: HighlightCircles, pooled: float | None) -> None:
     """Fit circles once more, or replace them, that are elsewhere than the highlights have them; then take means."""
     shines = np.isfinite(shine.radius_px)
     for turn in range(2):
-        ratio, spread, shift, shift_px = _relation(circles, shine)
+        ratio, spread, shift, shift_px = _relation(circles, shine, pooled)
         expected = HighlightCircles(
             shine.row + shift[0], shine.col + shift[1], shine.radius_px * ratio, shine.u_centre_px, shine.u_radius_px
         )
@@ -156,6 +220,8 @@ def _agree_with_highlights(levels: Levels, circles: Circles, shine: HighlightCir
     sure = np.clip((circles.support - UNSURE) / (SURE - UNSURE), 0.0, 1.0)
     sure *= np.clip(3.0 - circles.u_radius_px / np.median(circles.u_radius_px[shines]), 0.0, 1.0)
     common = _common_uncertainty(spread, shine, circles, shines & (far < 0.5))  # noqa: PLR2004
+    if spread == POOLED_ERROR:
+        common = np.hypot(common, POOLED_ERROR * circles.radius_px)
 
     def joined(shift: Array, own: Array, other: Array) -> tuple[Array, Array]:
         """How far to shift a silhouette's coordinate by, and its uncertainty."""
@@ -176,6 +242,7 @@ def _agree_with_highlights(levels: Levels, circles: Circles, shine: HighlightCir
     circles.col += col
     circles.u_centre_px = np.sqrt((u_row**2 + u_col**2) / 2.0)
     replaced = far * (1.0 - sure) > 0.5  # noqa: PLR2004
+    replaced |= shines & (pooled is not None)
     circles.support = np.where(replaced, np.maximum(circles.support, MIN_SUPPORT), circles.support)
 
 
@@ -187,7 +254,7 @@ def _try_from(levels: Levels, circles: Circles, expected: HighlightCircles, inde
     if not len(index):
         return
     start = HighlightCircles(*(column[index] for column in expected))
-    again = fit_rims(levels, start.row, start.col, start.radius_px, blur_px=circles.blur_px)
+    again = _fit_again(levels, circles, start.row, start.col, start.radius_px)
     first = circles.take(index)
     # Compared around the highlights' circle: around a shoulder inside the ball, the shoulder is the better rim.
     costs = rim_costs(levels, start.row, start.col, start.radius_px, [first, again])
@@ -221,14 +288,19 @@ def _own_uncertainty(
 def _common_uncertainty(spread: float, shine: HighlightCircles, circles: Circles, joined: NDArray[np.bool_]) -> Array:
     """What all radii share: the error of the ratio, and of the rim model."""
     number = max(int(joined.sum()), 1)
-    shared = float(np.median(circles.u_radius_px[joined])) / 2.0 if joined.any() else 0.0
+    own = np.minimum(circles.u_radius_px, RATIO_ERROR * circles.radius_px)
+    shared = float(np.median(own[joined])) / 2.0 if joined.any() else 0.0
     common: Array = np.hypot(spread * np.nan_to_num(shine.radius_px) / np.sqrt(number), shared)
     return common
 
 
-def _relation(circles: Circles, shine: HighlightCircles) -> tuple[float, float, Array, float]:
+def _relation(circles: Circles, shine: HighlightCircles, pooled: float | None) -> tuple[float, float, Array, float]:
     """Ratio of silhouette to highlight radius, its spread, shift (row, column) of centres, its spread; medians."""
     good = np.isfinite(shine.radius_px) & (circles.support >= MIN_SUPPORT)
+    if pooled is not None:
+        good &= np.abs(circles.radius_px / shine.radius_px / pooled - 1.0) < SLIPPED
+        if good.sum() < ENOUGH:
+            return pooled, POOLED_ERROR, np.zeros(2), float(np.nanmedian(shine.u_centre_px))
     if good.sum() < ENOUGH:
         good = np.isfinite(shine.radius_px)
     ratio = circles.radius_px[good] / shine.radius_px[good]
@@ -239,8 +311,8 @@ def _relation(circles: Circles, shine: HighlightCircles) -> tuple[float, float, 
     shift = np.median(shifts, axis=1)
     spread = 1.48 * float(np.median(np.abs(ratio - middle)))
     shift_px = 1.48 * float(np.median(np.abs(shifts - shift[:, None])))
-    # Lights all around cancel what lobes shift; only a clear shift is believed.
-    doubt = shift_px**2 * 1.6 / max(int(good.sum()), 1)
+    # Lights all around cancel what lobes shift; only a clear shift is believed. What rims mirror is alike in all.
+    doubt = shift_px**2 * 1.6 / max(int(good.sum()), 1) + float(np.median(circles.u_centre_px[good])) ** 2
     shift *= max(0.0, 1.0 - 2.0 * doubt / max(float(shift @ shift), 1e-12))
     return middle, spread, shift, shift_px
 
@@ -258,7 +330,12 @@ def _agree_with_radius(levels: Levels, circles: Circles, judged: NDArray[np.bool
     if not len(index):
         return
     start_px = np.full(len(index), usual_px)
-    again = fit_rims(levels, circles.row[index], circles.col[index], start_px, blur_px=circles.blur_px)
-    better = np.abs(again.radius_px - usual_px) < np.maximum(4.0 * spread_px, 0.03 * usual_px)
-    better &= again.support >= circles.support[index] + BETTER_SUPPORT
+    again = _fit_again(levels, circles, circles.row[index], circles.col[index], start_px)
+    usual = np.abs(again.radius_px - usual_px) < np.maximum(4.0 * spread_px, 0.03 * usual_px)
+    better = usual & (again.support >= circles.support[index] + BETTER_SUPPORT)
+    # Ends of shadows make circles, too, as complete as a rim but in fewer lights at once.
+    first = circles.take(index)
+    row, col = (first.row + again.row) / 2.0, (first.col + again.col) / 2.0
+    costs = rim_costs(levels, row, col, (first.radius_px + again.radius_px) / 2.0, [first, again])
+    better |= usual & (again.support >= first.support - BETTER_SUPPORT) & (costs[1] < costs[0])
     circles.put(index[better], again.take(np.flatnonzero(better)))

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from bgars.balls.alike import fit_alike
+from bgars.balls.constellation import shining_circles
 from bgars.balls.highlights import mirrors_lights
 from bgars.balls.mask_blobs import round_blobs
 from bgars.balls.outward import outward_centres, slope_field
 from bgars.balls.rim_fit import Circles
-from bgars.balls.rim_pixels import SECTORS
+from bgars.balls.rim_pixels import sector_count
 from bgars.balls.rim_scan import CoarseCircles, scan_rims
 
 if TYPE_CHECKING:
@@ -22,7 +23,16 @@ if TYPE_CHECKING:
     from bgars.balls.levels import Levels
     from bgars.records import BoolArray, FloatArray
 
-__all__ = ["Detection", "find_circles"]
+__all__ = [
+    "MIN_SHARE",
+    "MIN_SHARE_LIKE_OTHERS",
+    "MIN_STRENGTH_LIKE_OTHERS",
+    "SMALLEST_OF_USUAL",
+    "Detection",
+    "find_circles",
+    "inside",
+    "unfitted",
+]
 
 WORKING_SIZE_PX = 512
 FLOOR_LEVELS = 2.0
@@ -32,8 +42,9 @@ MIN_SHARE = 0.7
 MIN_SHARE_LIKE_OTHERS = 0.45
 MIN_STRENGTH = 0.15
 MIN_STRENGTH_LIKE_OTHERS = 0.08
-MIN_OUTWARD = 0.3
-MIN_ALIGNMENT = 0.6
+MIN_OUTWARD, MIN_ALIGNMENT = 0.3, 0.6
+MIN_OUTWARD_CLIPPED, MIN_ALIGNMENT_CLIPPED, CLIPPED = 0.1, 0.9, 0.25
+"""Where so much of a disc is clipped, slopes are small; their directions are left."""
 OUTER_STRENGTH = 0.8
 OUTER_STRENGTH_OF_HIGHLIGHTS = 0.35
 HIGHLIGHT_RATIO = 2.5
@@ -49,6 +60,12 @@ ODD_SIZE = 1.35
 USUAL_STRENGTH = 0.3
 ENOUGH_TO_JUDGE_SIZE = 3
 SMALLEST_OF_USUAL = 0.35
+LIKE_SHINE, SHINING = 1.1, 0.5
+"""Ratio of highlight circles that are alike, and the share of all balls that makes them the rule."""
+INNER = 0.7
+"""Of the highlight circle: where flat balls and caps have no rim yet, and mirrored board has none any more."""
+COARSE_ERROR = 0.05
+"""Standard deviation of a circle of coarse edges, in radii."""
 MIN_COVERED = 0.97
 MOST_MIRRORS = 50
 
@@ -64,14 +81,20 @@ class Detection(NamedTuple):
         Slope along x and y (:func:`bgars.balls.outward.slope_field`).
     brightest : (H', W') float32
         Highest level over the lights.
+    reduced : (L, H', W') float32
+        Linear grey levels.
     factor : int
         Pixels of the full images a reduced pixel is wide.
+    rejected : Circles
+        What looked like a ball, but whose silhouette was not found.
     """
 
     circles: Circles
     slopes: tuple[FloatArray, FloatArray]
     brightest: FloatArray
+    reduced: FloatArray
     factor: int
+    rejected: Circles
 
 
 def find_circles(levels: Levels, progress: Callable[[float], object] | None) -> Detection:
@@ -98,9 +121,13 @@ def find_circles(levels: Levels, progress: Callable[[float], object] | None) -> 
     brightest = reduced.max(axis=0)
     blobs = None if mask is None else _blobs_that_are_balls(levels, slopes, reduced, factor)
     if blobs is not None and len(blobs.row):
-        return Detection(blobs, slopes, brightest, factor)
-    coarse = _coarse_circles(reduced, slopes, mask, levels.threads)
+        return Detection(blobs, slopes, brightest, reduced, factor, blobs.take(slice(0)))
+    coarse = _coarse_circles(levels, reduced, slopes, mask)
     report(0.4)
+    crumbs = np.zeros(len(coarse.row), np.bool_)
+    if len(coarse.row) > ENOUGH_TO_JUDGE_SIZE:
+        crumbs = coarse.radius_px <= SMALLEST_OF_USUAL * np.median(coarse.radius_px)
+    coarse, small = _take(coarse, ~crumbs), _take(coarse, crumbs)
     row, col = ((column + 0.5) * factor - 0.5 for column in coarse[:2])
     circles = fit_alike(levels, row, col, coarse.radius_px * factor)
     good = circles.support >= (MIN_SUPPORT if mask is None else MIN_SUPPORT_IN_MASK)
@@ -109,7 +136,16 @@ def find_circles(levels: Levels, progress: Callable[[float], object] | None) -> 
     moved = np.abs(np.log(circles.radius_px / (coarse.radius_px * factor)))
     good &= np.minimum(moved, np.abs(np.log(circles.radius_px / usual_px))) < np.log(LIKE_OTHERS[1])
     report(0.95)
-    return Detection(circles.take(np.flatnonzero(good)), slopes, brightest, factor)
+    rejected = circles.take(np.flatnonzero(~good)).join(unfitted(small, factor, circles.offsets_px.shape[1]))
+    return Detection(circles.take(np.flatnonzero(good)), slopes, brightest, reduced, factor, rejected)
+
+
+def unfitted(coarse: CoarseCircles, factor: int, sectors: int) -> Circles:
+    """Circles as they are, in full pixels, with their share of the rim as support."""
+    row, col = ((column + 0.5) * factor - 0.5 for column in coarse[:2])
+    radius_px = coarse.radius_px * factor
+    offsets, u_px = np.full((len(row), sectors), np.nan), COARSE_ERROR * radius_px
+    return Circles(row, col, radius_px, u_px, u_px, coarse.share + 0.0, offsets)
 
 
 def _blobs_that_are_balls(
@@ -119,8 +155,7 @@ def _blobs_that_are_balls(
     blobs = round_blobs(levels.capture.mask)
     row, col = ((column + 0.5) / factor - 0.5 for column in blobs[:2])
     seen = CoarseCircles(row, col, blobs.radius_px / factor, blobs.rms_px, blobs.rms_px)
-    outward, alignment = _inside(seen, slopes)
-    good = (outward >= MIN_OUTWARD) & (alignment >= MIN_ALIGNMENT)
+    good = _slopes_outward(levels, seen, slopes)
     directions = levels.capture.rig.directions
     for index in np.flatnonzero(~good)[:MOST_MIRRORS]:
         disc = float(seen.row[index]), float(seen.col[index]), float(seen.radius_px[index])
@@ -128,32 +163,66 @@ def _blobs_that_are_balls(
     row, col, radius_px, rms_px = (column[good] for column in blobs)
     # Someone drew the mask: its outline may be off as a whole by as much as it is uneven.
     outline = np.sqrt(2.0 * np.pi * radius_px)
-    return Circles(row, col, radius_px, rms_px * 2.0 / outline + 0.1, rms_px, np.ones(len(row)), _no_offsets(len(row)))
-
-
-def _no_offsets(count: int) -> NDArray[np.float64]:
-    return np.full((count, SECTORS), np.nan)
+    return Circles(
+        row,
+        col,
+        radius_px,
+        rms_px * 2.0 / outline + 0.1,
+        rms_px,
+        np.ones(len(row)),
+        np.full((len(row), sector_count(radius_px)), np.nan),
+    )
 
 
 def _coarse_circles(
-    reduced: FloatArray, slopes: tuple[FloatArray, FloatArray], mask: BoolArray | None, threads: int
+    levels: Levels, reduced: FloatArray, slopes: tuple[FloatArray, FloatArray], mask: BoolArray | None
 ) -> CoarseCircles:
     """Circles to a pixel or two, in reduced pixels."""
+    threads = levels.threads
     centres = np.array(outward_centres(*slopes)).reshape(-1, 4)
     centres = centres[_best_of_place(centres)]
-    coarse = _accepted(scan_rims(reduced, *centres[:, :3].T, threads=threads), slopes, MIN_SHARE, MIN_STRENGTH)
+    coarse = scan_rims(reduced, *centres[:, :3].T, threads=threads)
+    coarse = _accepted(levels, coarse, slopes, MIN_SHARE, MIN_STRENGTH)
     if len(coarse.row) > 1:
         usual_px = float(np.median(coarse.radius_px))
         rest = centres[_outside(centres, coarse)]
         scale_px = np.full(len(rest), usual_px)
         more = scan_rims(reduced, rest[:, 0], rest[:, 1], scale_px, span=LIKE_OTHERS, rims=1, threads=threads)
         more = _take(more, np.abs(np.log(more.radius_px / usual_px)) < np.log(LIKE_OTHERS[1]))
-        coarse = _merged(coarse, _accepted(more, slopes, MIN_SHARE_LIKE_OTHERS, MIN_STRENGTH_LIKE_OTHERS), usual_px)
+        more = _accepted(levels, more, slopes, MIN_SHARE_LIKE_OTHERS, MIN_STRENGTH_LIKE_OTHERS)
+        coarse = _merged(coarse, more, usual_px)
+    coarse = _with_shining(coarse, _shining(levels, reduced, centres, slopes))
     if mask is not None:
         coarse = _take(coarse, _covered(coarse, mask) > MIN_COVERED)
-    if len(coarse.row) > ENOUGH_TO_JUDGE_SIZE:
-        coarse = _take(coarse, coarse.radius_px > SMALLEST_OF_USUAL * np.median(coarse.radius_px))
     return coarse
+
+
+def _shining(
+    levels: Levels, reduced: FloatArray, centres: NDArray[np.float64], slopes: tuple[FloatArray, FloatArray]
+) -> CoarseCircles:
+    """Circles of like highlights, in reduced pixels; none where fewer than a population has them."""
+    shine = shining_circles(levels, reduced, *centres[:, :3].T)
+    factor = levels.height // reduced.shape[1]
+    row, col = ((column + 0.5) / factor - 0.5 for column in (shine.row, shine.col))
+    every = CoarseCircles(row, col, shine.radius_px / factor, np.zeros(len(row)), np.ones(len(row)))
+    if not len(row):
+        return every
+    usual_px = float(np.median(every.radius_px))
+    every = _take(every, np.flatnonzero(np.abs(np.log(every.radius_px / usual_px)) < np.log(LIKE_SHINE)))
+    return _take(every, np.flatnonzero(_slopes_outward(levels, every, slopes)))
+
+
+def _with_shining(coarse: CoarseCircles, shining: CoarseCircles) -> CoarseCircles:
+    """Both sets; circles inside those of highlights are the highlights themselves, which have rims, too."""
+    distance = np.hypot(coarse.row[:, None] - shining.row, coarse.col[:, None] - shining.col)
+    here = distance < np.maximum(coarse.radius_px[:, None], shining.radius_px)
+    alone = int((~here.any(axis=1)).sum()) + len(shining.row)
+    if len(shining.row) < max(ENOUGH_TO_JUDGE_SIZE, SHINING * alone):
+        return coarse
+    inner = here & (coarse.radius_px[:, None] < INNER * shining.radius_px)
+    new = np.flatnonzero(~(here & ~inner).any(axis=0))
+    kept = _take(coarse, np.flatnonzero(~inner.any(axis=1)))
+    return CoarseCircles(*(np.concatenate(pair) for pair in zip(kept, _take(shining, new), strict=True)))
 
 
 def _covered(coarse: CoarseCircles, mask: BoolArray) -> NDArray[np.float64]:
@@ -168,19 +237,34 @@ def _covered(coarse: CoarseCircles, mask: BoolArray) -> NDArray[np.float64]:
 
 
 def _accepted(
-    coarse: CoarseCircles, slopes: tuple[FloatArray, FloatArray], share: float, strength: float
+    levels: Levels, coarse: CoarseCircles, slopes: tuple[FloatArray, FloatArray], share: float, strength: float
 ) -> CoarseCircles:
     """Circles with a rim all around, whose inside slopes outward, one a place."""
     coarse = _take(
         coarse,
         (coarse.share >= share) & (coarse.strength >= strength) & (coarse.radius_px >= SMALLEST_RADIUS_PX),
     )
-    outward, alignment = _inside(coarse, slopes)
-    coarse = _take(coarse, (outward >= MIN_OUTWARD) & (alignment >= MIN_ALIGNMENT))
+    coarse = _take(coarse, _slopes_outward(levels, coarse, slopes))
     return _without_overlaps(coarse)
 
 
-def _inside(
+def _slopes_outward(levels: Levels, coarse: CoarseCircles, slopes: tuple[FloatArray, FloatArray]) -> NDArray[np.bool_]:
+    """Whether the inside of each circle slopes outward: enough, or everywhere where it is clipped."""
+    outward, alignment = inside(coarse, slopes)
+    good: NDArray[np.bool_] = (outward >= MIN_OUTWARD) & (alignment >= MIN_ALIGNMENT)
+    faint = np.flatnonzero(~good & (outward >= MIN_OUTWARD_CLIPPED) & (alignment >= MIN_ALIGNMENT_CLIPPED))
+    if len(faint):
+        factor = levels.height // slopes[0].shape[0]
+        grid = np.linspace(-0.7, 0.7, 9)
+        y, x = (side.ravel() for side in np.meshgrid(grid, grid))
+        row = np.rint(factor * (coarse.row[faint, None] - coarse.radius_px[faint, None] * y)).astype(np.intp)
+        col = np.rint(factor * (coarse.col[faint, None] + coarse.radius_px[faint, None] * x)).astype(np.intp)
+        pixels = row.clip(0, levels.height - 1) * levels.width + col.clip(0, levels.width - 1)
+        good[faint] = levels.clipped_at(pixels).mean(axis=(0, 2)) > CLIPPED
+    return good
+
+
+def inside(
     coarse: CoarseCircles, slopes: tuple[FloatArray, FloatArray]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Mean outward slope inside each circle, and its fraction of the mean slope: 2/3 and 1 for a sphere."""

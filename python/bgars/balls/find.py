@@ -13,6 +13,7 @@ from bgars.balls.bridges import joined_pairs
 from bgars.balls.circles import Detection, find_circles
 from bgars.balls.lattice import fit_lattice
 from bgars.balls.levels import Levels
+from bgars.balls.places import look_again
 from bgars.balls.registration import register
 from bgars.errors import InputError
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bgars.ball_records import BallLayout
+    from bgars.balls.rim_fit import Circles
     from bgars.records import Capture
 
 __all__ = ["find_balls"]
@@ -40,6 +42,7 @@ class _Grid(NamedTuple):
     row: list[int]
     col: list[int]
     missing: list[tuple[str, int, int]]
+    missing_px: list[tuple[float, float]]
     rows: int
     cols: int
     pitch_px: float | None
@@ -65,8 +68,8 @@ def find_balls(
     capture : Capture
         Images and lights. Where the mask has round blobs that slope outward, their outlines are the silhouettes.
     layout : BallLayout, optional
-        Where balls should be. Without it, the lattice is that of the balls: every free place of the smallest rectangle
-        around them is missing.
+        Where balls should be, at any turn of the part. Without it, the lattice is that of the balls: every free place
+        of the smallest rectangle around them is missing.
     threads : int, optional
         Most threads to work on; by default one a core.
     progress : callable, optional
@@ -113,10 +116,34 @@ def find_balls(
             joined = sorted(pairs)
             found = found._replace(circles=found.circles.take(keep))
             x_px, y_px = x_px[keep], y_px[keep]
-    grid = _inferred(x_px, y_px) if layout is None else _from_layout(x_px, y_px, layout, capture.pixel_pitch_um or 1.0)
+    grid = _grid(x_px, y_px, layout, capture.pixel_pitch_um)
+    added, unclear = _second_look(levels, found, grid)
+    if len(added.row):
+        found = found._replace(circles=found.circles.join(added))
+        x_px = found.circles.col + 0.5 - levels.width / 2
+        y_px = levels.height / 2 - found.circles.row - 0.5
+        grid = _grid(x_px, y_px, layout, capture.pixel_pitch_um)
+        unclear &= {name for name, _, _ in grid.missing}
     if progress is not None:
         progress(1.0)
-    return _record(x_px, y_px, found, grid, joined)
+    return _record(x_px, y_px, found, grid, joined, unclear)
+
+
+def _second_look(levels: Levels, found: Detection, grid: _Grid) -> tuple[Circles, set[str]]:
+    """Balls that were overlooked on places of the grid, and names of the places that are not seen to be empty."""
+    if not grid.missing:
+        return found.circles.take(slice(0)), set()
+    x_px, y_px = np.array(grid.missing_px).T
+    row, col = levels.height / 2 - y_px - 0.5, x_px + levels.width / 2 - 0.5
+    look = look_again(levels, found, row, col, grid.pitch_px or float(max(levels.height, levels.width)))
+    return look.circles, {grid.missing[index][0] for index in np.flatnonzero(look.unclear)}
+
+
+def _grid(
+    x_px: NDArray[np.float64], y_px: NDArray[np.float64], layout: BallLayout | None, pixel_pitch_um: float | None
+) -> _Grid:
+    """The places of a layout, or of the balls' own lattice."""
+    return _inferred(x_px, y_px) if layout is None else _from_layout(x_px, y_px, layout, pixel_pitch_um or 1.0)
 
 
 def _joined(
@@ -158,7 +185,7 @@ def _inferred(x_px: NDArray[np.float64], y_px: NDArray[np.float64]) -> _Grid:
     if lattice is None:
         count = len(x_px)
         origin_px = (float(x_px[0]), float(y_px[0])) if count else (0.0, 0.0)
-        return _Grid(["A1"] * count, [0] * count, [0] * count, [], count, count, None, 0.0, origin_px)
+        return _Grid(["A1"] * count, [0] * count, [0] * count, [], [], count, count, None, 0.0, origin_px)
     rows, cols = int(lattice.row[lattice.on].max()) + 1, int(lattice.col[lattice.on].max()) + 1
     row = [int(r) if on else -1 for r, on in zip(lattice.row, lattice.on, strict=True)]
     col = [int(c) if on else -1 for c, on in zip(lattice.col, lattice.on, strict=True)]
@@ -169,6 +196,7 @@ def _inferred(x_px: NDArray[np.float64], y_px: NDArray[np.float64]) -> _Grid:
         row=row,
         col=col,
         missing=[(ball_name(r, c), r, c) for r, c in free],
+        missing_px=[lattice.place(r, c) for r, c in free],
         rows=rows,
         cols=cols,
         pitch_px=lattice.pitch_px,
@@ -185,10 +213,11 @@ def _from_layout(
     places = layout.places()
     count = len(x_px)
     names, row, col = [""] * count, [-1] * count, [-1] * count
-    missing = []
-    for (name, r, c, _, _), ball in zip(places, fit.ball, strict=True):
+    missing, missing_px = [], []
+    for (name, r, c, _, _), ball, x, y in zip(places, fit.ball, fit.x_px, fit.y_px, strict=True):
         if ball < 0:
             missing.append((name, r, c))
+            missing_px.append((float(x), float(y)))
         else:
             names[ball], row[ball], col[ball] = name, r, c
     rows = layout.rows or max(place[1] for place in places) + 1
@@ -206,6 +235,7 @@ def _from_layout(
         row=row,
         col=col,
         missing=missing,
+        missing_px=missing_px,
         rows=rows,
         cols=cols,
         pitch_px=None if pitch_um is None else pitch_um * fit.scale_px_per_um,
@@ -230,6 +260,7 @@ def _record(
     found: Detection,
     grid: _Grid,
     joined: list[tuple[int, int]],
+    unclear: set[str],
 ) -> FoundBalls:
     """Balls in reading order, those off the lattice last and numbered X1, X2, ..."""
     circles = found.circles
@@ -261,6 +292,7 @@ def _record(
     return FoundBalls(
         balls=balls,
         missing=tuple(grid.missing),
+        unclear=tuple(name for name, _, _ in grid.missing if name in unclear),
         bridges=tuple(sorted((names[i], names[j]) if order[i] < order[j] else (names[j], names[i]) for i, j in joined)),
         rows=grid.rows,
         cols=grid.cols,

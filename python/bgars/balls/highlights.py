@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["HighlightCircles", "highlight_circles", "mirrors_lights"]
+__all__ = ["MIN_CONTRAST", "HighlightCircles", "half_vectors", "highlight_circles", "mirrors_lights"]
 
 WINDOW = 0.25
 """Half width of the taper that a highlight is centred in, in radii."""
@@ -30,8 +30,8 @@ MIN_CONTRAST = 4.0
 MIN_RATIO = 0.5
 """The same, of the surroundings."""
 MIN_HIGHLIGHTS = 3
-TOLERANCE = 0.015
-"""Distance of a highlight from its place that halves its weight, in radii."""
+TOLERANCE, TOLERANCE_PX = 0.015, 0.2
+"""Distance of a highlight from its place that quarters its weight: in radii, and in pixels, whose noise it holds."""
 MAX_RMS = 0.03
 POOL_BALLS = 6
 MIN_DISC_PIXELS, MIRROR_SPOT = 30, 0.05
@@ -67,7 +67,7 @@ def highlight_circles(levels: Levels, row: Array, col: Array, radius_px: Array) 
     row, col, radius_px : (N,) float64
         Circles to start from, good to a third of the radius.
     """
-    half = _half_vectors(levels, row, col)
+    half = half_vectors(levels, row, col)
     row, col, radius_px = row + 0.0, col + 0.0, radius_px + 0.0
     start_px = radius_px.copy()
     rms = np.full(len(row), np.inf)
@@ -131,7 +131,7 @@ def mirrors_lights(reduced: FloatArray, directions: Array, row: float, col: floa
     return bool((near & spot).mean() >= 0.75)  # noqa: PLR2004 - a highlight may be hidden or clipped
 
 
-def _half_vectors(levels: Levels, row: Array, col: Array) -> Array:
+def half_vectors(levels: Levels, row: Array, col: Array) -> Array:
     """(N, L, 2) components x and y of the half vectors at each ball, view along z."""
     rig, pixel_um = levels.capture.rig, levels.capture.pixel_pitch_um
     if rig.positions_um is not None and pixel_um is not None:
@@ -210,7 +210,8 @@ def _fit(x: Array, y: Array, good: NDArray[np.bool_], place: Array, radius_px: A
     design[..., 2] = place
     target = np.stack([x, y], axis=2)
     weight = good.astype(np.float64)
-    tolerances = np.geomspace(0.2, TOLERANCE, ROUNDS)
+    closest = np.hypot(TOLERANCE, TOLERANCE_PX / radius_px)
+    tolerances = np.geomspace(np.maximum(0.2, closest), closest, ROUNDS)
     step = np.zeros((count, 3))
     step[:, 2] = radius_px
     for tolerance in tolerances:
@@ -219,7 +220,7 @@ def _fit(x: Array, y: Array, good: NDArray[np.bool_], place: Array, radius_px: A
         step = np.linalg.solve(normal, right[..., None])[..., 0]
         left = np.einsum("nlci,ni->nlc", design, step) - target
         distance = np.hypot(left[..., 0], left[..., 1]) / radius_px[:, None]
-        weight = good / (1.0 + (distance / tolerance) ** 2) ** 2
+        weight = good / (1.0 + (distance / tolerance[:, None]) ** 2) ** 2
     used = weight.sum(axis=1)
     rms = np.sqrt((weight * distance**2).sum(axis=1) / np.maximum(2.0 * used - 3.0, 0.5))
     number = good.sum(axis=1)

@@ -1,4 +1,4 @@
-"""A layout laid over the balls that were found."""
+"""A layout laid over the balls that were found, whatever way up the part lies."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from bgars.errors import InputError
 
@@ -14,14 +15,22 @@ if TYPE_CHECKING:
 
     from bgars.ball_records import BallLayout
 
+    Points = NDArray[np.complex128]
+
 __all__ = ["Registration", "register"]
 
-LARGEST_TURN_DEG = 15.0
-TURN_STEP_DEG = 0.5
 MATCH = 0.3
 """Farthest from its place, in distances of nearest places, that a ball still belongs to it."""
 WRONG_SCALE = 0.1
-MIN_MATCHED = 0.5
+MIN_MATCHED = 0.6
+"""Of the balls: every other ball of a square lattice is one, too, turned by 45 degrees and wider, with half of them."""
+NEIGHBOURS, NEIGHBOURS_OF_PLACE = 6, 12
+"""Nearest balls and places whose directions are compared; of places more, because balls may be missing."""
+SOME_BALLS = 200
+TURNS, SCALES = 180, 35
+"""Cells of a turn of 2 degrees, and of 4 % from half to twice the scale: balls stand off their places by less."""
+PEAKS, SHIFTS = 16, 8
+"""Most turns and shifts that are tried."""
 ROUNDS = 8
 
 
@@ -48,7 +57,10 @@ class Registration(NamedTuple):
 def register(
     x_px: NDArray[np.float64], y_px: NDArray[np.float64], layout: BallLayout, pixel_pitch_um: float
 ) -> Registration:
-    """Turn, shift and scale a layout onto the balls: the shift that most balls vote for, then least squares.
+    """Turn, shift and scale a layout onto the balls: what most pairs and balls vote for, then least squares.
+
+    Of equally good turns the smallest is taken: a square part that lies a quarter turn off cannot be told from one
+    that does not.
 
     Parameters
     ----------
@@ -62,22 +74,21 @@ def register(
     Raises
     ------
     InputError
-        Fewer than half of the balls are on places of the layout, or its scale is off by more than a tenth.
+        Too few of the balls are on places of the layout at any turn, or its scale is off by more than a tenth.
     """
     places = layout.places()
     nominal = np.array([(x + 1j * y) for *_, x, y in places]) / pixel_pitch_um
     nominal = nominal - (nominal.real.min() + nominal.real.max() + 1j * (nominal.imag.min() + nominal.imag.max())) / 2
     points = x_px + 1j * y_px
-    apart = np.abs(nominal[:, None] - nominal)
-    np.fill_diagonal(apart, np.inf)
-    spacing = float(np.median(apart.min(axis=1))) if len(nominal) > 1 else 1.0 / MATCH
     if not len(points):
         return Registration(nominal.real, nominal.imag, np.full(len(nominal), -1), 1.0 / pixel_pitch_um, 0.0)
-    reach = MATCH * spacing
-    turn, shift = _vote(points, nominal, reach) if len(nominal) > 1 else (1.0 + 0.0j, points[np.argmin(np.abs(points))])
+    turn, shift, reach = 1.0 + 0.0j, points[np.argmin(np.abs(points))], 1.0
+    if len(nominal) > 1:
+        reach = MATCH * float(np.median(np.abs(_to_neighbours(nominal, 1))))
+        turn, shift = _vote(points, nominal, reach)
     for _ in range(ROUNDS):
         placed = nominal * turn + shift
-        ball = _nearest(points, placed, reach)
+        ball = _nearest(points, placed, reach * abs(turn))
         on = np.flatnonzero(ball >= 0)
         if len(on) < 2:  # noqa: PLR2004 - a turn needs two
             break
@@ -90,13 +101,13 @@ def register(
             turn = np.sum(weight * np.conj(lever) * (points[ball[on]] - target)) / size
         shift = target - turn * centre
     placed = nominal * turn + shift
-    ball = _nearest(points, placed, reach)
+    ball = _nearest(points, placed, reach * abs(turn))
     matched = int((ball >= 0).sum())
     if matched < MIN_MATCHED * len(points):
         keys = "positions" if layout.positions else "rows, cols, pitch_um"
         msg = (
             f"layout: {keys}: must fit the image at its pixel_pitch_um of {pixel_pitch_um:g}, but only {matched} of "
-            f"{len(points)} balls are on the {len(nominal)} places"
+            f"{len(points)} balls are on the {len(nominal)} places at any turn of the part"
         )
         raise InputError(msg)
     if abs(abs(turn) - 1.0) > WRONG_SCALE:
@@ -112,32 +123,92 @@ def _wrong_scale(layout: BallLayout, ratio: float, pixel_pitch_um: float) -> str
     return f"layout: pitch_um: must be {at}, which is {ratio * layout.pitch_um:.4g}, got {layout.pitch_um:g}"
 
 
-def _vote(points: NDArray[np.complex128], nominal: NDArray[np.complex128], reach: float) -> tuple[complex, complex]:
-    """Turn and shift that lay most places on balls; among equals the least turn, then the shift nearest to none."""
-    best = (-1, 0.0, 0.0, 1.0 + 0.0j, 0.0j)
-    count = round(LARGEST_TURN_DEG / TURN_STEP_DEG)
-    for step in sorted(range(-count, count + 1), key=abs):
-        turn = complex(np.exp(1j * math.radians(step * TURN_STEP_DEG)))
-        shifts = (points[:, None] - nominal * turn).ravel()
-        cells = np.rint(shifts.real / reach) + 1j * np.rint(shifts.imag / reach)
-        kinds, votes = np.unique(cells, return_counts=True)
-        for kind in kinds[votes >= max(votes.max() - 2, 1)][:50]:
+def _to_neighbours(points: Points, count: int) -> Points:
+    """(N, count) vectors from each point to its nearest others."""
+    flat = np.stack([points.real, points.imag], axis=1)
+    _, index = cKDTree(flat).query(flat, k=min(count + 1, len(points)))
+    vectors: Points = points[np.asarray(index)[:, 1:]] - points[:, None]
+    return vectors
+
+
+def _turns(points: Points, nominal: Points) -> list[complex]:
+    """Turns with scale that carry neighbours in the layout to neighbours in the image, most frequent first."""
+    if len(points) < 2:  # noqa: PLR2004 - a direction needs two
+        return [1.0 + 0.0j]
+    some = slice(None, None, math.ceil(len(points) / SOME_BALLS))
+    here = _to_neighbours(points, NEIGHBOURS)[some].ravel()
+    there = np.unique(np.round(_to_neighbours(nominal, NEIGHBOURS_OF_PLACE).ravel(), 3))
+    there = there[:: math.ceil(len(there) / SOME_BALLS)]
+    ratio = (here[:, None] / there).ravel()
+    ratio = ratio[np.abs(np.log2(np.abs(ratio))) < 1.0]
+    cell_turn = np.rint(np.angle(ratio) * (TURNS / (2.0 * math.pi))).astype(int) % TURNS
+    cell_scale = np.rint((np.log2(np.abs(ratio)) + 1.0) * (SCALES / 2.0)).astype(int)
+    votes = np.zeros((TURNS, SCALES + 3))
+    np.add.at(votes, (cell_turn, cell_scale + 1), 1.0)
+    # Cells overlap, so that a peak on a border is not halved.
+    votes = votes + np.roll(votes, 1, axis=0) + np.roll(votes, -1, axis=0)
+    votes[:, 1:-1] += votes[:, :-2] + votes[:, 2:]
+    turns = [1.0 + 0.0j]
+    for _ in range(PEAKS):
+        turn, scale = (int(index) for index in np.unravel_index(np.argmax(votes), votes.shape))
+        if votes[turn, scale] <= 0:
+            break
+        apart = np.abs((cell_turn - turn + TURNS // 2) % TURNS - TURNS // 2)
+        near = (apart <= 1) & (np.abs(cell_scale + 1 - scale) <= 1)
+        if near.any():
+            middle = np.exp(np.median(np.log(np.abs(ratio[near]))))
+            unit = np.mean(ratio[near] / np.abs(ratio[near]))
+            turns.append(complex(middle * unit / abs(unit)))
+        votes[np.arange(turn - 2, turn + 3) % TURNS, max(scale - 2, 0) : scale + 3] = 0.0
+    return turns
+
+
+def _vote(points: Points, nominal: Points, reach: float) -> tuple[complex, complex]:
+    """Turn with scale, and shift, that lay most places on balls.
+
+    Among equals the right scale, then the least turn, then the shift nearest to none.
+    """
+    tree = cKDTree(np.stack([points.real, points.imag], axis=1))
+    some = points[:: math.ceil(len(points) / SOME_BALLS)]
+    best: tuple[tuple[float, ...], complex, complex] = ((-1.0,), 1.0 + 0.0j, 0.0j)
+    for turn in _turns(points, nominal):
+        shifts = (some[:, None] - nominal * turn).ravel()
+        for kind in _frequent(shifts / reach):
             near = np.abs(shifts - kind * reach) < 1.5 * reach
             shift = complex(np.median(shifts[near].real) + 1j * np.median(shifts[near].imag))
-            hits = int((_nearest(points, nominal * turn + shift, reach) >= 0).sum())
-            score = (hits, -abs(step), -round(abs(shift) / reach), turn, shift)
-            if score[:3] > best[:3]:
-                best = score
-    return best[3], best[4]
+            placed = nominal * turn + shift
+            apart, ball = tree.query(np.stack([placed.real, placed.imag], axis=1))
+            hits = len(np.unique(np.asarray(ball)[apart < reach * abs(turn)]))
+            right = abs(abs(turn) - 1.0) <= WRONG_SCALE
+            degrees = abs(round(math.degrees(float(np.angle(turn)))))
+            score = (float(hits), float(right), -float(degrees), -float(round(abs(shift) / reach)))
+            if score > best[0]:
+                best = (score, turn, shift)
+    return best[1], best[2]
 
 
-def _nearest(points: NDArray[np.complex128], placed: NDArray[np.complex128], reach: float) -> NDArray[np.int64]:
+def _frequent(shifts: Points) -> Points:
+    """Cells of size 1 around which most shifts lie, best first; neighbours count: a peak may lie on a corner."""
+    x, y = (np.rint(part).astype(np.int64) for part in (shifts.real, shifts.imag))
+    x_low, y_low = x.min() - 1, y.min() - 1
+    width = int(y.max() - y_low) + 2
+    keys, votes = np.unique((x - x_low) * width + (y - y_low), return_counts=True)
+    total = np.zeros(len(keys))
+    for step in (i * width + j for i in (-1, 0, 1) for j in (-1, 0, 1)):
+        at = np.searchsorted(keys, keys + step).clip(0, len(keys) - 1)
+        total += np.where(keys[at] == keys + step, votes[at], 0)
+    best = keys[np.argsort(-total, kind="stable")[:SHIFTS]]
+    cells: Points = best // width + x_low + 1j * (best % width + y_low)
+    return cells
+
+
+def _nearest(points: Points, placed: Points, reach: float) -> NDArray[np.int64]:
     """Index of the ball nearest to each place within reach, one place a ball; -1 for none."""
-    distance = np.abs(placed[:, None] - points)
+    trees = [cKDTree(np.stack([at.real, at.imag], axis=1)) for at in (placed, points)]
+    pairs = trees[0].sparse_distance_matrix(trees[1], reach, output_type="ndarray")
     ball = np.full(len(placed), -1, np.int64)
-    for place, point in sorted(
-        np.argwhere(distance < reach).tolist(), key=lambda pair: float(distance[pair[0], pair[1]])
-    ):
-        if ball[place] < 0 and point not in ball:
-            ball[place] = point
+    taken = np.zeros(len(points), np.bool_)
+    for _, place, point in sorted(zip(pairs["v"].tolist(), pairs["i"].tolist(), pairs["j"].tolist(), strict=True)):
+        if ball[place] < 0 and not taken[point]:
+            ball[place], taken[point] = point, True
     return ball

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bgars.balls.rim_model import BASIS, SLOPES, RimModel
-from bgars.balls.rim_pixels import SECTORS, TAPER_PX, RimPixels
+from bgars.balls.rim_pixels import TAPER_PX, RimPixels, sector_count
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -58,7 +58,7 @@ class Circles:
         Standard uncertainties.
     support : (N,) float64
         Fraction of the sectors whose rim was seen on the circle.
-    offsets_px : (N, SECTORS) float64
+    offsets_px : (N, S) float64
         Where each sector's rim lies, outward from the circle; NaN where it was not seen.
     blur_px : float
         Standard deviation of the lens blur.
@@ -78,6 +78,15 @@ class Circles:
         columns = {field.name: getattr(self, field.name)[index] for field in fields(self) if field.name != "blur_px"}
         return replace(self, **columns)
 
+    def join(self, other: Circles) -> Circles:
+        """These circles and others."""
+        columns: dict[str, Any] = {
+            field.name: np.concatenate([getattr(self, field.name), getattr(other, field.name)])
+            for field in fields(self)
+            if field.name != "blur_px"
+        }
+        return replace(self, **columns)
+
     def put(self, index: NDArray[np.intp], other: Circles) -> None:
         """Set some of the circles."""
         for field in fields(self):
@@ -92,6 +101,7 @@ def fit_rims(
     radius_px: NDArray[np.float64],
     *,
     blur_px: float | None = None,
+    sectors: int | None = None,
 ) -> Circles:
     """Fit the circle of each ball to its rim in all lights.
 
@@ -105,19 +115,21 @@ def fit_rims(
         Circles to start from, good to a tenth of the radius.
     blur_px : float, optional
         Standard deviation of the lens blur; found from the images by default.
+    sectors : int, optional
+        Equal angles that a rim is divided into; as many as pixels allow by default.
     """
-    circles = Circles(
-        row + 0.0, col + 0.0, radius_px + 0.0, 0.0 * row, 0.0 * row, 0.0 * row, np.zeros((len(row), SECTORS))
-    )
+    sectors = sectors or sector_count(radius_px)
+    nothing = 0.0 * row
+    circles = Circles(row + 0.0, col + 0.0, radius_px + 0.0, nothing, nothing, nothing, np.zeros((len(row), sectors)))
     if not len(row):
         return circles
     model = RimModel(FIRST_BLUR_PX if blur_px is None else blur_px, WIDE_REACH_PX, levels.threads)
     wide_px = np.clip(0.2 * radius_px, 4.0, 9.0) + TAPER_PX / 2.0
-    pixels = RimPixels(levels, circles.row, circles.col, circles.radius_px, wide_px, wide_px, 2)
+    pixels = RimPixels(levels, circles.row, circles.col, circles.radius_px, wide_px, wide_px, 2, sectors)
     for _ in range(WIDE_ROUNDS):
         _update(circles, *_sector_offsets(pixels, circles, model)[:2])
     radius_px = circles.radius_px.clip(0.5 * radius_px, 2.0 * radius_px)
-    pixels = _narrow_band(levels, circles.row, circles.col, circles.radius_px, radius_px)
+    pixels = _narrow_band(levels, circles.row, circles.col, circles.radius_px, radius_px, sectors)
     model = RimModel(model.blur_px, NARROW_REACH_PX, levels.threads)
     for turn in range(NARROW_ROUNDS):
         if turn == 1 and blur_px is None:
@@ -150,7 +162,7 @@ def rim_costs(levels: Levels, row: Array, col: Array, radius_px: Array, tried: l
         Sum over sectors and lights of n log(mean squared residual): the likelihood concentrated with respect to the
         variances (Seber and Wild 1989, section 2.2).
     """
-    pixels = _narrow_band(levels, row, col, radius_px, radius_px)
+    pixels = _narrow_band(levels, row, col, radius_px, radius_px, tried[0].offsets_px.shape[1])
     model = RimModel(tried[0].blur_px, NARROW_REACH_PX, levels.threads)
     costs = []
     for circles in tried:
@@ -162,10 +174,10 @@ def rim_costs(levels: Levels, row: Array, col: Array, radius_px: Array, tried: l
     return np.stack(costs)
 
 
-def _narrow_band(levels: Levels, row: Array, col: Array, radius_px: Array, size_px: Array) -> RimPixels:
+def _narrow_band(levels: Levels, row: Array, col: Array, radius_px: Array, size_px: Array, sectors: int) -> RimPixels:
     """All pixels near the rims; `size_px` are the radii that its depths are in proportion to."""
     in_px, out_px = np.clip(0.15 * size_px, 3.0, 6.0), np.clip(0.14 * size_px, 2.5, 5.0)
-    return RimPixels(levels, row, col, radius_px, in_px, out_px, 1)
+    return RimPixels(levels, row, col, radius_px, in_px, out_px, 1, sectors)
 
 
 def _u_model_px(levels: Levels, circles: Circles, variance: Array, jump: Array) -> Array:
@@ -223,7 +235,7 @@ def _sector_offsets(pixels: RimPixels, circles: Circles, model: RimModel) -> tup
     variance = (left + NOISE_FLOOR**2) / dd
     bad = (count < 2 * BASIS)[..., None] | (np.moveaxis(pixels.clipped, 0, -1))
     variance = np.where(bad, np.inf, variance)
-    arc_px = (2 * math.pi / SECTORS) * circles.radius_px[:, None, None]
+    arc_px = (2 * math.pi / slope.shape[1]) * circles.radius_px[:, None, None]
     return np.clip(offset, -3.0, 3.0), variance, np.sqrt(dd / arc_px)
 
 
@@ -232,15 +244,15 @@ def _pooled(slope: Array, azimuths_rad: Array) -> Array:
 
     The derivative must not come from the pixels that it is applied to: noise would enter twice and pull rims inward.
     """
-    balls, _, terms, _ = slope.shape
+    balls, sectors, terms, _ = slope.shape
     if balls >= POOL_BALLS:
         return np.broadcast_to(np.median(slope, axis=0), slope.shape)
     pooled = np.zeros((1, *slope.shape[1:]))
-    mid = (np.arange(SECTORS) + 0.5) * (2 * math.pi / SECTORS)
-    turn = np.rint((mid[:, None] - azimuths_rad) / (2 * math.pi / SECTORS)).astype(int) % SECTORS
-    by_turn = np.zeros((SECTORS, terms))
+    mid = (np.arange(sectors) + 0.5) * (2 * math.pi / sectors)
+    turn = np.rint((mid[:, None] - azimuths_rad) / (2 * math.pi / sectors)).astype(int) % sectors
+    by_turn = np.zeros((sectors, terms))
     flat = np.moveaxis(slope, 2, 3)  # (N, S, L, 5)
-    for index in range(SECTORS):
+    for index in range(sectors):
         here = flat[:, turn == index]
         if here.size:
             by_turn[index] = np.median(here.reshape(-1, terms), axis=0)
@@ -260,8 +272,9 @@ def _left_over(pixels: RimPixels, circles: Circles, model: RimModel) -> tuple[Ar
 
 def _update(circles: Circles, offset: Array, variance: Array) -> None:
     """One step of the three parameters of each circle, all sectors and lights together, outliers down-weighted."""
-    mid = (np.arange(SECTORS) + 0.5) * (2 * math.pi / SECTORS)
-    design = np.stack([np.cos(mid), np.sin(mid), np.ones(SECTORS)], axis=1)  # x right, y up, radius
+    sectors = offset.shape[1]
+    mid = (np.arange(sectors) + 0.5) * (2 * math.pi / sectors)
+    design = np.stack([np.cos(mid), np.sin(mid), np.ones(sectors)], axis=1)  # x right, y up, radius
     base = 1.0 / (variance + MODEL_ERROR_PX**2)
     base[~np.isfinite(base)] = 0.0
     base[variance > 0.5**2] = 0.0

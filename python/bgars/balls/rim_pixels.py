@@ -14,12 +14,20 @@ if TYPE_CHECKING:
 
     from bgars.balls.levels import Levels
 
-__all__ = ["SECTORS", "TAPER_PX", "RimPixels"]
+__all__ = ["TAPER_PX", "RimPixels", "sector_count"]
 
-SECTORS = 24
+MOST_SECTORS, FEWEST_SECTORS = 24, 12
 """Equal angles that a rim is divided into."""
+LEAST_ARC_PX = 4.0
+"""A narrower sector has hardly more pixels than the basis of the rim has terms."""
 TAPER_PX = 1.0
 """Width over which the weight of pixels falls to nothing at the edges of a band."""
+
+
+def sector_count(radius_px: NDArray[np.float64]) -> int:
+    """Sectors that the rims of circles like these are divided into."""
+    arcs = 2.0 * np.pi * float(np.median(radius_px)) / LEAST_ARC_PX if len(radius_px) else MOST_SECTORS
+    return int(np.clip(arcs, FEWEST_SECTORS, MOST_SECTORS))
 
 
 class RimPixels:
@@ -35,15 +43,17 @@ class RimPixels:
         Depths of the bands inside and outside.
     every : int
         One pixel in how many is taken.
+    sectors : int
+        Equal angles (S) that a rim is divided into.
 
     Attributes
     ----------
-    row, col : (N, SECTORS, P) float32
+    row, col : (N, S, P) float32
         Pixels relative to the anchor of the ball.
-    weight : (N, SECTORS, P) float32
+    weight : (N, S, P) float32
         Roots of the pixels' weights: 1, less toward the edges of the band, so that pixels come and go without a jump;
         0 for padding and for pixels outside the image or the mask.
-    levels : (L, N, SECTORS, P) float32
+    levels : (L, N, S, P) float32
         Grey levels times `weight`.
     """
 
@@ -56,6 +66,7 @@ class RimPixels:
         in_px: NDArray[np.float64],
         out_px: NDArray[np.float64],
         every: int,
+        sectors: int,
     ) -> None:
         directions = levels.capture.rig.directions
         self.threads = levels.threads
@@ -64,7 +75,7 @@ class RimPixels:
         self.anchor_col = np.rint(col).astype(np.int64)
         circles, depths = np.stack([row, col, radius_px], axis=1), np.stack([in_px, out_px], axis=1)
         self.row, self.col, self.weight = _bgars.rim_bands(
-            circles, depths, every=every, sectors=SECTORS, threads=levels.threads
+            circles, depths, every=every, sectors=sectors, threads=levels.threads
         )
         height, width = levels.height, levels.width
         image_row = self.row.astype(np.int64) + self.anchor_row[:, None, None]

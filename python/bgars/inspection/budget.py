@@ -57,8 +57,10 @@ COMMON_SOURCES = {
 
 
 class Budget(NamedTuple):
-    """Of one reading of N balls: standard uncertainty of each ball alone (N,), and what they share, (N, M) for M
-    independent sources of standard deviation 1 with the names `causes` (M,); `alone_by` splits `alone` by cause.
+    """The uncertainty of one reading of N balls.
+
+    `alone` (N,) standard uncertainty of each by itself, `alone_by` the same by cause; `shared` (N, M) what M
+    independent sources of standard deviation 1 put the balls off by, `causes` (M,) their names.
     """
 
     alone: Array
@@ -68,7 +70,8 @@ class Budget(NamedTuple):
 
     def total(self) -> Array:
         """(N,) standard uncertainties."""
-        return np.sqrt(np.square(self.alone) + np.square(self.shared).sum(axis=1))
+        total: Array = np.sqrt(np.square(self.alone) + np.square(self.shared).sum(axis=1))
+        return total
 
     def by_cause(self) -> dict[str, Array]:
         """(N,) standard uncertainties by cause, largest first."""

@@ -1,9 +1,9 @@
 """All balls, all lights and the board from measured points of shadow edges: robust Gauss-Newton with Schur complement.
 
-Unknowns: of each ball x, y, z, radius, q; of each light two small turns and the shift of its image; five coefficients of
-the board, and what all balls and lights share (:mod:`bgars.inspection.common_terms`). Balls meet only through lights,
-board and common terms, so the normal matrix is an arrow: blocks of 5 x 5, a border (Triggs et al., "Bundle adjustment - a
-modern synthesis", 2000, section 6.1).
+Unknowns: of each ball x, y, z, radius, q; of each light two small turns and the shift of its image; five coefficients
+of the board, and what all balls and lights share (:mod:`bgars.inspection.common_terms`). Balls meet only through
+lights, board and common terms, so the normal matrix is an arrow: blocks of 5 x 5, a border (Triggs et al., "Bundle
+adjustment - a modern synthesis", 2000, section 6.1).
 
 Priors are normal: each light stands where the rig says, turned by what all lights are turned by; the board is nearly
 flat; each ball is as round as all balls are; outlines are where the camera sees balls, aside by height over distance
@@ -13,14 +13,14 @@ where it is near, and as large as the part of a ball above the board (a cap's ou
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bgars.inspection.board import SHAPE_TERMS, Board
-from bgars.inspection.bundle_model import EdgeModel, State, linearise_edges, outline_rows, tangents, turned
-from bgars.inspection.common_terms import AZIMUTH, COMMON_TERMS, ELEVATION, ROUNDNESS
+from bgars.inspection.bundle_model import State, linearise_edges, turned
+from bgars.inspection.bundle_normal import LIGHT_TERMS, NormalEquations, Priors, normal_equations
 from bgars.inspection.misfit import relief_px, scatter_factors
 from bgars.inspection.shadow_model import BALL_TERMS
 
@@ -38,35 +38,6 @@ CAUCHY = 2.5
 MIN_Q, MAX_Q = 0.2, 2.0
 LARGEST_STEP, LARGEST_TURN_RAD, LARGEST_Q_STEP = 0.3, 0.1, 0.15
 """Of one round: in radii, and for lights and q. Farther the linear model does not reach."""
-LIGHT_TERMS = 4
-"""Turn along the azimuth, turn up, shift of the image along x and y."""
-SHARED_TERMS = SHAPE_TERMS + COMMON_TERMS
-
-
-class Priors(NamedTuple):
-    """Where unknowns are expected: values and standard deviations.
-
-    `outlines` (N, 3) x, y, radius as the camera sees them, and `u_outlines` of each alone; `u_q` (N,) of each ball's
-    q around that of all; `vectors` (L, 3) the rig's, `u_light_rad` (L,) of each light around what all are turned by;
-    `shifts_px` (L, 2) and `u_shifts_px` of the images; `board` (5,) and `u_board`; `common` (COMMON_TERMS,) and
-    `u_common`.
-    """
-
-    outlines: Array
-    u_outlines: Array
-    u_q: Array
-    vectors: Array
-    u_light_rad: Array
-    shifts_px: Array
-    u_shifts_px: Array
-    board: Array
-    u_board: Array
-    common: Array
-    u_common: Array
-
-    def of_balls(self, index: NDArray[np.intp]) -> Priors:
-        """Priors of some of the balls."""
-        return self._replace(outlines=self.outlines[index], u_outlines=self.u_outlines[index], u_q=self.u_q[index])
 
 
 @dataclass(frozen=True)
@@ -75,10 +46,10 @@ class Solution:
 
     The covariance of ball i is ``alone[i] + lever[i] border lever[i]^T``: `alone` (N, 5, 5) with everything shared
     known, `lever` (N, 5, B) how the ball follows the B shared unknowns, `border` (B, B) their covariance; first four of
-    each light (:data:`LIGHT_TERMS`), then board, then common terms. `q_alone` (N,) is the part of `u_q` in
-    `alone`. `residual_px` (N, L, S) distance of each point to its edge, NaN where none; `weight` (N, L, S);
-    `relief` (N, 5) what relief of the board adds to the variances, part of `alone`; `excess_px` scatter of the points beyond their own; `factor` (N,) by how much more than points scatter whole
-    shadows of a ball do (variances); `iterations`.
+    each light (:data:`LIGHT_TERMS`), then board, then common terms. `residual_px` (N, L, S) distance of each point to
+    its edge, NaN where none; `weight` (N, L, S); `excess_px` scatter of the points beyond their own; `factor` (N,) by
+    how much more than points scatter whole shadows of a ball do (variances); `relief` (N, 5) what relief of the board
+    adds to the variances, part of `alone`; `iterations`.
     """
 
     balls: Array
@@ -164,7 +135,7 @@ def solve_bundle(
         excess = _excess(model.residual[known], edges.u_px[known])
         variance = np.where(known, edges.u_px**2 + excess**2, 1.0)
         weight = _weights(model.residual, variance, known, redescend)
-        normal = _normal(model, weight, state, priors)
+        normal = normal_equations(model, weight, state, priors)
         table_step, border_step = _step(normal)
         state = _moved(state, table_step, border_step)
         if (
@@ -175,7 +146,7 @@ def solve_bundle(
     model = linearise_edges(edges, state, near)
     honest = _honest_weights(model.residual, variance, known, redescend)
     factor = scatter_factors(model, honest)
-    normal = _normal(model, honest / factor[:, None, None], state, priors)
+    normal = normal_equations(model, honest / factor[:, None, None], state, priors)
     inverse = np.linalg.inv(normal.balls)
     lever = -inverse @ normal.cross
     reduced = normal.corner + np.tensordot(normal.cross, lever, axes=((0, 1), (0, 1)))
@@ -206,17 +177,7 @@ def _relief(residual: Array, u_px: Array, vectors: Array) -> Array:
     return np.column_stack([aside, aside, rise**2 * square, aside, np.zeros_like(square)])
 
 
-class _Normal(NamedTuple):
-    """Blocks of the normal equations and their right sides: balls (N, 5, 5), cross (N, 5, B), corner (B, B)."""
-
-    balls: Array
-    cross: Array
-    corner: Array
-    right: Array
-    right_border: Array
-
-
-def _step(normal: _Normal) -> tuple[Array, Array]:
+def _step(normal: NormalEquations) -> tuple[Array, Array]:
     """Steps of the balls (N, 5), within limits, and of the border (B,)."""
     inverse = np.linalg.inv(normal.balls)
     lever = inverse @ normal.cross
@@ -284,82 +245,3 @@ def _excess(residual: Array, u_px: Array) -> float:
         return 0.0
     spread = 1.4826 * float(np.median(np.abs(residual)))
     return float(np.sqrt(max(spread**2 - float(np.median(u_px)) ** 2, 0.0)))
-
-
-def _normal(model: EdgeModel, weight: Array, state: State, priors: Priors) -> _Normal:
-    """Normal equations of edge points and priors."""
-    count, lights = model.residual.shape[:2]
-    first_shared = LIGHT_TERMS * lights
-    border = first_shared + SHARED_TERMS
-    weighted = (model.derivatives * weight[..., None]).swapaxes(-1, -2)
-    shadows = weighted @ model.derivatives  # of every shadow, (N, L, T, T)
-    sides = -(weighted @ model.residual[..., None])[..., 0]
-    ball, lamp = slice(BALL_TERMS), slice(BALL_TERMS, BALL_TERMS + LIGHT_TERMS)
-    shared = slice(BALL_TERMS + LIGHT_TERMS, None)
-    of_balls, of_lights = shadows[:, :, ball].sum(axis=1), shadows.sum(axis=0)
-    by_light = shadows[:, :, ball, lamp].swapaxes(1, 2).reshape(count, BALL_TERMS, first_shared)
-    cross = np.concatenate([by_light, of_balls[:, :, shared]], axis=2)
-    corner = np.zeros((border, border))
-    for light in range(lights):
-        part = slice(LIGHT_TERMS * light, LIGHT_TERMS * (light + 1))
-        corner[part, part] = of_lights[light, lamp, lamp]
-        corner[part, first_shared:] = of_lights[light, lamp, shared]
-        corner[first_shared:, part] = of_lights[light, shared, lamp]
-    corner[first_shared:, first_shared:] = of_lights[:, shared, shared].sum(axis=0)
-    border_sides = sides.sum(axis=0)
-    right_border = np.concatenate([border_sides[:, lamp].reshape(-1), border_sides[:, shared].sum(axis=0)])
-    normal = _Normal(of_balls[:, :, ball], cross, corner, sides[:, :, ball].sum(axis=1), right_border)
-    _add_ball_priors(normal, state, priors)
-    _add_light_priors(normal, state, priors)
-    return normal
-
-
-def _add_ball_priors(normal: _Normal, state: State, priors: Priors) -> None:
-    """Outlines, heights somewhere near the radius, and q around that of all balls."""
-    first = normal.corner.shape[0] - COMMON_TERMS
-    residual, by_ball, by_common = outline_rows(state, priors.outlines)
-    weight = priors.u_outlines**-2.0
-    normal.balls[:] += np.einsum("nki,nk,nkj->nij", by_ball, weight, by_ball)
-    normal.right[:] -= np.einsum("nki,nk,nk->ni", by_ball, weight, residual)
-    normal.cross[:, :, first:] += np.einsum("nki,nk,nkj->nij", by_ball, weight, by_common)
-    normal.corner[first:, first:] += np.einsum("nki,nk,nkj->ij", by_common, weight, by_common)
-    normal.right_border[first:] -= np.einsum("nki,nk,nk->i", by_common, weight, residual)
-    pull = 1.0 / priors.outlines[:, 2] ** 2
-    normal.balls[:, 2, 2] += pull
-    normal.right[:, 2] -= pull * state.balls[:, 2]
-    pull = priors.u_q**-2.0
-    off = state.balls[:, 4] - 1.0 - state.common[ROUNDNESS]
-    normal.balls[:, 4, 4] += pull
-    normal.right[:, 4] -= pull * off
-    normal.cross[:, 4, first + ROUNDNESS] -= pull
-    normal.corner[first + ROUNDNESS, first + ROUNDNESS] += pull.sum()
-    normal.right_border[first + ROUNDNESS] += (pull * off).sum()
-    normal.balls[:, range(BALL_TERMS), range(BALL_TERMS)] += 1e-9
-
-
-def _add_light_priors(normal: _Normal, state: State, priors: Priors) -> None:
-    """Each light around what all are turned by, shifts of images, board, common terms."""
-    lights = len(state.vectors)
-    corner, right = normal.corner, normal.right_border
-    first = len(right) - COMMON_TERMS
-    ways = tangents(state.vectors)
-    length = np.linalg.norm(state.vectors, axis=1)
-    turn = np.einsum("lc,lkc->lk", state.vectors - priors.vectors, ways) / np.square(length)[:, None]
-    for axis, term in ((0, AZIMUTH), (1, ELEVATION)):
-        own = LIGHT_TERMS * np.arange(lights) + axis
-        pull = priors.u_light_rad**-2.0
-        off = turn[:, axis] - state.common[term]
-        corner[own, own] += pull
-        corner[own, first + term] -= pull
-        corner[first + term, own] -= pull
-        corner[first + term, first + term] += pull.sum()
-        right[own] -= pull * off
-        right[first + term] += (pull * off).sum()
-        own = LIGHT_TERMS * np.arange(lights) + 2 + axis
-        pull = priors.u_shifts_px[:, axis] ** -2.0
-        corner[own, own] += pull
-        right[own] += pull * (priors.shifts_px - state.shifts_px)[:, axis]
-    shared = np.arange(LIGHT_TERMS * lights, len(right))
-    pull = np.concatenate([priors.u_board, priors.u_common]) ** -2.0
-    corner[shared, shared] += pull
-    right[shared] += pull * np.concatenate([priors.board - state.board, priors.common - state.common])

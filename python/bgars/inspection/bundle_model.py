@@ -30,8 +30,10 @@ LEAST_FOOT = 0.1
 
 
 class State(NamedTuple):
-    """Values of all unknowns: balls (N, 5) as x, y, z, radius, q; lights (L, 3); shifts of images (L, 2); board (5,);
-    common terms (COMMON_TERMS,).
+    """Values of all unknowns.
+
+    Balls (N, 5) as x, y, z, radius, q; lights (L, 3); shifts of images (L, 2); board (5,); common terms
+    (COMMON_TERMS,).
     """
 
     balls: Array
@@ -46,8 +48,10 @@ class State(NamedTuple):
 
 
 class EdgeModel(NamedTuple):
-    """Of every measured point (N, L, S): distance to its edge; derivatives (..., T) by ball, light and what is shared;
-    place on the edge, the angle from its tip (rad).
+    """Every measured point, (N, L, S).
+
+    Distance to its edge; derivatives (..., T) by ball, light and what is shared; its place, the angle from the tip
+    (rad).
     """
 
     residual: Array

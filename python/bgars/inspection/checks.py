@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Complaint",
     "ImageShifts",
+    "agreed_shifts",
     "check_shifts",
     "displaced_images",
     "explain_dark_steps",
@@ -57,6 +58,8 @@ OUTLINE_BESIDE = 0.1
 SHARPER = 1.15
 SHIFT_WARNING_PX, SHIFT_ERROR_PX = 0.4, 1.0
 SHIFT_SIGMAS = 6.0
+AGREEING = 0.5
+"""Share of a coarse shift that a fine look must see, along it."""
 MIN_STRETCHES = 20
 FEW_OUTLINES = 0.25
 """An image that shows less than this share of the outlines that the others show, where they show them, is displaced."""
@@ -307,6 +310,15 @@ def image_shifts(outlines: Outlines) -> ImageShifts:
         shifts.move_px[light] = np.linalg.lstsq(system[keep], found[keep], rcond=None)[0]
         shifts.u_px[light] = spread / np.sqrt(max(int(keep.sum()), 1) / 2.0)
     return shifts
+
+
+def agreed_shifts(coarse: ImageShifts, fine: ImageShifts) -> ImageShifts:
+    """Coarse shifts that the outlines' shape confirms: by area alone, a shadow beside the rim looks like a shift."""
+    size = np.hypot(*coarse.move_px.T)
+    along = (coarse.move_px * fine.move_px).sum(axis=1)
+    # The fine look knows the shape of an edge that lies within its spread: a pixel at most.
+    denied = np.isfinite(fine.u_px) & (size < SHIFT_ERROR_PX) & (along < AGREEING * size**2)
+    return ImageShifts(np.where(denied[:, None], 0.0, coarse.move_px), coarse.u_px)
 
 
 def check_shifts(shifts: ImageShifts, files: Sequence[Path] = ()) -> tuple[str, ...]:

@@ -34,8 +34,8 @@ __all__ = [
 Array = NDArray[np.float64]
 
 ELEVATION, AZIMUTH, ROUNDNESS, PERSPECTIVE, EDGE, EDGE_1, EDGE_2, EDGE_3, OUTLINE, OUTLINE_X, OUTLINE_Y = range(11)
-"""Elevation and azimuth of all lights together (rad), q - 1 of all balls together, 1 / camera distance (1 / px); how far
-out edges of shadows are measured: all, and by cos a, cos 2a, cos 3a, a the angle from the tip (px); how far out all
+"""Elevation and azimuth of all lights together (rad), q - 1 of all balls together, 1 / camera distance (1 / px); how
+far out edges of shadows are measured: all, and by cos a, cos 2a, cos 3a, a the angle from the tip (px); how far out all
 outlines are, and how far aside along x and y (px)."""
 COMMON_TERMS = 11
 EDGE_TERMS = (EDGE, EDGE_1, EDGE_2, EDGE_3)
@@ -78,10 +78,9 @@ def posterior(mean: Array, covariance: Array, u_prior: Array, mixtures: list[Mix
     information = precision @ mean
     logs, means, covariances, picks = [], [], [], []
     for pick in product((False, True), repeat=len(mixtures)):
-        u = np.array(
-            [mixture.wide if is_wide else mixture.narrow for mixture, is_wide in zip(mixtures, pick, strict=True)]
-        )
-        share = np.prod([m.share if is_wide else 1.0 - m.share for m, is_wide in zip(mixtures, pick, strict=True)])
+        parts = list(zip(mixtures, pick, strict=True))
+        u = np.array([mixture.wide if is_wide else mixture.narrow for mixture, is_wide in parts])
+        share = float(np.prod([mixture.share if is_wide else 1.0 - mixture.share for mixture, is_wide in parts]))
         if share <= 0.0:
             continue
         here = np.linalg.inv(likelihood + np.diag(u**-2.0))

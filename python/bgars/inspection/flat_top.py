@@ -26,6 +26,8 @@ REACH = 0.8
 """Normals within this share of the radius are looked at: farther out they are worst."""
 MIN_KNOWN = 0.6
 MIN_POPULATION = 5
+WITHOUT_POPULATION = 0.02
+"""Standard deviation of M / R^2 that estimators get wrong on all balls alike: only a population takes it off."""
 INNER, UPRIGHT = 0.7, 0.5
 """Within this share of a flat top, normals have less than this share of the tilt of a ball's."""
 LARGEST = 0.75
@@ -51,10 +53,10 @@ def flat_tops(field: NormalField, table: Array) -> FlatTops:
     missing = np.array([_missing_slope(field, row) for row in table])
     known = np.isfinite(missing)
     height, u_height = np.full(len(table), np.nan), np.full(len(table), np.nan)
-    if known.sum() < MIN_POPULATION:
-        return FlatTops(height, u_height)
-    usual = float(np.median(missing[known]))
-    spread = max(1.4826 * float(np.median(np.abs(missing[known] - usual))), 1e-6)
+    usual, spread = 0.0, WITHOUT_POPULATION
+    if known.sum() >= MIN_POPULATION:
+        usual = float(np.median(missing[known]))
+        spread = max(1.4826 * float(np.median(np.abs(missing[known] - usual))), 1e-6)
     for index in np.flatnonzero(known):
         radius, q = table[index, 3], table[index, 4]
         height[index] = _cap(missing[index] - usual, radius, q)

@@ -10,12 +10,13 @@ import numpy as np
 
 from bgars.inspection.coplanarity import Coplanarity, measure_coplanarity, seating_budget
 from bgars.inspection.decision import COVERAGE_FACTOR, worst
-from bgars.inspection.judge_ball import Position, judge_ball, true_position
+from bgars.inspection.judge_ball import Position, judge_ball
 from bgars.inspection.judge_part import part_checks, part_reasons
 from bgars.inspection.lens_scale import PIXEL_PITCH
 from bgars.inspection.odd_sizes import odd_sizes
+from bgars.inspection.on_grid import finite_centres, is_seen, lay_grid, true_positions
 from bgars.inspection.places import Slot, match_balls
-from bgars.inspection.position import GridFit, fit_grid
+from bgars.inspection.position import GridFit
 from bgars.inspection.to_scale import lens_scale, to_scale
 from bgars.inspection.warpage import board_height_um, board_terms, warpage
 from bgars.light_names import light_name
@@ -35,9 +36,6 @@ __all__ = ["judge_part"]
 
 OWN_PITCH = "no recipe: true positions are against a grid of the part's own pitch"
 MIN_ROCKING = 2
-SEEN_SHARE = 0.5
-"""Of the places of a part: with fewer balls than that the finder, or the set-up, has failed."""
-MIN_GRID = 3
 EACH_BALL = "each ball by itself"
 MAX_LIGHT_CHANGE_DEG = 5.0
 """Beyond this nothing that rests on the lights may pass."""
@@ -84,24 +82,24 @@ def judge_part(
         Records that do not belong together.
     """
     slots = match_balls(found, measurement, recipe)
-    pitch_um, u_pitch_um = _pitch(_grid(slots, recipe)[0], recipe, measurement)
+    pitch_um, u_pitch_um = _pitch(lay_grid(slots, recipe)[0], recipe, measurement)
     lens = lens_scale(slots, measurement, recipe)
     if lens is not None:
         measurement = to_scale(measurement, lens)
         slots = match_balls(found, measurement, recipe)
-    fit, nominal_um = _grid(slots, recipe)
+    fit, nominal_um = lay_grid(slots, recipe)
     coplanarity, rows, budget = _coplanarity(slots, measurement, recipe, fit, nominal_um)
     limits = None if recipe is None else recipe.limits
     names = {
         slot.name: slot.name if recipe is None else recipe.name_of(slot.name, slot.row, slot.col) for slot in slots
     }
     doubts = (*_strayed_lights(measurement.light_change_deg, light_files), *measurement.doubts)
-    is_seen = _is_seen(slots)
-    positions = _positions(slots, nominal_um, measurement)
+    enough = is_seen(slots)
+    positions = true_positions(slots, nominal_um, measurement)
     balls = []
     for index, (slot, position) in enumerate(zip(slots, positions, strict=True)):
         partners = tuple(names.get(each, each) for each in _partners(slot.name, found.bridges))
-        verdict, reasons = judge_ball(slot, position, limits, partners, doubts, is_seen=is_seen)
+        verdict, reasons = judge_ball(slot, position, limits, partners, doubts, is_seen=enough)
         ball = _ball(slot, names[slot.name], nominal_um[index], position)
         balls.append(replace(ball, verdict=verdict, reasons=reasons))
     for row, index in enumerate(rows):
@@ -112,7 +110,7 @@ def judge_part(
             deviation_um = float(coplanarity.regression.deviations_um[row])
             balls[index] = replace(balls[index], regression_deviation_um=deviation_um)
     warpage_um, u_warpage_um = warpage(
-        measurement.board_coefficients_um, measurement.board_covariance, _finite_centres(slots)
+        measurement.board_coefficients_um, measurement.board_covariance, finite_centres(slots)
     )
     unmeasured = [
         names[slot.name]
@@ -124,13 +122,16 @@ def judge_part(
     verdicts = [ball.verdict for ball in balls] + [check.verdict for check in checks if check.verdict is not None]
     if bridges:
         verdicts.append("fail")
-    if doubts or not limits or not is_seen:
+    if doubts or not limits or not enough:
         verdicts.append("undecided")
     return PartResult(
         name=name if recipe is None else recipe.name,
         balls=tuple(balls),
         verdict=worst(verdicts),
-        reasons=(*part_reasons(balls, checks, bridges, has_limits=bool(limits), is_seen=is_seen), *doubts),
+        reasons=(
+            *part_reasons(balls, checks, bridges, has_limits=bool(limits), is_seen=enough, doubts=doubts),
+            *doubts,
+        ),
         pitch_um=pitch_um,
         u_pitch_um=u_pitch_um,
         grid_angle_deg=math.nan if fit is None else math.degrees(fit.angle_rad),
@@ -196,32 +197,6 @@ def _strayed_lights(change_deg: Array, files: Sequence[str]) -> list[str]:
     ]
 
 
-def _finite_centres(slots: tuple[Slot, ...]) -> Array:
-    centres_um = [(slot.measured.x_um, slot.measured.y_um) for slot in slots if slot.measured is not None]
-    array_um = np.array(centres_um, dtype=np.float64).reshape(-1, 2)
-    return array_um[np.isfinite(array_um).all(axis=1)]
-
-
-def _grid(slots: tuple[Slot, ...], recipe: PartRecipe | None) -> tuple[GridFit | None, Array]:
-    """The grid through all whole balls, and (n, 2) places of all slots in the image (NaN where there is none)."""
-    whole = [
-        (slot.nominal, slot.measured)
-        for slot in slots
-        if slot.nominal is not None and slot.measured is not None and slot.kind == "ball"
-    ]
-    centres_um = np.array([(ball.x_um, ball.y_um) for _, ball in whole], dtype=np.float64).reshape(-1, 2)
-    known = np.isfinite(centres_um).all(axis=1)
-    nominal = np.array([place for place, _ in whole], dtype=np.float64).reshape(-1, 2)
-    u_um = np.array([(ball.u_x_um, ball.u_y_um) for _, ball in whole], dtype=np.float64).reshape(-1, 2)
-    fit = fit_grid(nominal[known], centres_um[known], u_um[known], free_scale=recipe is None)
-    places_um = np.full((len(slots), 2), math.nan)
-    if fit is not None:
-        for index, slot in enumerate(slots):
-            if slot.nominal is not None:
-                places_um[index] = fit.place(np.array(slot.nominal))
-    return fit, places_um
-
-
 def _pitch(fit: GridFit | None, recipe: PartRecipe | None, measurement: BallMeasurement) -> tuple[float, float]:
     """Pitch by the declared size of a pixel, not by the recipe's grid, and its standard uncertainty."""
     if fit is None or (recipe is not None and recipe.layout.pitch_um is None):
@@ -230,46 +205,6 @@ def _pitch(fit: GridFit | None, recipe: PartRecipe | None, measurement: BallMeas
     u_pixel = PIXEL_PITCH.spread if measurement.u_pixel_pitch is None else measurement.u_pixel_pitch
     u_scale = math.hypot(fit.u_free_scale, fit.free_scale * u_pixel)
     return fit.free_scale * unit_um, u_scale * unit_um
-
-
-def _is_seen(slots: tuple[Slot, ...]) -> bool:
-    """Whether most places show a ball: where they do not, the set-up is to be looked at, not the part."""
-    wanted = [slot for slot in slots if slot.kind != "extra"]
-    return bool(wanted) and sum(slot.found for slot in wanted) > SEEN_SHARE * len(wanted)
-
-
-def _positions(slots: tuple[Slot, ...], nominal_um: Array, measurement: BallMeasurement) -> list[Position]:
-    """True positions; what shifts or turns all balls together moves the grid with them, and is in none."""
-    places = {ball.name: place for place, ball in enumerate(measurement.balls)}
-    positions = []
-    shared = {name: measurement.shared_um.get(name) for name in ("x_um", "y_um")}
-    left = {name: None if part is None else _off_grid(part, measurement, name) for name, part in shared.items()}
-    for slot, place_um in zip(slots, nominal_um, strict=True):
-        ball = slot.measured
-        if ball is None or slot.nominal is None:
-            positions.append(Position(math.nan, math.nan))
-            continue
-        u_um = [ball.u_x_um, ball.u_y_um]
-        for axis, name in enumerate(("x_um", "y_um")):
-            part, rest = shared[name], left[name]
-            if part is not None and rest is not None:
-                row = places[ball.name]
-                alone = max(u_um[axis] ** 2 - float(np.square(part[row]).sum()), 0.0)
-                u_um[axis] = math.sqrt(alone + float(np.square(rest[row]).sum()))
-        positions.append(true_position(np.array([ball.x_um, ball.y_um]) - place_um, np.array(u_um)))
-    return positions
-
-
-def _off_grid(shared_um: Array, measurement: BallMeasurement, name: str) -> Array:
-    """(N, M) errors that balls share, less the shift along this axis and the turn that a grid follows."""
-    across = np.array([ball.y_um if name == "x_um" else ball.x_um for ball in measurement.balls], dtype=np.float64)
-    seen = np.square(shared_um).sum(axis=1) > 0
-    if seen.sum() < MIN_GRID:
-        return shared_um
-    design = np.column_stack([np.ones(len(across)), across / max(float(np.abs(across[seen]).max()), 1e-9)])
-    fitted = np.linalg.lstsq(design[seen], shared_um[seen], rcond=None)[0]
-    off: Array = np.where(seen[:, None], shared_um - design @ fitted, 0.0)
-    return off
 
 
 def _coplanarity(

@@ -87,9 +87,7 @@ def judge_ball(
         False where so few balls were found that what is missing says more of the set-up than of the part.
     """
     if not slot.found:
-        if slot.unclear:
-            return "undecided", (UNCLEAR,)
-        return ("fail", (MISSING,)) if is_seen else ("undecided", (UNJUDGED,))
+        return _judge_empty(slot, is_seen=is_seen)
     failed, open_ = [], []
     if slot.kind == "extra":
         failed.append(EXTRA)
@@ -100,13 +98,15 @@ def judge_ball(
     else:
         open_ += slot.measured.reasons
         open_ += _holes(slot.measured, limits)
+        # Nothing confirms a circle without a shadow: it is no ground to fail a ball on.
+        circle_alone = not math.isfinite(slot.measured.top_um)
         if limits and slot.kind != "extra":
             for name, value, u in _readings(slot.measured, position):
                 allowed = limits.range_of(name)
                 if allowed is None:
                     continue
                 verdict, reason = decide(WORDS[name], value, u, allowed, unit="" if name == "q" else "um")
-                if verdict == "fail" and doubts:
+                if verdict == "fail" and (doubts or circle_alone):
                     verdict = "undecided"
                 if verdict != "pass":
                     (failed if verdict == "fail" else open_).append(reason)
@@ -117,6 +117,13 @@ def judge_ball(
     if failed:
         return "fail", reasons
     return ("undecided" if open_ else "pass"), reasons
+
+
+def _judge_empty(slot: Slot, *, is_seen: bool) -> tuple[Verdict, tuple[str, ...]]:
+    """A place without a ball: missing only where it is seen to be empty, in a set-up that shows the others."""
+    if slot.unclear:
+        return "undecided", (UNCLEAR,)
+    return ("fail", (MISSING,)) if is_seen else ("undecided", (UNJUDGED,))
 
 
 def _readings(ball: MeasuredBall, position: Position) -> Iterator[tuple[str, float, float]]:

@@ -86,10 +86,12 @@ def part_reasons(
     *,
     has_limits: bool,
     is_seen: bool,
+    doubts: tuple[str, ...] = (),
 ) -> tuple[str, ...]:
     """Say why a part does not pass, the worst first; empty for one that does.
 
-    `is_seen`: whether most of the balls were found; otherwise what is missing is a question to the set-up.
+    `doubts` of the whole part stand for themselves, not once for each ball. `is_seen`: whether most of the balls were
+    found; otherwise what is missing is a question to the set-up.
     """
     reasons = []
     missing = [ball.name for ball in balls if not ball.present and ball.verdict == "fail"]
@@ -115,10 +117,13 @@ def part_reasons(
         worst = [f"{ball.name} ({ball.reasons[0]})" for ball in failing]
         reasons.append(f"{_count(len(failing), 'ball')} outside limits: {_listed(worst, ';', MAX_TOLD)}")
     reasons += [check.reason for check in checks if check.verdict == "fail"]
-    open_ = [ball for ball in balls if ball.present and ball.verdict == "undecided" and ball.reasons != (NO_LIMITS,)]
-    if open_:
-        why = [f"{ball.name} ({next(r for r in ball.reasons if r != NO_LIMITS)})" for ball in open_]
-        reasons.append(f"{_count(len(open_), 'ball')} undecided: {_listed(why, ';', MAX_TOLD)}")
+    why = []
+    for ball in balls:
+        own = [reason for reason in ball.reasons if reason not in (NO_LIMITS, *doubts)]
+        if ball.present and ball.verdict == "undecided" and own:
+            why.append(f"{ball.name} ({own[0]})")
+    if why:
+        reasons.append(f"{_count(len(why), 'ball')} undecided: {_listed(why, ';', MAX_TOLD)}")
     reasons += [check.reason for check in checks if check.verdict == "undecided"]
     if not has_limits:
         reasons.append(HOW_TO_LIMIT)

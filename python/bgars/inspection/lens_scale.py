@@ -1,8 +1,8 @@
 r"""Size of a pixel and distortion of the lens, from the recipe's grid: what every length is multiplied by.
 
-A pixel pitch that is off by a share scales every length; a lens with radial distortion (Brown 1971, first term) puts what
-is at x at ``x (1 + k r^2 / r_c^2)``, r_c the distance of the image's corner from its middle. Balls stand on their grid to
-some micrometres, so that the grid of a whole part tells both far better than a ruler:
+A pixel pitch that is off by a share scales every length; a lens with radial distortion (Brown 1971, first term) puts
+what is at x at ``x (1 + k r^2 / r_c^2)``, r_c the distance of the image's corner from its middle. Balls stand on their
+grid to some micrometres, so that the grid of a whole part tells both far better than a ruler:
 
     c_i = t + (1 + a) R n_i + k (r_i / r_c)^2 c_i
 
@@ -56,14 +56,16 @@ class LensScale(NamedTuple):
         return 1.0 / (1.0 + self.scale + self.distortion * self._square(x_um, y_um))
 
     def length_factor(self, x_um: Array, y_um: Array) -> Array:
-        """The same of lengths at a place, mean over directions: d(x (1 + k r^2)) / dx is 1 + 3 k r^2 outward, 1 + k r^2
-        across.
+        """The same of lengths at a place, mean over directions.
+
+        ``d(x (1 + k r^2)) / dx`` is ``1 + 3 k r^2`` outward and ``1 + k r^2`` across.
         """
         return 1.0 / (1.0 + self.scale + 2.0 * self.distortion * self._square(x_um, y_um))
 
-    def u_share(self, x_um: Array, y_um: Array, turns: float = 1.0) -> Array:
-        """(N, 2) relative change of places (`turns` 1) or lengths (2) by two independent sources of standard deviation
-        1: those of the covariance's triangular root.
+    def u_share(self, x_um: Array, y_um: Array, *, turns: float = 1.0) -> Array:
+        """(N, 2) relative change of places (`turns` 1) or lengths (2) by two independent sources of deviation 1.
+
+        They are those of the covariance's triangular root.
         """
         root = np.linalg.cholesky(self.covariance + 1e-18 * np.eye(2))
         design = np.stack([np.ones_like(x_um), turns * self._square(x_um, y_um)], axis=-1)

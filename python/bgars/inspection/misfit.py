@@ -7,8 +7,8 @@ shadow then have a mean and a tilt along the edge beyond what independent points
 
 C the covariance of c for independent points: 3 numbers a shadow, less what the fit takes. Its mean over the degrees of
 freedom is the factor that variances are too small by (Birge 1932). Few shadows know their own factor badly: it is drawn
-to the usual one as if that had been seen in `PRIOR_FREEDOM` numbers (the scaled inverse chi-squared prior of a variance;
-Gelman et al., "Bayesian Data Analysis", 2013, section 2.6).
+to the usual one as if that had been seen in `PRIOR_FREEDOM` numbers (the scaled inverse chi-squared prior of a
+variance; Gelman et al., "Bayesian Data Analysis", 2013, section 2.6).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ BASIS = 3
 MIN_POINTS = 4
 """Of a shadow, to have a mean and two tilts."""
 USUAL_EXCESS_PX = 0.05
-"""What pixel grid, penumbra and quantisation make points scatter beyond their own uncertainty on a plain board: 0.03."""
+"""More than pixel grid, penumbra and quantisation make points scatter beyond their own on a plain board: 0.03."""
 FARTHEST_PX = 3.0
 """Points farther off are no edge of this shadow."""
 PRIOR_FREEDOM = 6.0
@@ -78,4 +78,5 @@ def relief_px(residual: Array, u_px: Array) -> Array:
     count = known.sum(axis=(1, 2))
     part = square.sum() / max(int(count.sum()), 1)
     own = np.where(count > 0, square / np.maximum(count, 1), part)
-    return np.sqrt(np.maximum(0.5 * (own + part) - USUAL_EXCESS_PX**2, 0.0))
+    relief: Array = np.sqrt(np.maximum(0.5 * (own + part) - USUAL_EXCESS_PX**2, 0.0))
+    return relief

@@ -27,7 +27,7 @@ ROUNDS = 10
 
 
 def q_spread(solution: Solution, u_prior: Array) -> Array:
-    """(N,) standard deviations of the priors of q around that of all balls: one for like balls, wide for one that is not.
+    """(N,) standard deviations of the priors of q around that of all: one for like balls, wide for one that is not.
 
     Parameters
     ----------

@@ -38,24 +38,24 @@ Array = NDArray[np.float64]
 RIG_DEG = 0.3
 """Lights may be this far from where the rig says (standard deviation of each axis), before their scatter says more."""
 CERTAIN_RIG_DEG = 1e-4
-RIG_LIMITS_DEG = (0.02, 2.0)
+RIG_LIMITS_DEG = (0.003, 2.0)
 FIRST_Q_SPREAD = 0.02
 TILT = 0.003
 BOW_SLOPE = 0.02
 STEEPEST_BOARD = 0.05
 """Prior standard deviations of the board: tilt, and slope by bow at the edge of the image."""
-TOGETHER_DEG = Mixture(0.05, 1.0, 0.1)
-"""Elevation of all lights together: a ring that was squared to the board, and one that was not, in one set-up of ten."""
+TOGETHER_DEG = Mixture(0.05, 1.5, 0.1)
+"""Elevation of all lights together: a ring that was squared to the board; one that was not, in one set-up of ten."""
 ROUND = Mixture(0.001, 0.05, 0.1)
-"""q - 1 of all balls together: surface tension keeps reflowed spheres of 0.3 to 0.7 mm round to a part in a thousand above
-their equator (Bond number 0.003 to 0.02); coined or sagged lots are not, one in ten."""
+"""q - 1 of all balls together: surface tension keeps reflowed spheres of 0.3 to 0.7 mm round to a part in a thousand
+above their equator (Bond number 0.003 to 0.02); coined or sagged lots are not, one in ten."""
 CAMERA_MM = Mixture(1.0 / 3000.0, 1.0 / 40.0, 0.2)
 """Inverse distance of the camera: telecentric lenses are so to a fraction of a degree, others stand at 20 to 300 mm."""
-EDGE_SHARE, BEND_SHARE, EXCESS_SHARE = 0.008, 0.4, 0.2
+EDGE_SHARE, BEND_SHARE, EXCESS_SHARE = 0.008, 0.25, 0.15
 """Edges too far out or in, shares of their spread s, of ``s^2 / R``, and of what points scatter beyond their own: what
 penumbra, reflected light and a board that light enters leave of the model. Rendered edges of 0.6 px agree with it to
-0.007 px; what a wide lamp shifts an edge by to second order is known to its own size; where points scatter, some of it is
-alike on all balls."""
+0.01 px; what a wide lamp shifts an edge by to second order is known to half of its own size; where points scatter, some
+of it is alike on all balls."""
 EDGE_WAVES = (1.0, 1.0, 0.3, 0.3)
 """The same of all edges together, and by cos a, cos 2a, cos 3a along them."""
 COARSE_SPREAD_PX = 2.0
@@ -66,10 +66,10 @@ RAISED_DEG = 0.5
 """Elevation of all lights together while the fit finds its way; in the end its mixture counts."""
 SWING_DEG = 1.5
 """Azimuth of all lights together: turns the part's picture of the rig, and moves no height."""
-SHIFT_PX = 0.02
+SHIFT_PX = 0.015
 """Images of a rig that stands still; a shift that outlines show is taken from them."""
 SHIFT_SIGMAS, SHIFT_SEEN_PX, SHIFT_FLOOR_PX = 6.0, 0.4, 0.05
-ASIDE_PX = 0.03
+ASIDE_PX = 0.015
 """All outlines together aside: lights of a ring cancel what shading does to a rim, but for their differences."""
 OUTLIER_SIGMAS = 3.0
 LEAST_OUTLINE_PX = 0.02
@@ -190,7 +190,8 @@ def _scatter_of_lights(priors: Priors, solution: Solution) -> Array:
         ordinary = size < OUTLIER_SIGMAS**2 * usual
         usual = float(size[ordinary].mean()) if ordinary.any() else usual
     scatter = np.clip(np.sqrt(usual), *np.radians(RIG_LIMITS_DEG))
-    return np.maximum(scatter, np.sqrt(size) / OUTLIER_SIGMAS)
+    own: Array = np.maximum(scatter, np.sqrt(size) / OUTLIER_SIGMAS)
+    return own
 
 
 def with_shifts(priors: Priors, shifts: ImageShifts) -> Priors:

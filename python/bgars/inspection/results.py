@@ -38,7 +38,7 @@ FLAT_SHARE = 0.01
 FLAT_MODEL = 0.15
 """Relative standard uncertainty of a flat top's depth: its edge is rounded, normals blend it with the slope beside."""
 FLAT_BALLS, DEEPEST_FLAT = 0.05, 0.25
-"""Balls that are flat at all, one in twenty, by up to so many radii: what is believed of a top before it was looked at."""
+"""Balls that are flat at all, one in twenty, by up to so many radii: what is believed before a top was looked at."""
 UNSEEN_TOP = 0.04
 """Of the radius: where a top is known no better, a flat one would pass for a round one."""
 FLAT_TOP = "flat top"
@@ -179,11 +179,13 @@ def _u_flat(flats: FlatTops | None, radius: Array) -> Array:
     """
     deepest = DEEPEST_FLAT * radius
     if flats is None:
-        return np.sqrt(FLAT_BALLS / 3.0) * deepest
+        unseen: Array = np.sqrt(FLAT_BALLS / 3.0) * deepest
+        return unseen
     found = np.nan_to_num(flats.height_px)
     u = np.where(np.isfinite(flats.u_height_px), flats.u_height_px, deepest)
-    still_flat = FLAT_BALLS * np.minimum(1.0, u * np.sqrt(np.pi / 2.0) / deepest)
-    return np.where(_is_flat(flats, radius), np.hypot(u, FLAT_MODEL * found), np.sqrt(still_flat) * u)
+    still_flat: Array = FLAT_BALLS * np.minimum(1.0, u * np.sqrt(np.pi / 2.0) / deepest)
+    u_flat: Array = np.where(_is_flat(flats, radius), np.hypot(u, FLAT_MODEL * found), np.sqrt(still_flat) * u)
+    return u_flat
 
 
 def _is_flat(flats: FlatTops, radius: Array) -> NDArray[np.bool_]:

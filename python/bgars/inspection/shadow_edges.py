@@ -13,11 +13,11 @@ the edge), and to first order a displacement a and a change b of the spread:
 
 linear in four unknowns: least squares, then once more with Cauchy weights.
 
-Light that balls throw on the board beside them is not the same under all lights: T, a mean over lights, has too much of
-it on the far side of a ball, so that the lit level grows outward by a share g a pixel. A stretch knows its own g badly,
-all shadows of a part together know it well as a function of the place along the edge: a fifth column ``hi T g d Phi`` is
-fitted for it, and the displacement is that of four columns with the usual g of its place taken out (exact, for least
-squares are linear).
+Light that balls throw on the board beside them is not the same under all lights: T, a mean over lights, has too much
+of it on the far side of a ball, so that the lit level grows outward by a share g per pixel. A stretch knows its own g
+badly, all shadows of a part together know it well as a function of the place along the edge: a fifth column
+``hi T g d Phi`` is fitted for it, and the displacement is that of four columns with the usual g of its place taken out
+(exact, for least squares are linear).
 
 That holds for displacements below s. The coarse search goes by area: with H the unit step and r the reach,
 
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from bgars.inspection.radiance import Radiance
     from bgars.inspection.shadow_map import ShadowMap
 
-__all__ = ["EdgeSettings", "Edges", "measure_edges"]
+__all__ = ["EdgeSettings", "Edges", "Lines", "edge_lines", "measure_edges"]
 
 Array = NDArray[np.float64]
 
@@ -60,15 +60,18 @@ FEWEST_LINES = 12
 LINES_A_STRETCH = 3
 REACH_SIGMAS, REACH_PX = 3.2, 1.2
 """How far pixels across an edge reach: spreads, and pixels more."""
+STEEPEST_GROWTH = 0.1
+"""Growth of the lit level per pixel that reflected light can bring."""
 MIN_GROWTHS = 24
-"""Stretches at one place of the edge whose median growth is worth more than none: each knows it to a per cent a pixel."""
+"""Stretches at one place of the edge whose median growth beats none: each knows its own to a per cent per pixel."""
 
 
 class EdgeSettings(NamedTuple):
     """How edges are looked for.
 
-    Spread of a sharp edge; size of the lamps, standard deviations along the azimuth and up; largest distance to look to on
-    both sides; distance of pixels. `coarse`: by area instead, see the head of this file; finds edges up to half of `reach_px` away.
+    Spread of a sharp edge; size of the lamps, standard deviations along the azimuth and up; largest distance to look to
+    on both sides; distance of pixels. `coarse`: by area instead, see the head of this file; finds edges up to half of
+    `reach_px` away.
     `thorough`: more lines across the edges of large balls.
     """
 
@@ -167,7 +170,7 @@ def measure_edges(
     stretches, noise = _bgars.measure_edges(
         kernel_capture(radiance.capture),
         Casters.of(table, vectors, near, board),
-        _lines(angles_rad, np.median(table, axis=0), vectors, near, board, settings),
+        edge_lines(angles_rad, np.median(table, axis=0), vectors, near, board, settings),
         angles_rad=angles_rad.tolist(),
         sectors=sectors,
         gains=gains.astype(np.float32),
@@ -183,7 +186,7 @@ def measure_edges(
     return _edges(fit, noise, balls, vectors, near, board, settings, lamp or EdgeSpread(0.0, 0.0), radiance.scale)
 
 
-class _Lines(NamedTuple):
+class Lines(NamedTuple):
     """Settings of the kernel: the same of all lines across edges, and lists with a value for each."""
 
     spread_px: float
@@ -193,7 +196,9 @@ class _Lines(NamedTuple):
     coarse: bool
 
 
-def _lines(angles_rad: Array, ball: Array, vectors: Array, near: bool, board: Board, settings: EdgeSettings) -> _Lines:
+def edge_lines(
+    angles_rad: Array, ball: Array, vectors: Array, near: bool, board: Board, settings: EdgeSettings
+) -> Lines:
     """How wide a usual ball's edges are, by the place along them: a lamp may be wider than it is high."""
     balls, lights = Balls.from_table(ball[None]).spread(2), Lights.from_table(vectors, near).spread(1, 1)
     edge = edge_at(angles_rad, balls, lights, board)
@@ -205,7 +210,7 @@ def _lines(angles_rad: Array, ball: Array, vectors: Array, near: bool, board: Bo
     reach_px = np.full(len(angles_rad), settings.reach_px)
     if not settings.coarse:
         reach_px = np.minimum(reach_px, REACH_SIGMAS * np.hypot(settings.spread_px, blurred_px) + REACH_PX)
-    return _Lines(
+    return Lines(
         settings.spread_px, (blurred_px / way_px).tolist(), reach_px.tolist(), settings.stride_px, settings.coarse
     )
 
@@ -215,8 +220,8 @@ class Stretches(NamedTuple):
 
     Coefficients (shadow and lit level, displacement and change of the spread times the contrast) and their standard
     uncertainties; mean texture and its relative growth outward per pixel; means over the lines of the tangent point's
-    angle, the way of the light and the spread, weighted by what they say about the displacement; growth of the lit level
-    outward per pixel where it is free, and the displacement then; 1 where there was enough to see, else 0.
+    angle, the way of the light and the spread, weighted by what they say about the displacement; growth of the lit
+    level outward per pixel where it is free, and the displacement then; 1 where there was enough to see, else 0.
     """
 
     low: Array
@@ -293,6 +298,9 @@ def _without_growth(fit: Stretches, measured: NDArray[np.bool_]) -> Array:
     per_growth = np.where(fit.lit_growth != 0.0, fit.moved - fit.moved_with_growth, 0.0)
     per_growth = per_growth / np.where(fit.lit_growth != 0.0, fit.lit_growth, 1.0)
     share = np.where(measured, fit.lit_growth / np.where(measured, fit.high, 1.0), np.nan)
+    # Steeper ones are none: too little lit board to tell growth from displacement.
+    plausible = np.abs(share) < STEEPEST_GROWTH
+    share, per_growth = np.where(plausible, share, np.nan), np.where(plausible, per_growth, 0.0)
     count = np.isfinite(share).sum(axis=(0, 1))
     # Left and right of the tip are alike.
     both = np.concatenate([share, share[..., ::-1]], axis=0)

@@ -50,8 +50,9 @@ def what_is_odd(settled: Settled, pitch_um: float) -> tuple[str, ...]:
         )
     if odd.get(EDGE, 0.0) > PROBABLE:
         texts.append(
-            f"all edges of shadows lie {abs(float(common[EDGE])):.2f} pixels {'outside' if common[EDGE] > 0 else 'inside'}"
-            " of where outlines put them: is the response linear, is the board over-exposed?"
+            f"all edges of shadows lie {abs(float(common[EDGE])):.2f} pixels "
+            f"{'outside' if common[EDGE] > 0 else 'inside'} of where outlines put them: is the response linear, is the "
+            "board over-exposed?"
         )
     return tuple(texts)
 

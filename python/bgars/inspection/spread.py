@@ -1,10 +1,10 @@
 """How sharp shadow edges are: pixel and lens alike everywhere, the lamp's width and height by the way of its light.
 
-A lamp that is wide blurs an edge, and moves it, too: seen from a board point on the edge, half of the lamp is hidden. With
-d the distance to the edge, g its gradient and H its second derivative by the direction of the light, half of a lamp with
-covariance S is hidden where ``d + H_tt v / 2 = 0``, t the direction on the lamp along which d does not change (g t = 0)
-and v the variance of the lamp there, ``1 / (t^T S^-1 t)``: to second order the median of a quadratic form of normal
-variables under the condition that its linear part vanishes.
+A lamp that is wide blurs an edge, and moves it, too: seen from a board point on the edge, half of the lamp is hidden.
+With d the distance to the edge, g its gradient and H its second derivative by the direction of the light, half of a
+lamp with covariance S is hidden where ``d + H_tt v / 2 = 0``, t the direction on the lamp along which d does not change
+(g t = 0) and v the variance of the lamp there, ``1 / (t^T S^-1 t)``: to second order the median of a quadratic form of
+normal variables under the condition that its linear part vanishes.
 """
 
 from __future__ import annotations
@@ -40,8 +40,10 @@ NUDGE_RAD = 0.02
 
 
 class EdgeSpread(NamedTuple):
-    """s^2 = sharp^2 + (g_a a)^2 + (g_e e)^2: standard deviations in px, and of the lamp in radians seen from the board,
-    along the azimuth and up. `lamp_rad` is that of a round lamp that blurs as much on the whole.
+    """``s^2 = sharp^2 + (g_a a)^2 + (g_e e)^2``: standard deviations of an edge.
+
+    In px, and of the lamp in radians seen from the board, along the azimuth and up; `lamp_rad` is that of a round lamp
+    that blurs as much on the whole.
     """
 
     sharp_px: float
@@ -61,7 +63,7 @@ def lamp_gradients(beam: Rays, balls: Balls, vectors: Array) -> tuple[Array, Arr
 def lamp_shift_px(
     x: Array, y: Array, balls: Balls, vectors: Array, near: bool, board: Board, spread: EdgeSpread
 ) -> Array:
-    """(N, L, S) how far outside the measured edge, where half of the lamp is seen, the edge of the lamp's middle lies."""
+    """(N, L, S) how far outside the measured edge, where half of the lamp is seen, that of the lamp's middle lies."""
     wide, high = spread.lamp_azimuth_rad, spread.lamp_elevation_rad
     lights = Lights.from_table(vectors, near).spread(1, 1)
     beam = rays(x, y, balls, lights, board)
@@ -70,7 +72,7 @@ def lamp_shift_px(
     turn_along, turn_up = -up / steep, along / steep
     ways = tangents(vectors)
     slope = np.maximum(beam.slope, 1e-3)
-    second = np.zeros_like(steep)
+    second: Array = np.zeros(steep.shape)
     for sign in (-1.0, 1.0):
         way = (
             sign
@@ -79,7 +81,8 @@ def lamp_shift_px(
         )
         moved = vectors[None, :, None, :] + way
         moved *= (np.linalg.norm(vectors, axis=1)[None, :, None] / np.linalg.norm(moved, axis=-1))[..., None]
-        second += rays(x, y, balls, Lights(*np.moveaxis(moved, -1, 0), near), board).distance
+        lamp_x, lamp_y, lamp_z = np.moveaxis(moved, -1, 0)
+        second = second + rays(x, y, balls, Lights(lamp_x, lamp_y, lamp_z, near), board).distance
     bend = (second - 2.0 * beam.distance) / (NUDGE_RAD**2 * slope)
     least = 1e-12
     # With t across g: 1 / (t_a^2 / wide^2 + t_e^2 / high^2), t = (-g_e, g_a) / |g|.

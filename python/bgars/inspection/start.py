@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 HEIGHTS = np.linspace(-0.6, 1.15, 36)
 """Heights of the centre that are tried, in radii of the outline; below 0 the outline is the foot of a cap."""
+CAP_MARGIN = 0.1
+"""Step of brightness that speaks for a cap: balls are the rule, and little of a cap's shadow is seen."""
 ANGLES = np.radians(np.linspace(-60.0, 60.0, 13))
 BESIDE = 0.09
 """Points inside and outside lie this share of the radius off the edge."""
@@ -138,6 +140,7 @@ def first_heights(
         seen[index] = step
         known = np.isfinite(step)
         scores[index] = np.where(known, step, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 3.0)
+        scores[index] -= np.where(HEIGHTS < 0.0, CAP_MARGIN, 0.0)
 
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(look, range(len(table))))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,12 +46,13 @@ def lens_scale(slots: tuple[Slot, ...], measurement: BallMeasurement, recipe: Pa
 def to_scale(measurement: BallMeasurement, lens: LensScale) -> BallMeasurement:
     """All lengths as they are, not as the image has them."""
     centres = np.array([(ball.x_um, ball.y_um) for ball in measurement.balls], dtype=np.float64).reshape(-1, 2)
+    x_um, y_um = centres[:, 0], centres[:, 1]
     tops = np.array([ball.top_um for ball in measurement.balls], dtype=np.float64)
-    by_place = lens.u_share(*centres.T)
+    by_place, by_length = lens.u_share(x_um, y_um), lens.u_share(x_um, y_um, turns=2.0)
     shared = {}
     for name, part in measurement.shared_um.items():
-        value = {"x_um": centres[:, 0], "y_um": centres[:, 1], "top_um": tops}[name]
-        share = lens.u_share(*centres.T, turns=2.0) if name == "top_um" else by_place
+        value = {"x_um": x_um, "y_um": y_um, "top_um": tops}[name]
+        share = by_length if name == "top_um" else by_place
         shared[name] = np.column_stack([part, np.nan_to_num(value)[:, None] * share])
     coefficients = measurement.board_coefficients_um.copy()
     coefficients[3:] *= 1.0 + lens.scale
@@ -69,7 +70,7 @@ def _ball_to_scale(ball: MeasuredBall, lens: LensScale) -> MeasuredBall:
     place, length = float(lens.factor(x_um, y_um)), float(lens.length_factor(x_um, y_um))
     by_place = float(np.linalg.norm(lens.u_share(x_um, y_um)))
     by_length = float(np.linalg.norm(lens.u_share(x_um, y_um, turns=2.0)))
-    values: dict[str, float] = {}
+    values: dict[str, Any] = {}
     budget = {name: dict(causes) for name, causes in ball.budget.items()}
     for name in ("x_um", "y_um", *LENGTHS):
         factor, share = (length, by_length) if name in LENGTHS else (place, by_place)

@@ -17,7 +17,8 @@ const MATCH_LEVELS: f64 = 1.5;
 /// Standard error of the direction from which on a normal is the neighbours', not measured, degrees.
 const MAX_ERROR_DEG: f64 = 30.0;
 
-/// Residual that a fit is assumed to have at least, relative to the pixel's mean value.
+/// Residual that a fit is assumed to have at least: the scale of its loss, 2 % of the pixel's mean value or a grey level of 255.
+/// A misfit below it is not seen: the loss takes all lights for good ones.
 const PRIOR_RESIDUAL: f64 = 0.02;
 
 /// Unknowns of a pixel: two of the direction, and the albedo.

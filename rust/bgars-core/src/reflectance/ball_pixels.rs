@@ -40,11 +40,8 @@ pub fn paired(pixels: &[usize], count: usize) -> Vec<usize> {
 
 /// The circles with another shape over them; an uncertain shape makes a normal as uncertain as an uncertain radius does.
 pub fn with_shape(circles: &[Circle], common: CommonShape) -> Vec<Circle> {
-    let shaped = |circle: &Circle| Circle {
-        shape: common.shape,
-        u_radius_px: circle.u_radius_px.hypot(circle.radius_px * common.u_ratio),
-        ..*circle
-    };
+    let shaped =
+        |circle: &Circle| Circle { shape: common.shape, u_radius_px: circle.radius_px * common.u_ratio, ..*circle };
     circles.iter().map(shaped).collect()
 }
 

@@ -15,7 +15,7 @@ use super::regions::{Region, Regions};
 use super::residuals::learnt_corrections;
 use super::samples::FIT_MIN_N_Z;
 use super::scale::bend;
-use super::shape::{CommonShape, common_shape};
+use super::shape::{CommonShape, EVIDENCE, PRIOR, common_shape};
 use super::spread::Spread;
 use super::variation::ball_materials;
 use crate::normals::{NormalMapMut, check_finite};
@@ -196,11 +196,20 @@ pub fn estimate_into<P: Pixel>(
             let circles = with_shape(request.circles, CommonShape { shape, u_ratio: 0.0 });
             samples(&reader, lights, &circles, &pairs, &clip, usize::MAX, f64::NEG_INFINITY)
         };
-        shape = common_shape(&shaped, &of_spheres.material);
+        let squares = request.circles.iter().map(|circle| (circle.u_radius_px / circle.radius_px).powi(2));
+        let u_radius = (squares.sum::<f64>() / balls as f64).sqrt();
+        shape = common_shape(&shaped, &of_spheres.material, u_radius);
         circles = with_shape(request.circles, shape);
         if shape.shape != Shape::SPHERE {
-            some = sampled(&circles, of_each, FIT_MIN_N_Z);
-            fit = Some(best_material(&some));
+            let shaped = sampled(&circles, of_each, FIT_MIN_N_Z);
+            let of_shape = best_material(&shaped);
+            // To the rim, too.
+            if of_shape.cost < (1.0 - EVIDENCE) * of_spheres.cost {
+                (some, fit) = (shaped, Some(of_shape));
+            } else {
+                shape = CommonShape { shape: Shape::SPHERE, u_ratio: PRIOR.hypot(u_radius) };
+                circles = with_shape(request.circles, shape);
+            }
         }
     }
     let material = request.material.or(fit.as_ref().map(|fit| &fit.material)).cloned().ok_or(Error::NoMaterial)?;

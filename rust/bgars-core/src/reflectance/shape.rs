@@ -22,13 +22,13 @@ const INDEPENDENT: f64 = 54.0;
 
 /// Standard deviation of the ratio that is reckoned with before the light is looked at: what is seen of solder balls is round
 /// within 1 %, twice this.
-const PRIOR: f64 = 0.005;
+pub const PRIOR: f64 = 0.005;
 
 /// A ratio so many standard uncertainties from 1 is believed ...
 const SIGNIFICANT: f64 = 3.0;
 
 /// ... if it lowers the loss by this share, as a second lobe must: lights that all stand higher than said look much the same.
-const EVIDENCE: f64 = 0.15;
+pub const EVIDENCE: f64 = 0.15;
 
 /// What stands on the circles.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,14 +57,17 @@ struct Best {
 /// light and prior together say it is off. One that is believed competes with that of an ellipsoid.
 ///
 /// `samples(shape)`: the same pixels, in pairs of neighbours, with the normals of a shape.
-pub fn common_shape(samples: &dyn Fn(Shape) -> Samples, material: &Material) -> CommonShape {
+/// `u_radius`: standard uncertainty of the radii over the radii. A circle that is too small and a cap lower than half a ball have the
+/// same normals: the ratio is that of both, and so is its uncertainty.
+pub fn common_shape(samples: &dyn Fn(Shape) -> Samples, material: &Material, u_radius: f64) -> CommonShape {
+    let prior = PRIOR.hypot(u_radius);
     let free = Free { grazing: material.grazing != 0.0, tails: true, gains: true };
     let Some(cap) = least(samples, material, free, Shape::Cap) else {
-        return CommonShape { shape: Shape::SPHERE, u_ratio: PRIOR };
+        return CommonShape { shape: Shape::SPHERE, u_ratio: prior };
     };
     let is_better = cap.loss < (1.0 - EVIDENCE) * cap.loss_of_spheres;
     if !is_better || (cap.ratio - 1.0).abs() <= SIGNIFICANT * cap.sigma {
-        let (prior, sigma) = (PRIOR * PRIOR, cap.sigma * cap.sigma);
+        let (prior, sigma) = (prior * prior, cap.sigma * cap.sigma);
         let off = (cap.ratio - 1.0) * prior / (prior + sigma);
         let u_ratio = (off * off + prior * sigma / (prior + sigma)).sqrt();
         return CommonShape { shape: Shape::SPHERE, u_ratio };
@@ -106,7 +109,7 @@ fn least(
     let samples = samples(family(best.ratio));
     let independent =
         1.0 / (shared(&samples, &middle.1.material) / INDEPENDENT + 1.0 / samples.values.len().max(1) as f64);
-    let sigma = (best.sigma * (INDEPENDENT / independent).sqrt()).max(LEAST_SIGMA);
+    let sigma = best.sigma * (INDEPENDENT / independent).sqrt();
     Some(Best { sigma, loss_of_spheres, ..best })
 }
 
@@ -145,6 +148,3 @@ fn vertex(below: &(f64, MaterialFit), middle: &(f64, MaterialFit), above: &(f64,
     let sigma = (loss / (INDEPENDENT * half_curvature)).sqrt();
     Some(Best { ratio: middle.0 + shift * step, loss, loss_of_spheres: loss, sigma })
 }
-
-/// Standard uncertainty of a ratio at least: what the outline's blur and the camera's pixels leave of it.
-const LEAST_SIGMA: f64 = 2e-3;
