@@ -110,7 +110,7 @@ fn least(
     let independent =
         1.0 / (shared(&samples, &middle.1.material) / INDEPENDENT + 1.0 / samples.values.len().max(1) as f64);
     let sigma = best.sigma * (INDEPENDENT / independent).sqrt();
-    Some(Best { sigma, loss_of_spheres, ..best })
+    Some(Best { loss_of_spheres, sigma, ..best })
 }
 
 /// The share of the residuals that the neighbours of each pair have in common: what is no noise.
