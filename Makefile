@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral simulator experiments method schema studies performance instructions clean
+.PHONY: demo test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral simulator experiments method schema constants studies performance instructions clean
 
 demo: $(VENV)/.installed ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
@@ -68,6 +68,9 @@ studies: $(VENV)/.installed ## Run the gauge studies of docs/studies.md again (1
 
 schema: $(VENV)/.installed ## Write docs/result.schema.json, the JSON Schema of result.json, again
 	$(BIN)/python docs/make_result_schema.py
+
+constants: $(VENV)/.installed ## Write docs/constants.md, the registry of constants, again
+	$(BIN)/python docs/make_constants.py
 
 instructions: ## Instructions a pixel of each kernel against the kept counts (needs valgrind)
 	python3 benches/count_instructions.py

@@ -71,6 +71,19 @@ def mismatch() -> list[str]:
     return missing + sorted(stale) + wrong
 
 
+def unused() -> list[str]:
+    """Constants that no line of the package reads, in words."""
+    read: set[tuple[str, str]] = set()
+    for path in PACKAGE.rglob("*.py"):
+        module = f"{path.parent.name}.{path.stem}"
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
+                read.add((module, node.id))
+            if isinstance(node, ast.ImportFrom) and node.module:
+                read |= {(".".join(node.module.split(".")[-2:]), alias.name) for alias in node.names}
+    return [f"{module}.{name}" for module, name, *_ in constants() if (module, name) not in read]
+
+
 def page_text() -> str:
     """Return the page as the file holds it."""
     known = registry()
@@ -79,9 +92,9 @@ def page_text() -> str:
     lines = [
         "# Constants",
         "",
-        f"The {len(found)} constants of `balls/` and `inspection/`. `make constants` writes this page: value and meaning",
-        "from the sources, the rest from [constants.tsv](constants.tsv). The test is one that fails when the constant",
-        "is multiplied by the factor behind it (`benches/move_constants.py`); an empty cell: none is known.",
+        f"The {len(found)} constants of `balls/` and `inspection/`. `make constants` writes this page: value and",
+        "meaning from the sources, the rest from [constants.tsv](constants.tsv). The test is one that fails when the",
+        "constant is multiplied by the factor behind it (`benches/move_constants.py`); an empty cell: none is known.",
         "",
         "| kind | constants | what it is |",
         "|---|---|---|",

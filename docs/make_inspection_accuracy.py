@@ -189,7 +189,12 @@ def simulate(
         for ball in truth.balls
         if ball.x_um is not None and ball.y_um is not None and ball.diameter_um is not None
     ]
-    return measure_balls(replace(capture, rig=nominal), found(balls)), truth
+    circles = found(balls)
+
+    def normals() -> bgars.NormalField:
+        return bgars.estimate_normals(replace(capture, rig=nominal), anchors=circles)
+
+    return measure_balls(replace(capture, rig=nominal), circles, ball_field=normals), truth
 
 
 def coverage_row(name: str, setting: dict[str, float], totals: dict[str, list[bool]]) -> str:

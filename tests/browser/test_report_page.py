@@ -16,6 +16,7 @@ import pytest
 from bgars.report.page_units import with_micro
 from bgars.report.page_words import QUANTITIES, expanded, number
 from report_parts import RESULTS, failing, hostile, inspected, passing, simulated
+from test_report_budget import budgeted
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -170,6 +171,23 @@ def test_a_ball_is_chosen_in_picture_table_and_charts(failed_page: Path, open_pa
     page.keyboard.press("Escape")
     assert page.locator(".chosen").count() == 0
     assert page.inner_text("#chosen h3") == "Choose a ball"
+    assert opened.errors == []
+
+
+def test_a_chosen_ball_tells_what_its_height_is_uncertain_by(tmp_path: Path, open_page: Open) -> None:
+    result = budgeted()
+    path = tmp_path / "report.html"
+    bgars.write_report(result, path)
+    opened = open_page(path, viewport={"width": 390, "height": 844})
+    page = opened.page
+    for index, ball in enumerate(result.balls):
+        page.locator(f"#ball-{index} button.choose").press("Enter")
+        told = page.eval_on_selector_all("#chosen h4 + dl > div", "all => all.map(each => each.textContent)")
+        assert told == [f"{cause}{2 * u:.2f} µm" for cause, u in ball.budget.get("top_um", {}).items()]
+        assert page.locator("#chosen h4").count() == bool(told)
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+    table = page.locator(".budget")
+    assert table.bounding_box()["width"] <= 390, "no column is out of sight"  # type: ignore[index]
     assert opened.errors == []
 
 

@@ -21,8 +21,8 @@ __all__ = ["fit_alike"]
 
 ENOUGH = 4
 """Balls that make a population."""
-OTHER_START = 1.3
-MIN_SUPPORT = 0.5
+OTHER_START = 1.3  # radii to start from where the first show no highlights
+MIN_SUPPORT = 0.5  # of sectors: a rim that counts
 SHOULDER, SHOULDER_OF_USUAL, SHOULDER_OF_FEW = 0.8, 0.93, 0.75
 """Of the highlights' radius: smaller circles are shoulders of highlights. Wide lobes make that radius 13 % too large;
 a ball flattened to 0.8 would look the same among few."""
@@ -32,8 +32,8 @@ START_ERROR = 0.04
 """What circles to start from are wrong by in common, as a fraction of their radius."""
 SHOULDER_CLEAR = 0.84
 """Of the highlights' radius: metal mirrors the horizon at 0.71 and the nearest board up to here."""
-FLATTENED = 0.7
-USUAL = 0.04
+FLATTENED = 0.7  # flattest silhouette, of the highlights' radius
+USUAL = 0.04  # difference from the median highlight radius, as a fraction
 HALF_VECTOR_BIAS = 0.06
 """Largest usual difference of the highlights' radius, as a fraction: off-specular peaks and wide lobes."""
 DIFFERS_SIGMA, CENTRES_DIFFER_SIGMA = 3.0, 4.0
@@ -44,9 +44,9 @@ FAR = 1.5
 """Multiple of the limit of what agrees at which a silhouette counts as wholly elsewhere."""
 UNSURE, SURE = 0.83, 0.92
 """Support of a rim that proves nothing, and of a complete one."""
-CENTRE_DIFFERS = 0.015
-BETTER_SUPPORT = 0.1
-REPLACED_U = 2.0
+CENTRE_DIFFERS = 0.015  # of the radius: a silhouette that lies aside of its highlights
+BETTER_SUPPORT = 0.1  # of sectors: more, or less, that counts
+REPLACED_U = 2.0  # factor on the uncertainty of what takes a silhouette's place
 WORTH_A_TRY_PX = 0.05
 """Distance from the highlights' centre from which on a fit that starts there may end elsewhere."""
 

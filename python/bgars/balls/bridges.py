@@ -18,11 +18,17 @@ NEIGHBOUR = 1.3
 WIDTHS = (0.15, 0.25, 0.4, 0.6)
 """Half widths of a ridge to try, in radii."""
 MIN_RIDGE = 0.35
+"""Mean slope away from the line between two balls, as a sine, that a bridge has at least."""
 ABOVE_OTHERS = 0.1
+"""And so much more than the median gap of the part."""
 CLEAR = 0.25
+"""So much more needs no other witness; less than that must shine as well."""
 USUAL_RIDGE = 0.2
+"""What stands for the median gap where there are fewer than `ENOUGH_PAIRS`."""
 ENOUGH_PAIRS = 4
+"""Gaps whose median says what is usual."""
 BRIGHTER = 1.2
+"""Brightest level of a gap, over that of the board, from which on it shines."""
 
 
 def joined_pairs(

@@ -35,38 +35,38 @@ __all__ = [
 ]
 
 WORKING_SIZE_PX = 512
-FLOOR_LEVELS = 2.0
+FLOOR_LEVELS = 2.0  # grey levels below which slopes fade: noise has none
 SMALLEST_RADIUS_PX = 3.5
 """In the reduced images: fewer pixels show no rim."""
-MIN_SHARE = 0.7
-MIN_SHARE_LIKE_OTHERS = 0.45
-MIN_STRENGTH = 0.15
-MIN_STRENGTH_LIKE_OTHERS = 0.08
-MIN_OUTWARD, MIN_ALIGNMENT = 0.3, 0.6
+MIN_SHARE = 0.7  # of directions that show the rim
+MIN_SHARE_LIKE_OTHERS = 0.45  # the same, where the size is that of the others
+MIN_STRENGTH = 0.15  # step of the root of the grey level, lower quartile over directions
+MIN_STRENGTH_LIKE_OTHERS = 0.08  # the same, where the size is that of the others
+MIN_OUTWARD, MIN_ALIGNMENT = 0.3, 0.6  # mean outward slope of a disc, and how well slopes point outward
 MIN_OUTWARD_CLIPPED, MIN_ALIGNMENT_CLIPPED, CLIPPED = 0.1, 0.9, 0.25
 """Where so much of a disc is clipped, slopes are small; their directions are left."""
-OUTER_STRENGTH = 0.8
-OUTER_STRENGTH_OF_HIGHLIGHTS = 0.35
+OUTER_STRENGTH = 0.8  # of the strength of a rim inside: the rim around it wins
+OUTER_STRENGTH_OF_HIGHLIGHTS = 0.35  # the same, around the small rims of highlights
 HIGHLIGHT_RATIO = 2.5
 """A rim around another one wins from such a fraction of its strength on: highlights make strong rims inside balls, the
 smaller the more likely."""
-MIN_SUPPORT = 0.5
+MIN_SUPPORT = 0.5  # of sectors of the fitted rim
 MIN_SUPPORT_IN_MASK = 0.85
 """A mask says that there is an object: round parts of it are no balls."""
-MAX_U_RADIUS = 0.1
-LIKE_OTHERS = (0.8, 1.25)
-SCALES_LIKE_OTHERS = (0.6, 3.0)
-ODD_SIZE = 1.35
-USUAL_STRENGTH = 0.3
-ENOUGH_TO_JUDGE_SIZE = 3
-SMALLEST_OF_USUAL = 0.35
+MAX_U_RADIUS = 0.1  # standard uncertainty over radius from which on a circle is none
+LIKE_OTHERS = (0.8, 1.25)  # ratio to the usual radius of circles like the others
+SCALES_LIKE_OTHERS = (0.6, 3.0)  # ratio of scales to the usual radius that are worth a look
+ODD_SIZE = 1.35  # ratio to the usual radius from which on a size is odd
+USUAL_STRENGTH = 0.3  # of an odd rim's strength: a usual one that takes its place
+ENOUGH_TO_JUDGE_SIZE = 3  # circles that have a usual size
+SMALLEST_OF_USUAL = 0.35  # of the median radius: what is smaller is dirt
 LIKE_SHINE, SHINING = 1.1, 0.5
 """Ratio of highlight circles that are alike, and the share of all balls that makes them the rule."""
 INNER = 0.7
 """Of the highlight circle: where flat balls and caps have no rim yet, and mirrored board has none any more."""
 COARSE_ERROR = 0.05
 """Standard deviation of a circle of coarse edges, in radii."""
-MIN_COVERED = 0.97
+MIN_COVERED = 0.97  # share of a disc that must lie in the mask
 MOST_MIRRORS = 50
 
 

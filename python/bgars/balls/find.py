@@ -29,10 +29,13 @@ if TYPE_CHECKING:
 __all__ = ["find_balls"]
 
 ODD_SIZE = 0.25
+"""Difference from the median radius, as a share of it, that is told."""
 ENOUGH_TO_JUDGE_SIZE = 4
+"""Balls that have a usual size."""
 BRIDGE_MIDDLE = 0.25
 """Farthest from the middle of two neighbours, in pitches, that a small circle counts as the bridge between them."""
 BRIDGE_SIZE = 0.75
+"""Of the median radius: what is smaller, and between two balls, is their bridge."""
 
 
 class _Grid(NamedTuple):

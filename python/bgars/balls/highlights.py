@@ -21,6 +21,7 @@ WINDOW = 0.25
 """Half width of the taper that a highlight is centred in, in radii."""
 SEARCH = 0.45
 SMALLEST_WINDOW_PX = 2.5
+"""Half width of the taper on small balls."""
 PASSES = 3
 SHIFTS = 8
 ROUNDS = 6
@@ -30,11 +31,15 @@ MIN_CONTRAST = 4.0
 MIN_RATIO = 0.5
 """The same, of the surroundings."""
 MIN_HIGHLIGHTS = 3
+"""Three fix the circle of a ball: two coordinates and a radius."""
 TOLERANCE, TOLERANCE_PX = 0.015, 0.2
 """Distance of a highlight from its place that quarters its weight: in radii, and in pixels, whose noise it holds."""
 MAX_RMS = 0.03
+"""Of highlights around their places, in radii, that still are those of one sphere."""
 POOL_BALLS = 6
+"""Balls whose median tells where the highlight of a light lies off its half vector."""
 MIN_DISC_PIXELS, MIRROR_SPOT = 30, 0.05
+"""Least pixels of a disc, and most of them, as a share, that the mirror image of a light covers."""
 MIRRORED = 0.12
 """Largest distance, in radii, of a mirrored light from where a sphere would show it; of three lights in four."""
 NOISE = 0.001

@@ -15,6 +15,7 @@ __all__ = ["Lattice", "fit_lattice"]
 ON_LATTICE = 0.3
 """Farthest from its place, in pitches, that a ball still belongs to it."""
 GROWTH = 2.0
+"""How much farther each round looks for balls of the lattice than the one before."""
 MAX_ROUNDS = 12
 
 

@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 __all__ = ["RoundBlobs", "round_blobs"]
 
 SMALLEST_PX = 4.0
+"""Radius of the smallest blob that is looked at."""
 ROUND_PX = 0.7
+"""RMS distance of the outline from the circle that still is round, in pixels."""
 ROUND_FRACTION = 0.015
 """RMS distance of the outline from the circle that still is round: pixels, or of the radius."""
 MAX_BLOBS = 1000

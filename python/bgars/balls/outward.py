@@ -20,10 +20,12 @@ if TYPE_CHECKING:
 __all__ = ["Centre", "outward_centres", "slope_field"]
 
 SMALLEST_PX = 4.0
+"""Smallest radius that is looked for, in pixels of the reduced images."""
 SCALE_STEP = 1.35
 STEPS_PER_SCALE = 10
 """Least pixels a scale has: larger ones are looked for in coarser slopes."""
 MIN_SCORE = 0.13
+"""Mean outward slope of a centre; a sphere that fills its disc has 0.67, a board 0."""
 MAX_CENTRES = 3000
 
 

@@ -38,11 +38,13 @@ ALONG, RIMS = 24, 2
 SIZES, MOVED = (0.75, 1.3), 1.1
 """Of the usual radius, and the most that a fit goes from its edge, as a ratio."""
 MAX_U_RADIUS = 0.1
+"""Standard uncertainty of a radius, as a share of it, from which on a circle is none."""
 BALL_SLOPE = 0.5
 """Outward slope, of the usual ball's, that a ball has: a coined one has half."""
 EMPTY_SLOPE = 0.25
 """And that nothing that is seen to be empty has, however rough the board."""
 BOARD_SIGMA = 3.0
+"""Standard deviations of board beyond which a slope is no board."""
 FLAT_SLOPE = 0.02
 """Least standard deviation of the slope of board: a degree, by which lights may be off."""
 BOARD_DISC, FEWEST_BOARD = 0.6, 4

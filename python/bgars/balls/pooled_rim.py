@@ -25,6 +25,7 @@ RATIO_ERROR = 0.03
 POOLED_ERROR = 0.012
 """Standard deviation of the ratio found here: metal mirrors board and shadows, which end before the silhouette does."""
 BLUR_PX = 0.3
+"""Blur of the lens before it is known."""
 BALLS = 60
 """More than these say nothing new."""
 

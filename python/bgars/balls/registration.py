@@ -22,6 +22,7 @@ __all__ = ["Registration", "register"]
 MATCH = 0.3
 """Farthest from its place, in distances of nearest places, that a ball still belongs to it."""
 WRONG_SCALE = 0.1
+"""Relative difference of the places' scale and the image's from which on the recipe is not that of the part."""
 MIN_MATCHED = 0.6
 """Of the balls: every other ball of a square lattice is one, too, turned by 45 degrees and wider, with half of them."""
 NEIGHBOURS, NEIGHBOURS_OF_PLACE = 6, 12

@@ -23,14 +23,18 @@ __all__ = ["Circles", "fit_rims", "rim_costs"]
 WIDE_ROUNDS = 3
 NARROW_ROUNDS = 3
 FIRST_BLUR_PX = 0.3
+"""Blur of the lens before it is fitted."""
 WIDE_REACH_PX, NARROW_REACH_PX = 13.0, 9.0
 """Depth of the bands, and how far circles move within them."""
 TOLERANCES = ((0.6, 1),) * 3 + ((0.1, 1),) * 2 + ((0.1, 2),) + ((0.05, 2),) * 6
 """Offset in pixels that halves a weight, and the power of the weight: Cauchy first, then closer."""
 MODEL_ERROR_PX = 0.03
+"""Scatter of the offset of a sector that its noise does not explain."""
 LARGEST_STEP_PX = 1.5
 POOL_BALLS = 6
+"""Balls from which on the slopes of rims are the median over balls, else over turns of one."""
 SEEN_WITHIN_PX = 0.3
+"""Offset of a sector within which it supports the circle."""
 CENTRE_SHARE, RADIUS_SHARE = 0.6, 1.0
 """Error that all sectors share, as a fraction of their scatter."""
 U_MODEL_PX = 0.012

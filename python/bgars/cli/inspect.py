@@ -19,6 +19,7 @@ from bgars.io.given_paths import need_file, need_folder
 from bgars.io.parquet import need_pyarrow
 from bgars.normals import DEFAULT_METHOD
 from bgars.report.page import REPORT_FILES
+from bgars.report.page_budget import main_causes
 from bgars.report.part import PICTURES
 
 if TYPE_CHECKING:
@@ -133,6 +134,9 @@ def _tell(result: PartResult, output: Path, files: dict[str, str]) -> None:
     for reason in result.reasons:
         say(f"  {reason}")
     say(_summary(result))
+    if causes := main_causes(result.to_dict()):
+        told = ", ".join(f"{cause} {u_um:.2g} um" for cause, u_um in causes)
+        say(f"U of a typical height, by cause: {told}")
     for warning in result.warnings:
         say(f"warning: {warning}")
     say()

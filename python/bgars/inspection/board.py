@@ -19,7 +19,9 @@ Array = NDArray[np.float64]
 SHAPE_TERMS = 5
 """Coefficients c1 to c5 of z = c1 x + c2 y + c3 x^2 + c4 x y + c5 y^2; height 0 at the image centre by definition."""
 TRIM = 3.0
+"""Normals farther from the fit, in standard deviations, are no board."""
 MIN_BOARD_PIXELS = 100
+"""Fewer pixels of board have no shape."""
 MAX_SAMPLES = 60_000
 ROUNDS = 4
 OUTSIDE = 1.1

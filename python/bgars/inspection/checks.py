@@ -9,28 +9,20 @@ from numpy.typing import NDArray
 
 from bgars.errors import CalibrationError, InputError
 from bgars.inspection.board import Board
+from bgars.inspection.image_shifts import MIN_STRETCHES
 from bgars.inspection.in_view import fitting_stretches
 from bgars.inspection.shadow_model import Balls, Lights
 from bgars.inspection.start import edge_steps
 from bgars.light_names import light_name, numbered
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from bgars.inspection.outline import Outlines
     from bgars.inspection.problem import Problem
     from bgars.inspection.shadow_edges import Edges
     from bgars.records import Capture
 
 __all__ = [
     "Complaint",
-    "ImageShifts",
-    "agreed_shifts",
-    "check_shifts",
-    "displaced_images",
     "explain_dark_steps",
-    "image_shifts",
     "refuse_misfits",
     "refuse_repeated",
 ]
@@ -40,10 +32,10 @@ Array = NDArray[np.float64]
 SAMPLE = 50_000
 GOOD_STEP = 0.5
 """Mean step of brightness over predicted edges, relative to the board, that needs no explanation."""
-MUCH_BETTER = 0.2
+MUCH_BETTER = 0.2  # of the same: what another explanation must gain
 FITTING_SHARE = 0.7
 """A light is fine when this share of its stretches of edge fit, where it stands at most `FAR_DEG` from the rig."""
-FAR_DEG = 5.0
+FAR_DEG = 5.0  # from the rig: a light that is wrong
 MIN_WITNESSES = 3
 """Balls that must agree before an image is refused."""
 MOST_BALLS = 12
@@ -51,19 +43,12 @@ TURNS_DEG = np.arange(-180.0, 180.0, 7.5)
 RAISES_DEG = np.arange(-15.0, 16.0, 5.0)
 SHIFTS = np.arange(-0.9, 0.91, 0.15)
 """Shifts that are tried, in radii."""
-SAME_LIGHT_DEG = 12.0
+SAME_LIGHT_DEG = 12.0  # directions closer than this are the same light
 NEAR_DEG = 7.5
 """Lights this far off are still found by the fit, and measured there."""
-OUTLINE_BESIDE = 0.1
-SHARPER = 1.15
-SHIFT_WARNING_PX, SHIFT_ERROR_PX = 0.4, 1.0
-SHIFT_SIGMAS = 6.0
-AGREEING = 0.5
-"""Share of a coarse shift that a fine look must see, along it."""
-MIN_STRETCHES = 20
-FEW_OUTLINES = 0.25
-"""An image that shows less than this share of the outlines that the others show, where they show them, is displaced."""
-LOWEST_DEG, HIGHEST_DEG = 5.0, 88.0
+OUTLINE_BESIDE = 0.1  # of the radius: how far in and out of an outline contrast is taken
+SHARPER = 1.15  # ratio of contrasts of outlines that confirms a shift
+LOWEST_DEG, HIGHEST_DEG = 5.0, 88.0  # elevations within which lights are looked for
 
 
 def refuse_repeated(capture: Capture) -> None:
@@ -273,87 +258,3 @@ def _best_shift(problem: Problem, table: Array, chosen: NDArray[np.intp], light:
     # Of equal steps the smallest shift: the flat top around the right one is wide.
     best = int(np.argmax(steps - 1e-3 * np.hypot(dx, dy) / radius))
     return float(steps[best]), float(dx[best]), float(dy[best])
-
-
-class ImageShifts(NamedTuple):
-    """(L, 2) how far each image is shifted against the others, px, and its standard uncertainty (L,); inf: unknown."""
-
-    move_px: Array
-    u_px: Array
-
-
-def image_shifts(outlines: Outlines) -> ImageShifts:
-    """Shifts of images from the outlines of the balls in each.
-
-    Under one light an outline is seen on one side only, and how its shading moves the edge is the same under every
-    light: what differs between lights is a shift.
-    """
-    lights = len(outlines.azimuths_rad)
-    shifts = ImageShifts(np.zeros((lights, 2)), np.full(lights, np.inf))
-    weight = np.where(np.isfinite(outlines.u_shift_px), 1.0, 0.0)
-    shift = np.where(weight > 0, outlines.shift_px, np.nan)
-    if weight.sum() < MIN_STRETCHES * lights:
-        return shifts
-    # A place of the outline that no light shows has no usual shift.
-    shown: NDArray[np.bool_] = np.asarray(np.isfinite(shift).any(axis=(0, 1)))
-    usual = np.full(len(shown), np.nan)
-    usual[shown] = np.nanmedian(shift[:, :, shown], axis=(0, 1))
-    for light, azimuth in enumerate(outlines.azimuths_rad):
-        off = shift[:, light] - usual[None, :]
-        known = np.isfinite(off)
-        if known.sum() < MIN_STRETCHES:
-            continue
-        angle = np.broadcast_to(azimuth + outlines.offset_rad[None, :], off.shape)[known]
-        system, found = np.column_stack([np.cos(angle), np.sin(angle)]), off[known]
-        spread = max(1.4826 * float(np.median(np.abs(found - np.median(found)))), 1e-3)
-        keep = np.abs(found - np.median(found)) < 4.0 * spread
-        shifts.move_px[light] = np.linalg.lstsq(system[keep], found[keep], rcond=None)[0]
-        shifts.u_px[light] = spread / np.sqrt(max(int(keep.sum()), 1) / 2.0)
-    return shifts
-
-
-def agreed_shifts(coarse: ImageShifts, fine: ImageShifts) -> ImageShifts:
-    """Coarse shifts that the outlines' shape confirms: by area alone, a shadow beside the rim looks like a shift."""
-    size = np.hypot(*coarse.move_px.T)
-    along = (coarse.move_px * fine.move_px).sum(axis=1)
-    # The fine look knows the shape of an edge that lies within its spread: a pixel at most.
-    denied = np.isfinite(fine.u_px) & (size < SHIFT_ERROR_PX) & (along < AGREEING * size**2)
-    return ImageShifts(np.where(denied[:, None], 0.0, coarse.move_px), coarse.u_px)
-
-
-def check_shifts(shifts: ImageShifts, files: Sequence[Path] = ()) -> tuple[str, ...]:
-    """Name images that are shifted by little.
-
-    Raises
-    ------
-    CalibrationError
-        A shift of a pixel or more.
-    """
-    warnings = []
-    for light, (move, u_move) in enumerate(zip(shifts.move_px, shifts.u_px, strict=True)):
-        size = float(np.hypot(*move))
-        if not np.isfinite(u_move) or size < max(SHIFT_WARNING_PX, SHIFT_SIGMAS * u_move):
-            continue
-        name = light_name(light, files, what="image")
-        text = f"{name} is shifted by ({move[0]:+.1f}, {move[1]:+.1f}) pixels (x right, y up) against the others"
-        if size >= SHIFT_ERROR_PX:
-            raise CalibrationError(text)
-        warnings.append(text)
-    return tuple(warnings)
-
-
-def displaced_images(outlines: Outlines, files: Sequence[Path] = ()) -> tuple[str, ...]:
-    """Name images whose balls have no outline where the others have one.
-
-    A shift of some pixels along the light's azimuth is taken for another elevation by the fit, and is too far for
-    `check_shifts`: then outlines are not merely moved, they are not found.
-    """
-    known = np.isfinite(outlines.u_shift_px).sum(axis=(0, 2))
-    usual = float(np.median(known))
-    if usual < MIN_STRETCHES:
-        return ()
-    return tuple(
-        f"{light_name(light, files, what='image')} shows {known[light]} stretches of outline where other images show "
-        f"{usual:.0f}: it is shifted, or shows something else"
-        for light in map(int, np.flatnonzero(known < FEW_OUTLINES * usual))
-    )

@@ -19,6 +19,7 @@ DRAWN_APEXES = 1 << 18
 """Noisy apexes in memory at once; the result does not depend on it."""
 SEED = 20_240_229
 MIN_BALLS = 3
+"""Three carry a plane."""
 OUTLIER = 4.0
 """Residuals beyond this many standard deviations are defects, not noise."""
 MAD_TO_SIGMA = 1.4826

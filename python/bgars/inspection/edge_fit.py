@@ -17,12 +17,14 @@ Index = NDArray[np.intp]
 
 ROUNDS = 2
 CAUCHY = 2.5
+"""Scale of the Cauchy loss of pixels, in standard deviations."""
 CAUCHY_FACTOR = 1.10
 """What weights at 2.5 standard deviations make the formula of least squares too small by, for Gaussian noise: the
 square
 root of (E[psi^2] / E[psi']^2) over (E[w r^2] / E[w]^2) (Huber 1981, section 7.6).
 """
 MIN_PIXELS = 12.0
+"""Least sum of weights of a stretch of edge that is measured."""
 RIDGE = 1e-9
 
 

@@ -18,6 +18,7 @@ MAX_CLIPPED = 0.5
 MIN_CONTRAST = 2.0 / 255.0
 """Least signal, of full scale: the least contrast of a shadow that is measured."""
 BRIGHT_PERCENT = 99.9
+"""Percentile that counts as the brightest signal: a few hot pixels are none."""
 SAMPLE_PX = 1 << 18
 
 

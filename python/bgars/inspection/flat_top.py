@@ -25,7 +25,9 @@ Array = NDArray[np.float64]
 REACH = 0.8
 """Normals within this share of the radius are looked at: farther out they are worst."""
 MIN_KNOWN = 0.6
+"""Share of the normals of a top that must be measured."""
 MIN_POPULATION = 5
+"""Balls whose median shows what the normals get wrong on all."""
 WITHOUT_POPULATION = 0.02
 """Standard deviation of M / R^2 that estimators get wrong on all balls alike: only a population takes it off."""
 INNER, UPRIGHT = 0.7, 0.5

@@ -27,9 +27,11 @@ Index = NDArray[np.intp]
 MOSTLY = 0.5
 """A first look judges a light by the ends of its shadows, where this share of them lies in the image."""
 FITTING_WEIGHT, STRONG = 0.3, 0.4
+"""Weight in the fit from which on a stretch of edge fits, and contrast, of the median's, that is an edge."""
 MISFIT_SHARE = 0.3
 """Where fewer of the stretches of edge that are in view fit, a light or an image is not what the rig says."""
 FEWEST_STRETCHES = 3
+"""Fewer stretches in view say nothing."""
 
 
 def lights_in_view(problem: Problem, table: Array) -> NDArray[np.bool_]:

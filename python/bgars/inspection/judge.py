@@ -36,6 +36,7 @@ __all__ = ["judge_part"]
 
 OWN_PITCH = "no recipe: true positions are against a grid of the part's own pitch"
 MIN_ROCKING = 2
+"""A part with two seating planes rocks."""
 EACH_BALL = "each ball by itself"
 MAX_LIGHT_CHANGE_DEG = 5.0
 """Beyond this nothing that rests on the lights may pass."""

@@ -31,13 +31,16 @@ DISTORTION = Mixture(0.0003, 0.004, 0.15)
 RECIPE_PITCH = 0.0003
 """Relative standard uncertainty of a recipe's pitch where it is not declared: substrates are etched to that."""
 UNKNOWN = 10.0
+"""Relative standard deviation of what is not known: ten times the whole."""
 MIN_BALLS = 6
 """Fewer say little of two numbers beside shift and turn."""
 ROUNDS = 8
 OUTLIER = 3.0
+"""Scatters of a ball from its place at which its weight is a quarter."""
 MEDIAN_LENGTH = 1.1774
 """Median length of a normal vector in the plane, in standard deviations."""
 FLOOR_UM = 0.05
+"""Least scatter of balls around their grid."""
 
 
 class LensScale(NamedTuple):

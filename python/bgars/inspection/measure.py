@@ -63,8 +63,7 @@ def measure_balls(
     BallMeasurement
         Balls in the order of `found`. What could not be measured is NaN, with reasons. Heights are above the smooth
         board under the ball. They rest on two assumptions, which no image can replace: errors of the rig are
-        independent
-        from light to light, and the balls are round on the whole (one ball may well be flattened).
+        independent from light to light, and the balls are round on the whole (one ball may well be flattened).
 
     Raises
     ------
@@ -87,8 +86,9 @@ def measure_balls(
     >>> capture, truth = bgars.simulate(scene, bgars.LightRig.ring(8), bgars.Material(), bgars.Camera(supersample=4))
     >>> ball = FoundBall("A1", 0, 0, 0.1, -0.1, 30.1, u_centre_px=0.2, u_radius_px=0.2)
     >>> found = FoundBalls((ball,), (), (), 1, 1, None, 0.0, (0.0, 0.0))
-    >>> round(measure_balls(capture, found, refine_lights=False).balls[0].top_um)
-    500
+    >>> top = measure_balls(capture, found, refine_lights=False).balls[0]
+    >>> abs(top.top_um - 500.0) < top.u_top_um
+    True
     """
     if field is not None and field.mask.shape != capture.images.shape[1:]:
         msg = f"field: must have the shape of the images {capture.images.shape[1:]}, got {field.mask.shape}"

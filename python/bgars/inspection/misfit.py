@@ -34,6 +34,7 @@ USUAL_EXCESS_PX = 0.05
 FARTHEST_PX = 3.0
 """Points farther off are no edge of this shadow."""
 PRIOR_FREEDOM = 6.0
+"""Numbers that the usual factor counts for, against those of a ball: two shadows."""
 TURNS_OF_LIGHT = 2
 
 

@@ -12,9 +12,11 @@ if TYPE_CHECKING:
 __all__ = ["odd_sizes"]
 
 MIN_BALLS = 5
+"""Balls that have a usual size."""
 ODD_SHARE = 0.1
 """Least deviation from the median that is worth a word."""
 ODD_SIGMAS = 6.0
+"""And in standard deviations of the sizes: once in 5e8 normal ones."""
 MAD_TO_SIGMA = 1.4826
 
 

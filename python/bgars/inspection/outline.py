@@ -32,17 +32,25 @@ Array = NDArray[np.float64]
 
 SECTORS = 8
 WIDEST_RAD = np.radians(64.0)
+"""Half of the arc, around the azimuth of a light, on which outlines are lit."""
 LINE_SPACING_PX = 1.45
 MAX_LINES = 48
 REACH_PX = 3.5
+"""Half width of the band across an outline, once it is near."""
 COARSE_REACH, COARSE_EXTRA_PX = 0.2, 2.0
+"""Half width of the band of a first look: share of the radius, and pixels more."""
 MIN_STRETCHES = 12
+"""Measured stretches of an outline that is used."""
 MIN_SPREAD_DEG = 200.0
+"""And how far around the ball they must go: past half, so that both coordinates are held."""
 BESIDE_SHARE = 0.8
+"""Share of the pixels beside a stretch of outline that must be usable."""
 ROUNDS = 8
 BIN_DEG = 20.0
 CAUCHY = 2.5
+"""Scale of the Cauchy loss of stretches, in standard deviations."""
 NEIGHBOUR_GAP_PX = 5.0
+"""Board beside an outline that must be free of the next ball."""
 INV_SQRT_2PI = 0.3989422804014327
 
 

@@ -18,6 +18,7 @@ __all__ = ["ReferencePlane", "off_lines", "regression_plane", "seating_planes"]
 
 Array = NDArray[np.float64]
 MIN_BALLS = 3
+"""Three carry a plane."""
 NUDGE = 1e-6
 """How far the centre of gravity is moved off lines through two apexes, of the part's size."""
 TURNS_RAD = (0.05, -0.05, 0.0)

@@ -17,11 +17,15 @@ __all__ = ["q_spread"]
 Array = NDArray[np.float64]
 
 LIMITS = (0.0003, 0.02)
+"""Bounds of the scatter of q among round balls."""
 UNKNOWN = 0.003
-"""Scatter of q among round balls: bounds, and what is taken where too few balls are seen."""
+"""Scatter of q among round balls where too few of them are seen."""
 MIN_POPULATION = 5
+"""Fewer round balls do not know their scatter."""
 OUTLIER = 3.5
+"""Standard deviations beyond which a ball is not one of the round ones."""
 FREE = 0.2
+"""Prior standard deviation of q of a ball that is not round: its own shadows count."""
 MEDIAN_CHI_SQUARE = 0.455
 ROUNDS = 10
 

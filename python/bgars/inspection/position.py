@@ -12,6 +12,7 @@ __all__ = ["GridFit", "fit_grid"]
 
 Array = NDArray[np.float64]
 MIN_BALLS = 2
+"""Two fix a grid's shift and turn."""
 
 
 @dataclass(frozen=True, eq=False)

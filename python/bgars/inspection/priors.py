@@ -24,10 +24,11 @@ from bgars.inspection.common_terms import (
     ROUNDNESS,
     Mixture,
 )
+from bgars.inspection.image_shifts import SHIFT_SIGMAS, SHIFT_WARNING_PX
 from bgars.inspection.population import q_spread
 
 if TYPE_CHECKING:
-    from bgars.inspection.checks import ImageShifts
+    from bgars.inspection.image_shifts import ImageShifts
     from bgars.inspection.problem import Problem
     from bgars.records import NormalField
 
@@ -38,12 +39,17 @@ Array = NDArray[np.float64]
 RIG_DEG = 0.3
 """Lights may be this far from where the rig says (standard deviation of each axis), before their scatter says more."""
 CERTAIN_RIG_DEG = 1e-4
+"""Lights that the fit must leave where the rig says."""
 RIG_LIMITS_DEG = (0.003, 2.0)
+"""Bounds of the scatter of lights around what all are turned by."""
 FIRST_Q_SPREAD = 0.02
+"""Scatter of q from ball to ball before anything was measured."""
 TILT = 0.003
+"""Prior standard deviation of the tilt of the board against the image plane."""
 BOW_SLOPE = 0.02
+"""Prior standard deviation of the slope by bow at the edge of the image."""
 STEEPEST_BOARD = 0.05
-"""Prior standard deviations of the board: tilt, and slope by bow at the edge of the image."""
+"""Slope by tilt or bow: where the normals of the board show a steeper one, too few of them are good."""
 TOGETHER_DEG = Mixture(0.05, 1.5, 0.1)
 """Elevation of all lights together: a ring that was squared to the board; one that was not, in one set-up of ten."""
 ROUND = Mixture(0.001, 0.05, 0.1)
@@ -68,11 +74,14 @@ SWING_DEG = 1.5
 """Azimuth of all lights together: turns the part's picture of the rig, and moves no height."""
 SHIFT_PX = 0.015
 """Images of a rig that stands still; a shift that outlines show is taken from them."""
-SHIFT_SIGMAS, SHIFT_SEEN_PX, SHIFT_FLOOR_PX = 6.0, 0.4, 0.05
+SHIFT_FLOOR_PX = 0.05
+"""A shift that outlines show is known no better than this."""
 ASIDE_PX = 0.015
 """All outlines together aside: lights of a ring cancel what shading does to a rim, but for their differences."""
 OUTLIER_SIGMAS = 3.0
+"""A light or an outline that lies farther off gets a standard deviation that puts it there."""
 LEAST_OUTLINE_PX = 0.02
+"""Least scatter of the radii of outlines from ball to ball."""
 MAD_TO_SIGMA = 1.4826
 MEDIAN_OF_CHI_SQUARE = 0.693
 """Median of the mean of two squared standard normal variables."""
@@ -197,7 +206,7 @@ def _scatter_of_lights(priors: Priors, solution: Solution) -> Array:
 def with_shifts(priors: Priors, shifts: ImageShifts) -> Priors:
     """Shifts of images that outlines show beyond doubt, instead of none."""
     size = np.hypot(*shifts.move_px.T)
-    seen = size > np.maximum(SHIFT_SIGMAS * shifts.u_px, SHIFT_SEEN_PX)
+    seen = size > np.maximum(SHIFT_SIGMAS * shifts.u_px, SHIFT_WARNING_PX)
     move = np.where(seen[:, None], shifts.move_px, 0.0)
     u = np.where(seen, np.maximum(shifts.u_px, SHIFT_FLOOR_PX), SHIFT_PX)
     return priors._replace(shifts_px=move, u_shifts_px=np.repeat(u[:, None], 2, axis=1))

@@ -29,23 +29,28 @@ Array = NDArray[np.float64]
 MIN_STRETCHES = 4
 """Measured stretches of edge that make a shadow usable."""
 MIN_LIGHTS = 2
+"""Lights whose shadows must be usable: one knows no elevation from height."""
 MIN_CONTRAST_LEVELS = 1.5
 """Contrast of lit and shadowed board, in grey levels of 255, that is too little: it rounds to less than 2."""
 MIN_CONTRAST_NOISE = 0.7
+"""Least contrast of a shadow, over the noise of the pixels at its edge."""
 FLAT_SIGMAS = 3.0
+"""Uncertainties from which on a flat top is significant."""
 FLAT_SHARE = 0.01
 """A flat top is taken off the height where it is significant and more than this share of the radius."""
-FLAT_MODEL = 0.15
+FLAT_MODEL = 0.25
 """Relative standard uncertainty of a flat top's depth: its edge is rounded, normals blend it with the slope beside."""
 FLAT_BALLS, DEEPEST_FLAT = 0.05, 0.25
 """Balls that are flat at all, one in twenty, by up to so many radii: what is believed before a top was looked at."""
 UNSEEN_TOP = 0.04
 """Of the radius: where a top is known no better, a flat one would pass for a round one."""
 FLAT_TOP = "flat top"
-POOR_SHARE = 0.02
 MANY_OUTLIERS = 0.4
+"""Share of the stretches of edge without weight from which on a ball is doubtful."""
 CLIPPED_SHARE = 0.5
+"""Share of board around a ball, saturated or masked, that explains why nothing was measured."""
 LIGHT_WARNING_DEG = 5.0
+"""Move of a light in the fit that is told."""
 WORTH_TELLING = 0.05
 """Causes of less than this share of an uncertainty are not listed: together they are a few thousandths of it."""
 
@@ -175,7 +180,8 @@ def _u_flat(flats: FlatTops | None, radius: Array) -> Array:
     """(N,) what a flat top, seen or not, makes the height uncertain by, px.
 
     A depth that was not found significant is uncertain by u only if the ball is flat at all: with a share p of flat
-    balls, deep evenly up to d, about ``p u sqrt(pi / 2) / d`` of those that look round within u are (Bayes' rule).
+    balls, deep evenly up to d, about ``p u sqrt(pi / 2) / d`` of those that look round within u are (Bayes' rule). A
+    top that was hardly seen is uncertain by all of u.
     """
     deepest = DEEPEST_FLAT * radius
     if flats is None:
@@ -184,7 +190,8 @@ def _u_flat(flats: FlatTops | None, radius: Array) -> Array:
     found = np.nan_to_num(flats.height_px)
     u = np.where(np.isfinite(flats.u_height_px), flats.u_height_px, deepest)
     still_flat: Array = FLAT_BALLS * np.minimum(1.0, u * np.sqrt(np.pi / 2.0) / deepest)
-    u_flat: Array = np.where(_is_flat(flats, radius), np.hypot(u, FLAT_MODEL * found), np.sqrt(still_flat) * u)
+    round_ = np.where(u > UNSEEN_TOP * radius, u, np.sqrt(still_flat) * u)
+    u_flat: Array = np.where(_is_flat(flats, radius), np.hypot(u, FLAT_MODEL * found), round_)
     return u_flat
 
 

@@ -52,6 +52,7 @@ Array = NDArray[np.float64]
 
 SECTORS, FEWEST_SECTORS = 20, 4
 WIDEST_RAD = np.radians(100.0)
+"""Half of the arc of a shadow, from its tip, that is looked at: beyond, the ball hides it."""
 LINE_SPACING_PX = 1.45
 """Distance of neighbouring lines along the edge: above sqrt(2), so that no two lines share a pixel."""
 MAX_LINES = 96

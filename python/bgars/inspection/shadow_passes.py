@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from bgars.inspection.board import Board
 from bgars.inspection.bundle import Priors, Solution, solve_bundle
 from bgars.inspection.bundle_model import State
-from bgars.inspection.checks import ImageShifts, agreed_shifts, image_shifts
 from bgars.inspection.common_terms import PERSPECTIVE
+from bgars.inspection.image_shifts import ImageShifts, agreed_shifts, image_shifts
 from bgars.inspection.outline import Outlines, outline_centres
 from bgars.inspection.plateaus import edge_bias_px
 from bgars.inspection.priors import COARSE_SPREAD_PX, refined_priors, with_edges, with_shifts
@@ -47,9 +47,12 @@ EMPIRICAL_ROUNDS = 5
 SETTLED = 0.1
 SHORT_ROUNDS, LONG_ROUNDS = 8, 20
 REDESCEND_FIRST, REDESCEND = 8.0, 3.5
+"""Scale, in standard deviations, of the loss that rejects outliers: at first, and once edges are sharp."""
 OUTLINE_SAFETY = 1.5
+"""Uncertainties of outlines count this much larger, beside what they scatter more than they say."""
 SHIFT_BALLS = 24
 OUTLINE_FLOOR_PX = 0.01
+"""Least standard uncertainty of a centre by its outline."""
 
 
 class ShadowPasses:

@@ -28,13 +28,18 @@ __all__ = ["SHARP_PX", "EdgeSpread", "fit_spread", "lamp_gradients", "lamp_shift
 Array = NDArray[np.float64]
 
 SHARPEST_PX = 0.2
+"""Least spread of an edge by lens and pixel together."""
 SHARP_PX = 0.3
 """A pixel alone: the standard deviation of a box one pixel wide is 0.29."""
 BLUNTEST_PX = 12.0
+"""Wider spreads are no edges."""
 FLOOR_PX = 0.03
+"""Least standard uncertainty of the spread of one stretch."""
 ROUNDS = 5
 CAUCHY = 2.0
+"""Scale of the Cauchy loss of spreads, in standard deviations."""
 MIN_STRETCHES = 20
+"""Stretches of edge that tell their spread by lamp and lens."""
 NUDGE_RAD = 0.02
 """Turn of the light for second differences: small against the angles in which a shadow's shape changes."""
 

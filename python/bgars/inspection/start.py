@@ -26,13 +26,17 @@ ANGLES = np.radians(np.linspace(-60.0, 60.0, 13))
 BESIDE = 0.09
 """Points inside and outside lie this share of the radius off the edge."""
 CLIP = (-0.5, 1.0)
+"""Bounds of a step of brightness, over the board: one bright speck counts no more."""
 DARK = 0.5
 """Board darker than this share of its mean over the lights is in a shadow."""
 MIN_POINTS = 3
+"""Points of an edge that must be seen."""
 USUAL_HEIGHT = 2.0 / 3.0
 """Height of the centre, in radii, where no ball shows its own."""
 WEAK_STEP = 0.08
+"""Step below which a ball shows no height of its own."""
 TOP_SHARE = 0.7
+"""Of the best score, what still belongs to the top whose middle is taken."""
 
 
 def edge_steps(

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from bgars.errors import InputError
 from bgars.io.atomic import atomic_file
 from bgars.part_result import PartResult
+from bgars.report.page_budget import BUDGET_COLUMNS, budget_table
 from bgars.report.page_charts import coplanarity_chart, histogram_charts
 from bgars.report.page_chosen import chosen_marks
 from bgars.report.page_material import material_facts, material_rows
@@ -36,7 +37,7 @@ from bgars.report.page_tables import (
 )
 from bgars.report.page_units import with_micro
 from bgars.report.page_vectors import VectorChart, vector_chart
-from bgars.report.page_words import QUANTITIES, VERDICT_MARKS, VERDICT_MEANINGS, listed, number
+from bgars.report.page_words import QUANTITIES, VERDICT_MARKS, VERDICT_MEANINGS, ball_state, listed, number
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -182,6 +183,8 @@ def page_text(source: PageSource) -> str:
         no_plane="; ".join(row["why"] for row in unmeasured(result) if "coplanarity" in row["what"]),
         residual="not measured" if residual is None else f"{residual:.1%} of the contrast of lit and shadowed board",
         board=board_words(result),
+        budget=budget_table(result),
+        budget_columns=BUDGET_COLUMNS,
         lights=light_rows(source),
         material=material_rows(result),
         material_facts=material_facts(result),
@@ -215,11 +218,9 @@ def _figures(source: PageSource) -> tuple[dict[str, dict[str, Any]], VectorChart
 
 
 def _counts(result: dict[str, Any]) -> list[tuple[str, int]]:
-    """Every ball once: those that are there by their verdict, the missing ones apart."""
-    count = Counter(ball["verdict"] for ball in result["balls"] if ball["present"])
-    told = [(verdict, count[verdict]) for verdict in VERDICT_MARKS if count[verdict]]
-    missing = sum(not ball["present"] for ball in result["balls"])
-    return [*told, ("missing", missing)] if missing else told
+    """Every ball once: those that are there by their verdict, places without one apart."""
+    count = Counter(ball["verdict"] if ball["present"] else ball_state(ball) for ball in result["balls"])
+    return [(name, count[name]) for name in (*VERDICT_MARKS, "missing", "unclear") if count[name]]
 
 
 def _columns() -> list[dict[str, Any]]:

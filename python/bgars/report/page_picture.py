@@ -139,7 +139,7 @@ def part_picture(source: PageSource) -> PartPicture | None:
             continue
         color = to_hex(colormaps[COLORS]((value - low) / max(high - low, 1e-9))) if is_known(value) else ""
         state = ball_state(ball)
-        assumed = ball["present"] and not is_known(ball["diameter_um"])
+        assumed = state not in {"missing", "unclear"} and not is_known(ball["diameter_um"])
         marks.append(
             BallMark(
                 index,
@@ -150,7 +150,7 @@ def part_picture(source: PageSource) -> PartPicture | None:
                 "" if crowded and ball["verdict"] == "pass" else ball["name"],
                 _words(ball, name, value, state),
                 f"{ball['verdict']} {state}" + (" assumed" if assumed else ""),
-                not ball["present"],
+                state == "missing",
             )
         )
     ends = {ball["name"]: place for ball, place in zip(balls, places, strict=True) if place}

@@ -110,12 +110,10 @@ def unmeasured(result: dict[str, Any]) -> list[dict[str, str]]:
     groups: dict[tuple[str, str], list[str]] = {}
     for ball in result["balls"]:
         holes = [words for name, words in CORE if not is_known(ball[name])]
-        if not ball["present"]:
-            what, why = "everything", "no ball at its place"
-        elif holes:
-            what, why = ", ".join(holes), "; ".join(ball["reasons"]) or "no reason is given"
-        else:
+        if ball["present"] and not holes:
             continue
+        what = ", ".join(holes) if ball["present"] else "everything"
+        why = "; ".join(ball["reasons"]) or "no reason is given"
         groups.setdefault((what, why), []).append(ball["name"])
     rows = [{"where": listed(names), "what": what, "why": why} for (what, why), names in groups.items()]
     for check in result["checks"]:

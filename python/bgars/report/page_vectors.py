@@ -143,7 +143,7 @@ def _gaps(balls: list[dict[str, Any]]) -> dict[str, Any]:
     return {
         "type": "scatter",
         "mode": "markers",
-        "name": "no ball, or no place in the grid",
+        "name": "no centre, or no place in the grid",
         "x": [place[0] for place, _ in places],
         "y": [place[1] for place, _ in places],
         "text": [name for _, name in places],

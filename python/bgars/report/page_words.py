@@ -151,8 +151,13 @@ def limit_words(limits: tuple[float | None, float | None] | None) -> str:
 
 
 def ball_state(ball: dict[str, Any]) -> str:
-    """Whether it is there, and how: "ball", "missing", "bridged", "extra"."""
-    return str(ball["kind"]) if ball["present"] else "missing"
+    """Whether it is there, and how: "ball", "bridged", "extra", "missing", "unclear".
+
+    Missing is a place that is seen to be empty: that fails. Any other without a ball is unclear.
+    """
+    if ball["present"]:
+        return str(ball["kind"])
+    return "missing" if ball["verdict"] == "fail" else "unclear"
 
 
 def listed(names: list[str], most: int = 40) -> str:

@@ -14,6 +14,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
 from bgars.report.part_style import (
+    ABSENT,
+    DASHES,
     VERDICT_COLORS,
     ball_deviations,
     ball_place_um,
@@ -77,7 +79,12 @@ def part_figure(result: PartResult, capture: Capture) -> Figure:
         else:
             axes.add_patch(
                 Circle(
-                    place, radius, fill=False, edgecolor=VERDICT_COLORS["fail"], linewidth=2.0, linestyle=(0, (3, 2))
+                    place,
+                    radius,
+                    fill=False,
+                    edgecolor=VERDICT_COLORS[ball.verdict],
+                    linewidth=2.0,
+                    linestyle=DASHES,
                 )
             )
     _draw_bridges(axes, result)
@@ -124,9 +131,11 @@ def _legend(axes: Axes, result: PartResult) -> None:
         for verdict, color in VERDICT_COLORS.items()
         if any(ball.verdict == verdict and ball.present for ball in result.balls)
     ]
-    if any(not ball.present for ball in result.balls):
-        missing = Line2D([], [], color=VERDICT_COLORS["fail"], linestyle=(0, (3, 2)), linewidth=2.0, label="missing")
-        handles.append(missing)
+    handles += [
+        Line2D([], [], color=VERDICT_COLORS[verdict], linestyle=DASHES, linewidth=2.0, label=words)
+        for verdict, words in ABSENT.items()
+        if any(ball.verdict == verdict and not ball.present for ball in result.balls)
+    ]
     if result.bridges:
         handles.append(Line2D([], [], color=VERDICT_COLORS["fail"], linewidth=5.0, label="bridge"))
     if handles:

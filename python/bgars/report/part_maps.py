@@ -13,6 +13,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
 from bgars.report.part_style import (
+    ABSENT,
+    DASHES,
     VERDICT_COLORS,
     ball_deviations,
     ball_place_um,
@@ -38,17 +40,20 @@ LONGEST_ARROW = 0.9
 ROUND = (1.0, 2.0, 5.0)
 FAIL, OFFSET = VERDICT_COLORS["fail"], "#0072B2"
 DISC: dict[str, object] = {"linestyle": "none", "marker": "o", "markersize": 9, "markeredgewidth": 1.2}
-DASHED: dict[str, object] = {"linestyle": (0, (3, 2)), "color": FAIL, "linewidth": 1.2}
+DASHED: dict[str, dict[str, object]] = {
+    verdict: {"linestyle": DASHES, "color": VERDICT_COLORS[verdict], "linewidth": 1.2} for verdict in ABSENT
+}
+"""Places without a ball, by verdict."""
 HEIGHT_MARKS: tuple[tuple[str, dict[str, object]], ...] = (
     ("filled: see the colour bar", DISC | {"markerfacecolor": "#21918C", "markeredgecolor": "0.3"}),
     ("orange outline: fails", DISC | {"markerfacecolor": "#21918C", "markeredgecolor": FAIL}),
     ("white: no height measured", DISC | {"markerfacecolor": "white", "markeredgecolor": "0.3"}),
-    ("dashed: missing", DASHED),
+    *((f"dashed: {words}", DASHED[verdict]) for verdict, words in ABSENT.items()),
 )
 OFFSET_MARKS: tuple[tuple[str, dict[str, object]], ...] = (
     ("offset of a ball", {"color": OFFSET, "linewidth": 2.2}),
     ("of a ball that fails", {"color": FAIL, "linewidth": 2.2}),
-    ("missing", DASHED),
+    *((words, DASHED[verdict]) for verdict, words in ABSENT.items()),
 )
 
 
@@ -74,9 +79,9 @@ def _heights(figure: Figure, axes: Axes, result: PartResult) -> None:
                 place,
                 ball_radius_um(ball, result),
                 facecolor=colors(norm(value)) if known else "white",
-                edgecolor=VERDICT_COLORS["fail"] if ball.verdict == "fail" else "0.3",
-                linewidth=1.8 if ball.verdict == "fail" else 0.8,
-                linestyle="-" if ball.present else (0, (3, 2)),
+                edgecolor=VERDICT_COLORS[ball.verdict] if ball.verdict == "fail" or not ball.present else "0.3",
+                linewidth=1.8 if ball.verdict == "fail" or not ball.present else 0.8,
+                linestyle="-" if ball.present else DASHES,
             )
         )
     seats = " / ".join(", ".join(seat.balls[:6]) for seat in result.seatings[:2])
@@ -110,8 +115,8 @@ def _offsets(axes: Axes, result: PartResult) -> None:
                     place,
                     ball_radius_um(ball, result),
                     facecolor="0.93",
-                    edgecolor="0.75" if ball.present else VERDICT_COLORS["fail"],
-                    linestyle="-" if ball.present else (0, (3, 2)),
+                    edgecolor="0.75" if ball.present else VERDICT_COLORS[ball.verdict],
+                    linestyle="-" if ball.present else DASHES,
                 )
             )
     part_frame(axes, result)
@@ -130,7 +135,7 @@ def _offsets(axes: Axes, result: PartResult) -> None:
         drawn = (
             any(ball.verdict != "fail" for ball in known),
             any(ball.verdict == "fail" for ball in known),
-            any(not ball.present for ball in result.balls),
+            *_absent(result),
         )
         _legend(axes, [entry for entry, is_drawn in zip(OFFSET_MARKS, drawn, strict=True) if is_drawn])
     limit_um = None if result.recipe is None else result.recipe.limits.true_position_um
@@ -142,15 +147,20 @@ def _offsets(axes: Axes, result: PartResult) -> None:
     )
 
 
-def _height_marks(result: PartResult, known: list[bool]) -> tuple[bool, bool, bool, bool]:
+def _height_marks(result: PartResult, known: list[bool]) -> tuple[bool, ...]:
     """Which of `HEIGHT_MARKS` the map of heights needs."""
     balls = list(zip(result.balls, known, strict=True))
     return (
         any(ball.present and is_known and ball.verdict != "fail" for ball, is_known in balls),
         any(ball.present and ball.verdict == "fail" for ball, _ in balls),
         any(ball.present and not is_known for ball, is_known in balls),
-        any(not ball.present for ball, _ in balls),
+        *_absent(result),
     )
+
+
+def _absent(result: PartResult) -> tuple[bool, ...]:
+    """Which kinds of `ABSENT` there are."""
+    return tuple(any(not ball.present and ball.verdict == verdict for ball in result.balls) for verdict in ABSENT)
 
 
 def _legend(axes: Axes, entries: list[tuple[str, dict[str, object]]]) -> None:

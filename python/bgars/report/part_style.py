@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from bgars.records import Capture
 
 __all__ = [
+    "ABSENT",
+    "DASHES",
     "VERDICT_COLORS",
     "ball_deviations",
     "ball_place_um",
@@ -40,6 +42,9 @@ __all__ = [
 
 VERDICT_COLORS = {"pass": "#56B4E9", "fail": "#D55E00", "undecided": "#E69F00"}
 """Okabe and Ito, Color universal design, 2008: told apart by colour-blind readers."""
+ABSENT = {"fail": "missing", "undecided": "place not clear"}
+"""What a place without a ball is, by its verdict: seen to be empty, or not."""
+DASHES = (0, (3, 2))
 DPI = 110
 MAX_PICTURE_PX = 1100
 SETTINGS = {"font.size": 10, "axes.titlesize": 11, "axes.labelsize": 10, "legend.fontsize": 9, "legend.frameon": False}

@@ -18,6 +18,28 @@
   let chosen = null;
 
   // --- choosing a ball: picture, table and charts show the same one ---
+  const MOST_CAUSES = 6;
+  const addEntry = (list, title, text) => {
+    const entry = document.createElement("div");
+    const name = document.createElement("dt");
+    const value = document.createElement("dd");
+    name.textContent = title;
+    value.textContent = text;
+    entry.append(name, value);
+    list.append(entry);
+  };
+  // The result lies on the page, whole: its budgets are read when a ball is first asked for.
+  let measured = null;
+  const budgetOf = (ball) => {
+    measured ??= JSON.parse(document.getElementById("result").textContent).balls;
+    const causes = Object.entries(measured[ball].budget.top_um || {}).slice(0, MOST_CAUSES);
+    if (!causes.length) return [];
+    const title = document.createElement("h4");
+    title.textContent = "U of the height by cause";
+    const list = document.createElement("dl");
+    for (const [cause, u] of causes) addEntry(list, cause, (2 * u).toFixed(2) + " µm");
+    return [title, list];
+  };
   const tell = (ball) => {
     if (!panel) return;
     panel.replaceChildren();
@@ -27,18 +49,12 @@
     title.textContent = row.cells[0].textContent;
     const list = document.createElement("dl");
     heads.slice(1, -1).forEach((head, at) => {
-      const entry = document.createElement("div");
-      const name = document.createElement("dt");
-      const value = document.createElement("dd");
-      name.textContent = head.textContent;
-      value.textContent = row.cells[at + 1].textContent;
-      if (head.dataset.unit && value.textContent !== "-") value.textContent += " " + head.dataset.unit;
-      entry.append(name, value);
-      list.append(entry);
+      const text = row.cells[at + 1].textContent;
+      addEntry(list, head.textContent, head.dataset.unit && text !== "-" ? `${text} ${head.dataset.unit}` : text);
     });
     const why = document.createElement("p");
     why.textContent = row.cells[row.cells.length - 1].textContent;
-    panel.append(title, list, why);
+    panel.append(title, list, ...budgetOf(ball), why);
   };
   const markAs = (ball, name, on) => {
     for (const node of [rowOf.get(ball), marks.get(ball)]) if (node) node.classList.toggle(name, on);
