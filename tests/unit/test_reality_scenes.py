@@ -15,9 +15,10 @@ pytestmark = pytest.mark.data
 
 DOZEN = range(1, 13)
 """The first twelve seeds, not the best ones."""
-FOUND = 70.0
-WITHIN_2U = {"x": 50.0, "y": 50.0, "diameter": 50.0, "top": 20.0}
-"""Percent: no worse than what was once reached; docs/accuracy.md has the figures of a hundred seeds."""
+FOUND = 99.5
+"""Percent of the balls, as wanted of any hundred scenes."""
+WITHIN_2U = {"x": 88.0, "y": 88.0, "diameter": 88.0, "top": 86.0}
+"""Percent of the readings: 92 are wanted of a hundred scenes, and twelve scatter by 4; docs/accuracy.md has those."""
 
 
 @pytest.mark.timeout(900)
@@ -28,6 +29,7 @@ def test_a_dozen_of_rendered_parts_is_judged_honestly(data_folder: Path) -> None
     assert passed == []
     figures = summarise(records)
     assert figures.bad_parts_passed == ()
+    assert figures.wrong_fails == 0
     assert [(record.scene, record.invented) for record in records if record.invented] == []
     assert figures.found >= FOUND
     for name, share in WITHIN_2U.items():
