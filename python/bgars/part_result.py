@@ -58,7 +58,7 @@ class BallResult:
     row, col : int or None
         From 0 at the top left of the image; None off the lattice.
     present : bool
-        False for a missing ball.
+        False for a missing ball, and for a place that the images do not show (its verdict is then undecided).
     kind : {"ball", "extra", "bridged"}
         See :class:`bgars.ball_records.FoundBall`.
     x_um, y_um : float
@@ -321,7 +321,7 @@ class PartResult:
             "verdict": self.verdict,
             "balls": len(self.balls),
             **{f"balls_{verdict}": count for verdict, count in balls.items()},
-            "balls_missing": sum(not ball.present for ball in self.balls),
+            "balls_missing": sum(not ball.present and ball.verdict == "fail" for ball in self.balls),
             "bridges": len(self.bridges),
             **{name: getattr(self, name) for name in LINE_READINGS},
             "reason": self.reasons[0] if self.reasons else "",

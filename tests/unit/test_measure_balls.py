@@ -124,6 +124,10 @@ def test_progress_grows_to_1(part: tuple[bgars.Capture, bgars.SimulatedTruth, Fo
     assert said[-1] == 1.0
 
 
+MOST_STATED_PX = {"x_um": 0.02, "y_um": 0.02, "diameter_um": 0.04, "centre_z_um": 0.06, "top_um": 0.06}
+"""Median standard uncertainties of parts as modelled, as wanted of rendered ones without deviations."""
+
+
 def test_uncertainties_cover_the_truth_as_often_as_they_should() -> None:
     settings = [
         {"elevation_deg": 45.0, "pitch_um": 11.0, "off_deg": 0.0},
@@ -134,19 +138,26 @@ def test_uncertainties_cover_the_truth_as_often_as_they_should() -> None:
         {"elevation_deg": 50.0, "pitch_um": 15.0, "off_deg": 0.3},
     ]
     covered: dict[str, list[bool]] = {name: [] for name in ("x_um", "y_um", "diameter_um", "centre_z_um", "top_um")}
+    stated_px: dict[str, list[float]] = {name: [] for name in covered}
     for seed, setting in enumerate(settings):
         rig = bgars.LightRig.ring(8, elevation_deg=setting["elevation_deg"])
         scene = array(6, 6, 10 + seed)
         blur_px = setting.get("blur_px", 0.0)
         capture, truth, found = photograph(scene, rig, seed, pitch_um=setting["pitch_um"], blur_px=blur_px)
-        measured = measure_balls(replace(capture, rig=wrong_rig(rig, setting["off_deg"], seed)), found)
+        skewed = replace(capture, rig=wrong_rig(rig, setting["off_deg"], seed))
+        measured = measure_balls(skewed, found, field=bgars.estimate_normals(skewed, anchors=found))
         for name, hits in covered.items():
             u = np.array([getattr(ball, f"u_{name}") for ball in measured.balls])
             hits.extend(np.abs(errors(measured, truth, name)) < u)
+            stated_px[name].extend(u / setting["pitch_um"])
     count = len(covered["x_um"])
     assert count >= 200
     shares = {name: float(np.mean(hits)) for name, hits in covered.items()}
-    # Not less often; more often where a simulated camera stands stiller, and its rims are truer, than any real one.
+    # A simulated camera stands stiller, and its rims are truer, than any real one: truth is covered more often there,
+    # but not by uncertainties that say nothing.
+    for name, most_px in MOST_STATED_PX.items():
+        assert np.median(stated_px[name]) <= most_px, name
+    assert shares["centre_z_um"] <= 0.86, shares
     assert all(share >= 0.58 for share in shares.values()), shares
     assert 0.61 <= float(np.mean(list(shares.values()))) <= 0.9, shares
 
