@@ -16,13 +16,14 @@ from bgars.inspection.shadow_edges import (
     STEEPEST_GROWTH,
     WIDEST_RAD,
     EdgeSettings,
+    Lines,
     edge_lines,
 )
 from bgars.inspection.shadow_map import ShadowMap
 from bgars.inspection.shadow_model import Balls, Lights, Rays, edge_at, near_edge, rays
 from bgars.inspection.spread import lamp_gradients
 from numpy.typing import NDArray
-from scipy.special import ndtr
+from scipy.interpolate import CubicHermiteSpline
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -30,7 +31,6 @@ Index = NDArray[np.intp]
 MIN_LIGHTS_LIT = 2
 LOWEST_TANGENT = 0.08
 MAX_GROWTH = 0.3
-INV_SQRT_2PI = 0.3989422804014327
 
 
 def shadowed(x: Array, y: Array, ball: Balls, lamp: Lights, board: Board, margin_px: float) -> NDArray[np.bool_]:
@@ -84,9 +84,22 @@ def slow_edges(
     reach = np.array(lines.reach_px)[place]
     point = (edge.x[pick], edge.y[pick])
     pixels = _pixels(radiance, shadows, balls, board, gains, settings, here, point, ball, light, spread, reach)
+    lit = _lit(pixels.distance, lines, light, place)
     sector = (ball * len(vectors) + light) * sectors + place * sectors // len(angles)
     solved = _solve(
-        radiance, pixels, sector, angles[place], way, spread, shape, wide_balls, wide_lights, vectors, board, settings
+        radiance,
+        pixels,
+        lit,
+        sector,
+        angles[place],
+        way,
+        spread,
+        shape,
+        wide_balls,
+        wide_lights,
+        vectors,
+        board,
+        settings,
     )
     return solved
 
@@ -146,9 +159,25 @@ def _pixels(
     return _Pixels(distance / spread[None, :], texture, np.where(usable, value, 0.0), weight)
 
 
+def _lit(distance: Array, lines: Lines, light: Index, place: Index) -> tuple[Array, Array]:
+    """Share of the light at pixels (O, M) and its growth per spread, by the cubic through the nodes of their line."""
+    share, growth = np.zeros(distance.shape), np.zeros(distance.shape)
+    if lines.coarse:
+        return share, growth
+    for which in set(zip(light.tolist(), place.tolist(), strict=True)):
+        mine = (light == which[0]) & (place == which[1])
+        limit, profile = lines.limit[which[1]], lines.profiles[which]
+        curve = CubicHermiteSpline(np.linspace(-limit, limit, len(profile)), profile[:, 0], profile[:, 1])
+        at = np.clip(distance[:, mine], -limit, limit)
+        share[:, mine] = curve(at)
+        growth[:, mine] = np.where(np.abs(distance[:, mine]) < limit, curve(at, 1), 0.0)
+    return share, growth
+
+
 def _solve(
     radiance: Radiance,
     pixels: _Pixels,
+    profile: tuple[Array, Array],
     sector: Index,
     angle: Array,
     way: Array,
@@ -164,8 +193,8 @@ def _solve(
     size = shape[0] * shape[1] * shape[2]
     coarse_px, sharp_px = settings.reach_px if settings.coarse else None, settings.spread_px
     if coarse_px is None:
-        lit = ndtr(pixels.distance)
-        bell = INV_SQRT_2PI * np.exp(-0.5 * pixels.distance**2) / spread[None, :] * pixels.texture
+        lit = profile[0]
+        bell = profile[1] / spread[None, :] * pixels.texture
         columns = [pixels.texture * (1.0 - lit), pixels.texture * lit, bell, bell * pixels.distance]
     else:
         lit = (pixels.distance >= 0.0).astype(np.float64)

@@ -2,21 +2,21 @@ r"""Where the edges of the shadows really are: short stretches of edge, each mea
 
 Near the predicted edge of a shadow, at signed distance d, the board reads
 
-    I = T [lo + (hi - lo) Phi(d / s)] + e,
+    I = T [lo + (hi - lo) F(d)] + e,
 
-T the board's own texture (mean of the lights that reach the pixel, each divided by its gain), s the spread of the edge
-by pixel, lens and size of the lamp. A stretch of edge has its own lo and hi (light from neighbouring balls differs
-along
-the edge), and to first order a displacement a and a change b of the spread:
+T the board's own texture (mean of the lights that reach the pixel, each divided by its gain), F the share of the light
+that pixel, lens and size of the lamp let through (`edge_profile.py`; of a usual ball, in spreads s of the edge). A
+stretch of edge has its own lo and hi (light from neighbouring balls differs along the edge), and to first order a
+displacement a and a change b of the spread:
 
-    I = lo T (1 - Phi) + hi T Phi - (hi - lo) [a T phi / s + b T (d / s) phi / s],
+    I = lo T (1 - F) + hi T F - (hi - lo) [a T F' + b T (d / s) F'],
 
 linear in four unknowns: least squares, then once more with Cauchy weights.
 
 Light that balls throw on the board beside them is not the same under all lights: T, a mean over lights, has too much
 of it on the far side of a ball, so that the lit level grows outward by a share g per pixel. A stretch knows its own g
 badly, all shadows of a part together know it well as a function of the place along the edge: a fifth column
-``hi T g d Phi`` is fitted for it, and the displacement is that of four columns with the usual g of its place taken out
+``hi T g d F`` is fitted for it, and the displacement is that of four columns with the usual g of its place taken out
 (exact, for least squares are linear).
 
 That holds for displacements below s. The coarse search goes by area: with H the unit step and r the reach,
@@ -36,9 +36,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars import _bgars
+from bgars.inspection.edge_profile import NODES, Lamp, edge_profiles
 from bgars.inspection.shadow_map import Casters
 from bgars.inspection.shadow_model import Balls, Lights, edge_at, rays
-from bgars.inspection.spread import EdgeSpread, lamp_gradients, lamp_shift_px
+from bgars.inspection.spread import lamp_gradients
 from bgars.kernel_capture import kernel_capture
 
 if TYPE_CHECKING:
@@ -61,6 +62,8 @@ FEWEST_LINES = 12
 LINES_A_STRETCH = 3
 REACH_SIGMAS, REACH_PX = 3.2, 1.2
 """How far pixels across an edge reach: spreads, and pixels more."""
+BEYOND = 1.25
+"""Profiles go this much farther than the reach: smaller balls have sharper edges."""
 STEEPEST_GROWTH = 0.1
 """Growth of the lit level per pixel that reflected light can bring."""
 MIN_GROWTHS = 24
@@ -141,7 +144,6 @@ def measure_edges(
     gains: Array,
     settings: EdgeSettings,
     threads: int,
-    lamp: EdgeSpread | None = None,
 ) -> Edges:
     """Measure the edges of the shadows of all balls under all lights.
 
@@ -160,8 +162,6 @@ def measure_edges(
         Irradiance of the board around each ball under each light, relative.
     settings : EdgeSettings
     threads : int
-    lamp : EdgeSpread, optional
-        How wide and high the lamps are: edges are then those of their middles.
     """
     radius = float(np.median(table[:, 3]))
     most = MAX_LINES if settings.thorough else FEW_LINES
@@ -184,15 +184,21 @@ def measure_edges(
     shape = (len(table), len(vectors), sectors)
     fit = Stretches(*np.moveaxis(stretches, -1, 0).reshape(-1, *shape))
     balls = Balls.from_table(table).spread(2)
-    return _edges(fit, noise, balls, vectors, near, board, settings, lamp or EdgeSpread(0.0, 0.0), radiance.scale)
+    return _edges(fit, noise, balls, vectors, near, board, settings, radiance.scale)
 
 
 class Lines(NamedTuple):
-    """Settings of the kernel: the same of all lines across edges, and lists with a value for each."""
+    """Settings of the kernel: the same of all lines across edges, lists with a value for each, and their profiles.
+
+    `profiles` (L, S, NODES, 2): share of the light, and its growth per spread, at `NODES` places from -`limit` to
+    `limit` spreads; empty where `coarse`.
+    """
 
     spread_px: float
     lamp_spread_rad: list[float]
     reach_px: list[float]
+    limit: list[float]
+    profiles: NDArray[np.float64]
     stride_px: int
     coarse: bool
 
@@ -200,19 +206,42 @@ class Lines(NamedTuple):
 def edge_lines(
     angles_rad: Array, ball: Array, vectors: Array, near: bool, board: Board, settings: EdgeSettings
 ) -> Lines:
-    """How wide a usual ball's edges are, by the place along them: a lamp may be wider than it is high."""
+    """How wide a usual ball's edges are, and their profiles, by the place along them."""
     balls, lights = Balls.from_table(ball[None]).spread(2), Lights.from_table(vectors, near).spread(1, 1)
     edge = edge_at(angles_rad, balls, lights, board)
     beam = rays(edge.x, edge.y, balls, lights, board)
     along, up = lamp_gradients(beam, balls, vectors)
     blurred = np.square(along * settings.lamp_azimuth_rad) + np.square(up * settings.lamp_elevation_rad)
     blurred_px = np.sqrt(blurred.mean(axis=(0, 1)))
-    way_px = np.maximum(np.abs(beam.along / np.maximum(beam.slope, 1e-3)).mean(axis=(0, 1)), 1e-3)
+    ways_px = np.abs(beam.along / np.maximum(beam.slope, 1e-3))
+    lamp_spread_rad = blurred_px / np.maximum(ways_px.mean(axis=(0, 1)), 1e-3)
     reach_px = np.full(len(angles_rad), settings.reach_px)
-    if not settings.coarse:
-        reach_px = np.minimum(reach_px, REACH_SIGMAS * np.hypot(settings.spread_px, blurred_px) + REACH_PX)
+    if settings.coarse:
+        nothing = np.zeros((len(vectors), len(angles_rad), 0, 2))
+        return Lines(
+            settings.spread_px,
+            lamp_spread_rad.tolist(),
+            reach_px.tolist(),
+            reach_px.tolist(),
+            nothing,
+            settings.stride_px,
+            coarse=True,
+        )
+    reach_px = np.minimum(reach_px, REACH_SIGMAS * np.hypot(settings.spread_px, blurred_px) + REACH_PX)
+    spread_px = np.hypot(settings.spread_px, lamp_spread_rad * ways_px[0])
+    limit = BEYOND * (reach_px / spread_px).max(axis=0)
+    at = np.linspace(-1.0, 1.0, NODES) * (limit * spread_px)[..., None]
+    lamp = Lamp(settings.lamp_azimuth_rad, settings.lamp_elevation_rad)
+    share, growth = edge_profiles(edge, beam, balls, vectors, near, board, settings.spread_px, lamp, at)
+    profiles = np.stack([share, growth * spread_px[..., None]], axis=-1)
     return Lines(
-        settings.spread_px, (blurred_px / way_px).tolist(), reach_px.tolist(), settings.stride_px, settings.coarse
+        settings.spread_px,
+        lamp_spread_rad.tolist(),
+        reach_px.tolist(),
+        limit.tolist(),
+        profiles,
+        settings.stride_px,
+        coarse=False,
     )
 
 
@@ -251,7 +280,6 @@ def _edges(
     near: bool,
     board: Board,
     settings: EdgeSettings,
-    lamp: EdgeSpread,
     scale: float,
 ) -> Edges:
     """Points on the edges; `scale` in grey levels per level of 255."""
@@ -271,8 +299,6 @@ def _edges(
     curvature = (1.0 - tangent_along**2) / (beam.distance * beam.slope)
     # And texture that grows outward by g a pixel, blurred with the shadow, moves its edge inward by g s^2.
     blurred = settings.spread_px**2 * (fit.growth + 0.5 * curvature)
-    if lamp.lamp_rad > 0.0:
-        blurred = blurred + lamp_shift_px(edge.x, edge.y, balls, vectors, near, board, lamp)
     moved = fit.moved if settings.coarse else _without_growth(fit, measured)
     shift = blurred - np.where(measured, moved / safe, 0.0)
     along, up = lamp_gradients(beam, balls, vectors)

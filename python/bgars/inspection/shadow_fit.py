@@ -20,7 +20,7 @@ from bgars.inspection.common_terms import ROUNDNESS
 from bgars.inspection.image_shifts import check_shifts, displaced_images
 from bgars.inspection.in_view import lights_in_view, unjudged_lights
 from bgars.inspection.priors import common_mixtures, first_priors
-from bgars.inspection.settle import Settled, alike_by_pixels, settle
+from bgars.inspection.settle import Settled, settle
 from bgars.inspection.shadow_passes import ShadowPasses
 from bgars.inspection.start import first_heights, radius_at
 
@@ -99,8 +99,7 @@ def fit_shadows(
         warnings = _warnings(problem, complaints, edges, None, enough)
         return Fit(problem, index, usability, None, edges, spread, warnings)
     mixtures = common_mixtures(problem, passes.priors, refine_lights)
-    alike = alike_by_pixels(passes.solution, spread.sharp_px)
-    settled = settle(passes.solution, passes.priors, mixtures, alike)
+    settled = settle(passes.solution, passes.priors, mixtures)
     moved = abs(float(settled.solution.common[ROUNDNESS] - passes.solution.common[ROUNDNESS]))
     if ROUNDNESS in mixtures and moved > LINEAR_ROUNDNESS:
         u_common = passes.priors.u_common.copy()
@@ -108,7 +107,7 @@ def fit_shadows(
         passes.from_elsewhere(settled.solution.state, u_common)
         edges, usability = passes.edges, passes.usability
         if passes.solution is not None:
-            settled = settle(passes.solution, passes.priors, mixtures, alike)
+            settled = settle(passes.solution, passes.priors, mixtures)
     # First heights may be wrong, and what lies in the image with them.
     in_view &= lights_in_view(problem, passes.state.balls)
     warnings = _warnings(problem, complaints, passes.used, passes.solution, in_view)

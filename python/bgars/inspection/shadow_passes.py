@@ -118,8 +118,7 @@ class ShadowPasses:
         shadows = self._shadows(settings, radius)
         if self.is_last and self.shifts is None:
             self._look_at_outlines(shadows)
-        lamp = self.spread if self.turn > len(COARSE) else None
-        edges = self._edges(shadows, settings, self.index, lamp)
+        edges = self._edges(shadows, settings, self.index)
         usability = judge_balls(edges)
         if not usability.usable.any() and self.turn > len(COARSE):
             # Edges went out of reach where little is in view: what the pass before measured is the best there is.
@@ -155,9 +154,7 @@ class ShadowPasses:
             threads=self.threads,
         )
 
-    def _edges(
-        self, shadows: ShadowMap, settings: EdgeSettings, balls: NDArray[np.intp], lamp: EdgeSpread | None = None
-    ) -> Edges:
+    def _edges(self, shadows: ShadowMap, settings: EdgeSettings, balls: NDArray[np.intp]) -> Edges:
         state, problem = self.state, self.problem
         return measure_edges(
             problem.radiance,
@@ -169,7 +166,6 @@ class ShadowPasses:
             self.gains[balls],
             settings,
             self.threads,
-            lamp,
         )
 
     def _look_at_outlines(self, shadows: ShadowMap) -> None:

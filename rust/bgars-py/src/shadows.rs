@@ -5,11 +5,11 @@ use std::ops::ControlFlow;
 use bgars_core::shadows::model::{Ball, Board, Lamp};
 use bgars_core::shadows::{EdgeSettings, Edges, Margins, STRETCH_FIELDS, Silhouettes};
 use bgars_core::{ImageStack, Lights, Pixel, Radiometry, shadows};
-use numpy::{PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArray4, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use crate::capture::{Capture, Work};
-use crate::convert::{array2, array3, rows, slice2, slice3, triples};
+use crate::convert::{array2, array3, rows, slice2, slice3, slice4, triples};
 use crate::errors::InputError;
 use crate::progress::on_threads;
 
@@ -56,10 +56,12 @@ pub fn draw_shadows<'py>(
 
 /// The attributes of `bgars.inspection.shadow_edges.EdgeSettings` and of the lines across an edge.
 #[derive(FromPyObject)]
-pub struct Lines {
+pub struct Lines<'py> {
     spread_px: f64,
     lamp_spread_rad: Vec<f64>,
     reach_px: Vec<f64>,
+    limit: Vec<f64>,
+    profiles: PyReadonlyArray4<'py, f64>,
     stride_px: usize,
     coarse: bool,
 }
@@ -74,7 +76,7 @@ pub fn measure_edges<'py>(
     py: Python<'py>,
     capture: Capture<'py>,
     casters: Casters<'py>,
-    settings: Lines,
+    settings: Lines<'py>,
     angles_rad: Vec<f64>,
     sectors: usize,
     gains: PyReadonlyArray2<'py, f32>,
@@ -94,14 +96,32 @@ pub fn measure_edges<'py>(
         mask: mask.as_ref().map(|mask| slice2(mask, "mask")).transpose()?,
     };
     let gains = slice2(&gains, "gains")?;
-    let Lines { spread_px, lamp_spread_rad, reach_px, stride_px, coarse } = settings;
-    let settings = EdgeSettings { spread_px, lamp_spread_rad, reach_px, stride_px, coarse, angles_rad, sectors };
+    let Lines { spread_px, lamp_spread_rad, reach_px, limit, profiles, stride_px, coarse } = settings;
+    let (nodes, curves) = (profiles.shape()[2], slice4(&profiles, "profiles")?.as_chunks().0.to_vec());
+    let settings = EdgeSettings {
+        spread_px,
+        lamp_spread_rad,
+        reach_px,
+        limit,
+        profiles: curves,
+        nodes,
+        stride_px,
+        coarse,
+        angles_rad,
+        sectors,
+    };
     if settings.stride_px == 0 || settings.sectors == 0 || step == 0 {
         return Err(InputError::new_err("stride_px, sectors, step: must be at least 1"));
     }
     let lines = settings.angles_rad.len();
-    if settings.lamp_spread_rad.len() != lines || settings.reach_px.len() != lines {
-        return Err(InputError::new_err("lamp_spread_rad, reach_px: must have one value for each of angles_rad"));
+    if [&settings.lamp_spread_rad, &settings.reach_px, &settings.limit].iter().any(|values| values.len() != lines) {
+        return Err(InputError::new_err(
+            "lamp_spread_rad, reach_px, limit: must have one value for each of angles_rad",
+        ));
+    }
+    let least = if coarse { 0 } else { 2 };
+    if settings.nodes < least || profiles.shape() != [lights, lines, settings.nodes, 2] {
+        return Err(InputError::new_err("profiles: must have shape (lights, angles_rad, at least 2, 2)"));
     }
     if !settings.reach_px.iter().all(|reach| reach.is_finite()) {
         return Err(InputError::new_err("reach_px: must be finite"));

@@ -5,7 +5,6 @@
 use rayon::prelude::*;
 
 use super::model::{Ball, Board, Lamp, Shadow};
-use super::normal_curve::{density, distribution};
 use super::stretch::{COLUMNS, Line, Part, Pixel, Stretch, fit};
 use crate::{ImageStack, Radiometry};
 
@@ -22,6 +21,12 @@ pub struct EdgeSettings {
     pub lamp_spread_rad: Vec<f64>,
     /// Distance to look to on both sides, one for each of `angles_rad`.
     pub reach_px: Vec<f64>,
+    /// How far profiles reach, in spreads, one for each of `angles_rad`.
+    pub limit: Vec<f64>,
+    /// By light, then by `angles_rad`, then `nodes`: share of the light across an edge, and its growth per spread.
+    pub profiles: Vec<[f64; 2]>,
+    /// Places from -`limit` to `limit` at which a profile is known.
+    pub nodes: usize,
     /// Distance of pixels on a line.
     pub stride_px: usize,
     /// By area instead of by shape: finds edges up to half of `reach_px` away.
@@ -103,6 +108,31 @@ struct Place {
     cell: usize,
 }
 
+/// How the board brightens across an edge; places in spreads.
+#[derive(Clone, Copy)]
+struct Profile<'a> {
+    limit: f64,
+    nodes: &'a [[f64; 2]],
+}
+
+impl Profile<'_> {
+    /// Share of the light and its growth: the cubic through values and slopes of two nodes.
+    fn at(&self, scaled: f64) -> [f64; 2] {
+        let cells = (self.nodes.len() - 1) as f64;
+        let place = (scaled / self.limit + 1.0) * 0.5 * cells;
+        if !(place > 0.0 && place < cells) {
+            let end = if place > 0.0 { self.nodes[self.nodes.len() - 1] } else { self.nodes[0] };
+            return [end[0], 0.0];
+        }
+        let step = 2.0 * self.limit / cells;
+        let (node, t) = (place as usize, place.fract());
+        let ([low, rise], [high, fall]) = (self.nodes[node], self.nodes[node + 1]);
+        let (way, rise, fall) = (high - low, rise * step, fall * step);
+        let (square, cube) = (3.0 * way - 2.0 * rise - fall, rise + fall - 2.0 * way);
+        [low + t * (rise + t * (square + t * cube)), (rise + t * (2.0 * square + 3.0 * t * cube)) / step]
+    }
+}
+
 struct Scene<'a, P> {
     stack: &'a ImageStack<'a, P>,
     radiometry: &'a Radiometry<'a, P>,
@@ -142,6 +172,7 @@ impl<P: crate::Pixel> Scene<'_, P> {
             let way_px = ray.along / ray.slope();
             let spread_px = settings.spread_px.hypot(settings.lamp_spread_rad[place] * way_px);
             let reach_px = settings.reach_px[place];
+            let profile = self.profile(light, place);
             let nearby = shadow.near_edge(point.x, point.y, &ray);
             let before = pixels.len();
             // Pixels on the row or column that crosses the edge more steeply.
@@ -155,7 +186,7 @@ impl<P: crate::Pixel> Scene<'_, P> {
                     continue;
                 }
                 if let Some((value, texture)) = self.read(at, light, gains) {
-                    let columns = self.columns(across_px, spread_px, reach_px, texture);
+                    let columns = self.columns(across_px, spread_px, reach_px, texture, profile);
                     let scaled = across_px / spread_px;
                     pixels.push(Pixel { columns, value, texture, scaled, across_px, line: lines.len(), weight: 1.0 });
                 }
@@ -174,17 +205,29 @@ impl<P: crate::Pixel> Scene<'_, P> {
         if settings.coarse { fit::<3>(&mut parts, lines, false, out) } else { fit::<4>(&mut parts, lines, true, out) }
     }
 
+    /// The profile of the edge at one of `angles_rad` under a light.
+    fn profile(&self, light: usize, place: usize) -> Profile<'_> {
+        let EdgeSettings { limit, profiles, nodes, angles_rad, .. } = self.settings;
+        Profile { limit: limit[place], nodes: &profiles[(light * angles_rad.len() + place) * nodes..][..*nodes] }
+    }
+
     /// Columns of the model: shadow, light, displacement, spread, growth of the light outward.
-    fn columns(&self, across_px: f64, spread_px: f64, reach: f64, texture: f64) -> [f64; COLUMNS] {
+    fn columns(
+        &self,
+        across_px: f64,
+        spread_px: f64,
+        reach: f64,
+        texture: f64,
+        profile: Profile<'_>,
+    ) -> [f64; COLUMNS] {
         if self.settings.coarse {
             let lit = if across_px >= 0.0 { texture } else { 0.0 };
             let box_ = if across_px.abs() < 0.5 * reach { texture / reach } else { 0.0 };
             return [texture - lit, lit, box_, 0.0, 0.0];
         }
         let scaled = across_px / spread_px;
-        let density = density(scaled);
-        let lit = distribution(scaled, density);
-        let bell = density / spread_px * texture;
+        let [lit, growth] = profile.at(scaled);
+        let bell = growth / spread_px * texture;
         [texture * (1.0 - lit), texture * lit, bell, bell * scaled, texture * lit * across_px]
     }
 

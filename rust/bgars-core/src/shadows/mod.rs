@@ -6,7 +6,6 @@
 mod edges;
 mod map;
 pub mod model;
-mod normal_curve;
 mod stretch;
 
 pub use edges::{EdgeSettings, Edges, Silhouettes, measure_edges};
