@@ -1,4 +1,4 @@
-"""The commands and their options."""
+"""The commands and their options: those that stand here load what they need when they run."""
 
 from __future__ import annotations
 
@@ -12,22 +12,12 @@ from typing import Annotated, Any, Literal
 import typer
 
 import bgars
-from bgars.cli.calibrate import register as register_calibrate
 from bgars.cli.console import EXIT_BAD_INPUT, activation, fail, print_json, say, shown_path, stage_progress
-from bgars.cli.describe import describe, describe_in_words
 from bgars.cli.evaluation import choice_in_words, evaluation_table
-from bgars.cli.experiment import register as register_experiment
-from bgars.cli.grr import register as register_grr
-from bgars.cli.inspect import register as register_inspect
-from bgars.cli.mesh import register as register_mesh
+from bgars.cli.lazy import LazyGroup
 from bgars.cli.options import MethodOption
-from bgars.cli.outputs import write_normals, write_reconstruction
-from bgars.cli.report import register as register_report
-from bgars.cli.simulate import register as register_simulate
-from bgars.cli.spc import register as register_spc
 from bgars.errors import BgarsError
-from bgars.light_files import read_filenames
-from bgars.normals import DEFAULT_METHOD, METHODS, Method
+from bgars.normal_methods import DEFAULT_METHOD, METHODS, Method
 
 __all__ = ["main"]
 
@@ -35,12 +25,12 @@ ChannelOption = Literal["luminance", "mean", "red", "green", "blue"]
 
 app = typer.Typer(
     name="bgars",
+    cls=LazyGroup,
     help=(
-        "Photometric stereo for shiny parts: one camera, several lights, one image a light. "
+        "Photometric stereo for shiny parts: one camera, several lights, one image per light. "
         "Start with 'bgars demo'; then 'bgars reconstruct FOLDER -o OUT' on your own photographs."
     ),
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 
@@ -178,6 +168,8 @@ def normals(
     as_json: JsonOption = False,
 ) -> None:
     """Only the normals: normals.png (16 bit), albedo.tif, confidence.tif, measured.png, lights_kept.png."""
+    from bgars.cli.outputs import write_normals  # noqa: PLC0415 - loaded when it runs
+
     capture = bgars.read_capture(folder, channel=channel)
     surface = _material_from(material, capture)
     with stage_progress() as report:
@@ -200,12 +192,11 @@ def normals(
     _list_files(output, files)
 
 
-register_mesh(app)
-
-
 @app.command()
 def info(folder: FolderArgument, channel: ChannelChoice = None, as_json: JsonOption = False) -> None:
     """Read a capture and say what is in it: images, lights, scale, clipped pixels."""
+    from bgars.cli.describe import describe, describe_in_words  # noqa: PLC0415 - loaded when it runs
+
     capture = bgars.read_capture(folder, channel=channel)
     facts = describe(capture)
     if as_json:
@@ -244,6 +235,8 @@ def evaluate(
     of them should be within the standard error that the method states, on photographs far fewer are
     (docs/accuracy.md).
     """
+    from bgars.light_files import read_filenames  # noqa: PLC0415 - loaded when it runs
+
     names = None if images is None else read_filenames(images)
     capture = bgars.read_capture(folder, channel=channel, images=names)
     surface = _material_from(material, capture)
@@ -260,15 +253,6 @@ def evaluate(
         return
     for line in evaluation_table(results, len(capture.rig)):
         say(line)
-
-
-register_inspect(app)
-register_report(app)
-register_grr(app)
-register_spc(app)
-register_calibrate(app)
-register_simulate(app)
-register_experiment(app)
 
 
 def main() -> None:
@@ -289,6 +273,8 @@ def _reconstruct_to(
     directx: bool,
     channel: ChannelOption | None = None,
 ) -> tuple[dict[str, Any], dict[str, str]]:
+    from bgars.cli.outputs import write_reconstruction  # noqa: PLC0415 - loaded when it runs
+
     with stage_progress() as report:
         return write_reconstruction(
             lambda: run(bgars.read_capture(folder, channel=channel), progress=report),

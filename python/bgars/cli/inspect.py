@@ -17,7 +17,7 @@ from bgars.errors import InputError
 from bgars.io.atomic import FolderNames, atomic_folder
 from bgars.io.given_paths import need_file, need_folder
 from bgars.io.parquet import need_pyarrow
-from bgars.normals import DEFAULT_METHOD
+from bgars.normal_methods import DEFAULT_METHOD
 from bgars.report.page import REPORT_FILES
 from bgars.report.page_budget import main_causes
 from bgars.report.part import PICTURES
