@@ -13,4 +13,16 @@ The public names stand in ``__init__.pyi``; each is imported when it is first us
 
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from bgars.extras import EXTRA_OF, how_to_install
+
+_load, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+
+def __getattr__(name: str) -> object:
+    try:
+        return _load(name)
+    except ModuleNotFoundError as error:
+        if error.name not in EXTRA_OF:
+            raise
+        msg = f"bgars.{name} {how_to_install(error.name)}"
+        raise ModuleNotFoundError(msg, name=error.name) from None

@@ -17,6 +17,7 @@ from bgars.cli.evaluation import choice_in_words, evaluation_table
 from bgars.cli.lazy import LazyGroup
 from bgars.cli.options import MethodOption
 from bgars.errors import BgarsError
+from bgars.extras import EXTRA_OF, how_to_install
 from bgars.normal_methods import DEFAULT_METHOD, METHODS, Method
 
 __all__ = ["main"]
@@ -261,6 +262,11 @@ def main() -> None:
         app()
     except BgarsError as error:
         fail(str(error))
+        sys.exit(EXIT_BAD_INPUT)
+    except ModuleNotFoundError as error:
+        if error.name not in EXTRA_OF:
+            raise
+        fail(f"this command {how_to_install(error.name)}")
         sys.exit(EXIT_BAD_INPUT)
 
 

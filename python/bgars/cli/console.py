@@ -28,6 +28,7 @@ __all__ = [
     "shown_path",
     "stage_progress",
     "utc_now",
+    "warn",
 ]
 
 EXIT_BAD_INPUT = 2
@@ -85,6 +86,11 @@ def fail(message: str) -> None:
     console = error_console()
     console.print("error:", style="bold red", end=" ")
     console.print(message, markup=False, emoji=False)
+
+
+def warn(message: str) -> None:
+    """Print, beside the result, what people should know of it."""
+    sys.stderr.write(f"warning: {message}\n")
 
 
 @contextmanager

@@ -41,7 +41,7 @@ OUTLINE = "#00E5FF"
 SILHOUETTE = "#FF4FD8"
 FLAGGED = "; orange title: a reason or warning names this light"
 CLOSE_UPS = 4
-WHOLE_IN, CLOSE_IN = 6.7, 2.75
+WHOLE_IN, CLOSE_IN = 6.7, 3.0
 REACH = 3.4
 """Half width of a close-up in radii."""
 
@@ -66,8 +66,9 @@ def shadow_figure(result: PartResult, capture: Capture) -> Figure:
     lights = panel_lights(result, len(capture.rig), CLOSE_UPS)
     for number, light in enumerate(lights):
         row, col = divmod(number, 2)
-        panel = add_axes(figure, 8.45 + 3.6 * col, 4.5 - 3.9 * row, CLOSE_IN, CLOSE_IN)
+        panel = add_axes(figure, 8.3 + 3.4 * col, 4.35 - 3.9 * row, CLOSE_IN, CLOSE_IN)
         _show_light(panel, capture, result, light)
+        panel.set(xticks=[], yticks=[], xlabel="", ylabel="")
         place = None if middle is None else ball_place_um(middle)
         if middle is None or place is None:
             continue
@@ -81,6 +82,7 @@ def shadow_figure(result: PartResult, capture: Capture) -> Figure:
         panel.set_xlim(place[0] - half_um, place[0] + half_um)
         panel.set_ylim(place[1] - half_um, place[1] + half_um)
         panel.set_title(f"{middle.name}, {panel.get_title()}", fontsize=10)
+        panel.set_xlabel(f"{2 * half_um:.0f} µm wide")
     return figure
 
 
