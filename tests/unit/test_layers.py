@@ -27,7 +27,7 @@ RECORDS = {
     "normals_choice": 3.6,
 }
 BASE = {
-    **{"errors": 0, "version": 0, "extras": 0, "normal_methods": 0, "large_arrays": 0},
+    **{"errors": 0, "version": 0, "extras": 0, "shown": 0.5, "normal_methods": 0, "large_arrays": 0},
     **{"light_files": 1, "light_names": 1, "rig": 2, "scalar_checks": 1},
     **RECORDS,
 }

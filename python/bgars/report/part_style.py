@@ -13,6 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
+from bgars.shown import VERDICT_COLORS
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from contextlib import AbstractContextManager
@@ -46,8 +48,6 @@ __all__ = [
     "window_size_in",
 ]
 
-VERDICT_COLORS = {"pass": "#56B4E9", "fail": "#D55E00", "undecided": "#E69F00"}
-"""Okabe and Ito, Color universal design, 2008: told apart by colour-blind readers."""
 ABSENT = {"fail": "missing", "undecided": "place not clear"}
 """What a place without a ball is, by its verdict: seen to be empty, or not."""
 DASHES = (0, (3, 2))
