@@ -112,7 +112,7 @@ def test_height_map_to_mesh_keeps_its_scale(tmp_path: Path) -> None:
 def test_info(tmp_path: Path) -> None:
     run = bgars_command("info", bgars.sample_capture())
     assert run.returncode == 0, run.stderr
-    for words in ("8 of 256 x 240 pixels, uint8", "3.4 um a pixel", "light_07.png", "45.0"):
+    for words in ("8 of 256 x 240 pixels, uint8", "3.4 um per pixel", "light_07.png", "45.0"):
         assert words in run.stdout
     facts = json.loads(bgars_command("info", bgars.sample_capture(), "--json").stdout)
     assert facts["lights"][2]["azimuth_deg"] == pytest.approx(90.0)

@@ -49,7 +49,7 @@ def test_normals_of_others_are_evaluated_as_one_s_own_are() -> None:
     capture = bgars.read_capture(bgars.sample_capture())
     field = bgars.estimate_normals(capture, method="lambertian")
     own = bgars.evaluate(capture, method="lambertian")
-    for given in (field.normals, 3.0 * field.normals.astype(np.float16), lambda capture: field, field):
+    for given in (field.normals, 3.0 * field.normals.astype(np.float16), lambda _: field, field):
         found = bgars.evaluate(capture, method=given)
         assert found.normals.mean_deg == pytest.approx(own.normals.mean_deg, abs=0.02)
         assert found.board is not None

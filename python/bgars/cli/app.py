@@ -75,7 +75,7 @@ def top(
     version: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False,
     threads: Annotated[
         int | None,
-        typer.Option(min=1, max=1024, help="Most threads to work on; one a core by default.", show_default=False),
+        typer.Option(min=1, max=1024, help="Largest number of threads; by default one per core.", show_default=False),
     ] = None,
 ) -> None:
     """Options of the command itself."""
@@ -94,7 +94,7 @@ def demo(
     ),
     as_json: JsonOption = False,
 ) -> None:
-    """Reconstruct a solder ball that ships with bgars, and say what to open."""
+    """Reconstruct the sample solder ball that comes with bgars."""
     folder = bgars.sample_capture()
     summary, files = _reconstruct_to(folder, output, bgars.reconstruct, mesh_format="ply", directx=False)
     scores = {
@@ -131,11 +131,11 @@ def reconstruct(
     directx: DirectxOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """The main job: a folder of photographs becomes normals, a height map, a mesh and an overview picture.
+    """Turn a folder of photographs into normals, a height map, a mesh and an overview picture.
 
     Writes overview.png, normals.png (16 bit), height.tif and height.npy (float32, um when the pixel pitch is known),
-    mesh.ply and summary.json; they replace all that an earlier run left of these in OUT. Heights between parts that do
-    not touch, such as a ball above its board, are not measured.
+    mesh.ply and summary.json; files that an earlier run left in OUT are replaced. The height of one part above another
+    that it does not touch, such as a ball above its board, is not measured.
     """
 
     def run(capture: bgars.Capture, **options: Any) -> bgars.Reconstruction:  # noqa: ANN401
@@ -148,12 +148,14 @@ def reconstruct(
         return
     height = summary["height"]
     low, high = height[f"height_range_{height['unit']}"]
+    trust, _, method_line = choice_in_words(summary["normals"]).partition("\n")
+    say(f"{summary['capture']}: {trust}")
+    parts = height["components"]
     say(
-        f"{summary['capture']}: {summary['normals']['valid_pixels']} normals, height {low:.1f} to "
-        f"{high:.1f} {height['unit']} in {height['components']} connected part(s), "
-        f"{height['iterations']} solver iterations."
+        f"{summary['normals']['valid_pixels']} normals, height {low:.1f} to {high:.1f} {height['unit']} in "
+        f"{parts} connected part{'' if parts == 1 else 's'}, {height['iterations']} solver iterations."
     )
-    say(choice_in_words(summary["normals"]))
+    say(method_line)
     _list_files(output, files)
 
 
@@ -168,7 +170,7 @@ def normals(
     directx: DirectxOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Only the normals: normals.png (16 bit), albedo.tif, confidence.tif, measured.png, lights_kept.png."""
+    """Estimate the normals only: normals.png (16 bit), albedo.tif, confidence.tif, measured.png, lights_kept.png."""
     from bgars.cli.outputs import write_normals  # noqa: PLC0415 - loaded when it runs
 
     capture = bgars.read_capture(folder, channel=channel)
@@ -185,17 +187,19 @@ def normals(
     if as_json:
         print_json({"capture": capture.name, **summary})
         return
+    trust, _, method_line = choice_in_words(summary).partition("\n")
+    say(f"{capture.name}: {trust}")
     say(
-        f"{capture.name}: {summary['valid_pixels']} normals, {summary['mean_lights_kept']:.1f} of "
-        f"{len(capture.rig)} lights kept on average, mean confidence {summary['mean_confidence']:.2f}."
+        f"{summary['valid_pixels']} normals, {summary['mean_lights_kept']:.1f} of {len(capture.rig)} lights kept on "
+        f"average, mean confidence {summary['mean_confidence']:.2f}."
     )
-    say(choice_in_words(summary))
+    say(method_line)
     _list_files(output, files)
 
 
 @app.command()
 def info(folder: FolderArgument, channel: ChannelChoice = None, as_json: JsonOption = False) -> None:
-    """Read a capture and say what is in it: images, lights, scale, clipped pixels."""
+    """Describe a capture: images, lights, scale, clipped pixels."""
     from bgars.cli.describe import describe, describe_in_words  # noqa: PLC0415 - loaded when it runs
 
     capture = bgars.read_capture(folder, channel=channel)
@@ -222,14 +226,14 @@ def evaluate(
     images: Annotated[
         Path | None,
         typer.Option(
-            help="Text file of image names, one a line: use only these (such as ring8.txt).", show_default=False
+            help="Text file of image names, one per line: use only these (such as ring8.txt).", show_default=False
         ),
     ] = None,
     material: MaterialOption = None,
     channel: ChannelChoice = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Compare with truth (gt.npz of a rendered scene, Normal_gt.npy of a photograph).
+    """Compare estimated normals with known ones (gt.npz of a rendered scene, Normal_gt.npy of a photograph).
 
     Scenes are judged over ball pixels with true n_z > 0.3, photographs over their mask. A pixel without a solution
     counts as (0, 0, 1). Measured pixels are those whose own light fixes the normal; on balls, the errors of about 68 %

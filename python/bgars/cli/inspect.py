@@ -31,7 +31,7 @@ EXIT_NOT_PASSED = 1
 MAX_ROWS = 30
 FILES = {
     "result.json": "everything: readings, uncertainties, limits, verdicts, reasons, checksums of the input",
-    "balls.csv": "one line a ball, for a spreadsheet",
+    "balls.csv": "one row per ball, for a spreadsheet",
 }
 PARQUET = "balls.parquet"
 CFX = "cfx.json"

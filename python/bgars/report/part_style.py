@@ -128,8 +128,10 @@ def window_size_in(window: tuple[float, float, float, float], longest_in: float)
 
 def part_title(result: PartResult) -> str:
     """Name and verdict, and how many balls are which."""
-    counts = {verdict: sum(ball.verdict == verdict for ball in result.balls) for verdict in VERDICT_COLORS}
-    told = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
+    states = [ball.verdict if ball.present else ABSENT[ball.verdict] for ball in result.balls]
+    told = ", ".join(
+        f"{states.count(state)} {state}" for state in (*VERDICT_COLORS, *ABSENT.values()) if state in states
+    )
     return f"{result.name}: {result.verdict.upper()}   ({told or 'no balls'})"
 
 
