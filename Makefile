@@ -93,7 +93,7 @@ $(VENV)/.run-time: $(RUST_SOURCES)
 	@echo "2 of 3: packages (numpy, scipy, matplotlib, plotly and what they need)"
 	@echo "3 of 3: compiling the Rust kernels; some minutes the first time"
 	@$(BIN)/python -m pip install --editable '.[report]' | grep --line-buffered -E '^(Collecting|  Building|Building|Successfully|ERROR)' || true
-	@$(BIN)/python -c "import bgars" || { echo "bgars could not be installed: $(BIN)/python -m pip install -e '.[report]' says why" >&2; exit 1; }
+	@$(BIN)/python -c "from bgars import _bgars" || { echo "bgars could not be installed: $(BIN)/python -m pip install -e '.[report]' says why" >&2; exit 1; }
 	@touch $@
 
 # What tests and linters need, on top of it.

@@ -42,6 +42,7 @@ def test_every_public_name_can_be_had_and_is_what_type_checkers_see() -> None:
     assert sorted(names) == sorted(set(names)) == dir(bgars) == bgars.__all__
     for name in names:
         assert getattr(bgars, name) is not None
+    loaded_by("import bgars; assert bgars.normals.METHODS and bgars._bgars.DEBUG_BUILD is False")
     with pytest.raises(AttributeError, match="no_such_name"):
         bgars.no_such_name  # noqa: B018
 
