@@ -18,6 +18,8 @@ from .evaluate import evaluate as evaluate
 from .inspection_pipeline import inspect as inspect
 from .integrate import integrate_normals as integrate_normals
 from .io.capture import read_capture as read_capture
+from .io.formats import write_normals as write_normals
+from .io.formats import write_points as write_points
 from .io.height import read_height as read_height
 from .io.height import write_height as write_height
 from .io.material_file import read_material as read_material
@@ -56,6 +58,8 @@ from .report.part import write_part_pictures as write_part_pictures
 from .rig import LightRig as LightRig
 from .samples import sample_capture as sample_capture
 from .samples import sample_part_recipe as sample_part_recipe
+from .shape_images import ShapeImages as ShapeImages
+from .shape_images import shape_images as shape_images
 from .simulate import Ball as Ball
 from .simulate import BallTruth as BallTruth
 from .simulate import Board as Board

@@ -120,7 +120,7 @@ class _Layer:
 
 
 def _triangles(corners_um: Array, colors: Array, view: _View, *, ordered: bool) -> _Layer:
-    """Shaded triangles (m, 3, 2), the farthest first."""
+    """Shaded polygons (m, k, 2), the farthest first."""
     places, depth = view(corners_um)
     normal = np.cross(corners_um[:, 1] - corners_um[:, 0], corners_um[:, 2] - corners_um[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
@@ -152,7 +152,7 @@ def _grid_faces(trace: dict[str, Any]) -> tuple[Array, Array]:
     x, y = np.meshgrid(unpacked(trace["x"]), unpacked(trace["y"]))
     points = np.stack([x, y, unpacked(trace["z"])], axis=2).astype(np.float64)
     one, two, three, four = points[:-1, :-1], points[:-1, 1:], points[1:, 1:], points[1:, :-1]
-    corners = np.stack([np.stack([one, two, three], 2), np.stack([one, three, four], 2)]).reshape(-1, 3, 3)
+    corners = np.stack([one, two, three, four], axis=2).reshape(-1, 4, 3)
     corners = corners[np.isfinite(corners[..., 2]).all(axis=1)]
     return corners, np.broadcast_to(rgb_of(trace["colorscale"][0][1]), (len(corners), 3))
 
