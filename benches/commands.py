@@ -124,14 +124,15 @@ def tiled(source: Path, megapixels: float) -> Path:
     return folder
 
 
-def repeats_of(folder: Path, parts: int, repeats: int) -> Path:
-    """A study of several captures: the same images in folders part/repeat."""
-    study = folder.with_name(f"{folder.name}-study")
-    for part in range(parts):
-        for repeat in range(repeats):
-            place = study / f"part{part}" / f"repeat{repeat}"
-            if not place.is_dir():
-                shutil.copytree(folder, place)
+def study_of(data: Path, parts: int, repeats: int) -> Path:
+    """A study of several captures of 16 balls in folders part/repeat, each with noise of its own."""
+    study = data / "study"
+    for number in range(parts * repeats):
+        place = study / f"part{number // repeats}" / f"repeat{number % repeats}"
+        if not place.is_dir():
+            recipe = data / "balls-16-lights-8.toml"
+            command = [*BGARS, "simulate", str(recipe), "--seed", str(number), "-o", str(place)]
+            subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     return study
 
 
@@ -155,7 +156,7 @@ def cases(data: Path, quick: bool) -> list[Case]:
     found.append(Case("mesh, 4 megapixels", mesh))
     if quick:
         return found
-    study = [*BGARS, "grr", str(repeats_of(small, 4, 3)), "-o", "OUT", "-r", str(data / "part-16.toml")]
+    study = [*BGARS, "grr", str(study_of(data, 4, 3)), "-o", "OUT", "-r", str(data / "part-16.toml")]
     found.append(Case("grr, 12 captures of 16 balls", study, 1))
     many = simulated(data, 4, 24, 10.0)
     for source, lights in ((many, 24), (small, 8)):
