@@ -4,9 +4,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral simulator experiments method schema constants studies performance instructions clean
+.PHONY: demo test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral simulator experiments method schema constants studies performance bench instructions clean
 
-demo: $(VENV)/.installed ## Reconstruct the solder ball that ships with bgars
+demo: $(VENV)/.run-time ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
 
 test: test-rust test-python ## All tests, Rust and Python
@@ -72,6 +72,9 @@ schema: $(VENV)/.installed ## Write docs/result.schema.json, the JSON Schema of 
 constants: $(VENV)/.installed ## Write docs/constants.md, the registry of constants, again
 	$(BIN)/python docs/make_constants.py
 
+bench: $(VENV)/.run-time ## CPU seconds, wall time and memory of whole commands, into docs/performance.md
+	$(BIN)/python benches/commands.py --docs
+
 instructions: ## Instructions a pixel of each kernel against the kept counts (needs valgrind)
 	python3 benches/count_instructions.py
 
@@ -83,9 +86,18 @@ clean:
 	rm -rf $(VENV) target demo-output
 
 # The compiled module is rebuilt when a Rust source changes; Python sources are used in place.
-$(VENV)/.installed: $(RUST_SOURCES)
-	@echo "Building bgars in $(VENV): fetches packages, compiles Rust; minutes the first time, without a word"
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --editable '.[test,lint]'
-	touch $@
+$(VENV)/.run-time: $(RUST_SOURCES)
+	@echo "1 of 3: Python environment in $(VENV)"
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@$(BIN)/python -m pip install --quiet --upgrade pip
+	@echo "2 of 3: packages (numpy, scipy, matplotlib, plotly and what they need)"
+	@echo "3 of 3: compiling the Rust kernels; some minutes the first time"
+	@$(BIN)/python -m pip install --editable '.[report]' | grep --line-buffered -E '^(Collecting|  Building|Building|Successfully|ERROR)' || true
+	@$(BIN)/python -c "from bgars import _bgars" || { echo "bgars could not be installed: $(BIN)/python -m pip install -e '.[report]' says why" >&2; exit 1; }
+	@touch $@
+
+# What tests and linters need, on top of it.
+$(VENV)/.installed: $(VENV)/.run-time pyproject.toml
+	@echo "Tools for tests and lint"
+	@$(BIN)/python -m pip install --quiet $$($(BIN)/python .ci/extra-requirements test lint)
+	@touch $@

@@ -124,7 +124,7 @@ def words(lines: list[str]) -> str:
 def draw(all_figures: dict[Setting, dict[str, GaugeFigures]]) -> None:
     """Draw the repeatability of the height, with its interval, over the noise."""
     with figure_style():
-        figure = new_figure(8.0, 4.2)
+        figure = new_figure(8.0, 4.2, "constrained")
         axes = figure.add_subplot()
         for colour, pitch_um in zip(PLACEMENT_COLORS, PITCHES_UM, strict=False):
             for bits, mark, dash in zip(BITS, "os", ("-", "--"), strict=True):

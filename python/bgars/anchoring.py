@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
+import scipy  # loads its modules when they are used
 
 from bgars.errors import InputError
 
@@ -74,5 +74,5 @@ def _smoothed(
     density, lack = np.zeros(known.shape), np.zeros(known.shape)
     density[known], lack[known] = trust, trust * lack_px
     top = max(float(trust.max()), FEW)
-    mean: NDArray[np.float64] = gaussian_filter(lack * inside, reach_px, mode="constant")
-    return mean / (gaussian_filter(density * inside, reach_px, mode="constant") + FEW * top)
+    mean: NDArray[np.float64] = scipy.ndimage.gaussian_filter(lack * inside, reach_px, mode="constant")
+    return mean / (scipy.ndimage.gaussian_filter(density * inside, reach_px, mode="constant") + FEW * top)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -11,17 +11,19 @@ from bgars.errors import ConvergenceError, InputError
 from bgars.integrate import integrate_normals
 from bgars.io.truth import read_truth
 from bgars.normals import DEFAULT_METHOD, Method, estimate_normals
+from bgars.records import NormalField
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from bgars.material_records import SurfaceMaterial
-    from bgars.records import BoolArray, Capture, FloatArray, NormalField, Truth
+    from bgars.records import BoolArray, Capture, FloatArray, Truth
 
 __all__ = ["AngularErrors", "Evaluation", "angular_error_deg", "evaluate"]
 
+GIVEN = "normals as given"
 MIN_N_Z = 0.3
 """Balls are judged where the true n_z is above this: nearer the rim a pixel mixes ball and board."""
 
@@ -90,7 +92,7 @@ class Evaluation:
 def evaluate(
     capture: Capture,
     *,
-    method: Method = DEFAULT_METHOD,
+    method: Method | Callable[[Capture], NormalField | ArrayLike] | NormalField | ArrayLike = DEFAULT_METHOD,
     material: SurfaceMaterial | None = None,
     truth: Truth | None = None,
     progress: Callable[[float], object] | None = None,
@@ -101,8 +103,10 @@ def evaluate(
     ----------
     capture : Capture
         From :func:`bgars.read_capture`.
-    method : str
-        See :func:`bgars.estimate_normals`.
+    method : str, callable, NormalField or (H, W, 3) floating
+        A name, see :func:`bgars.estimate_normals`; or a function that is given the capture and returns normals; or
+        the normals themselves, as those of another program (:func:`bgars.read_normal_map`). Arrays are made unit
+        length; NaN and zero vectors have no solution, and nothing is said of what in them is measured.
     material : SurfaceMaterial, optional
         Fitted before, for the method ``reflectance``.
     truth : Truth, optional
@@ -115,11 +119,15 @@ def evaluate(
     FileFormatError
         The folder has no truth.
     InputError
-        Truth and images differ in size.
+        Truth, images and given normals differ in size.
 
     Examples
     --------
     >>> import bgars
+    >>> capture = bgars.read_capture(bgars.sample_capture())
+    >>> own = bgars.evaluate(capture, method=lambda capture: bgars.read_truth(capture.folder).normals)
+    >>> own.normals.mean_deg < 1e-3, own.measured is None
+    (True, True)
     >>> errors = bgars.evaluate(bgars.read_capture(bgars.sample_capture()), method="lambertian").normals
     >>> round(errors.mean_deg, 1), errors.invalid
     (9.3, 0)
@@ -132,7 +140,11 @@ def evaluate(
     if truth.mask.shape != capture.mask.shape:
         msg = f"truth: has shape {truth.mask.shape}, but the images have {capture.mask.shape}"
         raise InputError(msg)
-    field = estimate_normals(capture, method=method, material=material, progress=progress)
+    if isinstance(method, str):
+        field = estimate_normals(capture, method=cast("Method", method), material=material, progress=progress)
+    else:
+        field = _given_field(method, capture)
+    is_own = field.choice != GIVEN
     judged = truth.mask & capture.mask
     board = None
     if truth.ball_ids is not None:
@@ -144,15 +156,42 @@ def evaluate(
         raise InputError(msg)
     return Evaluation(
         name=capture.name,
-        method=method,
+        method=field.method,
         region=f"balls, n_z > {MIN_N_Z}" if truth.ball_ids is not None else "mask",
         choice=field.choice,
         normals=errors,
-        measured=_errors(field, truth.normals, judged & field.measured),
-        coverage=_coverage(field, truth.normals, judged & field.measured),
+        measured=_errors(field, truth.normals, judged & field.measured) if is_own else None,
+        coverage=_coverage(field, truth.normals, judged & field.measured) if is_own else None,
         board=board,
         ball_height_rmse_um=_ball_height_rmse_um(field, truth, judged),
     )
+
+
+def _given_field(
+    given: Callable[[Capture], NormalField | ArrayLike] | NormalField | ArrayLike, capture: Capture
+) -> NormalField:
+    """Normals that somebody else estimated, as a field; raise InputError unless they are as large as the images."""
+    name = getattr(given, "__name__", "given") if callable(given) else "given"
+    found = given(capture) if callable(given) else given
+    if isinstance(found, NormalField):
+        normals, field = found.normals, found
+    else:
+        normals = np.asarray(found)
+        shape = (*capture.mask.shape, 3)
+        if normals.shape != shape or normals.dtype.kind not in "fiu":
+            msg = f"method: normals must be numbers of shape {shape}, got {normals.dtype} of shape {normals.shape}"
+            raise InputError(msg)
+        wide = normals.astype(np.float64)
+        length = np.linalg.norm(wide, axis=2)
+        mask = np.isfinite(length) & (length > 0)
+        unit = np.where(mask[..., None], wide / np.where(mask, length, 1.0)[..., None], np.nan).astype(np.float32)
+        nothing = np.full(mask.shape, np.nan, np.float32)
+        lights = np.zeros(mask.shape, np.uint16)
+        field = NormalField(unit, nothing, mask, nothing, mask, lights, name, capture.pixel_pitch_um, choice=GIVEN)
+    if normals.shape[:2] != capture.mask.shape:
+        msg = f"method: normals have shape {normals.shape[:2]}, but the images have {capture.mask.shape}"
+        raise InputError(msg)
+    return field
 
 
 def angular_error_deg(estimate: FloatArray, truth: FloatArray) -> NDArray[np.float64]:

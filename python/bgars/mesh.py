@@ -5,15 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 
 from bgars import _bgars
 from bgars.errors import InputError
 
 if TYPE_CHECKING:
+    import trimesh
+
     from bgars.records import HeightMap, NormalField
 
-__all__ = ["mesh_from_height"]
+__all__ = ["check_faces", "mesh_from_height", "mesh_size"]
 
 
 def mesh_from_height(
@@ -49,12 +50,12 @@ def mesh_from_height(
     >>> mesh.vertices[0].tolist(), len(mesh.faces), mesh.metadata["unit"]
     ([-5.0, 5.0, 0.0], 2, 'um')
     """
+    import trimesh  # noqa: PLC0415 - half a second, only for those who want its record
+
     height.check_field(field)
     pitch = 1.0 if height.pixel_pitch_um is None else height.pixel_pitch_um
     vertices, faces, pixels = _bgars.triangulate(height.height_px, height.mask, pitch, threads=threads)
-    if len(faces) == 0:
-        msg = f"height: no three neighbouring pixels are valid ({len(vertices)} in all), so there is no face to make"
-        raise InputError(msg)
+    check_faces(len(vertices), len(faces))
     metadata = {"unit": height.unit, "components": len(height.components)}
     if field is None:
         # In the types that trimesh keeps, so that it does not convert them once more.
@@ -67,3 +68,25 @@ def mesh_from_height(
     return trimesh.Trimesh(
         vertices, faces, vertex_normals=normals, vertex_colors=colors, process=False, metadata=metadata
     )
+
+
+def mesh_size(height: HeightMap) -> tuple[int, int]:
+    """How many vertices and faces the mesh of a height map has, without making it.
+
+    Examples
+    --------
+    >>> import bgars, numpy as np
+    >>> mesh_size(bgars.HeightMap.from_array(np.zeros((2, 3), np.float32)))
+    (6, 4)
+    """
+    mask = height.mask.view(np.uint8)
+    corners = mask[:-1, :-1] + mask[:-1, 1:] + mask[1:, :-1] + mask[1:, 1:]
+    of_corners = np.bincount(corners.ravel(), minlength=5)
+    return int(np.count_nonzero(mask)), int(of_corners[3] + 2 * of_corners[4])
+
+
+def check_faces(vertices: int, faces: int) -> None:
+    """Raise InputError where a mesh has no face."""
+    if faces == 0:
+        msg = f"height: no three neighbouring pixels are valid ({vertices} in all), so there is no face to make"
+        raise InputError(msg)

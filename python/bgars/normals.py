@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from bgars.ball_records import FoundBalls
 from bgars.balls import find_balls
 from bgars.circle_pixels import inside_circles
 from bgars.errors import InputError
+from bgars.normal_methods import ALL_METHODS, DEFAULT_METHOD, METHODS, Method
 from bgars.pixelwise import (
     DEFAULT_THRESHOLD,
     PixelwiseMethod,
@@ -30,12 +31,6 @@ if TYPE_CHECKING:
     from bgars.records import Capture, NormalField
 
 __all__ = ["DEFAULT_METHOD", "METHODS", "Method", "estimate_normals"]
-
-Method = Literal["lambertian", "specular-filter", "robust-filter", "reflectance", "blind"]
-METHODS: tuple[Method, ...] = ("lambertian", "specular-filter", "robust-filter", "reflectance")
-"""The methods that are compared; ``blind`` is what ``reflectance`` does without balls."""
-DEFAULT_METHOD: Method = "reflectance"
-ALL_METHODS: tuple[Method, ...] = get_args(Method)
 
 CIRCLE_VALUES = 3
 RIM_PX = 0.01

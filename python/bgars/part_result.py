@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from bgars.ball_records import BallKind
 from bgars.part_material import PartMaterial
 from bgars.part_recipe import PartRecipe
+from bgars.shown import ShownPart
 from bgars.surface_map import PartSurface
 
 __all__ = ["FORMAT", "FORMAT_VERSION", "BallResult", "PartCheck", "PartResult", "SeatingResult", "Verdict"]
@@ -47,7 +48,7 @@ LINE_READINGS = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BallResult:
     """One ball, or a place that should have one; NaN = not measured. ``u_..`` are standard uncertainties (k = 1).
 
@@ -110,6 +111,12 @@ class BallResult:
     lights_used: int = 0
     budget: dict[str, dict[str, float]] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        """Name, verdict and the readings that are asked for first."""
+        return (
+            f"BallResult({self.name!r}, {self.verdict}, top_um={self.top_um:.2f}, diameter_um={self.diameter_um:.2f})"
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """Return the record as plain Python values; None where something was not measured."""
         return {entry.name: _plain(getattr(self, entry.name), DIGITS) for entry in fields(self)}
@@ -162,8 +169,8 @@ class SeatingResult:
     offset_um: float
 
 
-@dataclass(frozen=True, eq=False)
-class PartResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class PartResult(ShownPart):
     """What an inspection found. NaN = not measured; ``u_..`` are standard uncertainties (k = 1).
 
     Attributes

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from bgars.integrate import Difference, integrate_normals
-from bgars.mesh import mesh_from_height
+from bgars.mesh import check_faces, mesh_from_height, mesh_size
 from bgars.normals import DEFAULT_METHOD, Method, estimate_normals
 
 if TYPE_CHECKING:
@@ -21,12 +22,12 @@ if TYPE_CHECKING:
 
 __all__ = ["Reconstruction", "reconstruct", "solver_fraction", "summarise_field", "summarise_fit"]
 
-Stage = Literal["normals", "height", "mesh"]
+Stage = Literal["normals", "height"]
 
 
 @dataclass(frozen=True, eq=False)
 class Reconstruction:
-    """What the main job makes of a capture: one record a stage.
+    """What the main job makes of a capture: one record per stage.
 
     Attributes
     ----------
@@ -34,15 +35,21 @@ class Reconstruction:
     field : NormalField
     height : HeightMap
     mesh : trimesh.Trimesh
+        Made when it is first asked for; :func:`bgars.write_mesh` writes PLY and OBJ from `height` and `field` alone.
     """
 
     capture: Capture
     field: NormalField
     height: HeightMap
-    mesh: trimesh.Trimesh
+
+    @cached_property
+    def mesh(self) -> trimesh.Trimesh:
+        """The surface as triangles."""
+        return mesh_from_height(self.height, self.field)
 
     def summary(self) -> dict[str, Any]:
         """Return the scalars of every stage as plain Python values, for JSON."""
+        vertices, faces = mesh_size(self.height)
         return {
             "capture": self.capture.name,
             "lights": len(self.capture.rig),
@@ -50,7 +57,7 @@ class Reconstruction:
             "pixel_pitch_um": self.capture.pixel_pitch_um,
             "normals": summarise_field(self.field),
             "height": self.height.summary(),
-            "mesh": {"vertices": len(self.mesh.vertices), "faces": len(self.mesh.faces)},
+            "mesh": {"vertices": vertices, "faces": faces},
         }
 
 
@@ -143,9 +150,8 @@ def reconstruct(
         progress=lambda _, residual: report("height", solver_fraction(residual)),
     )
     report("height", 1.0)
-    mesh = mesh_from_height(height, field)
-    report("mesh", 1.0)
-    return Reconstruction(capture, field, height, mesh)
+    check_faces(*mesh_size(height))
+    return Reconstruction(capture, field, height)
 
 
 def solver_fraction(residual: float, tolerance: float = 1e-8) -> float:

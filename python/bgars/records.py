@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from bgars import _bgars
 from bgars.errors import InputError
 from bgars.scalar_checks import check_pitch
+from bgars.shown import ShownCapture, ShownField, ShownHeight
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -59,8 +60,8 @@ def float_full_scale(pixels: PixelArray, threads: int | None) -> float:
     return _bgars.float_full_scale(pixels.astype(np.float32, copy=False), threads=threads)
 
 
-@dataclass(frozen=True, eq=False)
-class Capture:
+@dataclass(frozen=True, eq=False, repr=False)
+class Capture(ShownCapture):
     """One part, photographed under one light at a time.
 
     Attributes
@@ -114,8 +115,8 @@ PERCENTILE_PIXELS = 1 << 16
 """Pixels that a percentile for display is taken from, about."""
 
 
-@dataclass(frozen=True, eq=False)
-class NormalField:
+@dataclass(frozen=True, eq=False, repr=False)
+class NormalField(ShownField):
     """Estimated normals.
 
     Attributes
@@ -197,8 +198,8 @@ class Component:
     anchor_rms_px: float = math.nan
 
 
-@dataclass(frozen=True, eq=False)
-class HeightMap:
+@dataclass(frozen=True, eq=False, repr=False)
+class HeightMap(ShownHeight):
     """Integrated heights, zero mean in each connected component that no anchor holds.
 
     Attributes

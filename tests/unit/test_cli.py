@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import bgars
 import numpy as np
@@ -19,6 +20,7 @@ import trimesh
 import typer
 from bgars.cli.app import app
 from bgars.cli.console import activation
+from bgars.cli.lazy import LAZY_COMMANDS
 from bgars.normals import METHODS, Method
 from rich.text import Text
 
@@ -110,7 +112,7 @@ def test_height_map_to_mesh_keeps_its_scale(tmp_path: Path) -> None:
 def test_info(tmp_path: Path) -> None:
     run = bgars_command("info", bgars.sample_capture())
     assert run.returncode == 0, run.stderr
-    for words in ("8 of 256 x 240 pixels, uint8", "3.4 um a pixel", "light_07.png", "45.0"):
+    for words in ("8 of 256 x 240 pixels, uint8", "3.4 um per pixel", "light_07.png", "45.0"):
         assert words in run.stdout
     facts = json.loads(bgars_command("info", bgars.sample_capture(), "--json").stdout)
     assert facts["lights"][2]["azimuth_deg"] == pytest.approx(90.0)
@@ -146,7 +148,7 @@ def test_every_command_has_help(command: str) -> None:
 
 
 def test_the_help_of_every_estimator_explains_each_method() -> None:
-    commands = typer.main.get_command(app).commands
+    commands = {name: loaded(command) for name, command in typer.main.get_command(app).commands.items()}
     for name in ("reconstruct", "normals", "inspect", "grr"):
         (told,) = [option.help for option in commands[name].params if option.name == "method"]
         for method in get_args(Method):
@@ -159,7 +161,13 @@ def test_the_help_of_every_estimator_explains_each_method() -> None:
     assert "blind is what reflectance uses without balls" in told
 
 
+def loaded(command: Any) -> Any:  # noqa: ANN401 - a command of whichever click typer brings
+    """The command itself, where the list of commands only knows its name."""
+    return command.load() if hasattr(command, "load") else command
+
+
 def help_texts(command: object) -> Iterator[str]:
+    command = loaded(command)
     for each in (command, *getattr(command, "params", ())):
         yield getattr(each, "help", None) or ""
     for other in getattr(command, "commands", {}).values():
@@ -171,6 +179,36 @@ def test_no_help_is_taken_for_markup() -> None:
     assert any("bgars\\[parquet]" in text for text in texts)
     for text in texts:
         assert Text.from_markup(text).plain == text.replace("\\[", "["), "brackets are escaped"
+
+
+def test_the_list_of_commands_says_what_the_commands_say() -> None:
+    commands = typer.main.get_command(app).commands
+    assert set(LAZY_COMMANDS) < set(commands)
+    for name, (_, line) in LAZY_COMMANDS.items():
+        assert loaded(commands[name]).help.startswith(line.removesuffix(".")), name
+
+
+def test_help_is_broken_into_lines_by_the_terminal_alone() -> None:
+    for text in help_texts(typer.main.get_command(app)):
+        assert "\n" not in text.replace("\n\n", "")
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        ("bgars gr", "grr"),
+        ("bgars calibrate m", "material"),
+        ("bgars inspect --pa", "--parquet"),
+        ("bgars rep", "report"),
+    ],
+)
+def test_completion_knows_commands_that_are_not_loaded(words: str, found: str) -> None:
+    ask = {"_BGARS_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(len(words.split()) - 1)}
+    command = "import sys; sys.argv = ['bgars']; from bgars.cli import main; main()"
+    run = subprocess.run(
+        [sys.executable, "-c", command], capture_output=True, text=True, env=os.environ | ask, check=False
+    )
+    assert run.stdout.split() == [found]
 
 
 @pytest.mark.parametrize(
@@ -237,3 +275,21 @@ def test_ctrl_c_stops_long_work() -> None:
     _, errors = process.communicate(timeout=20)
     assert process.returncode != 0
     assert "KeyboardInterrupt" in errors
+
+
+INTERRUPTED_START = """
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+class Interrupt:
+    def find_spec(self, name, *_):
+        if name == "bgars.cli.console":
+            signal.raise_signal(signal.SIGINT)
+sys.meta_path.insert(0, Interrupt())
+from bgars.cli import main
+main()
+"""
+
+
+def test_ctrl_c_while_modules_are_loaded_is_silent() -> None:
+    run = subprocess.run([sys.executable, "-c", INTERRUPTED_START], capture_output=True, text=True, check=False)
+    assert (run.returncode, run.stdout, run.stderr) == (130, "", "")

@@ -18,7 +18,7 @@ MODULES = [name for _, name, _ in pkgutil.walk_packages(bgars.__path__, "bgars."
 
 def test_the_readme_shows_the_examples() -> None:
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
-    examples = [ROOT / "examples" / name for name in ("quickstart.py", "inspect_part.py")]
+    examples = [ROOT / "examples" / name for name in ("inspect_part.py", "quickstart.py")]
     assert blocks == [example.read_text(encoding="utf-8") for example in examples]
 
 

@@ -26,8 +26,14 @@ RECORDS = {
     "integration_inputs": 3.5,
     "normals_choice": 3.6,
 }
-BASE = {"errors": 0, "large_arrays": 0, "light_files": 1, "light_names": 1, "rig": 2, "scalar_checks": 1, **RECORDS}
-STAGES = dict.fromkeys(("io", "pixelwise", "reflectance", "integrate", "mesh", "balls", "inspection"), 4)
+BASE = {
+    **{"errors": 0, "version": 0, "extras": 0, "shown": 0.5, "normal_methods": 0, "large_arrays": 0},
+    **{"light_files": 1, "light_names": 1, "rig": 2, "scalar_checks": 1},
+    **RECORDS,
+}
+STAGES = dict.fromkeys(
+    ("io", "pixelwise", "shape_images", "reflectance", "integrate", "mesh", "balls", "inspection"), 4
+)
 PIPELINES = ("calibrate", "pipeline", "evaluate", "part_anchors", "recipes", "cfx")
 JOINED = {"normals": 4.5, **dict.fromkeys(PIPELINES, 5), "part_surface": 5.2, "inspection_pipeline": 5.4}
 LATER = {**JOINED, "batch": 6, "report": 6, "studies": 6.5, "experiments": 6, "samples": 0, "cli": 7}

@@ -116,7 +116,7 @@ def test_pictures_do_not_call_an_unclear_place_missing() -> None:
     result = unclear()
     figures = deviation_figure(result), part_figure(result, simulated("bad")[0])
     for figure in figures:
-        legends = [axes.get_legend() for axes in figure.axes if axes.get_legend() is not None]
+        legends = [axes.get_legend() for axes in figure.axes if axes.get_legend() is not None] + figure.legends
         assert legends
         for legend in legends:
             words = " ".join(text.get_text() for text in legend.get_texts())

@@ -27,7 +27,7 @@ def test_the_wheel_installs_and_runs_the_demo(tmp_path: Path) -> None:
     assert "abi3" in wheels[0].name
     venv.create(tmp_path / "clean", with_pip=True)
     python = tmp_path / "clean" / "bin" / "python"
-    run(python, "-m", "pip", "install", "--quiet", wheels[0], cwd=tmp_path)
+    run(python, "-m", "pip", "install", "--quiet", f"{wheels[0]}[report]", cwd=tmp_path)
     output = run(tmp_path / "clean" / "bin" / "bgars", "demo", "-o", "demo", cwd=tmp_path)
     assert "overview.png" in output
     assert (tmp_path / "demo" / "mesh.ply").stat().st_size > 100_000

@@ -14,6 +14,7 @@ from bgars.report.page import page_text
 from bgars.report.page_scene import view_words
 from bgars.report.page_source import PageSource
 from bgars.report.part_maps import deviation_figure
+from bgars.report.part_style import part_title
 from bgars.studies.characteristics import CHARACTERISTICS
 from bgars.studies.pages import grr_page
 from judged_parts import RECIPE, judged
@@ -98,5 +99,23 @@ def test_a_study_without_a_recipe_is_named_after_its_folder(tmp_path: Path) -> N
 def test_warnings_of_a_study_speak_the_words_of_its_page(tmp_path: Path) -> None:
     found = bgars.gauge_rr(bgars.read_study(study_of(tmp_path / "study", RECIPE)))
     assert any("seating coplanarity (" in warning for warning in found.warnings)
-    listed = grr_page(found).partition("Mind:")[2].partition("</ul>")[0]
+    listed = grr_page(found).partition("Warnings:")[2].partition("</ul>")[0]
     assert not [each.name for each in CHARACTERISTICS if each.name.endswith("_um") and each.name in listed]
+
+
+def test_every_limit_that_a_ball_breaks_is_named_and_places_without_a_ball_are_counted_apart() -> None:
+    result = failing()
+    broken = {
+        ball.name: [reason for reason in ball.reasons if "is outside its limits" in reason]
+        for ball in result.balls
+        if ball.present and ball.verdict == "fail"
+    }
+    assert any(len(reasons) > 1 for reasons in broken.values())
+    (told,) = [reason for reason in result.reasons if "outside limits:" in reason]
+    for name, reasons in broken.items():
+        if f"{name} (" in told:
+            own = told.partition(f"{name} (")[2].partition(";")[0]
+            assert all(reason.partition(" is outside")[0] in own for reason in reasons)
+    missing = sum(not ball.present for ball in result.balls)
+    assert f"{missing} missing" in part_title(result)
+    assert f"{len([b for b in result.balls if b.present and b.verdict == 'fail'])} fail," in part_title(result)

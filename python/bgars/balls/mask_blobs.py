@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy import ndimage
+import scipy  # loads its modules when they are used
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -40,16 +40,16 @@ def round_blobs(mask: BoolArray) -> RoundBlobs:
     mask : (H, W) bool
         True = use.
     """
-    labels, count = ndimage.label(mask)
+    labels, count = scipy.ndimage.label(mask)
     found = []
-    for index, box in enumerate(ndimage.find_objects(labels)[:MAX_BLOBS] if count else [], start=1):
-        blob = np.pad(ndimage.binary_fill_holes(labels[box] == index), 1)
+    for index, box in enumerate(scipy.ndimage.find_objects(labels)[:MAX_BLOBS] if count else [], start=1):
+        blob = np.pad(scipy.ndimage.binary_fill_holes(labels[box] == index), 1)
         radius_px = float(np.sqrt(blob.sum() / np.pi))
         if radius_px < SMALLEST_PX:
             continue
         rows, cols = np.nonzero(blob)
         row, col = rows.mean(), cols.mean()
-        edge_rows, edge_cols = np.nonzero(blob & ~ndimage.binary_erosion(blob))
+        edge_rows, edge_cols = np.nonzero(blob & ~scipy.ndimage.binary_erosion(blob))
         distance = np.hypot(edge_rows - row, edge_cols - col)
         rms_px = float(np.sqrt(np.mean((distance - distance.mean()) ** 2)))
         if rms_px <= max(ROUND_PX, ROUND_FRACTION * radius_px):

@@ -7,7 +7,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy import fft, ndimage
+import scipy  # loads its modules when they are used
 
 from bgars.balls.levels import block_means
 
@@ -96,7 +96,7 @@ def outward_centres(slope_x: FloatArray, slope_y: FloatArray) -> list[Centre]:
         coarse = [block_means(slope, step) for slope in (slope_x, slope_y)]
         for scale_px, score in _outward_means(coarse, [(scale_px, scale_px / step) for scale_px in group]):
             size = 2 * max(1, int(0.35 * scale_px) // step) + 1
-            peak = (score == ndimage.maximum_filter(score, size)) & (score > MIN_SCORE)
+            peak = (score == scipy.ndimage.maximum_filter(score, size)) & (score > MIN_SCORE)
             for row, col in np.argwhere(peak).tolist():
                 value = float(score[row, col])
                 centres.append(Centre(row * step + step // 2, col * step + step // 2, scale_px, value))
@@ -115,9 +115,9 @@ def _outward_means(slopes: list[FloatArray], scales: list[tuple[float, float]]) 
     """
     height, width = slopes[0].shape
     margin = 2 * math.ceil(scales[-1][1])
-    shape = [fft.next_fast_len(side + margin, real=True) for side in (height, width)]
+    shape = [scipy.fft.next_fast_len(side + margin, real=True) for side in (height, width)]
     # Along x and y at once, and for all scales the same.
-    spectra = [fft.rfft2(slope, shape) for slope in slopes]
+    spectra = [scipy.fft.rfft2(slope, shape) for slope in slopes]
     for scale_px, radius in scales:
         reach = math.ceil(radius)
         side = np.arange(-reach, reach + 1, dtype=np.float32)
@@ -126,6 +126,6 @@ def _outward_means(slopes: list[FloatArray], scales: list[tuple[float, float]]) 
         outward = inside / (np.maximum(distance, np.float32(1e-6)) * inside.sum())
         # Mirrored, because convolution mirrors: x falls along columns, y (up) grows along rows.
         kernels = (outward * -side, outward * side[:, None])
-        along_x, along_y = (one * fft.rfft2(kernel, shape) for one, kernel in zip(spectra, kernels, strict=True))
-        mean: FloatArray = fft.irfft2(along_x + along_y, shape)
+        along_x, along_y = (one * scipy.fft.rfft2(kernel, shape) for one, kernel in zip(spectra, kernels, strict=True))
+        mean: FloatArray = scipy.fft.irfft2(along_x + along_y, shape)
         yield scale_px, mean[reach : reach + height, reach : reach + width]

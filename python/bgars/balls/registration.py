@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy  # loads its modules when they are used
 
 from bgars.errors import InputError
 
@@ -127,7 +127,7 @@ def _wrong_scale(layout: BallLayout, ratio: float, pixel_pitch_um: float) -> str
 def _to_neighbours(points: Points, count: int) -> Points:
     """(N, count) vectors from each point to its nearest others."""
     flat = np.stack([points.real, points.imag], axis=1)
-    _, index = cKDTree(flat).query(flat, k=min(count + 1, len(points)))
+    _, index = scipy.spatial.cKDTree(flat).query(flat, k=min(count + 1, len(points)))
     vectors: Points = points[np.asarray(index)[:, 1:]] - points[:, None]
     return vectors
 
@@ -169,7 +169,7 @@ def _vote(points: Points, nominal: Points, reach: float) -> tuple[complex, compl
 
     Among equals the right scale, then the least turn, then the shift nearest to none.
     """
-    tree = cKDTree(np.stack([points.real, points.imag], axis=1))
+    tree = scipy.spatial.cKDTree(np.stack([points.real, points.imag], axis=1))
     some = points[:: math.ceil(len(points) / SOME_BALLS)]
     best: tuple[tuple[float, ...], complex, complex] = ((-1.0,), 1.0 + 0.0j, 0.0j)
     for turn in _turns(points, nominal):
@@ -205,7 +205,7 @@ def _frequent(shifts: Points) -> Points:
 
 def _nearest(points: Points, placed: Points, reach: float) -> NDArray[np.int64]:
     """Index of the ball nearest to each place within reach, one place a ball; -1 for none."""
-    trees = [cKDTree(np.stack([at.real, at.imag], axis=1)) for at in (placed, points)]
+    trees = [scipy.spatial.cKDTree(np.stack([at.real, at.imag], axis=1)) for at in (placed, points)]
     pairs = trees[0].sparse_distance_matrix(trees[1], reach, output_type="ndarray")
     ball = np.full(len(placed), -1, np.int64)
     taken = np.zeros(len(points), np.bool_)

@@ -1,4 +1,4 @@
-"""The commands and their options."""
+"""The commands and their options: those that stand here load what they need when they run."""
 
 from __future__ import annotations
 
@@ -12,22 +12,13 @@ from typing import Annotated, Any, Literal
 import typer
 
 import bgars
-from bgars.cli.calibrate import register as register_calibrate
 from bgars.cli.console import EXIT_BAD_INPUT, activation, fail, print_json, say, shown_path, stage_progress
-from bgars.cli.describe import describe, describe_in_words
 from bgars.cli.evaluation import choice_in_words, evaluation_table
-from bgars.cli.experiment import register as register_experiment
-from bgars.cli.grr import register as register_grr
-from bgars.cli.inspect import register as register_inspect
-from bgars.cli.mesh import register as register_mesh
+from bgars.cli.lazy import LazyGroup
 from bgars.cli.options import MethodOption
-from bgars.cli.outputs import write_normals, write_reconstruction
-from bgars.cli.report import register as register_report
-from bgars.cli.simulate import register as register_simulate
-from bgars.cli.spc import register as register_spc
 from bgars.errors import BgarsError
-from bgars.light_files import read_filenames
-from bgars.normals import DEFAULT_METHOD, METHODS, Method
+from bgars.extras import EXTRA_OF, how_to_install
+from bgars.normal_methods import DEFAULT_METHOD, METHODS, Method
 
 __all__ = ["main"]
 
@@ -35,12 +26,12 @@ ChannelOption = Literal["luminance", "mean", "red", "green", "blue"]
 
 app = typer.Typer(
     name="bgars",
+    cls=LazyGroup,
     help=(
-        "Photometric stereo for shiny parts: one camera, several lights, one image a light. "
+        "Photometric stereo for shiny parts: one camera, several lights, one image per light. "
         "Start with 'bgars demo'; then 'bgars reconstruct FOLDER -o OUT' on your own photographs."
     ),
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 
@@ -84,7 +75,7 @@ def top(
     version: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False,
     threads: Annotated[
         int | None,
-        typer.Option(min=1, max=1024, help="Most threads to work on; one a core by default.", show_default=False),
+        typer.Option(min=1, max=1024, help="Largest number of threads; by default one per core.", show_default=False),
     ] = None,
 ) -> None:
     """Options of the command itself."""
@@ -103,7 +94,7 @@ def demo(
     ),
     as_json: JsonOption = False,
 ) -> None:
-    """Reconstruct a solder ball that ships with bgars, and say what to open."""
+    """Reconstruct the sample solder ball that comes with bgars."""
     folder = bgars.sample_capture()
     summary, files = _reconstruct_to(folder, output, bgars.reconstruct, mesh_format="ply", directx=False)
     scores = {
@@ -140,11 +131,11 @@ def reconstruct(
     directx: DirectxOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """The main job: a folder of photographs becomes normals, a height map, a mesh and an overview picture.
+    """Turn a folder of photographs into normals, a height map, a mesh and an overview picture.
 
     Writes overview.png, normals.png (16 bit), height.tif and height.npy (float32, um when the pixel pitch is known),
-    mesh.ply and summary.json; they replace all that an earlier run left of these in OUT. Heights between parts that do
-    not touch, such as a ball above its board, are not measured.
+    mesh.ply and summary.json; files that an earlier run left in OUT are replaced. The height of one part above another
+    that it does not touch, such as a ball above its board, is not measured.
     """
 
     def run(capture: bgars.Capture, **options: Any) -> bgars.Reconstruction:  # noqa: ANN401
@@ -157,12 +148,14 @@ def reconstruct(
         return
     height = summary["height"]
     low, high = height[f"height_range_{height['unit']}"]
+    trust, _, method_line = choice_in_words(summary["normals"]).partition("\n")
+    say(f"{summary['capture']}: {trust}")
+    parts = height["components"]
     say(
-        f"{summary['capture']}: {summary['normals']['valid_pixels']} normals, height {low:.1f} to "
-        f"{high:.1f} {height['unit']} in {height['components']} connected part(s), "
-        f"{height['iterations']} solver iterations."
+        f"{summary['normals']['valid_pixels']} normals, height {low:.1f} to {high:.1f} {height['unit']} in "
+        f"{parts} connected part{'' if parts == 1 else 's'}, {height['iterations']} solver iterations."
     )
-    say(choice_in_words(summary["normals"]))
+    say(method_line)
     _list_files(output, files)
 
 
@@ -177,7 +170,9 @@ def normals(
     directx: DirectxOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Only the normals: normals.png (16 bit), albedo.tif, confidence.tif, measured.png, lights_kept.png."""
+    """Estimate the normals only: normals.png (16 bit), albedo.tif, confidence.tif, measured.png, lights_kept.png."""
+    from bgars.cli.outputs import write_normals  # noqa: PLC0415 - loaded when it runs
+
     capture = bgars.read_capture(folder, channel=channel)
     surface = _material_from(material, capture)
     with stage_progress() as report:
@@ -192,20 +187,21 @@ def normals(
     if as_json:
         print_json({"capture": capture.name, **summary})
         return
+    trust, _, method_line = choice_in_words(summary).partition("\n")
+    say(f"{capture.name}: {trust}")
     say(
-        f"{capture.name}: {summary['valid_pixels']} normals, {summary['mean_lights_kept']:.1f} of "
-        f"{len(capture.rig)} lights kept on average, mean confidence {summary['mean_confidence']:.2f}."
+        f"{summary['valid_pixels']} normals, {summary['mean_lights_kept']:.1f} of {len(capture.rig)} lights kept on "
+        f"average, mean confidence {summary['mean_confidence']:.2f}."
     )
-    say(choice_in_words(summary))
+    say(method_line)
     _list_files(output, files)
-
-
-register_mesh(app)
 
 
 @app.command()
 def info(folder: FolderArgument, channel: ChannelChoice = None, as_json: JsonOption = False) -> None:
-    """Read a capture and say what is in it: images, lights, scale, clipped pixels."""
+    """Describe a capture: images, lights, scale, clipped pixels."""
+    from bgars.cli.describe import describe, describe_in_words  # noqa: PLC0415 - loaded when it runs
+
     capture = bgars.read_capture(folder, channel=channel)
     facts = describe(capture)
     if as_json:
@@ -230,20 +226,22 @@ def evaluate(
     images: Annotated[
         Path | None,
         typer.Option(
-            help="Text file of image names, one a line: use only these (such as ring8.txt).", show_default=False
+            help="Text file of image names, one per line: use only these (such as ring8.txt).", show_default=False
         ),
     ] = None,
     material: MaterialOption = None,
     channel: ChannelChoice = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Compare with truth (gt.npz of a rendered scene, Normal_gt.npy of a photograph).
+    """Compare estimated normals with known ones (gt.npz of a rendered scene, Normal_gt.npy of a photograph).
 
     Scenes are judged over ball pixels with true n_z > 0.3, photographs over their mask. A pixel without a solution
     counts as (0, 0, 1). Measured pixels are those whose own light fixes the normal; on balls, the errors of about 68 %
     of them should be within the standard error that the method states, on photographs far fewer are
     (docs/accuracy.md).
     """
+    from bgars.light_files import read_filenames  # noqa: PLC0415 - loaded when it runs
+
     names = None if images is None else read_filenames(images)
     capture = bgars.read_capture(folder, channel=channel, images=names)
     surface = _material_from(material, capture)
@@ -262,21 +260,17 @@ def evaluate(
         say(line)
 
 
-register_inspect(app)
-register_report(app)
-register_grr(app)
-register_spc(app)
-register_calibrate(app)
-register_simulate(app)
-register_experiment(app)
-
-
 def main() -> None:
     """Run the command; an error becomes one line and exit code 2 (wrong use: 2 too, Ctrl-C: 130)."""
     try:
         app()
     except BgarsError as error:
         fail(str(error))
+        sys.exit(EXIT_BAD_INPUT)
+    except ModuleNotFoundError as error:
+        if error.name not in EXTRA_OF:
+            raise
+        fail(f"this command {how_to_install(error.name)}")
         sys.exit(EXIT_BAD_INPUT)
 
 
@@ -289,6 +283,8 @@ def _reconstruct_to(
     directx: bool,
     channel: ChannelOption | None = None,
 ) -> tuple[dict[str, Any], dict[str, str]]:
+    from bgars.cli.outputs import write_reconstruction  # noqa: PLC0415 - loaded when it runs
+
     with stage_progress() as report:
         return write_reconstruction(
             lambda: run(bgars.read_capture(folder, channel=channel), progress=report),

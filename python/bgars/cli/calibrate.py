@@ -28,7 +28,7 @@ def register(app: typer.Typer) -> None:
     """Add the group of commands."""
     group = typer.Typer(
         name="calibrate",
-        help="Learn what is the same in every capture of a station, once, and keep it in a file.",
+        help="Learn what every capture of a station shares, and keep it in a file.",
         no_args_is_help=True,
     )
     group.callback()(lambda: None)

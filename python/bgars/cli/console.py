@@ -12,11 +12,10 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
-
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
+
+    from rich.console import Console
 
 __all__ = [
     "EXIT_BAD_INPUT",
@@ -29,17 +28,22 @@ __all__ = [
     "shown_path",
     "stage_progress",
     "utc_now",
+    "warn",
 ]
 
 EXIT_BAD_INPUT = 2
 
-output_console = Console(highlight=False, soft_wrap=True)
-error_console = Console(stderr=True, highlight=False, soft_wrap=True)
+
+def error_console() -> Console:
+    """The terminal for errors and progress; rich is loaded where it is needed."""
+    from rich.console import Console  # noqa: PLC0415 - as above
+
+    return Console(stderr=True, highlight=False, soft_wrap=True)
 
 
 def say(text: str = "") -> None:
-    """Print a line of a command's result; brackets are taken literally."""
-    output_console.print(text, markup=False)
+    """Print a line of a command's result."""
+    sys.stdout.write(f"{text}\n")
 
 
 def say_files(output: Path, files: Mapping[str, str]) -> None:
@@ -79,18 +83,32 @@ def utc_now() -> str:
 
 def fail(message: str) -> None:
     """Print an error for people."""
-    error_console.print("error:", style="bold red", end=" ")
-    error_console.print(message, markup=False)
+    console = error_console()
+    console.print("error:", style="bold red", end=" ")
+    console.print(message, markup=False, emoji=False)
+
+
+def warn(message: str) -> None:
+    """Print, beside the result, what people should know of it."""
+    sys.stderr.write(f"warning: {message}\n")
 
 
 @contextmanager
 def stage_progress() -> Iterator[Callable[[str, float], None]]:
     """Yield ``report(stage, fraction)``; bars on a terminal, silence in pipes."""
-    if not error_console.is_terminal:
+    if not sys.stderr.isatty():
         yield lambda _stage, _fraction: None
         return
+    from rich.progress import (  # noqa: PLC0415 - loaded on terminals only
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeElapsedColumn,
+    )
+
     columns = (TextColumn("{task.description:<10}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=error_console, transient=True) as progress:
+    with Progress(*columns, console=error_console(), transient=True) as progress:
         tasks: dict[str, Any] = {}
 
         def report(stage: str, fraction: float) -> None:

@@ -51,7 +51,7 @@ def describe_in_words(facts: dict[str, Any]) -> Iterator[str]:
     width, height = facts["image_size_px"]
     pitch = facts["pixel_pitch_um"]
     scale = (
-        f"{pitch:g} um a pixel ({width * pitch / 1000:.2f} x {height * pitch / 1000:.2f} mm)" if pitch else "unknown"
+        f"{pitch:g} um per pixel ({width * pitch / 1000:.2f} x {height * pitch / 1000:.2f} mm)" if pitch else "unknown"
     )
     yield f"capture     {facts['capture']}"
     yield f"images      {len(facts['lights'])} of {width} x {height} pixels, {facts['dtype']}"

@@ -11,10 +11,19 @@ if TYPE_CHECKING:
 
 __all__ = ["choice_in_words", "evaluation_table"]
 
+ALL_MEASURED, HALF = 0.9995, 0.5
+
 
 def choice_in_words(normals: dict[str, Any]) -> str:
-    """One line of a field's summary: what was used and why, and how much of it is measured."""
-    return f"Method: {normals['choice']}; {100.0 * normals['measured_share']:.1f} % of the normals are measured."
+    """Whether a field's normals can be trusted and why, then what was used."""
+    share = normals["measured_share"]
+    if share >= ALL_MEASURED:
+        trust = "Trust: the images determine every normal."
+    elif share >= HALF:
+        trust = f"Trust: the images determine {share:.1%} of the normals; the others are filled in, and marked."
+    else:
+        trust = f"Do not trust the surface as a whole: the images determine only {share:.1%} of its normals."
+    return f"{trust}\nMethod: {normals['choice']}."
 
 
 def evaluation_table(results: Sequence[Evaluation], lights: int) -> Iterator[str]:

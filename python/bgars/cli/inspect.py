@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import bgars
-from bgars.cli.console import print_json, say, say_files, stage_progress, utc_now
+from bgars.cli.console import print_json, say, say_files, stage_progress, utc_now, warn
 from bgars.cli.options import MethodOption
 from bgars.errors import InputError
+from bgars.extras import how_to_install, missing
 from bgars.io.atomic import FolderNames, atomic_folder
 from bgars.io.given_paths import need_file, need_folder
-from bgars.io.parquet import need_pyarrow
-from bgars.normals import DEFAULT_METHOD
+from bgars.normal_methods import DEFAULT_METHOD
 from bgars.report.page import REPORT_FILES
 from bgars.report.page_budget import main_causes
 from bgars.report.part import PICTURES
@@ -31,7 +31,7 @@ EXIT_NOT_PASSED = 1
 MAX_ROWS = 30
 FILES = {
     "result.json": "everything: readings, uncertainties, limits, verdicts, reasons, checksums of the input",
-    "balls.csv": "one line a ball, for a spreadsheet",
+    "balls.csv": "one row per ball, for a spreadsheet",
 }
 PARQUET = "balls.parquet"
 CFX = "cfx.json"
@@ -81,6 +81,10 @@ def inspect(
     cfx: Annotated[
         bool, typer.Option("--cfx", help="Write cfx.json, too: the IPC-CFX message UnitsInspected.")
     ] = False,
+    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Draw the four pictures (PNG).")] = True,
+    page: Annotated[
+        bool, typer.Option("--report/--no-report", help="Write report.html and what belongs to it.")
+    ] = True,
     log_line: Annotated[
         bool, typer.Option("--log", help="Print one line of key=value pairs for a log instead of text.")
     ] = False,
@@ -100,19 +104,26 @@ def inspect(
         msg = "--log and --json: give one of them"
         raise InputError(msg)
     if parquet:
+        from bgars.io.parquet import need_pyarrow  # noqa: PLC0415 - seldom wanted
+
         need_pyarrow()
     need_file(recipe)
     need_folder(folder)
+    pictures = _is_drawn(pictures, "the pictures are left out: drawing them", "matplotlib")
+    page = _is_drawn(page, "report.html is left out: it", "plotly")
     with stage_progress() as report, atomic_folder(output, NAMES) as place:
         part = None if recipe is None else bgars.read_part_recipe(recipe)
         capture = bgars.read_capture(folder)
-        result = bgars.inspect(capture, part, method=method, surface=True, progress=report)
+        result = bgars.inspect(capture, part, method=method, surface=page, progress=report)
         result = replace(result, serial=serial, inspected_utc=utc_now())
-        files = FILES | bgars.write_part_pictures(result, capture, place)
+        files = dict(FILES)
+        if pictures:
+            files |= bgars.write_part_pictures(result, capture, place)
         (place / "result.json").write_text(result.to_json(), encoding="utf-8")
         (place / "balls.csv").write_text(result.to_csv(), encoding="utf-8")
-        pages = bgars.write_report(result, place / "report.html", capture=capture)
-        files = {"report.html": pages.pop("report.html"), **files, **pages}
+        if page:
+            pages = bgars.write_report(result, place / "report.html", capture=capture)
+            files = {"report.html": pages.pop("report.html"), **files, **pages}
         if parquet:
             bgars.write_parquet(result, place / PARQUET)
             files[PARQUET] = "the same in full digits, units in the columns' metadata"
@@ -127,6 +138,14 @@ def inspect(
         _tell(result, output, files)
     if result.verdict != "pass":
         raise typer.Exit(EXIT_NOT_PASSED)
+
+
+def _is_drawn(wanted: bool, words: str, package: str) -> bool:
+    """Whether what was asked for can be drawn; where it cannot, say so at once."""
+    if wanted and missing(package):
+        warn(f"{words} {how_to_install(package)}")
+        return False
+    return wanted
 
 
 def _tell(result: PartResult, output: Path, files: dict[str, str]) -> None:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from bgars.normals import Method
+from bgars.normal_methods import Method
 
 __all__ = ["MethodOption"]
 

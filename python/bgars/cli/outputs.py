@@ -9,9 +9,11 @@ import imageio.v3 as iio
 import numpy as np
 
 import bgars
+from bgars.cli.console import warn
+from bgars.extras import how_to_install, missing
 from bgars.io.atomic import FolderNames, atomic_folder
 from bgars.io.described_tiff import write_described
-from bgars.io.mesh_files import MESH_SUFFIXES
+from bgars.io.mesh_files import MESH_SUFFIXES, NATIVE_SUFFIXES
 from bgars.pipeline import summarise_field
 
 if TYPE_CHECKING:
@@ -51,14 +53,26 @@ def write_reconstruction(
             "height.npy": "the same for numpy",
             MARK: "the numbers of this run",
         }
-        bgars.write_overview(result, folder / "overview.png")
-        bgars.write_mesh(result.mesh, folder / f"mesh.{mesh_format}")
+        if missing("matplotlib"):
+            del files["overview.png"]
+            warn(f"overview.png is left out: it {how_to_install('matplotlib')}")
+        else:
+            bgars.write_overview(result, folder / "overview.png")
+        _write_mesh(result, folder / f"mesh.{mesh_format}")
         bgars.write_normal_map(result.field, folder / "normals.png", directx=directx)
         bgars.write_height(result.height, folder / "height.tif")
         bgars.write_height(result.height, folder / "height.npy")
         summary = {"bgars": bgars.__version__, **result.summary(), "files": list(files)}
         (folder / MARK).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     return summary, files
+
+
+def _write_mesh(result: Reconstruction, path: Path) -> None:
+    """Write the surface; without a mesh in memory where the format can be written by rows."""
+    if path.suffix in NATIVE_SUFFIXES:
+        bgars.write_mesh(result.height, path, field=result.field)
+    else:
+        bgars.write_mesh(result.mesh, path)
 
 
 def _normals_meaning(directx: bool) -> str:

@@ -95,7 +95,7 @@ def simulate(
         )
     images = [name for name in files if name.startswith("light_")]
     width = max(len(str(output / name)) for name in files)
-    say(f"  {output / images[0]!s:<{width}}  ... {images[-1]}: one image a light")
+    say(f"  {output / images[0]!s:<{width}}  ... {images[-1]}: one image per light")
     for name, meaning in MEANINGS.items():
         if name in files:
             say(f"  {output / name!s:<{width}}  {meaning}")

@@ -18,6 +18,8 @@ __all__ = ["part_checks", "part_reasons"]
 MAX_NAMES = 8
 MAX_TOLD = 4
 """Balls that are named with their reasons."""
+OUTSIDE = "is outside its limits"
+"""What :mod:`bgars.inspection.decision` says of a reading that fails."""
 HOW_TO_LIMIT = f"{NO_LIMITS}: for a verdict, give a recipe with a [limits] table"
 LOOK_AT = (
     "this cannot be judged; look at the order of lights and images (mirrored, counted clockwise), the exposure, "
@@ -114,7 +116,7 @@ def part_reasons(
     if pairs:
         reasons.append(f"bridged: {_listed(pairs)}")
     if failing:
-        worst = [f"{ball.name} ({ball.reasons[0]})" for ball in failing]
+        worst = [f"{ball.name} ({_broken(ball)})" for ball in failing]
         reasons.append(f"{_count(len(failing), 'ball')} outside limits: {_listed(worst, ';', MAX_TOLD)}")
     reasons += [check.reason for check in checks if check.verdict == "fail"]
     why = []
@@ -132,6 +134,12 @@ def part_reasons(
 
 def _count(number: int, what: str) -> str:
     return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def _broken(ball: BallResult) -> str:
+    """Why a ball fails: its first reason, and the readings of every other limit that it is outside of."""
+    others = [reason.partition(f" {OUTSIDE}")[0] for reason in ball.reasons[1:] if OUTSIDE in reason]
+    return f"{ball.reasons[0]}, also {' and '.join(others)}" if others else ball.reasons[0]
 
 
 def _listed(names: list[str], separator: str = ",", most: int = MAX_NAMES) -> str:

@@ -22,7 +22,9 @@ OWN = "bgars "
 def write_described(path: Path, values: FloatArray, content: str, **fields: Any) -> None:  # noqa: ANN401 - JSON
     """Write a float32 image and what it is: `content`, without the name of bgars, and fields that JSON can hold."""
     description = json.dumps({"content": OWN + content, **fields})
-    tifffile.imwrite(path, np.ascontiguousarray(values, dtype=np.float32), description=description, metadata=None)
+    photometric = "rgb" if values.ndim == len(("row", "col", "channel")) else None
+    image = np.ascontiguousarray(values, dtype=np.float32)
+    tifffile.imwrite(path, image, description=description, metadata=None, photometric=photometric)
 
 
 def description_of(tiff: tifffile.TiffFile) -> dict[str, Any]:

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from trimesh.visual import ColorVisuals
 
 from bgars import _bgars
 from bgars.errors import InputError
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
 
     from bgars.records import NormalField
 
-__all__ = ["MESH_SUFFIXES", "write_mesh"]
+__all__ = ["MESH_SUFFIXES", "NATIVE_SUFFIXES", "write_mesh"]
 
 MESH_SUFFIXES = (".ply", ".obj", ".stl", ".glb")
 NATIVE_SUFFIXES = (".ply", ".obj")
@@ -139,6 +138,8 @@ def _normals(
 
 def _colors(mesh: trimesh.Trimesh) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]] | None:
     """(N, 3) red, green, blue, or None where the mesh has no vertex colours of its own."""
+    from trimesh.visual import ColorVisuals  # noqa: PLC0415 - whoever has a mesh has loaded it
+
     if not isinstance(mesh.visual, ColorVisuals) or mesh.visual.kind != "vertex":
         return None
     return np.ascontiguousarray(mesh.visual.vertex_colors[:, :3], dtype=np.uint8)

@@ -6,21 +6,22 @@ import textwrap
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib import colormaps
+from matplotlib import style as matplotlib_style
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
 from bgars.io.atomic import atomic_file
 from bgars.light_names import light_name
+from bgars.report.color_ramp import cividis
 from bgars.report.prior import prior_label, prior_pixels, show_prior, stripes
+from bgars.report.relief import relief
 
 if TYPE_CHECKING:
     from os import PathLike
 
     from matplotlib.axes import Axes
     from matplotlib.image import AxesImage
-    from mpl_toolkits.mplot3d import Axes3D
     from numpy.typing import NDArray
 
     from bgars.pipeline import Reconstruction
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
 __all__ = ["write_overview"]
 
 MAX_SURFACE_POINTS = 240
+SURFACE_PX = 760
+COMPRESSION = 3
+"""Of PNG: a tenth larger than the usual 6, in half its time."""
 MAX_PICTURE_PX = 1600
 DPI = 140
 FLAT_PROFILE = 0.2
@@ -62,13 +66,19 @@ def write_overview(result: Reconstruction, path: str | PathLike[str]) -> None:
     FileFormatError
         The file cannot be written.
     """
-    figure = Figure(figsize=(15.0, 9.4), dpi=DPI, layout="constrained", facecolor="white")
+    with matplotlib_style.context({"axes.titley": 1.0}):  # measured titles cost a third of the drawing
+        figure = _drawn(result)
+        with atomic_file(path) as temporary:
+            figure.savefig(temporary, format="png", pil_kwargs={"compress_level": COMPRESSION})
+
+
+def _drawn(result: Reconstruction) -> Figure:
+    # Without a layout engine, which draws everything twice.
+    figure = Figure(figsize=(15.0, 9.4), dpi=DPI, facecolor="white")
     height = result.height
-    figure.suptitle(_title(result), fontsize=12)
-    axes = figure.subplot_mosaic(
-        [["input", "normals", "kept"], ["height", "surface", "profile"]],
-        per_subplot_kw={"surface": {"projection": "3d"}},
-    )
+    figure.suptitle(_title(result), fontsize=12, y=0.985)
+    axes = figure.subplot_mosaic([["input", "normals", "kept"], ["height", "surface", "profile"]])
+    figure.subplots_adjust(left=0.055, right=0.925, bottom=0.085, top=0.89, wspace=0.52, hspace=0.34)
     row = _profile_row(height)
     _show_input(figure, axes["input"], result)
     _show_normals(axes["normals"], result)
@@ -79,8 +89,7 @@ def write_overview(result: Reconstruction, path: str | PathLike[str]) -> None:
     _show_height(figure, axes["height"], result, row)
     _show_surface(axes["surface"], result)
     _show_profile(axes["profile"], result, row)
-    with atomic_file(path) as temporary:
-        figure.savefig(temporary, format="png")
+    return figure
 
 
 def _title(result: Reconstruction) -> str:
@@ -133,6 +142,11 @@ def _picture(
     return picture
 
 
+def _beside(axes: Axes) -> Axes:
+    """Room for a colour bar as high as the picture."""
+    return axes.inset_axes((1.04, 0.0, 0.045, 1.0))
+
+
 def _show_input(figure: Figure, axes: Axes, result: Reconstruction) -> None:
     capture = result.capture
     image = np.asarray(capture.images[0], dtype=np.float32)
@@ -141,7 +155,7 @@ def _show_input(figure: Figure, axes: Axes, result: Reconstruction) -> None:
     place = f"azimuth {rig.azimuths_deg[0]:.0f}°, elevation {rig.elevations_deg[0]:.0f}°"
     title = f"Input: {light_name(0, capture.files)} of {len(rig)}\n{place}"
     picture = _picture(axes, image, result.height, title, cmap="gray", span=(0.0, top))
-    figure.colorbar(picture, ax=axes, label="grey level", shrink=0.85)
+    figure.colorbar(picture, cax=_beside(axes), label="grey level")
 
 
 def _show_normals(axes: Axes, result: Reconstruction) -> None:
@@ -156,7 +170,7 @@ def _show_kept_lights(figure: Figure, axes: Axes, result: Reconstruction) -> Non
     kept = np.where(result.field.mask, result.field.lights_kept, np.nan)
     title = "Lights kept in the fit (white: no normal)"
     picture = _picture(axes, kept, result.height, title, cmap="viridis", span=(min(3.0, most - 1.0), most))
-    figure.colorbar(picture, ax=axes, label="lights", shrink=0.85, ticks=MaxNLocator(6, integer=True))
+    figure.colorbar(picture, cax=_beside(axes), label="lights", ticks=MaxNLocator(6, integer=True))
 
 
 def _show_standard_error(figure: Figure, axes: Axes, result: Reconstruction) -> None:
@@ -166,7 +180,7 @@ def _show_standard_error(figure: Figure, axes: Axes, result: Reconstruction) -> 
         axes, error_deg, result.height, "Standard error of the normals (white: no normal)", cmap="viridis_r"
     )
     picture.set_norm(LogNorm(*ERROR_LIMITS_DEG))
-    bar = figure.colorbar(picture, ax=axes, label="standard error (°)", shrink=0.85, ticks=ERROR_TICKS_DEG)
+    bar = figure.colorbar(picture, cax=_beside(axes), label="standard error (°)", ticks=ERROR_TICKS_DEG)
     bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     bar.ax.yaxis.set_minor_formatter(NullFormatter())
     show_prior(axes, field, _extent(result.height), legend=False)
@@ -178,57 +192,45 @@ def _show_height(figure: Figure, axes: Axes, result: Reconstruction, row: int) -
     low, high = (float(level) for level in np.nanpercentile(values, [0.5, 99.5]))
     title = "Height" if len(height.components) == 1 else "Height (each connected part has mean 0)"
     picture = _picture(axes, values, height, title, cmap="cividis", span=(low, high))
-    figure.colorbar(picture, ax=axes, label=f"height ({_unit(height)})", shrink=0.85)
+    figure.colorbar(picture, cax=_beside(axes), label=f"height ({_unit(height)})")
     y = (height.mask.shape[0] / 2 - row - 0.5) * (height.pixel_pitch_um or 1.0)
     show_prior(axes, result.field, _extent(height), legend=False)
     axes.axhline(y, color=MARK_COLOR, linewidth=1.2, linestyle="--")
 
 
-def _show_surface(axes: Axes3D, result: Reconstruction) -> None:
+def _show_surface(axes: Axes, result: Reconstruction) -> None:
     """Shaded relief of the largest part, thinned to a drawable number of points."""
     height = result.height
     largest = int(np.argmax([part.pixels for part in height.components]))
     inside = height.labels == largest
     rows, cols = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
-    window = (slice(rows[0], rows[-1] + 1), slice(cols[0], cols[-1] + 1))
-    values = np.where(inside, height.height, np.nan)[window]
-    step = max(1, int(np.ceil(max(values.shape) / MAX_SURFACE_POINTS)))
+    step = max(1, int(np.ceil(max(np.ptp(rows), np.ptp(cols)) / MAX_SURFACE_POINTS)))
+    thinned = (slice(rows[0], rows[-1] + 1, step), slice(cols[0], cols[-1] + 1, step))
     pitch = height.pixel_pitch_um or 1.0
-    z = values[::step, ::step].astype(np.float64)
-    shape = height.mask.shape
-    x = (np.arange(cols[0], cols[-1] + 1)[::step] + 0.5 - shape[1] / 2) * pitch
-    y = (shape[0] / 2 - np.arange(rows[0], rows[-1] + 1)[::step] - 0.5) * pitch
-    grid_x, grid_y = np.meshgrid(x, y)
+    z = np.where(inside[thinned], height.height[thinned], np.nan).astype(np.float64)
     colors = _shaded_colors(z, pitch * step)
-    colors[..., :3] *= 1.0 - stripes(prior_pixels(result.field)[window][::step, ::step], SURFACE_STRIPES)[..., None]
-    axes.plot_surface(
-        grid_x, grid_y, z, facecolors=colors, rstride=1, cstride=1, linewidth=0, antialiased=False, shade=False
-    )
-    width, depth, rise = float(np.ptp(x)) or 1.0, float(np.ptp(y)) or 1.0, float(np.nanmax(z) - np.nanmin(z))
-    axes.set_box_aspect((width, depth, max(rise, 0.05 * max(width, depth))), zoom=1.1)
-    axes.view_init(elev=38, azim=-62)
+    colors *= 1.0 - stripes(prior_pixels(result.field)[thinned], SURFACE_STRIPES)[..., None]
+    picture = relief(z, pitch * step, colors, SURFACE_PX)
+    axes.imshow(np.asarray(picture))
+    axes.set_axis_off()
     part = ", largest part" if len(height.components) > 1 else ""
-    axes.set_title(f"Surface, true to scale{part} (z in {_unit(height)})", fontsize=11)
-    axes.set_xlabel(f"x ({_unit(height)})", labelpad=8)
-    axes.set_ylabel(f"y ({_unit(height)})", labelpad=8)
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(MaxNLocator(4))
-    axes.zaxis.set_major_locator(MaxNLocator(3 if rise > FLAT_PROFILE * max(width, depth) else 1))
-    axes.tick_params(labelsize=8)
+    wide, deep = (np.ptp(cols) + 1) * pitch, (np.ptp(rows) + 1) * pitch
+    rise = float(np.nanmax(z) - np.nanmin(z))
+    size = f"{wide:.4g} x {deep:.4g} x {rise:.4g} {_unit(height)} (x, y, z)"
+    axes.set_title(f"Surface, true to scale{part}\n{size}", fontsize=11)
 
 
 def _shaded_colors(z: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
-    """RGBA of a relief: colour by height, brightness by a light from the lower left; transparent where z is NaN."""
+    """(H, W, 3) colours of a relief: by height, as bright as a light from the lower left makes it."""
     filled = np.where(np.isfinite(z), z, np.nanmin(z))
     slope_down, slope_right = np.gradient(filled, spacing) if min(z.shape) > 1 else (np.zeros_like(z),) * 2
     normals = np.stack([-slope_right, slope_down, np.ones_like(z)], axis=2)
     normals /= np.linalg.norm(normals, axis=2, keepdims=True)
     brightness = AMBIENT + (1.0 - AMBIENT) * np.clip(normals @ np.array(PICTURE_LIGHT), 0.0, 1.0)
     low, high = np.nanpercentile(z, [0.5, 99.5])
-    colors: NDArray[np.float64] = colormaps["cividis"](np.clip((filled - low) / max(high - low, 1e-9), 0.0, 1.0))
-    colors[..., :3] = np.clip(colors[..., :3] * brightness[..., None] * 1.25, 0.0, 1.0)
-    colors[..., 3] = np.isfinite(z)
-    return colors
+    colors = cividis((filled - low) / max(high - low, 1e-9))
+    shaded: NDArray[np.float64] = np.clip(colors * brightness[..., None] * 1.25, 0.0, 1.0)
+    return shaded
 
 
 def _profile_row(height: HeightMap) -> int:
@@ -255,6 +257,7 @@ def _show_profile(axes: Axes, result: Reconstruction, row: int) -> None:
     else:
         axes.set_aspect("equal", adjustable="box")
     axes.margins(x=0.0, y=0.12)
+    axes.xaxis.set_major_locator(MaxNLocator(5))
     scale = "height stretched" if flat else "true to scale"
     axes.set_title(f"Profile along row {row} (dashed line), {scale}", fontsize=11)
     axes.set_xlabel(f"x ({_unit(height)})")

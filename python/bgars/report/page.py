@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bgars.errors import InputError
+from bgars.extras import how_to_install
 from bgars.io.atomic import atomic_file
 from bgars.part_result import PartResult
 from bgars.report.page_budget import BUDGET_COLUMNS, budget_table
@@ -254,7 +255,7 @@ def plotly_script() -> Markup:
     """plotly.js as the package plotly brings it, read without importing that package."""
     found = importlib.util.find_spec("plotly")
     if found is None or not found.submodule_search_locations:
-        msg = "plotly: must be installed for report.html (pip install plotly)"
+        msg = f"report.html {how_to_install('plotly')}"
         raise InputError(msg)
     path = Path(found.submodule_search_locations[0]) / "package_data" / "plotly.min.js"
     return _script(path.read_text(encoding="utf-8"))

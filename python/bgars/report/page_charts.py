@@ -173,7 +173,8 @@ def _histogram(
     least = LEAST_SPAN_UM if quantity.unit else LEAST_SPAN_RATIO
     room = max(0.02 * (high - low), 0.5 * (least - (high - low)))
     count = int(np.clip(np.sqrt(values.size) * 2, 5, 40))
-    bars, edges = np.histogram(values, bins=count, range=(low - room, high + room))
+    first = max(low - room, min(low, 0.0))  # a length is no less than 0
+    bars, edges = np.histogram(values, bins=count, range=(first, high + room))
     unit = f" {quantity.unit}" if quantity.unit else ""
     shapes: list[dict[str, Any]] = []
     for edge in (each for each in limits or () if each is not None):
@@ -181,8 +182,11 @@ def _histogram(
         if u > 0:
             band = {"fillcolor": UNDECIDED, "opacity": 0.3, "line": {"width": 0}, "layer": "below"}
             shapes.append({"type": "rect", "yref": "paper", "y0": 0, "y1": 1, "x0": edge - u, "x1": edge + u, **band})
-    ends = [low - room, high + room, *(shape[end] for shape in shapes for end in ("x0", "x1"))]
+    ends = [first, high + room, *(shape[end] for shape in shapes for end in ("x0", "x1"))]
     margin = 0.04 * (max(ends) - min(ends))
+    start = min(ends) - margin
+    if limits and limits[0] is None:  # a distance: it begins at 0
+        start = min(0.0, first)
     title = f"{quantity.title} ({quantity.unit})" if quantity.unit else quantity.title
     return {
         "data": [
@@ -198,7 +202,7 @@ def _histogram(
         ],
         "layout": {
             "title": {"text": f"limits: {limit_words(limits)}" if limits else "no limit given"},
-            "xaxis": axis(title, range=[min(ends) - margin, max(ends) + margin], zeroline=False),
+            "xaxis": axis(title, range=[start, max(ends) + margin], zeroline=False),
             "yaxis": axis("balls", rangemode="tozero", dtick=_whole_step(int(bars.max(initial=0)))),
             "shapes": shapes,
             "showlegend": False,

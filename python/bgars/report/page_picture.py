@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.colors import to_hex
 
+from bgars.report.color_ramp import hex_of, viridis
 from bgars.report.page_words import VERDICT_MARKS, ball_state, is_known, number
 
 if TYPE_CHECKING:
@@ -137,7 +136,7 @@ def part_picture(source: PageSource) -> PartPicture | None:
     for index, (ball, place, radius, value) in enumerate(zip(balls, places, radii, values, strict=True)):
         if place is None:
             continue
-        color = to_hex(colormaps[COLORS]((value - low) / max(high - low, 1e-9))) if is_known(value) else ""
+        color = hex_of(viridis((value - low) / max(high - low, 1e-9))) if is_known(value) else ""
         state = ball_state(ball)
         assumed = state not in {"missing", "unclear"} and not is_known(ball["diameter_um"])
         marks.append(
@@ -160,7 +159,7 @@ def part_picture(source: PageSource) -> PartPicture | None:
         if one in ends and two in ends
     ]
     scale_um = round_down(width / 5)
-    steps = [to_hex(colormaps[COLORS](step / (GRADIENT_STOPS - 1))) for step in range(GRADIENT_STOPS)]
+    steps = [hex_of(viridis(step / (GRADIENT_STOPS - 1))) for step in range(GRADIENT_STOPS)]
     return PartPicture(
         width,
         height,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from bgars.io.result_file import read_result
 from bgars.report.page_photograph import SIDE_FILE, Lamp, Photograph, lamps_of, photograph_of, read_side_files
 
 if TYPE_CHECKING:
@@ -58,6 +57,8 @@ def read_page_source(path: Path) -> PageSource:
     FileFormatError
         There is no result, or it is not one.
     """
+    from bgars.io.result_file import read_result  # noqa: PLC0415 - its schema is not needed for a result just made
+
     result = read_result(path).to_dict()
     folder = path if path.is_dir() else path.parent
     return PageSource(result, *read_side_files(folder / SIDE_FILE))

@@ -6,16 +6,11 @@ from base64 import b64encode
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import imageio.v3 as iio
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.colors import to_rgb
-from matplotlib.figure import Figure
 
+from bgars.report.color_ramp import rgb_of, viridis
 from bgars.report.page_mesh import LIGHTING, unpacked
-from bgars.report.page_picture import COLORS
+from bgars.report.painter import Painter
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,7 +20,6 @@ if TYPE_CHECKING:
 __all__ = ["Still", "still_of"]
 
 WIDTH_PX, MOST_HEIGHT_PX = 1160, 640
-SUPERSAMPLE = 2
 MARGIN = 0.03
 LABEL_ROOM = 0.06
 INK = "#77828d"
@@ -105,20 +99,18 @@ def still_of(figure: dict[str, Any]) -> Still | None:
     sides = high - low
     if not (np.isfinite(sides).all() and sides.min() > LEAST_SHAPE * sides.max()):
         return None
-    axes, size = _canvas(low, high)
-    for layer, order in zip(layers, (1, 3), strict=False):
-        # As one array: a list makes a Path object of each triangle.
-        drawn = PolyCollection(layer.corners, antialiased=False, linewidths=0.4)  # type: ignore[arg-type]
-        drawn.set_facecolor(layer.colors)  # type: ignore[arg-type]
-        drawn.set_edgecolor(layer.colors)  # type: ignore[arg-type]
-        axes.add_collection(drawn)
-        drawn.set_zorder(order if boards else 3)
+    painter, size = _canvas(low, high)
+    _label(painter, outline, frame)
+    for layer in layers[: len(boards)]:
+        painter.polygons(layer.corners, layer.colors)
     for points in lines:
-        axes.add_collection(LineCollection(_pieces(view(points)[0]), colors="#d55e00", linewidths=2.0, zorder=2))
+        for piece in _pieces(view(points)[0]):
+            painter.line(piece, "#d55e00", 2.8)
+    for layer in layers[len(boards) :]:
+        painter.polygons(layer.corners, layer.colors)
     for sheet, color in sheets:
-        axes.add_collection(PolyCollection([sheet], facecolors=[(*color, 0.15)], edgecolors=[(*color, 0.7)], zorder=4))
-    _label(axes, outline, frame)
-    return Still(_png(axes.figure, size), *size)
+        painter.sheet(sheet, color, 0.15, 0.7)
+    return Still(painter.png(), *size)
 
 
 @dataclass(frozen=True)
@@ -128,7 +120,7 @@ class _Layer:
 
 
 def _triangles(corners_um: Array, colors: Array, view: _View, *, ordered: bool) -> _Layer:
-    """Shaded triangles (m, 3, 2), the farthest first."""
+    """Shaded polygons (m, k, 2), the farthest first."""
     places, depth = view(corners_um)
     normal = np.cross(corners_um[:, 1] - corners_um[:, 0], corners_um[:, 2] - corners_um[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
@@ -149,26 +141,26 @@ def _mesh_faces(trace: dict[str, Any]) -> tuple[Array, Array]:
     points = np.column_stack([unpacked(trace[name]) for name in "xyz"]).astype(np.float64)
     faces = np.column_stack([unpacked(trace[name]) for name in "ijk"]).astype(np.int64)
     if "intensity" not in trace:
-        return points[faces], np.broadcast_to(to_rgb(trace["color"]), (len(faces), 3))
+        return points[faces], np.broadcast_to(rgb_of(trace["color"]), (len(faces), 3))
     values = unpacked(trace["intensity"]).astype(np.float64)
     low, high = float(values.min()), float(values.max())
     level = (values[faces[:, 0]] - low) / (high - low) if high > low else np.full(len(faces), 0.5)
-    return points[faces], colormaps[COLORS](level)[:, :3]
+    return points[faces], viridis(level)
 
 
 def _grid_faces(trace: dict[str, Any]) -> tuple[Array, Array]:
     x, y = np.meshgrid(unpacked(trace["x"]), unpacked(trace["y"]))
     points = np.stack([x, y, unpacked(trace["z"])], axis=2).astype(np.float64)
     one, two, three, four = points[:-1, :-1], points[:-1, 1:], points[1:, 1:], points[1:, :-1]
-    corners = np.stack([np.stack([one, two, three], 2), np.stack([one, three, four], 2)]).reshape(-1, 3, 3)
+    corners = np.stack([one, two, three, four], axis=2).reshape(-1, 4, 3)
     corners = corners[np.isfinite(corners[..., 2]).all(axis=1)]
-    return corners, np.broadcast_to(to_rgb(trace["colorscale"][0][1]), (len(corners), 3))
+    return corners, np.broadcast_to(rgb_of(trace["colorscale"][0][1]), (len(corners), 3))
 
 
 def _plane(trace: dict[str, Any]) -> tuple[Array, tuple[float, float, float]]:
     x, y, z = (unpacked(trace[name]).astype(np.float64) for name in "xyz")
     around = ((0, 0), (0, -1), (-1, -1), (-1, 0))
-    return np.array([(x[col], y[row], z[row, col]) for row, col in around]), to_rgb(trace["colorscale"][0][1])
+    return np.array([(x[col], y[row], z[row, col]) for row, col in around]), rgb_of(trace["colorscale"][0][1])
 
 
 def _numbers(values: list[float | None]) -> Array:
@@ -186,42 +178,22 @@ def _frame(scene: dict[str, Any]) -> Array:
     return np.array([(left, front, low), (right, front, low), (right, back, low)])
 
 
-def _canvas(low: Array, high: Array) -> tuple[Any, tuple[int, int]]:
-    """Axes as wide as the picture, true to scale."""
+def _canvas(low: Array, high: Array) -> tuple[Painter, tuple[int, int]]:
+    """A picture of the places between two corners with room for labels, true to scale."""
     low, high = low - MARGIN * (high - low), high + MARGIN * (high - low)
     low[1] -= LABEL_ROOM * (high[1] - low[1])
     high[0] += 2.2 * LABEL_ROOM * (high[0] - low[0])
     wide, tall = high - low
     width = WIDTH_PX if tall * WIDTH_PX <= MOST_HEIGHT_PX * wide else int(MOST_HEIGHT_PX * wide / tall)
     size = width, max(1, int(width * tall / wide))
-    figure = Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100 * SUPERSAMPLE)
-    figure.patch.set_alpha(0.0)
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    axes.set_axis_off()
-    return axes, size
+    return Painter.of(low, high, size), size
 
 
-def _label(axes: Any, outline: Array, frame: Array) -> None:  # noqa: ANN401 - matplotlib's axes
+def _label(painter: Painter, outline: Array, frame: Array) -> None:
     """How wide and how deep the board is that is drawn."""
-    axes.plot(*outline.T, color=INK, linewidth=1.2, zorder=0)
+    painter.line(outline, INK, 1.7)
     for at, name in ((0, "x"), (1, "y")):
-        length_um = float(np.abs(frame[at + 1] - frame[at]).max())
-        middle = outline[at : at + 2].mean(axis=0)
-        axes.annotate(
-            f"{name}: {length_um:,.0f} µm".replace(",", "\N{THIN SPACE}"), middle, (6 if at else 0, -4),
-            textcoords="offset points", ha="left" if at else "center", va="top", color=INK, fontsize=13,
-        )  # fmt: skip
-
-
-def _png(figure: Figure, size: tuple[int, int]) -> bytes:
-    """The figure, its pixels averaged: triangles are drawn without seams and edges smoothed after."""
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()  # type: ignore[no-untyped-call]
-    picture = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
-    picture = picture.astype(np.float32) / 255.0
-    width, height = size
-    picture = picture[: height * SUPERSAMPLE, : width * SUPERSAMPLE]
-    picture[..., :3] *= picture[..., 3:]
-    mean = picture.reshape(height, SUPERSAMPLE, width, SUPERSAMPLE, 4).mean(axis=(1, 3))
-    mean[..., :3] /= np.maximum(mean[..., 3:], 1e-6)
-    return bytes(iio.imwrite("<bytes>", np.rint(255.0 * mean).astype(np.uint8), extension=".png"))
+        length_mm = float(np.abs(frame[at + 1] - frame[at]).max()) / 1000.0
+        middle = outline[at : at + 2].mean(axis=0) - painter.per_px * (0.0, 0.0 if at else 30.0)
+        words = f"  {name}: {length_mm:.3g} mm" if at else f"{name}: {length_mm:.3g} mm"
+        painter.text(words, middle, "la" if at else "ma", INK, 18.0)

@@ -7,11 +7,6 @@ from typing import TYPE_CHECKING
 
 from bgars.errors import InputError
 from bgars.io.atomic import atomic_file
-from bgars.report.part_balls import part_figure
-from bgars.report.part_histograms import histogram_figure
-from bgars.report.part_maps import deviation_figure
-from bgars.report.part_shadows import shadow_figure
-from bgars.report.part_style import figure_style, save
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -59,6 +54,13 @@ def write_part_pictures(result: PartResult, capture: Capture, folder: str | Path
     if len(result.light_directions) != len(capture.images):
         msg = f"capture: must have the {len(result.light_directions)} lights of the result, got {len(capture.images)}"
         raise InputError(msg)
+    # Imported here: the names of the pictures are wanted where matplotlib is not.
+    from bgars.report.part_balls import part_figure  # noqa: PLC0415
+    from bgars.report.part_histograms import histogram_figure  # noqa: PLC0415
+    from bgars.report.part_maps import deviation_figure  # noqa: PLC0415
+    from bgars.report.part_shadows import shadow_figure  # noqa: PLC0415
+    from bgars.report.part_style import figure_style, save  # noqa: PLC0415
+
     folder = Path(folder)
     with figure_style():
         figures = {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
@@ -11,22 +10,25 @@ from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle
 
 from bgars.report.part_style import (
     ABSENT,
     DASHES,
     VERDICT_COLORS,
+    add_axes,
     ball_deviations,
     ball_place_um,
     ball_radius_um,
+    discs,
     finite_range,
     image_extent_um,
     label_balls,
     new_figure,
     part_frame,
     part_title,
+    part_window,
     shown_image,
+    window_size_in,
 )
 
 if TYPE_CHECKING:
@@ -39,7 +41,10 @@ if TYPE_CHECKING:
 
 __all__ = ["part_figure"]
 
-SIDE_IN = 9.0
+SIDE_IN = 8.1
+LEFT_IN, RIGHT_IN, BELOW_IN, LEAST_WIDTH_IN = 1.15, 1.75, 0.95, 11.0
+"""Room around the picture: for its axes, its colour bar, its legend, and for the reasons above it."""
+LINE_IN = 0.17
 FILL = 0.55
 MAX_LINES = 8
 MAX_LETTERS = 118
@@ -48,10 +53,14 @@ COLORS = "viridis"
 
 def part_figure(result: PartResult, capture: Capture) -> Figure:
     """Draw the balls over the mean of the images; colour = distance of the apex below the seating plane."""
-    figure = new_figure(SIDE_IN + 2.2, SIDE_IN + 0.9)
-    axes = figure.subplots()
+    reasons = _reasons(result)
+    window = part_window(result, image_extent_um(capture))
+    wide_in, tall_in = window_size_in(window, SIDE_IN)
+    over_in = 0.55 + LINE_IN * max(1, len(reasons))
+    figure = new_figure(max(LEFT_IN + wide_in + RIGHT_IN, LEAST_WIDTH_IN), BELOW_IN + tall_in + over_in)
+    axes = add_axes(figure, LEFT_IN, BELOW_IN, wide_in, tall_in)
     figure.suptitle(part_title(result), fontsize=14, color=_title_color(result))
-    axes.set_title("\n".join(_reasons(result)), fontsize=9, loc="left")
+    axes.set_title("\n".join(reasons), fontsize=9, loc="left")
     axes.imshow(
         np.sqrt(shown_image(capture, _mean_image(capture))),
         extent=image_extent_um(capture),
@@ -62,38 +71,34 @@ def part_figure(result: PartResult, capture: Capture) -> Figure:
     )
     name, values = ball_deviations(result)
     norm = Normalize(*finite_range(values))
-    colors = colormaps[COLORS]
-    for ball, value in zip(result.balls, values, strict=True):
-        place = ball_place_um(ball)
-        if place is None:
-            continue
-        radius = ball_radius_um(ball, result)
-        if ball.present:
-            if math.isfinite(value):
-                axes.add_patch(Circle(place, radius, facecolor=colors(norm(value)), alpha=FILL, edgecolor="none"))
-            axes.add_patch(
-                Circle(
-                    place, radius, fill=False, edgecolor=VERDICT_COLORS[ball.verdict], linewidth=_width(ball.verdict)
-                )
-            )
-        else:
-            axes.add_patch(
-                Circle(
-                    place,
-                    radius,
-                    fill=False,
-                    edgecolor=VERDICT_COLORS[ball.verdict],
-                    linewidth=2.0,
-                    linestyle=DASHES,
-                )
-            )
+    _draw_balls(axes, result, colormaps[COLORS](norm(np.nan_to_num(values))), np.isfinite(values))
     _draw_bridges(axes, result)
-    part_frame(axes, result, image_extent_um(capture))
-    label_balls(axes, result, SIDE_IN)
-    if any(math.isfinite(value) for value in values):
-        figure.colorbar(ScalarMappable(norm, COLORS), ax=axes, label=f"{name} (µm)", shrink=0.8)
-    _legend(axes, result)
+    part_frame(axes, window)
+    label_balls(axes, result, wide_in)
+    if np.isfinite(values).any():
+        bar = add_axes(figure, LEFT_IN + wide_in + 0.4, BELOW_IN + 0.1 * tall_in, 0.32, 0.8 * tall_in)
+        figure.colorbar(ScalarMappable(norm, COLORS), cax=bar, label=f"{name} (µm)")
+    _legend(figure, result, LEFT_IN + wide_in / 2)
     return figure
+
+
+def _draw_balls(axes: Axes, result: PartResult, colors: NDArray[np.float64], known: NDArray[np.bool_]) -> None:
+    """Every ball in the colour of its deviation, outlined in that of its verdict; dashed where none is."""
+    drawn = [(*each, place) for *each, place in zip(
+        result.balls, colors, known, map(ball_place_um, result.balls), strict=True
+    ) if place is not None]  # fmt: skip
+    filled = [(place, ball, color) for ball, color, is_known, place in drawn if ball.present and is_known]
+    discs(
+        axes, [place for place, _, _ in filled], [ball_radius_um(ball, result) for _, ball, _ in filled],
+        facecolors=[(*color[:3], FILL) for *_, color in filled], edgecolors="none",
+    )  # fmt: skip
+    for present, dashes in ((True, "-"), (False, DASHES)):
+        balls = [(place, ball) for ball, _, _, place in drawn if ball.present == present]
+        discs(
+            axes, [place for place, _ in balls], [ball_radius_um(ball, result) for _, ball in balls],
+            facecolors="none", edgecolors=[VERDICT_COLORS[ball.verdict] for _, ball in balls],
+            linewidths=[_width(ball.verdict) if present else 2.0 for _, ball in balls], linestyles=dashes,
+        )  # fmt: skip
 
 
 def _mean_image(capture: Capture) -> NDArray[np.float32]:
@@ -125,7 +130,7 @@ def _draw_bridges(axes: Axes, result: PartResult) -> None:
             axes.plot(*zip(*ends, strict=True), color=VERDICT_COLORS["fail"], linewidth=5.0, alpha=0.8, zorder=4)
 
 
-def _legend(axes: Axes, result: PartResult) -> None:
+def _legend(figure: Figure, result: PartResult, middle_in: float) -> None:
     handles = [
         Line2D([], [], color=color, marker="o", markersize=9, fillstyle="none", linestyle="none", label=verdict)
         for verdict, color in VERDICT_COLORS.items()
@@ -139,4 +144,6 @@ def _legend(axes: Axes, result: PartResult) -> None:
     if result.bridges:
         handles.append(Line2D([], [], color=VERDICT_COLORS["fail"], linewidth=5.0, label="bridge"))
     if handles:
-        axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.07), ncols=len(handles))
+        width_in, height_in = figure.get_size_inches()
+        place = (middle_in / width_in, 0.35 / height_in)
+        figure.legend(handles=handles, loc="upper center", bbox_to_anchor=place, ncols=len(handles))

@@ -35,6 +35,7 @@ def histogram_figure(result: PartResult) -> Figure:
     figure = new_figure(13.0, 8.0)
     figure.suptitle(part_title(result), fontsize=13)
     panels = [axes for row in figure.subplots(2, 2, squeeze=False) for axes in row]
+    figure.subplots_adjust(left=0.045, right=0.985, bottom=0.07, top=0.91, hspace=0.27, wspace=0.11)
     for axes, (limit, name, u_name, label) in zip(panels, PANELS, strict=True):
         values = np.array([getattr(ball, name) for ball in result.balls if ball.present and ball.kind == "ball"])
         u = np.array([getattr(ball, u_name) for ball in result.balls if ball.present]) if u_name else np.zeros(0)
@@ -64,7 +65,7 @@ def _panel(
         low, high = float(values.min()), float(values.max())
         room = max(0.02 * (high - low), 0.5 * (LEAST_SPAN_UM - (high - low)))
         bins = int(np.clip(np.sqrt(values.size) * 2, 5, 40))
-        axes.hist(values, bins=bins, range=(low - room, high + room), color=BAR, alpha=0.85)
+        axes.hist(values, bins=bins, range=(max(low - room, min(low, 0.0)), high + room), color=BAR, alpha=0.85)
         axes.ticklabel_format(axis="x", useOffset=False)
     else:
         axes.set_xticks([])
@@ -86,6 +87,8 @@ def _panel(
     if not edges:
         axes.annotate("no limit given", (0.98, 0.97), xycoords="axes fraction", ha="right", va="top", color="0.4")
     axes.margins(x=0.06)
+    if values.size and len(edges) < len(("low", "high")):
+        axes.set_xlim(left=min(0.0, float(values.min())))  # a distance, which is no less
 
 
 def _title(known: NDArray[np.float64], missing: int) -> str:

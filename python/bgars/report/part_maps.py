@@ -10,19 +10,22 @@ from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle
 
 from bgars.report.part_style import (
     ABSENT,
     DASHES,
     VERDICT_COLORS,
+    add_axes,
     ball_deviations,
     ball_place_um,
     ball_radius_um,
+    discs,
     finite_range,
     label_balls,
     new_figure,
     part_frame,
+    part_window,
+    window_size_in,
 )
 
 if TYPE_CHECKING:
@@ -33,7 +36,8 @@ if TYPE_CHECKING:
 
 __all__ = ["deviation_figure"]
 
-SIDE_IN = 7.2
+SIDE_IN = 6.4
+LEFT_IN, BETWEEN_IN, BELOW_IN, ABOVE_IN, LEAST_WIDTH_IN = 0.95, 2.3, 1.25, 0.6, 4.6
 COLORS = "viridis"
 LONGEST_ARROW = 0.9
 """Length of the longest arrow, of the pitch."""
@@ -59,44 +63,54 @@ OFFSET_MARKS: tuple[tuple[str, dict[str, object]], ...] = (
 
 def deviation_figure(result: PartResult) -> Figure:
     """Heights by colour, offsets from the grid by arrows of a stated magnification."""
-    figure = new_figure(2 * SIDE_IN + 2.0, SIDE_IN + 0.8)
-    left, right = figure.subplots(1, 2)
-    _heights(figure, left, result)
+    window = part_window(result)
+    wide_in, tall_in = window_size_in(window, SIDE_IN)
+    wide_in = max(wide_in, LEAST_WIDTH_IN)
+    figure = new_figure(LEFT_IN + wide_in + BETWEEN_IN + wide_in + 0.3, BELOW_IN + tall_in + ABOVE_IN)
+    left = add_axes(figure, LEFT_IN, BELOW_IN, wide_in, tall_in)
+    right = add_axes(figure, LEFT_IN + wide_in + BETWEEN_IN, BELOW_IN, wide_in, tall_in)
+    bar = add_axes(figure, LEFT_IN + wide_in + 0.25, BELOW_IN + 0.1 * tall_in, 0.28, 0.8 * tall_in)
+    _heights(figure, left, bar, result)
     _offsets(right, result)
     return figure
 
 
-def _heights(figure: Figure, axes: Axes, result: PartResult) -> None:
+def _heights(figure: Figure, axes: Axes, bar: Axes, result: PartResult) -> None:
     name, values = ball_deviations(result)
     norm, colors = Normalize(*finite_range(values)), colormaps[COLORS]
-    for ball, value in zip(result.balls, values, strict=True):
-        place = ball_place_um(ball)
-        if place is None:
-            continue
-        known = math.isfinite(value)
-        axes.add_patch(
-            Circle(
-                place,
-                ball_radius_um(ball, result),
-                facecolor=colors(norm(value)) if known else "white",
-                edgecolor=VERDICT_COLORS[ball.verdict] if ball.verdict == "fail" or not ball.present else "0.3",
-                linewidth=1.8 if ball.verdict == "fail" or not ball.present else 0.8,
-                linestyle="-" if ball.present else DASHES,
-            )
+    drawn = [(place, ball, value) for ball, value in zip(result.balls, values, strict=True)
+             if (place := ball_place_um(ball)) is not None]  # fmt: skip
+    for present, dashes in ((True, "-"), (False, DASHES)):
+        these = [each for each in drawn if each[1].present == present]
+        marked = [ball.verdict == "fail" or not present for _, ball, _ in these]
+        discs(
+            axes,
+            [place for place, _, _ in these],
+            [ball_radius_um(ball, result) for _, ball, _ in these],
+            facecolors=[colors(norm(value)) if math.isfinite(value) else "white" for *_, value in these],
+            edgecolors=[
+                VERDICT_COLORS[ball.verdict] if is_marked else "0.3"
+                for is_marked, (_, ball, _) in zip(marked, these, strict=True)
+            ],
+            linewidths=[1.8 if is_marked else 0.8 for is_marked in marked],
+            linestyles=dashes,
         )
     seats = " / ".join(", ".join(seat.balls[:6]) for seat in result.seatings[:2])
     reading = _reading(result.seating_coplanarity_um, result.u_seating_coplanarity_um, result.seating_noise_bias_um)
     rests = f"rests on {seats}" if seats else "no seating plane"
     axes.set_title(f"{name[0].upper()}{name[1:]} ({rests})\nseating coplanarity {reading}")
-    part_frame(axes, result)
-    label_balls(axes, result, SIDE_IN - 1.5)
+    window = part_window(result)
+    part_frame(axes, window)
+    label_balls(axes, result, window_size_in(window, SIDE_IN)[0])
     has_height = [math.isfinite(value) for value in values]
     _legend(
         axes,
         [entry for entry, is_drawn in zip(HEIGHT_MARKS, _height_marks(result, has_height), strict=True) if is_drawn],
     )
     if any(math.isfinite(value) for value in values):
-        figure.colorbar(ScalarMappable(norm, COLORS), ax=axes, label=f"{name} (µm)", shrink=0.8)
+        figure.colorbar(ScalarMappable(norm, COLORS), cax=bar, label=f"{name} (µm)")
+    else:
+        bar.set_visible(False)
 
 
 def _offsets(axes: Axes, result: PartResult) -> None:
@@ -107,19 +121,17 @@ def _offsets(axes: Axes, result: PartResult) -> None:
     longest = float(np.hypot(*offsets.T).max(initial=0.0))
     pitch_um = result.pitch_um if math.isfinite(result.pitch_um) else _size_um(result)
     magnification = _round_down(LONGEST_ARROW * pitch_um / longest) if longest > 0 else 1.0
-    for ball in result.balls:
-        place = ball_place_um(ball)
-        if place is not None:
-            axes.add_patch(
-                Circle(
-                    place,
-                    ball_radius_um(ball, result),
-                    facecolor="0.93",
-                    edgecolor="0.75" if ball.present else VERDICT_COLORS[ball.verdict],
-                    linestyle="-" if ball.present else DASHES,
-                )
-            )
-    part_frame(axes, result)
+    for present, dashes in ((True, "-"), (False, DASHES)):
+        drawn = [(place, ball) for ball in result.balls if ball.present == present and (place := ball_place_um(ball))]
+        discs(
+            axes,
+            [place for place, _ in drawn],
+            [ball_radius_um(ball, result) for _, ball in drawn],
+            facecolors="0.93",
+            edgecolors="0.75" if present else [VERDICT_COLORS[ball.verdict] for _, ball in drawn],
+            linestyles=dashes,
+        )
+    part_frame(axes, part_window(result))
     if known:
         axes.quiver(
             *places.T,
@@ -132,12 +144,12 @@ def _offsets(axes: Axes, result: PartResult) -> None:
             zorder=5,
         )
         _key(axes, magnification, longest)
-        drawn = (
+        marks = (
             any(ball.verdict != "fail" for ball in known),
             any(ball.verdict == "fail" for ball in known),
             *_absent(result),
         )
-        _legend(axes, [entry for entry, is_drawn in zip(OFFSET_MARKS, drawn, strict=True) if is_drawn])
+        _legend(axes, [entry for entry, is_drawn in zip(OFFSET_MARKS, marks, strict=True) if is_drawn])
     limit_um = None if result.recipe is None else result.recipe.limits.true_position_um
     limit = "" if limit_um is None else f", limit {limit_um:g} µm"
     axes.set_title(

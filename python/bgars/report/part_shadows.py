@@ -6,22 +6,28 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.patches import Circle
+from matplotlib.collections import LineCollection
 
 from bgars.light_names import light_name
 from bgars.report.part_style import (
     VERDICT_COLORS,
+    add_axes,
     ball_place_um,
     ball_radius_um,
+    discs,
     image_extent_um,
     new_figure,
     part_frame,
+    part_window,
     shown_image,
+    window_size_in,
 )
 from bgars.report.shadow_lights import flagged_lights, is_fitted, panel_lights
 from bgars.report.shadow_outline import shadow_outline_um
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
@@ -35,6 +41,7 @@ OUTLINE = "#00E5FF"
 SILHOUETTE = "#FF4FD8"
 FLAGGED = "; orange title: a reason or warning names this light"
 CLOSE_UPS = 4
+WHOLE_IN, CLOSE_IN = 6.7, 3.0
 REACH = 3.4
 """Half width of a close-up in radii."""
 
@@ -48,30 +55,34 @@ def shadow_figure(result: PartResult, capture: Capture) -> Figure:
         f"{_residual(result.shadow_residual_rms)}{FLAGGED if flagged else ''}",
         fontsize=13,
     )
-    whole, close = figure.subfigures(1, 2, width_ratios=[1.05, 1.0], squeeze=False)[0]
-    axes = whole.subplots()
+    window = part_window(result, image_extent_um(capture), margin=2.0)
+    wide_in, tall_in = window_size_in(window, WHOLE_IN)
+    axes = add_axes(figure, 0.9 + (WHOLE_IN - wide_in) / 2, 0.6 + (WHOLE_IN - tall_in) / 2, wide_in, tall_in)
     first = flagged[0] if flagged else 0
     _show_light(axes, capture, result, first)
-    for ball in result.balls:
-        _draw(axes, ball, result, capture, first, linewidth=0.9)
-    part_frame(axes, result, image_extent_um(capture), margin=2.0)
+    _draw(axes, result.balls, result, capture, first, linewidth=0.9)
+    part_frame(axes, window)
     middle = _typical_ball(result)
-    grid = [panel for row in close.subplots(2, 2, squeeze=False) for panel in row]
     lights = panel_lights(result, len(capture.rig), CLOSE_UPS)
-    for panel, light in zip(grid, lights, strict=False):
+    for number, light in enumerate(lights):
+        row, col = divmod(number, 2)
+        panel = add_axes(figure, 8.3 + 3.4 * col, 4.35 - 3.9 * row, CLOSE_IN, CLOSE_IN)
         _show_light(panel, capture, result, light)
-        if middle is None:
+        panel.set(xticks=[], yticks=[], xlabel="", ylabel="")
+        place = None if middle is None else ball_place_um(middle)
+        if middle is None or place is None:
             continue
-        for ball in result.balls:
-            _draw(panel, ball, result, capture, light, linewidth=1.6)
-        place = ball_place_um(middle)
-        if place is not None:
-            half_um = REACH * ball_radius_um(middle, result)
-            panel.set_xlim(place[0] - half_um, place[0] + half_um)
-            panel.set_ylim(place[1] - half_um, place[1] + half_um)
-            panel.set_title(f"{middle.name}, {panel.get_title()}", fontsize=10)
-    for panel in grid[len(lights) :]:
-        panel.set_visible(False)
+        half_um = REACH * ball_radius_um(middle, result)
+        near = [
+            ball
+            for ball in result.balls
+            if (at := ball_place_um(ball)) and max(abs(at[0] - place[0]), abs(at[1] - place[1])) < 2.0 * half_um
+        ]
+        _draw(panel, near, result, capture, light, linewidth=1.6)
+        panel.set_xlim(place[0] - half_um, place[0] + half_um)
+        panel.set_ylim(place[1] - half_um, place[1] + half_um)
+        panel.set_title(f"{middle.name}, {panel.get_title()}", fontsize=10)
+        panel.set_xlabel(f"{2 * half_um:.0f} µm wide")
     return figure
 
 
@@ -88,28 +99,34 @@ def _show_light(axes: Axes, capture: Capture, result: PartResult, light: int) ->
     axes.set_ylabel("y (µm)")
 
 
-def _draw(axes: Axes, ball: BallResult, result: PartResult, capture: Capture, light: int, *, linewidth: float) -> None:
-    place = ball_place_um(ball)
-    if place is None or not ball.present:
-        return
-    axes.add_patch(Circle(place, ball_radius_um(ball, result), fill=False, edgecolor=SILHOUETTE, linewidth=linewidth))
-    q = ball.q if math.isfinite(ball.q) else 1.0
+def _draw(
+    axes: Axes, balls: Sequence[BallResult], result: PartResult, capture: Capture, light: int, *, linewidth: float
+) -> None:
+    """Silhouettes of the balls, and the outlines of their shadows as they were fitted."""
+    there = [(place, ball) for ball in balls if ball.present and (place := ball_place_um(ball))]
+    radii = [ball_radius_um(ball, result) for _, ball in there]
+    places = [place for place, _ in there]
+    discs(axes, places, radii, facecolors="none", edgecolors=SILHOUETTE, linewidths=linewidth)
+    outlines = [outline for _, ball in there if (outline := _shadow(ball, result, capture, light)) is not None]
+    axes.add_collection(LineCollection(outlines, colors=OUTLINE, linewidths=linewidth), autolim=False)
+
+
+def _shadow(ball: BallResult, result: PartResult, capture: Capture, light: int) -> NDArray[np.float64] | None:
+    """The outline of a ball's shadow; None where too little of the ball was measured."""
     if not all(math.isfinite(value) for value in (ball.x_um, ball.diameter_um, ball.centre_z_um)):
-        return
+        return None
     slopes, board_z_um = _board(result.board_coefficients_um, ball.x_um, ball.y_um)
     toward = result.light_directions[light]
     if capture.rig.positions_um is not None:
         toward = toward * np.linalg.norm(capture.rig.positions_um[light]) - [0.0, 0.0, board_z_um]
-    outline = shadow_outline_um(
+    return shadow_outline_um(
         np.array([ball.x_um, ball.y_um, ball.centre_z_um]),
         ball.diameter_um / 2,
-        q,
+        ball.q if math.isfinite(ball.q) else 1.0,
         np.asarray(toward, dtype=np.float64),
         slopes,
         is_position=capture.rig.positions_um is not None,
     )
-    if outline is not None:
-        axes.plot(outline[:, 0], outline[:, 1], color=OUTLINE, linewidth=linewidth)
 
 
 def _board(coefficients_um: NDArray[np.float64], x_um: float, y_um: float) -> tuple[NDArray[np.float64], float]:

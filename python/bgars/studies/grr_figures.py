@@ -31,7 +31,7 @@ INTERACTION = ("interaction", "part x placement", "#CC79A7")
 
 def share_figure(figures: Sequence[GaugeFigures], titles: Sequence[str]) -> Figure:
     """Bars: GRR and its sources in percent of the tolerance, of the total variation where there is no tolerance."""
-    figure = new_figure(WIDTH_IN, 1.4 + 0.62 * len(figures))
+    figure = new_figure(WIDTH_IN, 1.4 + 0.62 * len(figures), "constrained")
     axes = figure.add_subplot()
     sources = (("GRR", "gauge R&R", "#444444"), *SOURCES, INTERACTION)
     height = 0.8 / len(sources)
@@ -71,7 +71,7 @@ def deviation_figure(readings: Readings, figures: GaugeFigures, placements: Sequ
     """Every reading less the mean of its ball or part, coloured by placement."""
     values = readings.values
     n, k, r = values.shape
-    figure = new_figure(WIDTH_IN, 3.0)
+    figure = new_figure(WIDTH_IN, 3.0, "constrained")
     axes = figure.add_subplot()
     deviations = values - values.mean(axis=(1, 2), keepdims=True)
     for place in range(k):
@@ -120,7 +120,7 @@ def deviation_figure(readings: Readings, figures: GaugeFigures, placements: Sequ
 
 def linearity_figure(accuracy: Accuracy, figures: GaugeFigures, title: str) -> Figure:
     """Bias against reference, with the line through it."""
-    figure = new_figure(WIDTH_IN, 3.0)
+    figure = new_figure(WIDTH_IN, 3.0, "constrained")
     axes = figure.add_subplot()
     x, y = (np.array(each) for each in zip(*accuracy.points, strict=True))
     axes.plot(x, y, "o", color=PLACEMENT_COLORS[0], markersize=4, label="a ball or part, mean of its runs")

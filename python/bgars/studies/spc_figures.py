@@ -31,7 +31,7 @@ LABEL_X = 1.025
 
 def trend_figure(trend: Trend) -> Figure:
     """X-bar chart over S chart, signals marked."""
-    figure = new_figure(WIDTH_IN, HEIGHT_IN)
+    figure = new_figure(WIDTH_IN, HEIGHT_IN, "constrained")
     top, bottom = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [3, 2]})
     chart = trend.chart
     unit = f" ({trend.unit})" if trend.unit else ""

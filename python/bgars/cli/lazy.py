@@ -1,0 +1,60 @@
+"""Commands whose modules are loaded when they run, so that ``bgars --help`` and ``--version`` load none of them."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+__all__ = ["LAZY_COMMANDS", "LazyGroup"]
+
+LAZY_COMMANDS = {
+    "mesh": ("bgars.cli.mesh", "Turn a normal map or a height map into a mesh."),
+    "inspect": ("bgars.cli.inspect", "Find, measure and judge the solder balls of a part."),
+    "report": ("bgars.cli.report", "Write the page of an inspection again, from its result.json."),
+    "grr": ("bgars.cli.grr", "Say how well the gauge repeats: gauge R&R by analysis of variance."),
+    "spc": ("bgars.cli.spc", "Chart many results over time: X-bar / S charts, Cp, Cpk, Pp, Ppk."),
+    "calibrate": ("bgars.cli.calibrate", "Learn what every capture of a station shares, and keep it in a file."),
+    "simulate": ("bgars.cli.simulate", "Photograph a simulated part with known truth."),
+    "experiment": ("bgars.cli.experiment", "Reproduce the paper's figures on simulated captures."),
+}
+"""Of each command, in the order of the help: the module whose ``register`` adds it, and its line in the list."""
+
+
+class LazyGroup(TyperGroup):
+    """The commands of the app itself, then those of LAZY_COMMANDS."""
+
+    def __init__(self, **settings: Any) -> None:  # noqa: ANN401 - typer's own
+        super().__init__(**settings)
+        _reflow(self)
+        for name, (module, line) in LAZY_COMMANDS.items():
+            self.commands[name] = _Listed(name, help=line, module=module)
+
+
+class _Listed(TyperCommand):
+    """A command's name and line; it becomes the command itself where arguments are parsed or completed."""
+
+    def __init__(self, name: str, *, help: str, module: str) -> None:  # noqa: A002 - click's word
+        super().__init__(name, help=help)
+        self.module = module
+
+    def load(self) -> Any:  # noqa: ANN401 - a command of whichever click typer brings
+        """Import the module and return its command."""
+        registered = typer.Typer()
+        import_module(self.module).register(registered)
+        command = typer.main.get_group(registered).commands[str(self.name)]
+        _reflow(command)
+        return command
+
+    def make_context(self, *args: Any, **settings: Any) -> Any:  # noqa: ANN401
+        """Parse the command's arguments: from here on it is the command that works."""
+        return self.load().make_context(*args, **settings)
+
+
+def _reflow(command: Any) -> None:  # noqa: ANN401
+    """Join the lines of each paragraph of the help, which the terminal's width then breaks."""
+    command.help = "\n\n".join(" ".join(text.split()) for text in (command.help or "").split("\n\n"))
+    for each in getattr(command, "commands", {}).values():
+        _reflow(each)

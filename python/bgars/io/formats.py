@@ -1,0 +1,167 @@
+"""Files for other programs: normals as numbers, and the surface as points. A format is added in its table, here."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bgars.errors import InputError
+from bgars.io.atomic import atomic_file
+from bgars.io.described_tiff import write_described
+from bgars.io.normal_map import write_normal_map
+from bgars.records import NormalField
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from os import PathLike
+
+    from numpy.typing import NDArray
+
+    from bgars.records import HeightMap
+
+__all__ = ["NORMAL_FORMATS", "POINT_FORMATS", "write_normals", "write_points"]
+
+
+def write_normals(field: NormalField | NDArray[np.floating], path: str | PathLike[str]) -> None:
+    """Write normals; the suffix chooses the format.
+
+    ``.png`` is a normal map of 16 bits (:func:`bgars.write_normal_map`); ``.tif`` has three channels of float32, x, y,
+    z, NaN where there is no normal; ``.npz`` has the arrays ``normals``, and of a field ``albedo``, ``mask``,
+    ``confidence`` and ``measured``, for :func:`numpy.load`. The file appears whole or not at all.
+
+    Parameters
+    ----------
+    field : NormalField or (H, W, 3) floating
+        The normals.
+    path : path
+        File to write.
+
+    Raises
+    ------
+    InputError
+        An unknown suffix, or an array of another shape.
+    FileFormatError
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> import bgars, numpy as np, pathlib, tempfile
+    >>> normals = np.float32([[[0.6, 0.0, 0.8]]])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     bgars.write_normals(normals, pathlib.Path(folder) / "n.npz")
+    ...     np.load(pathlib.Path(folder) / "n.npz")["normals"].round(1).tolist()
+    [[[0.6000000238418579, 0.0, 0.800000011920929]]]
+    """
+    normals = field.normals if isinstance(field, NormalField) else np.asarray(field, dtype=np.float32)
+    if normals.ndim != len(("row", "col", "axis")) or normals.shape[2] != len("xyz"):
+        msg = f"normals: must have shape (H, W, 3), got {normals.shape}"
+        raise InputError(msg)
+    write, path = _writer(NORMAL_FORMATS, path, "normals")
+    with atomic_file(path) as temporary:
+        write(field, normals, temporary)
+
+
+def write_points(height: HeightMap, path: str | PathLike[str], *, field: NormalField | None = None) -> None:
+    """Write the valid pixels of a height map as a point cloud; the suffix chooses the format.
+
+    ``.xyz`` is text, a point per line: x y z, and with a field the normal; ``.ply`` is binary, with normals and grey
+    from a field. x is right, y up, z toward the camera, in the unit of the heights, origin at the image centre.
+
+    Parameters
+    ----------
+    height : HeightMap
+        From :func:`bgars.integrate_normals`.
+    path : path
+        File to write.
+    field : NormalField, optional
+        Gives each point its normal.
+
+    Raises
+    ------
+    InputError
+        An unknown suffix, or a field of another size.
+    FileFormatError
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> import bgars, numpy as np, pathlib, tempfile
+    >>> height = bgars.HeightMap.from_array(np.float32([[1.0, np.nan], [2.0, 3.0]]), pixel_pitch_um=10.0)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     bgars.write_points(height, pathlib.Path(folder) / "p.xyz")
+    ...     print((pathlib.Path(folder) / "p.xyz").read_text().splitlines()[0])
+    -5.00000 5.00000 1.00000
+    """
+    height.check_field(field)
+    write, path = _writer(POINT_FORMATS, path, "a point cloud")
+    rows, cols = np.nonzero(height.mask)
+    pitch = 1.0 if height.pixel_pitch_um is None else height.pixel_pitch_um
+    x, y = (cols + 0.5 - height.mask.shape[1] / 2) * pitch, (height.mask.shape[0] / 2 - rows - 0.5) * pitch
+    columns = {"x": x, "y": y, "z": height.height[height.mask]}
+    if field is not None:
+        normals = field.normals[height.mask]
+        columns |= {name: normals[:, axis] for axis, name in enumerate(("nx", "ny", "nz"))}
+        if path.suffix.lower() == ".ply":
+            grey = field.grey_levels()[height.mask]
+            columns |= dict.fromkeys(("red", "green", "blue"), grey)
+    with atomic_file(path) as temporary:
+        write(columns, height.unit, temporary)
+
+
+def _writer(
+    formats: Mapping[str, Callable[..., None]], path: str | PathLike[str], what: str
+) -> tuple[Callable[..., None], Path]:
+    """The writer of a file by its suffix."""
+    place = Path(path)
+    write = formats.get(place.suffix.lower())
+    if write is None:
+        msg = f"{place}: a file of {what} must end in {', '.join(formats)}; got {place.suffix!r}"
+        raise InputError(msg)
+    return write, place
+
+
+def _normals_png(_field: object, normals: NDArray[np.float32], path: Path) -> None:
+    write_normal_map(normals, path)
+
+
+def _normals_tiff(_field: object, normals: NDArray[np.float32], path: Path) -> None:
+    write_described(path, normals, "normals", channels=["x right", "y up", "z toward the camera"])
+
+
+def _normals_npz(field: object, normals: NDArray[np.float32], path: Path) -> None:
+    names = ("albedo", "mask", "confidence", "measured") if isinstance(field, NormalField) else ()
+    with path.open("wb") as file:
+        np.savez_compressed(file, normals=normals, **{name: getattr(field, name) for name in names})
+
+
+def _points_xyz(columns: dict[str, NDArray[np.floating]], _unit: str, path: Path) -> None:
+    np.savetxt(path, np.column_stack(list(columns.values())), fmt="%.5f")
+
+
+def _points_ply(columns: dict[str, NDArray[np.floating]], unit: str, path: Path) -> None:
+    kinds = {name: "u1" if values.dtype == np.uint8 else "<f4" for name, values in columns.items()}
+    points = np.zeros(len(columns["x"]), list(kinds.items()))
+    for name, values in columns.items():
+        points[name] = values
+    words = {"u1": "uchar", "<f4": "float"}
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"comment bgars points, unit {unit}, x right, y up, z toward the camera",
+        f"element vertex {len(points)}",
+        *(f"property {words[kind]} {name}" for name, kind in kinds.items()),
+        "end_header",
+    ]
+    path.write_bytes("\n".join([*header, ""]).encode("ascii") + points.tobytes())
+
+
+NORMAL_FORMATS: dict[str, Callable[..., None]] = {
+    ".png": _normals_png,
+    ".tif": _normals_tiff,
+    ".npz": _normals_npz,
+}
+"""Writer of normals by suffix: it is given the field (or array), the array, and the file."""
+POINT_FORMATS: dict[str, Callable[..., None]] = {".xyz": _points_xyz, ".ply": _points_ply}
+"""Writer of points by suffix: it is given columns by name, the unit, and the file."""

@@ -1,0 +1,55 @@
+"""A plain installation works; what needs more says in one line what to install."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import bgars
+
+WITHOUT = """
+import sys
+class Absent:
+    def find_spec(self, name, *_):
+        if name.partition(".")[0] in {"matplotlib", "plotly"}:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name.partition(".")[0])
+sys.meta_path.insert(0, Absent())
+import importlib.util
+found = importlib.util.find_spec
+importlib.util.find_spec = lambda name, *a: None if name in {"matplotlib", "plotly"} else found(name, *a)
+"""
+
+
+def run_without(code: str) -> subprocess.CompletedProcess[str]:
+    """Run code where matplotlib and plotly are not installed."""
+    return subprocess.run([sys.executable, "-c", WITHOUT + code], capture_output=True, text=True, check=False)
+
+
+def command(*arguments: object) -> str:
+    return f"sys.argv = {['bgars', *map(str, arguments)]!r}\nfrom bgars.cli import main\nmain()"
+
+
+def test_reconstruct_leaves_out_the_picture_and_says_so(tmp_path: Path) -> None:
+    run = run_without(command("reconstruct", bgars.sample_capture(), "-o", tmp_path / "out"))
+    assert run.returncode == 0, run.stderr
+    assert run.stderr == "warning: overview.png is left out: it needs matplotlib: pip install 'bgars[report]'\n"
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        *("mesh.ply", "normals.png", "height.tif", "height.npy", "summary.json")
+    }
+
+
+def test_inspect_judges_without_pictures_and_page(tmp_path: Path) -> None:
+    run = run_without(command("inspect", bgars.sample_capture(), "-o", tmp_path / "out"))
+    assert run.returncode == 1, run.stderr
+    assert run.stderr.count("pip install 'bgars[report]'") == 2
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"result.json", "balls.csv"}
+
+
+def test_what_cannot_do_without_says_what_to_install(tmp_path: Path) -> None:
+    for words in (("grr", tmp_path, "-o", tmp_path / "out"), ("experiment", "fig5", "-o", tmp_path / "out")):
+        run = run_without(command(*words))
+        assert run.returncode == 2
+        assert run.stderr.strip() == "error: this command needs matplotlib: pip install 'bgars[report]'"
+    run = run_without("import bgars\nbgars.write_overview")
+    assert "bgars.write_overview needs matplotlib: pip install 'bgars[report]'" in run.stderr

@@ -1,0 +1,64 @@
+"""Normals and points for other programs, and images of shape."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bgars
+import numpy as np
+import pytest
+import tifffile
+import trimesh
+from bgars.io.formats import NORMAL_FORMATS, POINT_FORMATS
+
+
+@pytest.fixture(scope="module")
+def field() -> bgars.NormalField:
+    return bgars.estimate_normals(bgars.read_capture(bgars.sample_capture()), method="lambertian")
+
+
+def test_normals_are_read_back_by_others(field: bgars.NormalField, tmp_path: Path) -> None:
+    for suffix in NORMAL_FORMATS:
+        bgars.write_normals(field, tmp_path / f"n{suffix}")
+    np.testing.assert_array_equal(tifffile.imread(tmp_path / "n.tif"), field.normals)
+    with np.load(tmp_path / "n.npz") as stored:
+        np.testing.assert_array_equal(stored["normals"], field.normals)
+        np.testing.assert_array_equal(stored["mask"], field.mask)
+    png = bgars.read_normal_map(tmp_path / "n.png")
+    assert bgars.angular_error_deg(png, field.normals)[field.mask].max() < 0.01
+    with pytest.raises(bgars.InputError, match=r"n\.exr: a file of normals must end in \.png, \.tif, \.npz"):
+        bgars.write_normals(field, tmp_path / "n.exr")
+    with pytest.raises(bgars.InputError, match=r"must have shape \(H, W, 3\)"):
+        bgars.write_normals(field.albedo, tmp_path / "n.tif")
+    assert len(list(tmp_path.iterdir())) == len(NORMAL_FORMATS)
+
+
+def test_points_lie_where_the_vertices_of_the_mesh_lie(field: bgars.NormalField, tmp_path: Path) -> None:
+    height = bgars.integrate_normals(field)
+    expected = bgars.mesh_from_height(height, field).vertices
+    for suffix in POINT_FORMATS:
+        bgars.write_points(height, tmp_path / f"p{suffix}", field=field)
+    text = np.loadtxt(tmp_path / "p.xyz")
+    np.testing.assert_allclose(text[:, :3], expected, atol=1e-4)
+    np.testing.assert_allclose(text[:, 3:], field.normals[height.mask], atol=1e-5)
+    cloud = trimesh.load(tmp_path / "p.ply")
+    np.testing.assert_allclose(cloud.vertices, expected, rtol=1e-6, atol=1e-4)
+    assert len(np.unique(cloud.colors[:, 0])) > 10
+    with pytest.raises(bgars.InputError, match=r"must end in \.xyz, \.ply"):
+        bgars.write_points(height, tmp_path / "p.las")
+
+
+def test_shape_of_a_ball_with_a_scratch() -> None:
+    row, col = np.mgrid[-30:31, -30:31]
+    heights = np.sqrt(80.0**2 - row**2 - col**2).astype(np.float32) * 5.0
+    heights[:, 33] -= 2.0
+    heights[0, 0] = np.nan
+    shape = bgars.shape_images(bgars.HeightMap.from_array(heights, pixel_pitch_um=5.0), scale_px=3.0)
+    assert shape.unit == "um"
+    assert shape.mean_curvature[30, 15] == pytest.approx(-1 / 400, rel=0.05)
+    assert shape.gaussian_curvature[30, 15] == pytest.approx(1 / 400**2, rel=0.1)
+    assert shape.flattened[30, 33] < -1.0
+    assert abs(shape.flattened[30, 15]) < 0.7, "what smoothing takes off a ball"
+    assert np.isnan(shape.slope_deg[0, 0])
+    with pytest.raises(bgars.InputError, match="scale_px: must be finite and above 0, got 0"):
+        bgars.shape_images(bgars.HeightMap.from_array(heights), scale_px=0)

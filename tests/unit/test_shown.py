@@ -1,0 +1,64 @@
+"""Records in a notebook: one line, a thumbnail, a plot."""
+
+from __future__ import annotations
+
+import bgars
+import matplotlib as mpl
+import numpy as np
+import pytest
+from report_parts import failing
+
+mpl.use("agg")
+
+
+@pytest.fixture(scope="module")
+def records() -> dict[str, object]:
+    capture = bgars.read_capture(bgars.sample_capture())
+    field = bgars.estimate_normals(capture, method="lambertian")
+    return {
+        "Capture": capture,
+        "NormalField": field,
+        "HeightMap": bgars.integrate_normals(field),
+        "PartResult": failing(),
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("Capture", "lights=8, size=256 x 240 px, dtype=uint8, pitch=3.4 um"),
+        ("NormalField", "method='lambertian', valid="),
+        ("HeightMap", "components=1"),
+        ("PartResult", "verdict=fail, balls="),
+    ],
+)
+def test_a_record_is_one_short_line_a_picture_and_a_plot(records: dict[str, object], name: str, words: str) -> None:
+    record = records[name]
+    assert words in repr(record)
+    assert len(repr(record)) < 200
+    html = record._repr_html_()  # type: ignore[attr-defined]
+    assert html.count("data:image/png;base64,") == 1
+    assert len(html) < 200_000
+    axes = record.plot()  # type: ignore[attr-defined]
+    assert axes.get_title()
+    assert record.plot(axes=axes) is axes  # type: ignore[attr-defined]
+    mpl.pyplot.close("all")
+
+
+def test_normals_of_others_are_evaluated_as_one_s_own_are() -> None:
+    capture = bgars.read_capture(bgars.sample_capture())
+    field = bgars.estimate_normals(capture, method="lambertian")
+    own = bgars.evaluate(capture, method="lambertian")
+    for given in (field.normals, 3.0 * field.normals.astype(np.float16), lambda _: field, field):
+        found = bgars.evaluate(capture, method=given)
+        assert found.normals.mean_deg == pytest.approx(own.normals.mean_deg, abs=0.02)
+        assert found.board is not None
+    assert bgars.evaluate(capture, method=field.normals).measured is None
+    with pytest.raises(bgars.InputError, match=r"method: normals must be numbers of shape \(240, 256, 3\)"):
+        bgars.evaluate(capture, method=field.normals[:9])
+
+
+@pytest.mark.parametrize("direction", [(0, 0, 0), (1, 0), (0, np.nan, 1)])
+def test_a_light_without_a_direction_relights_nothing(records: dict[str, object], direction: object) -> None:
+    with pytest.raises(bgars.InputError, match="direction: must be three finite numbers"):
+        records["NormalField"].relight(direction)  # type: ignore[attr-defined]
