@@ -18,6 +18,7 @@ from bgars.cfx import to_cfx
 from bgars.errors import (
     BgarsError,
     CalibrationError,
+    CaptureWarning,
     ConvergenceError,
     FileFormatError,
     InputError,
@@ -94,6 +95,7 @@ __all__ = [
     "CalibrationError",
     "Camera",
     "Capture",
+    "CaptureWarning",
     "Component",
     "ConvergenceError",
     "Defect",

@@ -85,6 +85,8 @@ class Capture:
         Grey level of full scale; thresholds "of 255" scale with it and albedo 1 means it. NaN: the kernels find it.
     files, folder : tuple of Path, Path or None
         The image files, for messages and reports; where the capture was read from.
+    assumed : tuple of str
+        What had to be assumed to read it: each was also a :class:`~bgars.CaptureWarning`.
     """
 
     images: PixelArray
@@ -100,6 +102,7 @@ class Capture:
     folder: Path | None = None
     pixel_pitch_u_um: float | None = None
     camera_distance_mm: float | None = None
+    assumed: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:

@@ -13,7 +13,16 @@ import typer
 
 import bgars
 from bgars.cli.calibrate import register as register_calibrate
-from bgars.cli.console import EXIT_BAD_INPUT, activation, fail, print_json, say, shown_path, stage_progress
+from bgars.cli.console import (
+    EXIT_BAD_INPUT,
+    activation,
+    fail,
+    notes_to_stderr,
+    print_json,
+    say,
+    shown_path,
+    stage_progress,
+)
 from bgars.cli.describe import describe, describe_in_words
 from bgars.cli.evaluation import choice_in_words, evaluation_table
 from bgars.cli.experiment import register as register_experiment
@@ -273,6 +282,7 @@ register_experiment(app)
 
 def main() -> None:
     """Run the command; an error becomes one line and exit code 2 (wrong use: 2 too, Ctrl-C: 130)."""
+    notes_to_stderr()
     try:
         app()
     except BgarsError as error:

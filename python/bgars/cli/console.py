@@ -7,13 +7,16 @@ import os
 import shutil
 import sys
 import time
+import warnings
 from contextlib import contextmanager
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+from bgars.errors import CaptureWarning
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -23,6 +26,7 @@ __all__ = [
     "activation",
     "error_console",
     "fail",
+    "notes_to_stderr",
     "print_json",
     "say",
     "say_files",
@@ -81,6 +85,28 @@ def fail(message: str) -> None:
     """Print an error for people."""
     error_console.print("error:", style="bold red", end=" ")
     error_console.print(message, markup=False)
+
+
+def notes_to_stderr() -> None:
+    """Print what had to be assumed to read a capture as notes, each once; other warnings stay as they are."""
+    other = warnings.showwarning
+
+    def show(  # as warnings.showwarning
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
+        if issubclass(category, CaptureWarning):
+            error_console.print("note:", style="bold yellow", end=" ")
+            error_console.print(str(message), markup=False)
+        else:
+            other(message, category, filename, lineno, file, line)
+
+    warnings.showwarning = show
+    warnings.simplefilter("once", CaptureWarning)
 
 
 @contextmanager

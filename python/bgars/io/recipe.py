@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from bgars.io.strict_toml import Strict, checked, read_values
+from bgars.light_formats import MAX_LIGHTS
 
 __all__ = [
     "RECIPE_NAME",
@@ -46,7 +47,7 @@ class TableResponse(Strict):
 class RingRecipe(Strict):
     """Evenly spaced distant lights, counter-clockwise from +x."""
 
-    count: Annotated[int, Field(ge=3)]
+    count: Annotated[int, Field(ge=3, le=MAX_LIGHTS)]
     elevation_deg: Annotated[float, Field(gt=0, lt=90)] = 45.0
     azimuth0_deg: float = 0.0
 
@@ -92,7 +93,7 @@ class CaptureRecipe(Strict):
     channel: ChannelName = "luminance"
     dark: str | None = None
     mask: str | None = None
-    response: Literal["linear"] | GammaResponse | TableResponse = "linear"
+    response: Literal["linear", "srgb"] | GammaResponse | TableResponse = "linear"
     black_level: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
     saturation: Positive | None = None
     lights: LightsRecipe | None = None

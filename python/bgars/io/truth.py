@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bgars.errors import FileFormatError
-from bgars.io.images import read_mask
+from bgars.io.masks import read_mask
 from bgars.records import Truth
 
 if TYPE_CHECKING:
