@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -9,6 +10,7 @@ from bgars.errors import FileFormatError, InputError
 from bgars.io.image_formats import format_of
 from bgars.io.image_listing import Listing, choose_series, list_folder, natural_key, some_of
 from bgars.io.image_names import find_named_images
+from bgars.io.image_tags import read_tags
 from bgars.io.light_discovery import choose_mask
 from bgars.io.recipe import RECIPE_NAME
 from bgars.light_files import read_filenames
@@ -55,19 +57,17 @@ def choose_images(
     InputError
         No images that fit the lights; the message says what lies there.
     """
+    listing = _without(listing, _files_of(recipe))
     written, source = _named(folder, recipe, lights, listing)
     if written:
         names, told = find_named_images(folder, written, source, listing.folders)
         notes.extend(told)
-        unused = [
-            name for name in (*listing.images, *listing.special) if name not in (*names, recipe.dark, recipe.mask)
-        ]
+        unused = [name for name in (*listing.images, *listing.special) if name not in names]
         if unused and recipe.images is None and not told:
             notes.append(f"images that {Path(source or NAMES_FILE).name} does not name are not used: {some_of(unused)}")
         return ChosenImages(names, written)
     count = len(lights.rig)
-    special = tuple(name for name in listing.special if name not in (recipe.dark, recipe.mask))
-    images = tuple(name for name in listing.images if name not in (recipe.dark, recipe.mask))
+    special, images = listing.special, listing.images
     chosen = _fitting(folder, images, special, count)
     if chosen is not None:
         _tell_surplus(recipe, (*images, *special), chosen, notes)
@@ -80,6 +80,17 @@ def choose_images(
         f"; seen: {listing.in_words()}"
     )
     raise InputError(msg)
+
+
+def _files_of(recipe: CaptureRecipe) -> set[str]:
+    """Files that a recipe names for something else than an image of one light."""
+    lights = () if recipe.lights is None else vars(recipe.lights).values()
+    return {value for value in (recipe.dark, recipe.mask, *lights) if isinstance(value, str)}
+
+
+def _without(listing: Listing, names: set[str]) -> Listing:
+    kept = [tuple(name for name in group if name not in names) for group in (listing.images, listing.special)]
+    return replace(listing, images=kept[0], special=kept[1])
 
 
 def _named(folder: Path, recipe: CaptureRecipe, lights: Lights, listing: Listing) -> tuple[list[str], Path | None]:
@@ -106,7 +117,8 @@ def _fitting(folder: Path, images: Sequence[str], special: Sequence[str], count:
 
 def _may_be_stack(path: Path) -> bool:
     try:
-        return format_of(path).stack
+        kind = format_of(path)
+        return kind.stack and (kind.decoder != "tiff" or read_tags(path, kind).pages > 1)
     except FileFormatError:
         return True  # let its decoder say what is wrong
 

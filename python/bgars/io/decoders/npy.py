@@ -27,6 +27,8 @@ def read_npy(path: Path, kind: ImageFormat, max_megapixels: float) -> PixelArray
         msg = f"{path}: must hold one grey or RGB image, but its shape is {array.shape}"
         raise FileFormatError(msg)
     check_size(path, array.shape[0], array.shape[1], max_megapixels)
+    if array.dtype == np.bool_:
+        return np.asarray(array).astype(np.uint8) * np.uint8(255)
     return np.array(array)
 
 
