@@ -55,7 +55,7 @@ def need_regular(path: str | os.PathLike[str], what: str = "file") -> int:
     try:
         found = Path(path).stat()
     except FileNotFoundError as error:
-        msg = f"{path}: no such {what}"
+        msg = f"{shown(path)}: no such {what}"
         raise FileFormatError(msg) from error
     except OSError as error:
         msg = f"{shown(path)}: cannot be read ({error.strerror or error})"
@@ -65,7 +65,7 @@ def need_regular(path: str | os.PathLike[str], what: str = "file") -> int:
         raise FileFormatError(msg) from error
     if not stat.S_ISREG(found.st_mode):
         kind = next((name for is_kind, name in KINDS.items() if is_kind(found.st_mode)), "no regular file")
-        msg = f"{path}: is {kind}, not a {what}"
+        msg = f"{shown(path)}: is {kind}, not a {what}"
         raise FileFormatError(msg)
     return found.st_size
 

@@ -21,7 +21,7 @@ from bgars.io.capture_radiometry import (
     subtract_offset,
 )
 from bgars.io.given_paths import need_folder
-from bgars.io.image_listing import Listing, list_folder
+from bgars.io.image_listing import list_folder
 from bgars.io.image_tags import upright
 from bgars.io.images import MAX_MEGAPIXELS, WEIGHTS
 from bgars.io.light_discovery import default_recipe
@@ -105,21 +105,12 @@ def read_capture(
     lights = read_lights(folder, recipe, notes)
     chosen = choose_images(folder, recipe, lights, listing, notes)
     lights, names = match(folder, lights, chosen, images)
-    if has_recipe:
-        _tell_unused(recipe, listing, notes)
     if recipe.mask is None and chosen.mask is not None:
         recipe = recipe.model_copy(update={"mask": chosen.mask})
     capture = _load(folder, recipe, lights, names, channel or recipe.channel, max_megapixels, threads, notes)
     for note in notes:
         warnings.warn(f"{folder}: {note}", CaptureWarning, stacklevel=2)
     return capture
-
-
-def _tell_unused(recipe: CaptureRecipe, listing: Listing, notes: list[str]) -> None:
-    """A mask that the recipe does not name is most likely forgotten."""
-    masks = [name for name in listing.masks if name != recipe.mask]
-    if masks and recipe.mask is None:
-        notes.append(f"{masks[0]} is not used: {RECIPE_NAME} does not name it (mask = {masks[0]!r} would)")
 
 
 def _load(

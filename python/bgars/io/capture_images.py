@@ -63,8 +63,9 @@ def choose_images(
         names, told = find_named_images(folder, written, source, listing.folders)
         notes.extend(told)
         unused = [name for name in (*listing.images, *listing.special) if name not in names]
-        if unused and recipe.images is None and not told:
-            notes.append(f"images that {Path(source or NAMES_FILE).name} does not name are not used: {some_of(unused)}")
+        by_lights = written == list(lights.rig.files)  # a list of images is a choice, a file of lights perhaps is not
+        if unused and by_lights and not told and recipe.images is None and source is not None:
+            notes.append(f"images that {source.name} does not name are not used: {some_of(unused)}")
         return ChosenImages(names, written)
     count = len(lights.rig)
     special, images = listing.special, listing.images

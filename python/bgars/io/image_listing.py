@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from bgars.errors import FileFormatError
 from bgars.io.image_formats import IMAGE_SUFFIXES
+from bgars.safe_files import shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -101,7 +102,7 @@ def natural_key(name: str) -> list[tuple[int, int | str]]:
 
 def some_of(names: Sequence[str]) -> str:
     """The first of some names, with dots where there are more."""
-    return ", ".join(names[:SHOWN]) + (", ..." if len(names) > SHOWN else "")
+    return ", ".join(shown(name) for name in names[:SHOWN]) + (", ..." if len(names) > SHOWN else "")
 
 
 def role_of(name: str) -> str | None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from bgars.errors import FileFormatError
 from bgars.io.image_formats import IMAGE_SUFFIXES
+from bgars.safe_files import shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -51,7 +52,7 @@ def find_named_images(
     count, first = best
     where = "" if source is None else f"{source.name} names it; "
     listing = f"{where}{max(count, 0)} of {len(names)} named images found in {folder}"
-    msg = f"{folder / _base_name(first)}: no such image file ({listing})"
+    msg = f"{shown(folder / _base_name(first))}: no such image file ({listing})"
     raise FileFormatError(msg)
 
 
