@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+RGB = 3
+
 __all__ = ["read_filenames", "read_intensities", "read_lp", "read_numbers", "read_text"]
 
 
@@ -89,6 +91,19 @@ def read_numbers(path: Path, columns: tuple[int, ...], meaning: str) -> NDArray[
     return np.array(rows, dtype=np.float64)
 
 
+def _in_rows(path: Path) -> NDArray[np.float64] | None:
+    """Intensities written as one line, or three, of a number a light; None for any other form."""
+    if path.suffix.lower() == ".npy":
+        return None
+    lines = data_lines(read_text(path))
+    style = find_style(lines)
+    rows = [[as_number(field, style) for field in line.text.replace(",", " ").split()] for line in lines[: RGB + 1]]
+    columns = len(rows[0]) if rows else 0
+    if len(rows) not in (1, RGB) or columns <= RGB or any(len(row) != columns or None in row for row in rows):
+        return None
+    return np.array(rows, dtype=np.float64).T
+
+
 def _fitting(array: NDArray[np.float64], path: Path, columns: tuple[int, ...], meaning: str) -> NDArray[np.float64]:
     rows = array.reshape(-1, 1) if array.ndim == 1 and 1 in columns else array
     if rows.ndim != 2 or rows.shape[1] not in columns or len(rows) > MAX_LIGHTS:  # noqa: PLR2004 - rows and columns
@@ -99,7 +114,10 @@ def _fitting(array: NDArray[np.float64], path: Path, columns: tuple[int, ...], m
 
 
 def read_intensities(path: Path) -> NDArray[np.float64]:
-    """Read (L, 1) or (L, 3) light intensities: one number a light, or red, green, blue."""
+    """Read (L, 1) or (L, 3) light intensities: one number a light, or red, green, blue; also as lines of L numbers."""
+    in_rows = _in_rows(path)
+    if in_rows is not None:
+        return in_rows
     return read_numbers(path, (1, 3), "one intensity a light, or red green blue")
 
 

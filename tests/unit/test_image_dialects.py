@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import struct
+import subprocess
+import sys
 from pathlib import Path
 
 import imageio.v3 as iio
@@ -398,8 +400,6 @@ def test_what_is_there_is_said_where_no_image_fits(tmp_path: Path) -> None:
 def test_bytes_choose_the_decoder_and_only_listed_ones_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes, words: list[str], name: str
 ) -> None:
-    import subprocess  # noqa: PLC0415 - in order to forbid it
-
     def started(*_: object, **__: object) -> None:
         pytest.fail("a program was started")
 
@@ -432,8 +432,6 @@ def test_images_of_an_lp_that_are_left_over_are_named(tmp_path: Path) -> None:
 
 
 def test_camera_raw_needs_its_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import sys  # noqa: PLC0415 - in order to hide a module
-
     monkeypatch.setitem(sys.modules, "rawpy", None)
     for name in names_of("DSC_{}.NEF"):
         (tmp_path / name).write_bytes(b"II*\0" + b"\0" * 200)
@@ -452,3 +450,52 @@ def test_damaged_camera_raw_is_refused(tmp_path: Path) -> None:
 def test_every_format_is_in_the_table_once() -> None:
     suffixes = [suffix for kind in IMAGE_FORMATS for suffix in kind.suffixes]
     assert len(suffixes) == len(set(suffixes))
+
+
+def test_of_a_series_developed_twice_the_better_one_is_taken(tmp_path: Path) -> None:
+    write_directions(tmp_path)
+    names = write_images(tmp_path, names_of("DSC_{:04d}.png"))
+    write_images(tmp_path, names_of("DSC_{:04d}.JPG"))
+    capture = reads_right(tmp_path, "not used: DSC_0001.JPG")
+    assert [path.name for path in capture.files] == names
+
+
+def test_the_course_images_of_buddha(tmp_path: Path) -> None:
+    names = write_images(tmp_path, names_of("buddha.{}.tga", 0))
+    Image.fromarray(MASK).save(tmp_path / "buddha.mask.tga")
+    (tmp_path / "lights.txt").write_text(
+        f"{COUNT}\n" + "\n".join(" ".join(f"{v:.6f}" for v in vector) for vector in LIGHTS), encoding="utf-8"
+    )
+    capture = reads_right(tmp_path, "buddha.mask.tga", "lights.txt")
+    assert [path.name for path in capture.files] == names
+    np.testing.assert_array_equal(capture.mask, MASK > 0)
+
+
+def test_names_that_are_no_text(tmp_path: Path) -> None:
+    write_directions(tmp_path)
+    names = [f"m\udcfcnze_{index}.png" for index in range(COUNT)]
+    try:
+        write_images(tmp_path, names)
+    except (OSError, UnicodeError):
+        pytest.skip("this file system takes no such names")
+    (tmp_path / "M\udcfcnze_mask.png").write_bytes((tmp_path / names[0]).read_bytes())
+    done = subprocess.run(
+        [sys.executable, "-m", "bgars", "info", str(tmp_path)], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert "Traceback" not in done.stderr
+    assert done.returncode in (0, 2)
+
+
+def test_paths_of_windows_in_a_recipe(tmp_path: Path) -> None:
+    names = write_images(tmp_path, names_of("images/a{}.png"))
+    write_directions(tmp_path / "images", "l.txt")
+    iio.imwrite(tmp_path / "images" / "part.png", MASK)
+    listed = ", ".join(f"'{name}'".replace("/", "\\") for name in names)
+    recipe(tmp_path, f"images = [{listed}]\nmask = 'images\\part.png'\n[lights]\ndirections = 'images\\l.txt'\n")
+    np.testing.assert_array_equal(reads_right(tmp_path).mask, MASK > 0)
+
+
+def test_a_recipe_whose_name_hides_its_ending(tmp_path: Path) -> None:
+    write_images(tmp_path)
+    (tmp_path / "capture.toml.txt").write_text("[lights]\nring = { count = 8 }\n", encoding="utf-8")
+    refused(tmp_path, "capture.toml.txt is not read", "must be called capture.toml")

@@ -178,6 +178,17 @@ TEXT_DIALECTS = {
         "\n".join(f"{index + 1} {line}" for index, line in enumerate(text_of(LIGHTS).splitlines())),
         ["number of the light"],
     ),
+    "printed by a program": (
+        "light_directions.txt",
+        str(LIGHTS.round(6)).replace("[", " [", 1),
+        [],
+    ),
+    "a Python list": ("light_directions.txt", ",\n".join(str(list(vector)) for vector in LIGHTS.tolist()), []),
+    "a csv with decimal commas in quotes": (
+        "lights.csv",
+        "\n".join(",".join(f'"{value:.6f}"'.replace(".", ",") for value in vector) for vector in LIGHTS),
+        ["decimal commas"],
+    ),
     "a count": ("lights.txt", f"{COUNT}\n{text_of(LIGHTS)}", ["lights taken from lights.txt"]),
     "a csv with a header": ("light_directions.csv", "x,y,z\n" + text_of(LIGHTS, ","), ["light_directions.csv"]),
     "a csv with names": (
@@ -290,6 +301,16 @@ def test_vectors_of_different_lengths_carry_the_intensity(tmp_path: Path) -> Non
     write_directions(tmp_path, vectors=LIGHTS * strength[:, None])
     capture = reads_right(tmp_path, "direction times intensity")
     np.testing.assert_allclose(capture.rig.intensities, strength, atol=1e-5)
+
+
+@pytest.mark.parametrize("shape", [(COUNT, 1), (1, COUNT), (COUNT, 3), (3, COUNT)])
+def test_intensities_in_rows_or_columns(tmp_path: Path, shape: tuple[int, int]) -> None:
+    strength = np.linspace(0.7, 1.2, COUNT)
+    write_images(tmp_path, images=np.rint(strength[:, None, None] * 0.8 * 255 * radiances()).astype(np.uint8))
+    write_directions(tmp_path)
+    columns = np.repeat(strength[:, None], 3, axis=1) if 3 in shape else strength[:, None]
+    np.savetxt(tmp_path / "light_intensities.txt", columns if shape[0] == COUNT else columns.T)
+    np.testing.assert_allclose(reads_right(tmp_path).rig.intensities, strength)
 
 
 def test_positions_are_no_directions(tmp_path: Path) -> None:

@@ -43,7 +43,12 @@ error_console = Console(stderr=True, highlight=False, soft_wrap=True)
 
 def say(text: str = "") -> None:
     """Print a line of a command's result; brackets are taken literally."""
-    output_console.print(text, markup=False)
+    output_console.print(_encodable(text), markup=False)
+
+
+def _encodable(text: str) -> str:
+    """Text that any terminal can take: names of files may hold bytes that are no text."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def say_files(output: Path, files: Mapping[str, str]) -> None:
@@ -84,7 +89,7 @@ def utc_now() -> str:
 def fail(message: str) -> None:
     """Print an error for people."""
     error_console.print("error:", style="bold red", end=" ")
-    error_console.print(message, markup=False)
+    error_console.print(_encodable(message), markup=False)
 
 
 def notes_to_stderr() -> None:
@@ -101,7 +106,7 @@ def notes_to_stderr() -> None:
     ) -> None:
         if issubclass(category, CaptureWarning):
             error_console.print("note:", style="bold yellow", end=" ")
-            error_console.print(str(message), markup=False)
+            error_console.print(_encodable(str(message)), markup=False)
         else:
             other(message, category, filename, lineno, file, line)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bgars.errors import FileFormatError
-from bgars.io.image_formats import IMAGE_SUFFIXES
+from bgars.io.image_formats import IMAGE_FORMATS, IMAGE_SUFFIXES
 from bgars.safe_files import shown
 
 if TYPE_CHECKING:
@@ -161,7 +161,8 @@ def _is_array_of_lights(path: Path) -> bool:
 def choose_series(names: Iterable[str], count: int) -> tuple[str, ...] | None:
     """Return the one numbered series of `count` images among some names, None where there is none or several.
 
-    Names are of one series where they differ in numbers only.
+    Names are of one series where they differ in numbers only. Of series that differ in their endings only, the one that
+    keeps most of the light is taken (TIFF rather than raw, raw rather than JPEG).
 
     Examples
     --------
@@ -171,5 +172,15 @@ def choose_series(names: Iterable[str], count: int) -> tuple[str, ...] | None:
     series: dict[str, list[str]] = {}
     for name in names:
         series.setdefault(re.sub(r"\d+", "#", name, flags=re.ASCII).lower(), []).append(name)
-    fitting = [group for pattern, group in series.items() if len(group) == count and "#" in pattern]
-    return tuple(sorted(fitting[0], key=natural_key)) if len(fitting) == 1 else None
+    fitting = {pattern: group for pattern, group in series.items() if len(group) == count and "#" in pattern}
+    if len({pattern.rpartition(".")[0] for pattern in fitting}) != 1:
+        return None
+    best = min(fitting, key=_loss)  # the same images, developed twice
+    return tuple(sorted(fitting[best], key=natural_key))
+
+
+def _loss(name: str) -> int:
+    """What an image format loses: 0 nothing; 1 nothing, but it must be developed; 2 what the eye does not need."""
+    suffix = "." + name.rpartition(".")[2]
+    kind = next((kind for kind in IMAGE_FORMATS if suffix in kind.suffixes), None)
+    return 0 if kind is None else 2 if kind.lossy else 1 if kind.decoder == "raw" else 0

@@ -62,14 +62,15 @@ def _told(
     """Bring the found names to the folder of the capture, and say how they were found."""
     relative = [_relative(folder, place / name) for name in found]
     notes = []
-    shown = "" if source is None else f"{source.name}: "
+    where = "" if source is None else f"{source.name}: "
+    example = f"such as {shown(names[0])} as {shown(relative[0])}"
     if rule or any(Path(name).name != new for name, new in zip(names, found, strict=True)):
         how = rule or "by the last part of their paths"
-        notes.append(f"{shown}images found {how}, such as {names[0]} as {relative[0]}")
+        notes.append(f"{where}images found {how}, {example}")
     elif place != folder:
-        notes.append(f"{shown}images found in {_relative(folder, place)}")
+        notes.append(f"{where}images found in {_relative(folder, place)}")
     elif any(_is_absolute(name) or "/" in name for name in names):
-        notes.append(f"{shown}images found by the last part of their paths, such as {names[0]} as {relative[0]}")
+        notes.append(f"{where}images found by the last part of their paths, {example}")
     return relative, notes
 
 

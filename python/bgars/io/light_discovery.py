@@ -109,6 +109,10 @@ def _other_file(folder: Path, listing: Listing, notes: list[str]) -> str:
             f'..., and under [lights] positions_mm = "{positions[0]}" (mm, origin at the image centre on the board)'
         )
         raise InputError(msg)
+    almost = [name for name in listing.others if name.lower().startswith(RECIPE_NAME) and name != RECIPE_NAME]
+    if almost:
+        msg = f"{folder}: {almost[0]} is not read: it must be called {RECIPE_NAME}"
+        raise InputError(msg)
     msg = (
         f"{folder}: no description of the lights: expected {RECIPE_NAME} with [lights], {DIRECTIONS}, "
         f"or one .lp file; seen: {listing.in_words()}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
@@ -16,6 +17,8 @@ DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?", re.ASCII)
 PLAIN_INTEGER = re.compile(r"[-+]?\d+", re.ASCII)
 NAME_WITH_SUFFIX = re.compile(r".*\.[A-Za-z][A-Za-z0-9]{1,4}")
 QUOTED = re.compile(r"(?P<quote>[\"'])(?P<name>.*?)(?P=quote)\s*[,;\t ]?(?P<rest>.*)")
+QUOTED_DECIMAL_COMMA = re.compile(r"\"[-+]?\d+,\d+\"", re.ASCII)
+BRACKETS = str.maketrans("[](){}", "      ")
 LONGEST_NUMBER = 64
 AXES = 3
 COMMENTS = ("#", "%", "//")
@@ -65,6 +68,8 @@ def find_style(lines: Sequence[Line], least: int = AXES) -> Style:
     (Style(separator=None, decimal_comma=True), Style(separator=',', decimal_comma=False))
     """
     texts = [line.text for line in lines]
+    if any(QUOTED_DECIMAL_COMMA.search(text) for text in texts):
+        return Style(",", decimal_comma=True)
     if any(";" in text for text in texts):
         decimal = any(DECIMAL_COMMA.fullmatch(part.strip()) for text in texts for part in text.split(";"))
         return Style(";", decimal_comma=decimal)
@@ -80,10 +85,12 @@ def find_style(lines: Sequence[Line], least: int = AXES) -> Style:
 def parse_row(text: str, style: Style) -> Row | None:
     """Return the name ("" where there is none) and the numbers of a line; None where no number ends it."""
     quoted = QUOTED.fullmatch(text)
-    if quoted:
+    if quoted and not QUOTED_DECIMAL_COMMA.fullmatch(f'"{quoted["name"]}"'):
         fields = _split(quoted["rest"], style)
         numbers = [as_number(field, style) for field in fields]
         return None if not numbers or None in numbers else Row(quoted["name"], _all(numbers))
+    if text[0] in "[({":  # as programs print vectors
+        text = text.translate(BRACKETS).strip(" ,")
     fields = _split(text, style)
     numbers = [as_number(field, style) for field in fields]
     first = len(fields)
@@ -120,6 +127,12 @@ def _is_decimal_comma(field: str) -> bool:
 def _split(text: str, style: Style) -> list[str]:
     if style.separator is None:
         return text.split()
+    if '"' in text:
+        try:
+            rows = list(csv.reader([text], delimiter=style.separator))
+        except csv.Error:  # a field of more than 100,000 characters
+            return [text]
+        return [field.strip() for row in rows for field in row if field.strip()]
     if style.separator == "," and not style.decimal_comma:
         return [part for field in text.split(",") for part in _numbers_between_blanks(field.strip()) if part]
     return [part.strip() for part in text.split(style.separator) if part.strip()]
