@@ -99,6 +99,12 @@ TABLES = {
     ".npy": saved(np.save, LIGHTS),
     ".mat": saved(savemat, {"L": LIGHTS, "intensities": np.ones(4)}),
 }  # fmt: skip
+OTHER_TABLES = {
+    ".txt": b"N_img nrows ncols f x0 y0 mean_distance\n1 9 11 100 5 4 300\n1 2 3 0 0 1 1 1 1 0 0\n",
+    ".csv": b'"0,7","0,0","0,7"\n"0,0","0,7","0,7"\n[0.1, 0.2, 0.9]\n',
+    ".json": json.dumps({f"img_{index}.png": [0.1, 0.2, 0.9] for index in range(4)}).encode(),
+    ".mat": saved(savemat, {"L": LIGHTS, "text": "hello"}, do_compression=True),
+}  # fmt: skip
 TOML = b"""pixel_pitch_um = 10.0
 mask = "mask.png"
 response = { gamma = 2.2 }
@@ -134,7 +140,9 @@ def damaged(draw: st.DrawFn, content: bytes) -> bytes:
 @QUICK
 @given(data=st.data())
 def test_light_files(suffix: str, data: st.DataObject) -> None:
-    content = data.draw(damaged(TABLES[suffix]) | st.binary(max_size=200))
+    content = data.draw(
+        damaged(TABLES[suffix]) | damaged(OTHER_TABLES.get(suffix, TABLES[suffix])) | st.binary(max_size=200)
+    )
     with named(f"lights{suffix}", content) as path:
         refuses_in_one_line(read_light_file, path)
 

@@ -31,6 +31,7 @@ BASE = {
     "bit_depth": 0,
     "large_arrays": 0,
     "safe_files": 0.5,
+    "mat_files": 0,
     "light_names": 1,
     "light_formats": 1.2,
     "light_files": 1.5,

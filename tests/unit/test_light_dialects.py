@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +11,7 @@ import bgars
 import numpy as np
 import pytest
 from bgars.light_formats import LIGHT_FORMATS, read_light_file
+from bgars.mat_files import read_arrays
 from case_captures import (
     COUNT,
     LIGHTS,
@@ -286,6 +288,30 @@ def test_matlab_files(tmp_path: Path, name: str, variables: dict[str, object], w
     write_images(tmp_path)
     savemat(tmp_path / name, variables)
     reads_right(tmp_path, *words)
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+@pytest.mark.parametrize("kind", ["f8", "f4", "i4", "u1", "i2"])
+def test_matlab_arrays_of_every_kind(compressed: bool, kind: str) -> None:
+    arrays = {
+        "L": (LIGHTS * 100).astype(kind),
+        "deep": np.arange(24).reshape(2, 3, 4).astype(kind),
+        "one": np.ones((1, 1)),
+    }
+    buffer = io.BytesIO()
+    others = {
+        "text": "hello",
+        "cells": np.array([1, "a"], dtype=object),
+        "struct": {"a": 1},
+        "complex": np.ones(2) * 1j,
+    }
+    savemat(buffer, {**arrays, **others}, do_compression=compressed)
+    read = read_arrays(buffer.getvalue(), 1_000_000)
+    assert set(arrays) <= set(read)
+    for name, array in arrays.items():
+        np.testing.assert_array_equal(read[name], array)
+    with pytest.raises(ValueError, match="bytes"):
+        read_arrays(buffer.getvalue()[:-40], 1_000_000)
 
 
 @pytest.mark.parametrize("array", [LIGHTS, LIGHTS.T, LIGHTS.astype(np.float32), np.asfortranarray(LIGHTS)])

@@ -10,8 +10,9 @@ import numpy as np
 from bgars.errors import FileFormatError
 from bgars.io.images import decode_stack
 from bgars.io.masks import read_mask
+from bgars.mat_files import read_arrays
 from bgars.records import Truth
-from bgars.safe_files import need_regular, read_text
+from bgars.safe_files import read_bounded, read_text
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -93,12 +94,8 @@ def _normals(path: Path, mask_path: Path) -> FloatArray:
         array: FloatArray = np.load(path, allow_pickle=False).astype(np.float32)
         return array
     if path.suffix == ".mat":
-        from scipy.io import loadmat  # noqa: PLC0415 - a tenth of a second that only .mat files need
-
-        if need_regular(path) > MAX_BYTES:
-            msg = f"{path}: is larger than normals of a photograph may be ({MAX_BYTES} bytes)"
-            raise FileFormatError(msg)
-        held = [value for value in loadmat(path).values() if getattr(value, "shape", ())[2:] == (AXES,)]
+        arrays = read_arrays(read_bounded(path, MAX_BYTES), MAX_BYTES)
+        held = [value for value in arrays.values() if value.shape[2:] == (AXES,)]
         if len(held) != 1:
             msg = f"{path}: must hold one variable of shape (H, W, 3), has {len(held)}"
             raise FileFormatError(msg)

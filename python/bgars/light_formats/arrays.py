@@ -9,7 +9,8 @@ import numpy as np
 
 from bgars.errors import FileFormatError
 from bgars.light_formats.table import LightTable, checked_vectors, rows_of_three
-from bgars.safe_files import read_bounded
+from bgars.mat_files import read_arrays
+from bgars.safe_files import read_bounded, shown
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -85,7 +86,8 @@ def read_mat_table(path: Path) -> LightTable:
         The file cannot be read, or holds no such variable, or several.
     """
     content = read_bounded(path, MAX_BYTES, "light file")
-    shapes = _mat_shapes(content, path)
+    arrays = _mat_arrays(content, path)
+    shapes = {name: array.shape for name, array in arrays.items()}
     wanted = {name for name, shape in shapes.items() if len(shape) == 2 and np.prod(shape, dtype=float) <= MAX_VALUES}  # noqa: PLR2004 - matrices
     vectors_like = [name for name in wanted if 3 in shapes[name]]  # noqa: PLR2004 - x, y, z
     near = {CAMERA_POSITIONS, LED_AXES} <= set(shapes)
@@ -93,14 +95,13 @@ def read_mat_table(path: Path) -> LightTable:
     if name is None and len(vectors_like) == 1:
         name = vectors_like[0]
     if name is None or name not in wanted:
-        held = ", ".join(f"{key} {'x'.join(map(str, shape))}" for key, shape in shapes.items())
+        held = ", ".join(f"{shown(key)} {'x'.join(map(str, shape))}" for key, shape in list(shapes.items())[:10])
         msg = (
             f"{path}: holds no single variable of shape (lights, 3) for the light directions (found {held or 'none'}); "
             "call it L, or write the vectors to light_directions.txt, one x y z a line"
         )
         raise FileFormatError(msg)
     strength = _pick([other for other in wanted if other != name], INTENSITY_NAMES)
-    arrays = _load_mat(content, path, [name] if strength is None else [name, strength])
     vectors, notes = rows_of_three(_numbers(arrays[name], path, name), path, name)
     notes = (f"variable {name!r} taken as the {'LED positions in mm' if near else 'light directions'}", *notes)
     intensities = None if strength is None else _intensities(_numbers(arrays[strength], path, strength), len(vectors))
@@ -122,35 +123,15 @@ def _intensities(array: NDArray[np.float64], count: int) -> NDArray[np.float64] 
     return array.reshape(count, -1) if array.shape[0] == count else np.ascontiguousarray(array.T).reshape(count, -1)
 
 
-def _mat_shapes(content: bytes, path: Path) -> dict[str, tuple[int, ...]]:
-    from scipy.io import whosmat  # noqa: PLC0415 - a tenth of a second that only .mat files need
-
+def _mat_arrays(content: bytes, path: Path) -> dict[str, NDArray[Any]]:
     try:
-        return {str(name): tuple(map(int, shape)) for name, shape, _ in whosmat(_as_file(content))}
-    except Exception as error:  # scipy raises whatever damaged bytes lead to
-        raise _mat_error(content, path, error) from error
-
-
-def _load_mat(content: bytes, path: Path, names: list[str]) -> dict[str, Any]:
-    from scipy.io import loadmat  # noqa: PLC0415 - as above
-
-    try:
-        arrays: dict[str, Any] = loadmat(_as_file(content), variable_names=names)
-        return {name: arrays[name] for name in names}
-    except Exception as error:  # scipy raises whatever damaged bytes lead to
-        raise _mat_error(content, path, error) from error
-
-
-def _as_file(content: bytes) -> Any:  # noqa: ANN401 - scipy takes open files, its types know names only
-    return io.BytesIO(content)
-
-
-def _mat_error(content: bytes, path: Path, error: Exception) -> FileFormatError:
-    if MATLAB_73 in content[:128]:
-        msg = f"{path}: is a MATLAB 7.3 (HDF5) file, which is not read; save it in MATLAB with save(..., '-v7')"
-    else:
-        msg = f"{path}: is not a MATLAB file ({_one_line(error)})"
-    return FileFormatError(msg)
+        return read_arrays(content, MAX_BYTES)
+    except ValueError as error:
+        if MATLAB_73 in content[:128]:
+            msg = f"{path}: is a MATLAB 7.3 (HDF5) file, which is not read; save it in MATLAB with save(..., '-v7')"
+        else:
+            msg = f"{path}: is not a MATLAB file ({error})"
+        raise FileFormatError(msg) from error
 
 
 def _numbers(array: Any, path: Path, name: str) -> NDArray[np.float64]:  # noqa: ANN401 - whatever a file held
