@@ -85,7 +85,13 @@ def read_bounded(path: str | os.PathLike[str], max_bytes: int = MAX_TEXT_BYTES, 
     FileFormatError
         As :func:`need_regular`, or the file is larger or cannot be read.
     """
-    size = need_regular(path, what)
+    try:
+        size = need_regular(path, what)
+    except FileFormatError as error:
+        if isinstance(error.__cause__, FileNotFoundError):
+            msg = f"{shown(path)}: cannot be read (no such {what})"
+            raise FileFormatError(msg) from error.__cause__
+        raise
     if size <= max_bytes:
         try:
             with Path(path).open("rb") as file:

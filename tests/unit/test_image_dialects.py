@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import struct
 import subprocess
 import sys
@@ -499,3 +500,24 @@ def test_a_recipe_whose_name_hides_its_ending(tmp_path: Path) -> None:
     write_images(tmp_path)
     (tmp_path / "capture.toml.txt").write_text("[lights]\nring = { count = 8 }\n", encoding="utf-8")
     refused(tmp_path, "capture.toml.txt is not read", "must be called capture.toml")
+
+
+def test_the_same_image_for_two_lights(tmp_path: Path) -> None:
+    names = write_images(tmp_path)
+    write_directions(tmp_path)
+    (tmp_path / "filenames.txt").write_text("\n".join([*names[:7], names[2]]), encoding="utf-8")
+    refused(tmp_path, "filenames.txt", "img_03.png", "twice")
+
+
+def test_notes_are_printed_and_machines_get_json_alone(tmp_path: Path) -> None:
+    names = write_images(tmp_path)
+    write_lp(tmp_path, lp_lines([name.upper() for name in names]), count=False)
+    done = subprocess.run(
+        [sys.executable, "-m", "bgars", "info", str(tmp_path), "--json"],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    assert [line[:6] for line in done.stderr.splitlines()] == ["note: ", "note: "]
+    assert len(json.loads(done.stdout)["assumed"]) == 2

@@ -57,7 +57,10 @@ FolderArgument = Annotated[
     Path,
     typer.Argument(
         metavar="FOLDER",
-        help="Capture folder: images, and capture.toml, or light_directions.txt (DiLiGenT), or one .lp file (RTI).",
+        help=(
+            "Capture folder: images, and capture.toml, or light_directions.txt (DiLiGenT), one .lp file (RTI), "
+            "or another file about the lights (docs/captures.md)."
+        ),
         show_default=False,
     ),
 ]
@@ -246,7 +249,7 @@ def evaluate(
     channel: ChannelChoice = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Compare with truth (gt.npz of a rendered scene, Normal_gt.npy of a photograph).
+    """Compare with truth (gt.npz of a rendered scene; Normal_gt.npy, .mat or normal.txt of a photograph).
 
     Scenes are judged over ball pixels with true n_z > 0.3, photographs over their mask. A pixel without a solution
     counts as (0, 0, 1). Measured pixels are those whose own light fixes the normal; on balls, the errors of about 68 %

@@ -61,6 +61,10 @@ def choose_images(
     written, source = _named(folder, recipe, lights, listing)
     if written:
         names, told = find_named_images(folder, written, source, listing.folders)
+        twice = next((name for index, name in enumerate(names) if name in names[:index]), None)
+        if twice is not None:
+            msg = f"{source or folder}: names {twice!r} twice; each light has an image of its own"
+            raise InputError(msg)
         notes.extend(told)
         unused = [name for name in (*listing.images, *listing.special) if name not in names]
         by_lights = written == list(lights.rig.files)  # a list of images is a choice, a file of lights perhaps is not

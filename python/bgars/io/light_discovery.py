@@ -18,7 +18,7 @@ __all__ = ["choose_mask", "default_recipe"]
 
 DIRECTIONS, INTENSITIES = "light_directions.txt", "light_intensities.txt"
 SUFFIXES = frozenset(suffix for kind in LIGHT_FORMATS for suffix in kind.suffixes)
-ABOUT_LIGHTS = re.compile(r"(?<![a-z])(light|lights|led|leds|dir|dirs|direction|directions|l|s)(?![a-z])")
+ABOUT_LIGHTS = re.compile(r"(?<![a-z])(light|lights|led|leds|dir|dirs|direction|directions)(?![a-z])|^[ls]$")
 ABOUT_STRENGTH = re.compile(r"intensit|strength|brightness")
 ABOUT_PLACES = re.compile(r"position|(?<![a-z])pos(?![a-z])")
 RTI_FOLDERS = ("assembly-files", "finished-files")
@@ -84,7 +84,7 @@ def _other_file(folder: Path, listing: Listing, notes: list[str]) -> str:
     about = []
     for name in listing.others:
         path = Path(name)
-        words = re.sub(r"[\W_\d]+", " ", path.stem.lower())
+        words = re.sub(r"[\W_\d]+", " ", path.stem.lower()).strip()
         fits = path.suffix.lower() == ".dome" or (
             path.suffix.lower() in SUFFIXES and ABOUT_LIGHTS.search(words) and not ABOUT_STRENGTH.search(words)
         )
