@@ -88,10 +88,11 @@ def read_bounded(path: str | os.PathLike[str], max_bytes: int = MAX_TEXT_BYTES, 
     try:
         size = need_regular(path, what)
     except FileFormatError as error:
-        if isinstance(error.__cause__, FileNotFoundError):
-            msg = f"{shown(path)}: cannot be read (no such {what})"
-            raise FileFormatError(msg) from error.__cause__
-        raise
+        reason = str(error).removeprefix(f"{shown(path)}: ")
+        if reason.startswith("cannot be read"):
+            raise
+        msg = f"{shown(path)}: cannot be read ({reason})"
+        raise FileFormatError(msg) from error
     if size <= max_bytes:
         try:
             with Path(path).open("rb") as file:
