@@ -357,6 +357,8 @@ def test_images_one_folder_down(tmp_path: Path) -> None:
     (tmp_path / "notes").mkdir()
     capture = reads_right(tmp_path, "folder images")
     np.testing.assert_array_equal(capture.mask, MASK > 0)
+    write_images(tmp_path / "masks")
+    reads_right(tmp_path, "folder images")
     write_images(tmp_path / "again")
     refused(tmp_path, "2 folders with 8 each", "again, images")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -74,6 +75,9 @@ LP_DIALECTS = {
     ),
     "upper-case ending": (PLAIN, {"name": "COIN.LP"}, []),
     "an intensity column": ([f"{line} 1.0" for line in PLAIN], {}, ["fourth number", "intensity"]),
+    "the number of the light first": ([f"{index} {line}" for index, line in enumerate(PLAIN)], {}, ["number of the"]),
+    "brackets": ([re.sub(r"png (.*)$", r"png (\1)", line).replace(" 0.", ", 0.") for line in PLAIN], {}, []),
+    "in another folder": (PLAIN, {"name": "lp/dome.lp"}, ["lp/dome.lp"]),
     "a header": (["filename x y z", *PLAIN], {"count": False}, ["no count"]),
 }  # fmt: skip
 
@@ -214,6 +218,11 @@ TEXT_DIALECTS = {
         ["lights.json", "by stem"],
     ),
     "json list": ("lights.json", json.dumps(LIGHTS.tolist()), ["lights.json"]),
+    "json list with names": (
+        "lights.json",
+        json.dumps([{"image": name, "direction": v} for name, v in zip(NAMES, LIGHTS.tolist(), strict=True)][::-1]),
+        ["lights.json"],
+    ),
     "json of Meshroom": (
         "lights.json",
         json.dumps(

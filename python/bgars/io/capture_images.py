@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from bgars.errors import FileFormatError, InputError
 from bgars.io.image_formats import format_of
-from bgars.io.image_listing import Listing, choose_series, list_folder, natural_key, some_of
+from bgars.io.image_listing import Listing, choose_series, list_folder, natural_key, role_of, some_of
 from bgars.io.image_names import find_named_images
 from bgars.io.image_tags import read_tags
 from bgars.io.light_discovery import choose_mask
@@ -138,6 +138,8 @@ def _one_folder_down(
         chosen = _fitting(folder / name, inner.images, inner.special, count)
         if chosen is not None:
             fitting.append((name, inner, chosen))
+    if len(fitting) > 1:  # not those of masks, normals, results
+        fitting = [found for found in fitting if role_of(f"{found[0]}.") is None] or fitting
     if len(fitting) == 1:
         name, inner, chosen = fitting[0]
         notes.append(f"images taken from the folder {name}")

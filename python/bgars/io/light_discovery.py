@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bgars.errors import InputError
-from bgars.io.image_listing import some_of
+from bgars.io.image_listing import list_folder, some_of
 from bgars.io.recipe import RECIPE_NAME, CaptureRecipe
 from bgars.light_formats import LIGHT_FORMATS
 
@@ -69,11 +69,13 @@ def choose_mask(listing: Listing, notes: list[str]) -> str | None:
 
 
 def _rti_files(folder: Path, listing: Listing, notes: list[str]) -> list[str]:
-    """The ``.lp`` files of an RTIBuilder project, seen from its top."""
-    places = [folder / name for name in listing.folders if name.lower() in RTI_FOLDERS]
-    found = [
-        f"{place.name}/{path.name}" for place in places for path in place.iterdir() if path.suffix.lower() == ".lp"
-    ]
+    """The ``.lp`` files of an RTIBuilder project, seen from its top, or of any other folder here."""
+    usual = [name for name in listing.folders if name.lower() in RTI_FOLDERS]
+    found: list[str] = []
+    for places in (usual, listing.folders):
+        if not found:
+            inner = {name: list_folder(folder / name).others for name in places}
+            found = [f"{name}/{file}" for name in places for file in inner[name] if file.lower().endswith(".lp")]
     if len(found) == 1:
         notes.append(f"lights taken from {found[0]}")
     return sorted(found)

@@ -18,6 +18,7 @@ PLAIN_INTEGER = re.compile(r"[-+]?\d+", re.ASCII)
 NAME_WITH_SUFFIX = re.compile(r".*\.[A-Za-z][A-Za-z0-9]{1,4}")
 QUOTED = re.compile(r"(?P<quote>[\"'])(?P<name>.*?)(?P=quote)\s*[,;\t ]?(?P<rest>.*)")
 QUOTED_DECIMAL_COMMA = re.compile(r"\"[-+]?\d+,\d+\"", re.ASCII)
+BRACKETED = re.compile(r"(?P<name>.*?)[\s,;]*[\[({](?P<vector>[^\[\](){}]*)[\])}]")
 BRACKETS = str.maketrans("[](){}", "      ")
 LONGEST_NUMBER = 64
 AXES = 3
@@ -97,7 +98,8 @@ def parse_row(text: str, style: Style) -> Row | None:
     while first > 0 and numbers[first - 1] is not None:
         first -= 1
     if first == len(fields):
-        return None
+        bracketed, between = BRACKETED.fullmatch(text), style.separator or " "
+        return None if bracketed is None else parse_row(f"{bracketed['name']}{between}{bracketed['vector']}", style)
     if first == 0:
         return Row("", _all(numbers))
     if style.separator is not None:

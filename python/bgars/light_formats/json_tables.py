@@ -39,6 +39,8 @@ def read_json_table(path: Path) -> LightTable:
     values = _load(path)
     if isinstance(values, dict) and isinstance(values.get("lights"), list | dict):
         return _meshroom(values["lights"], path)
+    if isinstance(values, list) and values and all(isinstance(v, dict) and "direction" in v for v in values):
+        return _meshroom(values, path)
     if isinstance(values, dict):
         for key in ("directions", "light_directions"):
             if isinstance(values.get(key), list | dict):
@@ -89,10 +91,8 @@ def _dome_keys(values: dict[str, Any]) -> tuple[str, ...]:
 
 
 def _meshroom(lights: list[Any] | dict[str, Any], path: Path) -> LightTable:
-    files: tuple[str, ...] = ()
     entries = list(lights.values()) if isinstance(lights, dict) else lights
-    if isinstance(lights, dict):
-        files = tuple(str(name) for name in lights)
+    files = tuple(str(name) for name in lights) if isinstance(lights, dict) else _names(entries)
     if not all(isinstance(entry, dict) and "direction" in entry for entry in entries):
         if isinstance(lights, list) and all(isinstance(entry, list) for entry in entries):
             return LightTable(
@@ -114,6 +114,15 @@ def _meshroom(lights: list[Any] | dict[str, Any], path: Path) -> LightTable:
     return LightTable(
         checked_vectors(vectors, path, files), intensities=intensities, files=files, free_length=True, notes=notes
     )
+
+
+def _names(entries: list[Any]) -> tuple[str, ...]:
+    """Image of each light, where every one has it under one of the usual keys."""
+    for key in ("file", "filename", "image", "path", "name"):
+        names = [entry.get(key) for entry in entries if isinstance(entry, dict)]
+        if names and len(names) == len(entries) and all(isinstance(name, str) for name in names):
+            return tuple(str(name) for name in names)
+    return ()
 
 
 def _vector(value: Any, path: Path, keys: tuple[str, ...] = AXES) -> list[float]:  # noqa: ANN401 - whatever a file held

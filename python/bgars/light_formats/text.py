@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -24,6 +25,7 @@ ENCODINGS_TO_SAY = {"cp1252": "Windows-1252 (no valid UTF-8)", "utf-16": "UTF-16
     "utf-32-le": "UTF-32",
     "utf-32-be": "UTF-32",
 }
+NUMBERED = re.compile(r"(?P<index>\d{1,6})\s+(?P<name>\S.*\.[A-Za-z]\w{1,4})", re.ASCII)
 WITH_INTENSITY, WITH_RGB, ANGLES = 4, 6, 2
 
 
@@ -101,7 +103,8 @@ def read_text_table(path: Path, *, names_needed: bool = False) -> LightTable:
         Other lines, a zero vector, or a count that does not fit.
     """
     parsed = read_rows(path, named=names_needed)
-    rows, notes = parsed.rows, list(parsed.notes)
+    notes = list(parsed.notes)
+    rows = _without_index(parsed.rows, notes)
     columns = len(rows[0].numbers) if rows else 0
     named = bool(rows) and bool(rows[0].name)
     if not named and not names_needed and len(rows) == AXES and columns > AXES and _equal(rows):
@@ -131,6 +134,16 @@ def read_text_table(path: Path, *, names_needed: bool = False) -> LightTable:
     _refuse_twice(path, files)
     vectors = checked_vectors(np.ascontiguousarray(numbers[:, :AXES]), path, files)
     return LightTable(vectors, intensities=intensities, files=files, free_length=names_needed, notes=tuple(notes))
+
+
+def _without_index(rows: list[Row], notes: list[str]) -> list[Row]:
+    """Rows whose names do not begin with the number of the light, where all did."""
+    numbers = [NUMBERED.fullmatch(row.name) for row in rows]
+    found = [int(number["index"]) for number in numbers if number]
+    if len(rows) <= AXES or found not in (list(range(len(rows))), list(range(1, len(rows) + 1))):
+        return rows
+    notes.append("the first column taken as the number of the light")
+    return [Row(number["name"], row.numbers) for number, row in zip(numbers, rows, strict=True) if number]
 
 
 def _refuse_line(path: Path, line: Line, named: bool) -> None:

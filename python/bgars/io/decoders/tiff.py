@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +12,7 @@ from bgars.errors import FileFormatError
 from bgars.io.decoders.limits import check_size
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -28,6 +31,17 @@ def read_tiff(path: Path, kind: ImageFormat, max_megapixels: float) -> PixelArra
     return pixels
 
 
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep tifffile from logging what it finds damaged: one message names the file."""
+    logger = logging.getLogger("tifffile")
+    before, logger.disabled = logger.disabled, True
+    try:
+        yield
+    finally:
+        logger.disabled = before
+
+
 def read_tiff_pages(path: Path, count: int, max_megapixels: float) -> NDArray[Any]:
     """Return (count, H, W) or (count, H, W, channels) pixels of the full pages of a file.
 
@@ -38,7 +52,7 @@ def read_tiff_pages(path: Path, count: int, max_megapixels: float) -> NDArray[An
     """
     import tifffile  # noqa: PLC0415 - most captures never need it
 
-    with tifffile.TiffFile(path) as file:
+    with _quiet(), tifffile.TiffFile(path) as file:
         pages: list[Any] = [page for page in file.pages if not getattr(page, "is_reduced", False)]
         if len(pages) != count:
             msg = f"{path}: holds {len(pages)} images, but {count} are expected"
