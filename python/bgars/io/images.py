@@ -102,6 +102,8 @@ def decode_stack(
         )
     except UnsupportedImageError:
         return _decode_arrays(paths, channel, response, gains, max_megapixels)
+    except FileFormatError as error:  # some decoders end their reasons in a line feed
+        raise FileFormatError("".join(str(error).splitlines())) from error
     return DecodedStack(images, linear, None if bits > MAX_INTEGER_BITS else 2.0**bits - 1.0)
 
 
