@@ -8,6 +8,7 @@ from .calibrate import calibrate_material as calibrate_material
 from .cfx import to_cfx as to_cfx
 from .errors import BgarsError as BgarsError
 from .errors import CalibrationError as CalibrationError
+from .errors import CaptureWarning as CaptureWarning
 from .errors import ConvergenceError as ConvergenceError
 from .errors import FileFormatError as FileFormatError
 from .errors import InputError as InputError

@@ -5,6 +5,7 @@ from __future__ import annotations
 __all__ = [
     "BgarsError",
     "CalibrationError",
+    "CaptureWarning",
     "ConvergenceError",
     "FileFormatError",
     "InputError",
@@ -52,3 +53,7 @@ class FileFormatError(BgarsError, OSError):
 
 class UnsupportedImageError(FileFormatError):
     """A valid image of a kind that the built-in decoders do not read."""
+
+
+class CaptureWarning(UserWarning):
+    """What had to be assumed to read a capture; the command line prints it as a note."""

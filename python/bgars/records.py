@@ -86,6 +86,8 @@ class Capture(ShownCapture):
         Grey level of full scale; thresholds "of 255" scale with it and albedo 1 means it. NaN: the kernels find it.
     files, folder : tuple of Path, Path or None
         The image files, for messages and reports; where the capture was read from.
+    assumed : tuple of str
+        What had to be assumed to read it: each was also a :class:`~bgars.CaptureWarning`.
     """
 
     images: PixelArray
@@ -101,6 +103,7 @@ class Capture(ShownCapture):
     folder: Path | None = None
     pixel_pitch_u_um: float | None = None
     camera_distance_mm: float | None = None
+    assumed: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from bgars import _bgars
 from bgars.errors import InputError
 from bgars.light_files import read_lp
+from bgars.light_formats import MAX_LIGHTS
 from bgars.light_names import light_name
 
 if TYPE_CHECKING:
@@ -106,8 +107,8 @@ class LightRig:
         >>> LightRig.ring(8, elevation_deg=45.0).directions[2].round(3).tolist()
         [0.0, 0.707, 0.707]
         """
-        if count < MIN_LIGHTS:
-            msg = f"count: a ring needs at least {MIN_LIGHTS} lights, got {count}"
+        if not MIN_LIGHTS <= count <= MAX_LIGHTS:
+            msg = f"count: a ring needs at least {MIN_LIGHTS} lights and has at most {MAX_LIGHTS}, got {count}"
             raise InputError(msg)
         azimuths_deg = azimuth0_deg + 360.0 / count * np.arange(count)
         angles_deg = np.column_stack([azimuths_deg, np.full(count, elevation_deg)])
@@ -217,6 +218,8 @@ class LightRig:
         cls, path: str | PathLike[str], *, intensities: ArrayLike | None = None, u_deg: ArrayLike | None = None
     ) -> LightRig:
         """Read an RTI light position file: a count, then ``file x y z`` a line (vectors are normalised).
+
+        Warns with :class:`~bgars.CaptureWarning` of what had to be assumed.
 
         Raises
         ------

@@ -168,6 +168,7 @@ def test_led_positions_in_mm_make_a_near_rig(capture_folder: Path) -> None:
 @pytest.mark.parametrize("suffix", [".png", ".tif", ".bmp", ".jpg", ".pgm"])
 def test_every_grey_format(capture_folder: Path, suffix: str) -> None:
     images = bgars.read_capture(capture_folder).images
+    recipe(capture_folder, 'response = "linear"\n' + RING)
     for index, image in enumerate(images):
         (capture_folder / f"img{index}.png").unlink()
         iio.imwrite(capture_folder / f"img{index}{suffix}", image)

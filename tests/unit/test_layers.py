@@ -28,7 +28,8 @@ RECORDS = {
 }
 BASE = {
     **{"errors": 0, "version": 0, "extras": 0, "shown": 0.5, "normal_methods": 0, "large_arrays": 0},
-    **{"light_files": 1, "light_names": 1, "rig": 2, "scalar_checks": 1},
+    **{"bit_depth": 0, "safe_files": 0.5, "mat_files": 0},
+    **{"light_names": 1, "light_formats": 1.2, "light_files": 1.5, "rig": 2, "scalar_checks": 1},
     **RECORDS,
 }
 STAGES = dict.fromkeys(

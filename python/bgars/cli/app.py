@@ -12,7 +12,16 @@ from typing import Annotated, Any, Literal
 import typer
 
 import bgars
-from bgars.cli.console import EXIT_BAD_INPUT, activation, fail, print_json, say, shown_path, stage_progress
+from bgars.cli.console import (
+    EXIT_BAD_INPUT,
+    activation,
+    fail,
+    notes_to_stderr,
+    print_json,
+    say,
+    shown_path,
+    stage_progress,
+)
 from bgars.cli.evaluation import choice_in_words, evaluation_table
 from bgars.cli.lazy import LazyGroup
 from bgars.cli.options import MethodOption
@@ -39,7 +48,10 @@ FolderArgument = Annotated[
     Path,
     typer.Argument(
         metavar="FOLDER",
-        help="Capture folder: images, and capture.toml, or light_directions.txt (DiLiGenT), or one .lp file (RTI).",
+        help=(
+            "Capture folder: images, and capture.toml, or light_directions.txt (DiLiGenT), one .lp file (RTI), "
+            "or another file about the lights (docs/captures.md)."
+        ),
         show_default=False,
     ),
 ]
@@ -233,7 +245,7 @@ def evaluate(
     channel: ChannelChoice = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Compare estimated normals with known ones (gt.npz of a rendered scene, Normal_gt.npy of a photograph).
+    """Compare estimated normals with known ones (gt.npz of a scene; Normal_gt.npy, .mat or normal.txt of a photograph).
 
     Scenes are judged over ball pixels with true n_z > 0.3, photographs over their mask. A pixel without a solution
     counts as (0, 0, 1). Measured pixels are those whose own light fixes the normal; on balls, the errors of about 68 %
@@ -262,6 +274,7 @@ def evaluate(
 
 def main() -> None:
     """Run the command; an error becomes one line and exit code 2 (wrong use: 2 too, Ctrl-C: 130)."""
+    notes_to_stderr()
     try:
         app()
     except BgarsError as error:

@@ -9,7 +9,7 @@ import typer
 
 import bgars
 from bgars.cli.console import print_json, say, stage_progress
-from bgars.io.images import read_mask
+from bgars.io.masks import read_mask
 from bgars.io.material_file import material_path
 from bgars.material_records import loss_in_words
 from bgars.pipeline import summarise_fit

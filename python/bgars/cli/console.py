@@ -7,10 +7,13 @@ import os
 import shutil
 import sys
 import time
+import warnings
 from contextlib import contextmanager
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
+
+from bgars.errors import CaptureWarning
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -22,6 +25,7 @@ __all__ = [
     "activation",
     "error_console",
     "fail",
+    "notes_to_stderr",
     "print_json",
     "say",
     "say_files",
@@ -43,7 +47,12 @@ def error_console() -> Console:
 
 def say(text: str = "") -> None:
     """Print a line of a command's result."""
-    sys.stdout.write(f"{text}\n")
+    sys.stdout.write(f"{_encodable(text)}\n")
+
+
+def _encodable(text: str) -> str:
+    """Text that any terminal can take: names of files may hold bytes that are no text."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def say_files(output: Path, files: Mapping[str, str]) -> None:
@@ -85,12 +94,33 @@ def fail(message: str) -> None:
     """Print an error for people."""
     console = error_console()
     console.print("error:", style="bold red", end=" ")
-    console.print(message, markup=False, emoji=False)
+    console.print(_encodable(message), markup=False, emoji=False)
 
 
 def warn(message: str) -> None:
     """Print, beside the result, what people should know of it."""
-    sys.stderr.write(f"warning: {message}\n")
+    sys.stderr.write(f"warning: {_encodable(message)}\n")
+
+
+def notes_to_stderr() -> None:
+    """Print what had to be assumed to read a capture as notes, each once; other warnings stay as they are."""
+    other = warnings.showwarning
+
+    def show(  # as warnings.showwarning
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
+        if issubclass(category, CaptureWarning):
+            sys.stderr.write(f"note: {_encodable(str(message))}\n")
+        else:
+            other(message, category, filename, lineno, file, line)
+
+    warnings.showwarning = show
+    warnings.simplefilter("once", CaptureWarning)
 
 
 @contextmanager

@@ -41,6 +41,7 @@ def describe(capture: Capture) -> dict[str, Any]:
         "response": "linear" if capture.response is None else "table",
         "black_level": capture.black_level,
         "saturation": capture.saturation if np.isfinite(capture.saturation) else None,
+        "assumed": list(capture.assumed),
         "rig": "near point lights" if rig.is_near else "distant lights",
         "lights": lights,
     }

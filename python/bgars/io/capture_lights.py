@@ -1,17 +1,17 @@
-"""Which lights a capture folder describes, which images it names, and how the two pair up."""
+"""Which lights a capture folder describes, and how strong they are."""
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bgars.errors import InputError
-from bgars.io.recipe import RECIPE_NAME, CaptureRecipe
-from bgars.light_files import read_filenames, read_intensities, read_numbers
+from bgars.errors import FileFormatError, InputError
+from bgars.io.recipe import RECIPE_NAME
+from bgars.light_files import read_intensities, read_numbers
+from bgars.light_formats import LightTable, read_light_file
 from bgars.light_names import light_name
 from bgars.rig import LightRig
 
@@ -20,19 +20,40 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["Lights", "default_recipe", "image_names", "match", "read_lights"]
+    from bgars.io.recipe import CaptureRecipe, LightsRecipe
 
-IMAGE_SUFFIXES = {".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".pgm", ".ppm", ".pnm"}
-NOT_A_LIGHT = re.compile(r"(mask|dark)", re.IGNORECASE)
+__all__ = ["Lights", "read_lights"]
+
+UNIT_WITHIN = 0.01
+"""Vectors whose lengths differ from 1, or from each other, by less are directions."""
+STRONGEST = 10.0
+"""Longest vector that can be a direction times an intensity; longer ones are positions, in whatever unit."""
+SOURCES = ("directions", "angles_deg", "positions_mm", "lp", "ring")
 
 
 @dataclass(frozen=True)
 class Lights:
-    """Lights as the files give them: intensities may have three columns still."""
+    """Lights as the files give them: intensities may have three columns still.
+
+    Attributes
+    ----------
+    rig : LightRig
+        The lights; `files` are the images that the file of the lights names, as it names them.
+    intensities : (L, 1) or (L, 3) float64
+        Of each light.
+    source : str
+        The file, or the key of the recipe.
+    path : Path or None
+        The file.
+    pixel_pitch_um : float or None
+        Where the file of the lights tells the scale.
+    """
 
     rig: LightRig
     intensities: NDArray[np.float64]
     source: str
+    path: Path | None = None
+    pixel_pitch_um: float | None = None
 
     def take(self, indices: Sequence[int]) -> Lights:
         """Return the lights at `indices`, in that order."""
@@ -40,34 +61,8 @@ class Lights:
         return replace(self, rig=self.rig.take(rows), intensities=self.intensities[rows])
 
 
-def default_recipe(folder: Path) -> CaptureRecipe:
-    """The recipe that a folder without ``capture.toml`` amounts to."""
-    lights: dict[str, str] = {}
-    lp_files = sorted(folder.glob("*.lp"))
-    if (folder / "light_directions.txt").exists():
-        lights["directions"] = "light_directions.txt"
-    elif len(lp_files) == 1:
-        lights["lp"] = lp_files[0].name
-    elif lp_files:
-        msg = (
-            f"{folder}: holds {len(lp_files)} .lp files ({', '.join(p.name for p in lp_files)}); name one in "
-            f"{RECIPE_NAME}"
-        )
-        raise InputError(msg)
-    else:
-        msg = (
-            f"{folder}: no description of the lights: expected {RECIPE_NAME} with [lights], light_directions.txt, "
-            "or one .lp file"
-        )
-        raise InputError(msg)
-    if (folder / "light_intensities.txt").exists():
-        lights["intensities"] = "light_intensities.txt"
-    mask = "mask.png" if (folder / "mask.png").exists() else None
-    return CaptureRecipe.model_validate({"lights": lights, "mask": mask})
-
-
-def read_lights(folder: Path, recipe: CaptureRecipe) -> Lights:
-    """Return the lights that a recipe describes, from whichever source it names."""
+def read_lights(folder: Path, recipe: CaptureRecipe, notes: list[str]) -> Lights:
+    """Return the lights that a recipe describes, from whichever source it names; `notes` gets what is assumed."""
     lights = recipe.lights
     if lights is None:
         msg = (
@@ -75,35 +70,12 @@ def read_lights(folder: Path, recipe: CaptureRecipe) -> Lights:
             f"positions_mm, lp or ring"
         )
         raise InputError(msg)
-
-    def numbers(value: str | Sequence[object], columns: int, meaning: str) -> NDArray[np.float64]:
-        if isinstance(value, str):
-            return read_numbers(folder / value, (columns,), meaning)
-        return np.array(value, dtype=np.float64)
-
-    def where(value: object, key: str) -> str:
-        return str(folder / value) if isinstance(value, str) else f"{folder / RECIPE_NAME} (lights.{key})"
-
+    key = next(name for name in SOURCES if getattr(lights, name) is not None)
+    given = getattr(lights, key)
+    path = folder / given if isinstance(given, str) else None
+    source = f"{folder / RECIPE_NAME} (lights.{key})" if path is None else str(path)
     try:
-        if lights.directions is not None:
-            source = where(lights.directions, "directions")
-            rig = LightRig.from_directions(numbers(lights.directions, 3, "x y z of a light"))
-        elif lights.angles_deg is not None:
-            source = where(lights.angles_deg, "angles_deg")
-            rig = LightRig.from_angles(numbers(lights.angles_deg, 2, "azimuth and elevation in degrees"))
-        elif lights.positions_mm is not None:
-            source = where(lights.positions_mm, "positions_mm")
-            distance_mm = lights.intensity_distance_mm
-            rig = LightRig.from_positions(
-                numbers(lights.positions_mm, 3, "x y z of an LED in mm") * 1000.0,
-                intensity_distance_um=None if distance_mm is None else distance_mm * 1000.0,
-            )
-        elif lights.lp is not None:
-            source = str(folder / lights.lp)
-            rig = LightRig.from_lp(folder / lights.lp)
-        else:
-            source = where(None, "ring")
-            rig = LightRig.ring(**lights.ring.model_dump()) if lights.ring is not None else LightRig.ring()
+        rig, strength, pitch_um = _rig(lights, path, recipe, notes)
     except InputError as error:
         msg = f"{source}: {error}"
         raise InputError(msg) from error
@@ -112,8 +84,94 @@ def read_lights(folder: Path, recipe: CaptureRecipe) -> Lights:
         msg = f"{where_u}: {len(lights.u_deg)} uncertainties, but {source} gives {len(rig)} lights"
         raise InputError(msg)
     rig = rig.with_u_deg(lights.u_deg)
-    intensities = _intensity_rows(folder, lights.intensities, len(rig), source)
-    return Lights(rig, intensities, source)
+    if strength is not None and lights.intensities is None:
+        _check_intensities(strength, source)
+    elif strength is not None:
+        notes.append(f"intensities in {Path(source).name} are not used: others are given")
+        strength = None
+    intensities = strength if strength is not None else _intensity_rows(folder, lights.intensities, len(rig), source)
+    return Lights(rig, intensities, source, path, pitch_um)
+
+
+def _rig(
+    lights: LightsRecipe, path: Path | None, recipe: CaptureRecipe, notes: list[str]
+) -> tuple[LightRig, NDArray[np.float64] | None, float | None]:
+    """Return the rig of a [lights] table, the intensities and the pixel pitch that its file gives."""
+    if lights.ring is not None:
+        return LightRig.ring(**lights.ring.model_dump()), None, None
+    if lights.angles_deg is not None:
+        angles = read_numbers(path, (2,), "azimuth and elevation in degrees") if path is not None else lights.angles_deg
+        return LightRig.from_angles(angles), None, None
+    if path is None:
+        table = LightTable(np.array(lights.directions or lights.positions_mm, dtype=np.float64).reshape(-1, 3))
+    else:
+        table = read_light_file(path)
+        notes.extend(f"{path.name}: {note}" for note in table.notes)
+        if table.kind == "camera_mm":
+            return _near_rig(table, path, recipe, notes)
+    if lights.positions_mm is not None:
+        distance_um = None if lights.intensity_distance_mm is None else lights.intensity_distance_mm * 1000.0
+        rig = LightRig.from_positions(table.vectors * 1000.0, intensity_distance_um=distance_um)
+        return replace(rig, files=table.files), table.intensities, None
+    vectors, strength = (table.vectors, None) if path is None else _unit(table, path, notes)
+    return LightRig.from_directions(vectors, files=table.files), strength, None
+
+
+def _unit(table: LightTable, path: Path, notes: list[str]) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    """Return unit vectors and intensities of a table: lengths that differ are intensities, or free."""
+    lengths = np.linalg.norm(table.vectors, axis=1)
+    units = table.vectors / lengths[:, None]
+    alike = len(lengths) == 0 or lengths.max() / lengths.min() < 1.0 + 2 * UNIT_WITHIN
+    if table.free_length or (alike and (np.abs(lengths - 1.0) < UNIT_WITHIN).all()):
+        return units, table.intensities
+    if alike:
+        notes.append(f"{path.name}: vectors of length {np.median(lengths):.4g} taken as directions")
+        return units, table.intensities
+    if lengths.max() > STRONGEST:
+        msg = (
+            f"{path}: its vectors are {lengths.min():.4g} to {lengths.max():.4g} long, so that they are no directions; "
+            f'where they are positions of LEDs, write in {RECIPE_NAME}, under [lights]: positions_mm = "{path.name}"'
+        )
+        raise FileFormatError(msg)
+    if table.intensities is not None:
+        notes.append(f"{path.name}: lengths of the vectors ignored, since intensities are given")
+        return units, table.intensities
+    notes.append(
+        f"{path.name}: vectors of lengths {lengths.min():.3g} to {lengths.max():.3g} taken as direction times intensity"
+    )
+    return units, lengths[:, None]
+
+
+def _near_rig(
+    table: LightTable, path: Path, recipe: CaptureRecipe, notes: list[str]
+) -> tuple[LightRig, NDArray[np.float64] | None, float | None]:
+    """Bring LEDs from the camera's frame to the part's: origin under the image centre, y up, z to the camera."""
+    stated = None if recipe.camera is None else recipe.camera.distance_mm
+    distance_mm = stated if stated is not None and np.isfinite(stated) else table.plane_mm
+    if distance_mm is None:
+        msg = (
+            f"{path}: holds LED positions in the camera's frame, which need the distance of the part; write in "
+            f"{RECIPE_NAME}: camera = {{ distance_mm = ... }}, pixel_pitch_um = ..., and under [lights] "
+            f'directions = "{path.name}"'
+        )
+        raise FileFormatError(msg)
+    center_mm = np.zeros(2)
+    pitch_um = None
+    if table.focal_px is not None:
+        pitch_um = 1000.0 * distance_mm / table.focal_px
+        if table.principal_px is not None and table.size_px is not None:
+            center_mm = (np.array(table.size_px) / 2 - np.array(table.principal_px)) * distance_mm / table.focal_px
+    positions_mm = np.column_stack(
+        [
+            table.vectors[:, 0] - center_mm[0],
+            center_mm[1] - table.vectors[:, 1],
+            distance_mm - table.vectors[:, 2],
+        ]
+    )
+    scale = "" if pitch_um is None else f", where a pixel is {pitch_um:.4g} um"
+    notes.append(f"{path.name}: LEDs brought to the plane {distance_mm:g} mm from the camera{scale}")
+    rig = LightRig.from_positions(positions_mm * 1000.0, intensity_distance_um=distance_mm * 1000.0)
+    return replace(rig, files=table.files), table.intensities, pitch_um
 
 
 def _intensity_rows(folder: Path, value: str | Sequence[object] | None, count: int, source: str) -> NDArray[np.float64]:
@@ -129,6 +187,11 @@ def _intensity_rows(folder: Path, value: str | Sequence[object] | None, count: i
     if len(intensities) != count:
         msg = f"{where}: {len(intensities)} intensities, but {source} gives {count} lights"
         raise InputError(msg)
+    _check_intensities(intensities, where)
+    return intensities
+
+
+def _check_intensities(intensities: NDArray[np.float64], where: str) -> None:
     wrong = np.argwhere(~(np.isfinite(intensities) & (intensities > 0)))
     if wrong.size:
         light, column = wrong[0]
@@ -136,51 +199,3 @@ def _intensity_rows(folder: Path, value: str | Sequence[object] | None, count: i
             f"{where}: intensity of {light_name(light)} must be finite and above 0, got {intensities[light, column]:g}"
         )
         raise InputError(msg)
-    return intensities
-
-
-def image_names(folder: Path, recipe: CaptureRecipe, lights: Lights) -> list[str]:
-    """Return the image files, in the order of the recipe, filenames.txt, the .lp file, or their natural order."""
-    if recipe.images is not None:
-        return recipe.images
-    if (folder / "filenames.txt").exists():
-        return read_filenames(folder / "filenames.txt")
-    if lights.rig.files:
-        return list(lights.rig.files)
-    special = {recipe.dark, recipe.mask}
-    found = [
-        path.name
-        for path in folder.iterdir()
-        if path.suffix.lower() in IMAGE_SUFFIXES and path.name not in special and not NOT_A_LIGHT.match(path.name)
-    ]
-    return sorted(found, key=_natural_key)
-
-
-def _natural_key(name: str) -> list[tuple[int, int | str]]:
-    """Sort key that puts ``img2`` before ``img10``."""
-    return [(0, int(part)) if part.isdigit() else (1, part.lower()) for part in re.split(r"(\d+)", name) if part]
-
-
-def match(folder: Path, lights: Lights, names: list[str], wanted: Sequence[str] | None) -> tuple[Lights, list[str]]:
-    """Pair lights and images: by name where the ``.lp`` file names them all, else by order."""
-    if lights.rig.files and names != list(lights.rig.files):
-        place = {Path(name).name: index for index, name in enumerate(lights.rig.files)}
-        if all(Path(name).name in place for name in names):
-            lights = lights.take([place[Path(name).name] for name in names])
-    if len(names) != len(lights.rig):
-        shown = ", ".join(names[:4]) + (", ..." if len(names) > 4 else "")  # noqa: PLR2004 - enough to recognise them
-        msg = (
-            f"{folder}: {len(names)} images ({shown or 'none found'}), but {lights.source} gives "
-            f"{len(lights.rig)} lights"
-        )
-        raise InputError(msg)
-    if wanted is None:
-        return lights, names
-    unknown = [name for name in wanted if name not in names]
-    if unknown:
-        msg = f"images: {unknown[0]!r} is not an image of {folder}"
-        raise InputError(msg)
-    if len(wanted) < 3:  # noqa: PLR2004 - three unknowns a pixel
-        msg = f"images: at least 3 images are needed, got {len(wanted)}"
-        raise InputError(msg)
-    return lights.take([names.index(name) for name in wanted]), list(wanted)

@@ -1,25 +1,26 @@
-"""Image files to arrays: decoded in parallel by the Rust core; imageio reads the formats it lacks."""
+"""Image files to arrays: decoded in parallel by the Rust core; other decoders read the formats it lacks."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-import imageio.v3 as iio
 import numpy as np
 
 from bgars import _bgars
 from bgars.errors import FileFormatError, InputError, UnsupportedImageError
+from bgars.io.image_formats import format_of, read_pixels
+from bgars.io.image_stacks import read_stack
 from bgars.large_arrays import any_content
 from bgars.records import integer_full_scale
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     from bgars.io.recipe import ChannelName
-    from bgars.records import BoolArray, FloatArray, PixelArray
+    from bgars.records import FloatArray, PixelArray
 
-__all__ = ["MAX_MEGAPIXELS", "DecodedStack", "decode_stack", "read_mask"]
+__all__ = ["MAX_MEGAPIXELS", "DecodedStack", "decode_pages", "decode_stack"]
 
 MAX_MEGAPIXELS = 256.0
 """Largest image a header may claim, in megapixels, unless the caller allows more."""
@@ -32,6 +33,8 @@ WEIGHTS: dict[str, tuple[float, float, float]] = {
     "blue": (0.0, 0.0, 1.0),
 }
 COLOR_CHANNELS = (3, 4)
+GREY_CHANNELS = (1, 2)
+FLOAT32_BYTES = 4
 MAX_INTEGER_BITS = 16
 
 
@@ -67,7 +70,7 @@ def decode_stack(
     Parameters
     ----------
     paths : sequence of Path
-        PNG, TIFF (8 and 16 bit, float), JPEG, BMP, PNM, or whatever imageio reads.
+        Images of any of :data:`~bgars.io.image_formats.IMAGE_FORMATS`, one a file.
     channel : str
         How red, green and blue become one value: luminance (Rec. 709 on the stored values, no hidden gamma), mean, red,
         green, blue.
@@ -85,6 +88,8 @@ def decode_stack(
     FileFormatError
         Missing, truncated, oversized or mismatched files, each named.
     """
+    if not all(format_of(path).core for path in paths):
+        return _decode_arrays(paths, channel, response, gains, max_megapixels)
     try:
         images, linear, bits = _bgars.decode_stack(
             list(paths),
@@ -96,47 +101,59 @@ def decode_stack(
             allocate=any_content,
         )
     except UnsupportedImageError:
-        return _decode_with_imageio(paths, channel, response, gains, max_megapixels)
+        return _decode_arrays(paths, channel, response, gains, max_megapixels)
+    except FileFormatError as error:  # some decoders end their reasons in a line feed
+        raise FileFormatError("".join(str(error).splitlines())) from error
     return DecodedStack(images, linear, None if bits > MAX_INTEGER_BITS else 2.0**bits - 1.0)
 
 
-def read_mask(path: Path, shape: tuple[int, int]) -> BoolArray:
-    """Read a mask image, white = use.
+def decode_pages(
+    path: Path,
+    count: int,
+    *,
+    channel: ChannelName = "luminance",
+    response: FloatArray | None = None,
+    gains: FloatArray | None = None,
+    max_megapixels: float = MAX_MEGAPIXELS,
+) -> DecodedStack:
+    """Decode a file that holds the images of all lights: a multi-page TIFF, or an array (L, H, W[, channels]).
 
     Raises
     ------
     FileFormatError
-        The file is not an image.
-    InputError
-        It has another size than the images, or selects no pixel.
+        The file does not hold `count` images.
     """
-    mask = decode_stack([path], channel="mean").images[0]
-    if mask.shape != shape:
-        msg = (
-            f"{path}: the mask is {mask.shape[1]} x {mask.shape[0]} pixels, but the images are {shape[1]} x {shape[0]}"
-        )
-        raise InputError(msg)
-    white = integer_full_scale(mask) or max(float(mask.max()), 1.0)
-    use: BoolArray = mask > white / 2
-    if not use.any():
-        msg = f"{path}: the mask is empty: no pixel is brighter than half of white ({white:g})"
-        raise InputError(msg)
-    return use
+    kind = format_of(path)
+    if not kind.stack:
+        msg = f"{path}: is one {kind.name} image, but {count} lights need an image each"
+        raise FileFormatError(msg)
+    return _stack_of([path] * count, iter(read_stack(path, kind, count, max_megapixels)), channel, response, gains)
 
 
-def _decode_with_imageio(
+def _decode_arrays(
     paths: Sequence[Path],
     channel: ChannelName,
     response: FloatArray | None,
     gains: FloatArray | None,
     max_megapixels: float,
 ) -> DecodedStack:
+    return _stack_of(paths, (read_pixels(path, max_megapixels) for path in paths), channel, response, gains)
+
+
+def _stack_of(
+    paths: Sequence[Path],
+    images: Iterator[PixelArray],
+    channel: ChannelName,
+    response: FloatArray | None,
+    gains: FloatArray | None,
+) -> DecodedStack:
+    """One value a pixel of images that must be alike."""
     stack: PixelArray | None = None
-    first_shape: tuple[int, ...] = ()
+    first_shape: tuple[int | str, ...] = ()
     linear = False
     full_scale = None
-    for index, path in enumerate(paths):
-        image = _read_one(path, max_megapixels)
+    for index, (path, pixels) in enumerate(zip(paths, images, strict=True)):
+        image = _supported(pixels, path)
         described = (*image.shape[:2], image.dtype.name, image.ndim)
         if stack is None:
             first_shape = described
@@ -160,44 +177,21 @@ def _decode_with_imageio(
     return DecodedStack(stack, linear, full_scale)
 
 
-def _read_one(path: Path, max_megapixels: float) -> PixelArray:
-    try:
-        # From memory: some plug-ins leave a file open when they fail.
-        content, suffix = path.read_bytes(), path.suffix
-        if not content:
-            msg = f"{path}: is empty (0 bytes), not an image"
-            raise FileFormatError(msg)
-        _check_shape(path, iio.improps(content, extension=suffix).shape, max_megapixels)
-        image = np.asarray(iio.imread(content, extension=suffix))
-    except FileFormatError:
-        raise
-    # The plug-ins of imageio raise whatever their libraries raise; here all of it means one thing.
-    except Exception as error:
-        reason = " ".join(str(error).split())[:200]
-        msg = f"{path}: cannot be decoded as an image ({type(error).__name__}: {reason})"
-        raise FileFormatError(msg) from error
-    _check_shape(path, image.shape, max_megapixels)
-    if image.dtype == np.float64:
+def _supported(pixels: PixelArray, path: Path) -> PixelArray:
+    """Return pixels (H, W) or (H, W, 3 or 4) of a type that the kernels know; grey with alpha loses the alpha."""
+    image = pixels
+    if image.ndim == 3 and image.shape[2] in GREY_CHANNELS:  # noqa: PLR2004 - rows, columns, channels
+        image = image[..., 0]
+    if not (image.ndim == 2 or (image.ndim == 3 and image.shape[2] in COLOR_CHANNELS)):  # noqa: PLR2004 - as above
+        msg = f"{path}: must hold one grey or RGB image, but its shape is {image.shape}"
+        raise FileFormatError(msg)
+    if image.dtype.kind == "f" and image.dtype.itemsize != FLOAT32_BYTES:
         image = image.astype(np.float32)
-    if image.dtype not in (np.uint8, np.uint16, np.float32):
+    if image.dtype.kind not in "uf" or image.dtype.newbyteorder("=") not in (np.uint8, np.uint16, np.float32):
         msg = f"{path}: pixels of type {image.dtype} are not supported; use uint8, uint16 or float32"
         raise FileFormatError(msg)
-    return image
-
-
-def _check_shape(path: Path, shape: tuple[int, ...], max_megapixels: float) -> None:
-    grey = len(shape) == 2  # noqa: PLR2004 - rows, columns
-    color = len(shape) == 3 and shape[2] in COLOR_CHANNELS  # noqa: PLR2004 - rows, columns, channels
-    if not (grey or color):
-        msg = f"{path}: must hold one grey or RGB image, but its shape is {shape}"
-        raise FileFormatError(msg)
-    megapixels = shape[0] * shape[1] / 1e6
-    if megapixels > max_megapixels:
-        msg = (
-            f"{path}: the header claims {shape[1]} x {shape[0]} pixels = {megapixels:.0f} megapixels, "
-            f"more than the limit of {max_megapixels:g} (max_megapixels)"
-        )
-        raise FileFormatError(msg)
+    native: PixelArray = np.ascontiguousarray(image, dtype=image.dtype.newbyteorder("="))  # type: ignore[assignment]
+    return native
 
 
 def _combine(

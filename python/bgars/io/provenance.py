@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bgars.errors import FileFormatError
-from bgars.io.capture_lights import default_recipe
+from bgars.io.image_listing import list_folder
+from bgars.io.light_discovery import default_recipe
 from bgars.io.recipe import RECIPE_NAME, TableResponse, read_recipe
 
 if TYPE_CHECKING:
@@ -34,14 +35,14 @@ def capture_files(capture: Capture) -> tuple[Path, ...]:
     if capture.folder is None:
         return capture.files
     path = capture.folder / RECIPE_NAME
-    recipe = read_recipe(path) if path.is_file() else default_recipe(capture.folder)
+    recipe = read_recipe(path) if path.is_file() else default_recipe(capture.folder, list_folder(capture.folder), [])
     named = [RECIPE_NAME, FILENAMES if recipe.images is None else None, recipe.dark, recipe.mask]
     if isinstance(recipe.response, TableResponse):
         named.append(recipe.response.table)
     if recipe.lights is not None:
         named += [value for value in vars(recipe.lights).values() if isinstance(value, str)]
     others = [capture.folder / name for name in named if name is not None]
-    return (*capture.files, *(file for file in others if file.is_file()))
+    return (*dict.fromkeys(capture.files), *(file for file in others if file.is_file()))
 
 
 def checksums(files: Iterable[Path]) -> tuple[tuple[str, str], ...]:

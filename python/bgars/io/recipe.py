@@ -6,9 +6,10 @@ import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from bgars.io.strict_toml import Strict, checked, read_values
+from bgars.light_formats import MAX_LIGHTS
 
 __all__ = [
     "RECIPE_NAME",
@@ -27,6 +28,8 @@ ChannelName = Literal["luminance", "mean", "red", "green", "blue"]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Uncertainty = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
 Vector = tuple[float, float, float]
+FileName = Annotated[str, AfterValidator(lambda name: name.replace("\\", "/"))]
+"""Relative to the folder of the recipe; Windows writes its paths with backslashes."""
 PITCH_OVER_U = 10.0
 """Least ratio of the pixel pitch to its standard uncertainty: below it the pitch is a guess, or the unit is wrong."""
 
@@ -40,13 +43,13 @@ class GammaResponse(Strict):
 class TableResponse(Strict):
     """Measured response: a CSV of grey level and radiance."""
 
-    table: str
+    table: FileName
 
 
 class RingRecipe(Strict):
     """Evenly spaced distant lights, counter-clockwise from +x."""
 
-    count: Annotated[int, Field(ge=3)]
+    count: Annotated[int, Field(ge=3, le=MAX_LIGHTS)]
     elevation_deg: Annotated[float, Field(gt=0, lt=90)] = 45.0
     azimuth0_deg: float = 0.0
 
@@ -60,12 +63,12 @@ class CameraRecipe(Strict):
 class LightsRecipe(Strict):
     """The ``[lights]`` table: exactly one of the first five keys."""
 
-    directions: str | list[Vector] | None = None
-    angles_deg: str | list[tuple[float, float]] | None = None
-    positions_mm: str | list[Vector] | None = None
-    lp: str | None = None
+    directions: FileName | list[Vector] | None = None
+    angles_deg: FileName | list[tuple[float, float]] | None = None
+    positions_mm: FileName | list[Vector] | None = None
+    lp: FileName | None = None
     ring: RingRecipe | None = None
-    intensities: str | list[float] | list[Vector] | None = None
+    intensities: FileName | list[float] | list[Vector] | None = None
     intensity_distance_mm: Positive | None = None
     u_deg: Uncertainty | list[Uncertainty] | None = None
 
@@ -90,9 +93,9 @@ class CaptureRecipe(Strict):
     camera: CameraRecipe | None = None
     images: Annotated[list[str], Field(min_length=1)] | None = None
     channel: ChannelName = "luminance"
-    dark: str | None = None
-    mask: str | None = None
-    response: Literal["linear"] | GammaResponse | TableResponse = "linear"
+    dark: FileName | None = None
+    mask: FileName | None = None
+    response: Literal["linear", "srgb"] | GammaResponse | TableResponse = "linear"
     black_level: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
     saturation: Positive | None = None
     lights: LightsRecipe | None = None

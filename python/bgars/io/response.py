@@ -16,18 +16,39 @@ if TYPE_CHECKING:
 
     from bgars.records import FloatArray, PixelArray
 
-__all__ = ["gamma_curve", "linearise", "read_response_table", "tabulate"]
+__all__ = ["Curve", "gamma_curve", "linearise", "read_response_table", "srgb_curve"]
 
 Curve = tuple["NDArray[np.float64]", "NDArray[np.float64]"]
 """Grey levels (increasing) and the radiance of each."""
 
 COLUMNS = 2
+SRGB_LINEAR_BELOW, SRGB_SLOPE, SRGB_OFFSET, SRGB_EXPONENT = 0.04045, 12.92, 0.055, 2.4
+"""The constants of IEC 61966-2-1."""
 
 
 def gamma_curve(gamma: float, full_scale: float) -> Curve:
     """Inverse response of a camera that encodes ``signal^(1/gamma)``, finely sampled."""
     levels = np.linspace(0.0, full_scale, 1 << 16)
     return levels, (levels / full_scale) ** gamma
+
+
+def srgb_curve(full_scale: float) -> Curve:
+    """Inverse response of sRGB, the encoding of most JPEG files (IEC 61966-2-1, equations 5 and 6), finely sampled.
+
+    Examples
+    --------
+    >>> levels, radiances = srgb_curve(255.0)
+    >>> round(float(np.interp(128.0, levels, radiances)), 6)
+    0.215861
+    """
+    levels = np.linspace(0.0, full_scale, 1 << 16)
+    encoded = levels / full_scale
+    linear = np.where(
+        encoded <= SRGB_LINEAR_BELOW,
+        encoded / SRGB_SLOPE,
+        ((encoded + SRGB_OFFSET) / (1.0 + SRGB_OFFSET)) ** SRGB_EXPONENT,
+    )
+    return levels, linear
 
 
 def read_response_table(path: Path, full_scale: float) -> Curve:
@@ -70,11 +91,6 @@ def read_response_table(path: Path, full_scale: float) -> Curve:
         msg = f"{path}: must cover grey levels 0 to {full_scale:g}, covers {levels[0]:g} to {levels[-1]:g}"
         raise InputError(msg)
     return levels, radiances
-
-
-def tabulate(curve: Curve, codes: int) -> FloatArray:
-    """Return the linear grey level of each of `codes` codes, (codes,) float32; full scale stays full scale."""
-    return linearise(np.arange(codes, dtype=np.float64), curve, codes - 1.0)
 
 
 def linearise(values: PixelArray | NDArray[np.float64], curve: Curve, full_scale: float) -> FloatArray:

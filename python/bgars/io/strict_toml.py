@@ -3,19 +3,13 @@
 from __future__ import annotations
 
 import difflib
-import json
 import re
-import sys
 from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from bgars.errors import FileFormatError, InputError
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from bgars.errors import InputError
+from bgars.io.toml_text import read_values
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -33,31 +27,6 @@ class Strict(BaseModel):
     """A table whose unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=False)
-
-
-def read_values(path: Path) -> dict[str, Any]:
-    """Read a ``.toml`` file, or a ``.json`` file with one object.
-
-    Raises
-    ------
-    FileFormatError
-        The file is missing or does not parse.
-    """
-    is_json = path.suffix.lower() == ".json"
-    kind = "JSON" if is_json else "TOML"
-    try:
-        content = path.read_bytes().decode("utf-8")
-        values = json.loads(content) if is_json else tomllib.loads(content)
-    except OSError as error:
-        msg = f"{path}: cannot be read ({error.strerror})"
-        raise FileFormatError(msg) from error
-    except ValueError as error:  # both decoders' errors, and bytes that are no text
-        msg = f"{path}: is not valid {kind} ({error})"
-        raise FileFormatError(msg) from error
-    if not isinstance(values, dict):
-        msg = f"{path}: must hold one object, got {type(values).__name__}"
-        raise FileFormatError(msg)
-    return values
 
 
 def checked(model: type[Model], values: dict[str, Any], path: Path) -> Model:
@@ -83,11 +52,28 @@ def _explain(model: type[BaseModel], path: Path, error: ValidationError) -> str:
         name = str(first["loc"][-1])
         nearest = difflib.get_close_matches(name, known, n=1, cutoff=0.0)
         hint = f"; the nearest known key is '{nearest[0]}'" if nearest else ""
-        return f"{path}: unknown key '{'.'.join([*keys, name])}'{hint} (known: {', '.join(known)})"
+        return f"{path}: unknown key '{_short('.'.join([*keys, name]))}'{hint} (known: {', '.join(known)})"
     reason = first["msg"].removeprefix("Value error, ")
-    value = "" if isinstance(first["input"], dict) else f", got {first['input']!r}"
+    value = "" if isinstance(first["input"], dict) else f", got {_shown(first['input'])}"
     # A rule over several keys names them itself.
     return ": ".join([str(path), *([".".join(keys)] if keys else []), f"{reason}{value}"])
+
+
+def _short(name: str) -> str:
+    """A key as it can be printed on one line."""
+    longest = 100
+    text = name if name.isprintable() else repr(name)[1:-1]
+    return text if len(text) <= longest else f"{text[:longest]}..."
+
+
+def _shown(value: object) -> str:
+    """A value on one short line."""
+    longest = 200
+    try:
+        text = repr(value)
+    except ValueError:  # an integer of thousands of digits
+        text = "a very large number"
+    return text if len(text) <= longest else f"{text[:longest]}..."
 
 
 def _rank(model: type[BaseModel], detail: ErrorDetails) -> int:

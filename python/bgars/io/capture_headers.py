@@ -1,0 +1,61 @@
+"""What the headers of a capture's images say together, before a pixel is decoded."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from bgars.errors import FileFormatError
+from bgars.io.image_formats import format_of
+from bgars.io.image_tags import read_tags
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+__all__ = ["Headers", "read_headers"]
+
+
+class Headers(NamedTuple):
+    """What the images of a capture have in common.
+
+    Attributes
+    ----------
+    orientation : int
+        As in EXIF, of all images.
+    lossy : str
+        Name of a format that was made for the eye, where there is one among them; else "".
+    with_alpha : tuple of Path
+        Files with an opacity.
+    """
+
+    orientation: int
+    lossy: str
+    with_alpha: tuple[Path, ...]
+
+
+def read_headers(paths: Sequence[Path], *, stack: bool) -> Headers:
+    """Read the headers of all images.
+
+    Raises
+    ------
+    FileFormatError
+        A file is missing, no image, holds several images, or is turned another way than the first.
+    """
+    kinds = [format_of(path) for path in paths]
+    tags = [read_tags(path, kind) for path, kind in zip(paths, kinds, strict=True)]
+    for path, tag in zip(paths, tags, strict=True):
+        if tag.pages > 1 and not stack:
+            msg = (
+                f"{path}: holds {tag.pages} images; one a light is expected (a stack of all lights is read where it is "
+                "the only image file)"
+            )
+            raise FileFormatError(msg)
+        if tag.orientation != tags[0].orientation:
+            msg = (
+                f"{path}: its orientation tag is {tag.orientation}, but that of {paths[0]} is {tags[0].orientation}: "
+                "the camera turned them differently; export them without rotation"
+            )
+            raise FileFormatError(msg)
+    lossy = next((kind.name for kind in kinds if kind.lossy), "")
+    with_alpha = tuple(path for path, tag in zip(paths, tags, strict=True) if tag.alpha)
+    return Headers(tags[0].orientation, lossy, with_alpha)

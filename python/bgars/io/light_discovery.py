@@ -1,0 +1,122 @@
+"""Which file of a folder without ``capture.toml`` describes the lights, and which is the mask."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bgars.errors import InputError
+from bgars.io.image_listing import list_folder, some_of
+from bgars.io.recipe import RECIPE_NAME, CaptureRecipe
+from bgars.light_formats import LIGHT_FORMATS
+
+if TYPE_CHECKING:
+    from bgars.io.image_listing import Listing
+
+__all__ = ["choose_mask", "default_recipe"]
+
+DIRECTIONS, INTENSITIES = "light_directions.txt", "light_intensities.txt"
+SUFFIXES = frozenset(suffix for kind in LIGHT_FORMATS for suffix in kind.suffixes)
+ABOUT_LIGHTS = re.compile(r"(?<![a-z])(light|lights|led|leds|dir|dirs|direction|directions)(?![a-z])|^[ls]$")
+ABOUT_STRENGTH = re.compile(r"intensit|strength|brightness")
+ABOUT_PLACES = re.compile(r"position|(?<![a-z])pos(?![a-z])")
+RTI_FOLDERS = ("assembly-files", "finished-files")
+PREFERRED = ("light_directions", "lights", "light")
+
+
+def default_recipe(folder: Path, listing: Listing, notes: list[str]) -> CaptureRecipe:
+    """The recipe that a folder without ``capture.toml`` amounts to; what it assumes is added to `notes`.
+
+    Raises
+    ------
+    InputError
+        Nothing describes the lights, or several files do.
+    """
+    lights: dict[str, str] = {}
+    lp_files = [name for name in listing.others if name.lower().endswith(".lp")]
+    if DIRECTIONS in listing.others:
+        lights["directions"] = DIRECTIONS
+    else:
+        lp_files = lp_files or _rti_files(folder, listing, notes)
+        if len(lp_files) > 1:
+            msg = f"{folder}: holds {len(lp_files)} .lp files ({some_of(lp_files)}); name one in {RECIPE_NAME}"
+            raise InputError(msg)
+        name = lp_files[0] if lp_files else _other_file(folder, listing, notes)
+        lights["lp" if lp_files else "directions"] = name
+    strength = [name for name in listing.others if name.lower() == INTENSITIES]
+    if strength:
+        lights["intensities"] = strength[0]
+    return CaptureRecipe.model_validate({"lights": lights, "mask": choose_mask(listing, notes)})
+
+
+def choose_mask(listing: Listing, notes: list[str]) -> str | None:
+    """Return the mask among the images that are called so; None where there is none, or no one is the likeliest.
+
+    `mask.png` is silent; any other is said.
+    """
+    named = [name for name in listing.masks if Path(name).stem.lower() == "mask"]
+    candidates = named or list(listing.masks)
+    chosen = "mask.png" if "mask.png" in candidates else candidates[0] if len(candidates) == 1 else None
+    if chosen is not None and chosen != "mask.png":
+        notes.append(f"{chosen} taken as the mask")
+    ignored = [name for name in listing.masks if name != chosen]
+    if ignored:
+        notes.append(
+            f"masks that are not used: {some_of(ignored)}; to use one, write mask = {ignored[0]!r} in {RECIPE_NAME}"
+        )
+    return chosen
+
+
+def _rti_files(folder: Path, listing: Listing, notes: list[str]) -> list[str]:
+    """The ``.lp`` files of an RTIBuilder project, seen from its top, or of any other folder here."""
+    usual = [name for name in listing.folders if name.lower() in RTI_FOLDERS]
+    found: list[str] = []
+    for places in (usual, listing.folders):
+        if not found:
+            inner = {name: list_folder(folder / name).others for name in places}
+            found = [f"{name}/{file}" for name in places for file in inner[name] if file.lower().endswith(".lp")]
+    if len(found) == 1:
+        notes.append(f"lights taken from {found[0]}")
+    return sorted(found)
+
+
+def _other_file(folder: Path, listing: Listing, notes: list[str]) -> str:
+    """The file of another format that is about lights by its name."""
+    about = []
+    for name in listing.others:
+        path = Path(name)
+        words = re.sub(r"[\W_\d]+", " ", path.stem.lower()).strip()
+        fits = path.suffix.lower() == ".dome" or (
+            path.suffix.lower() in SUFFIXES and ABOUT_LIGHTS.search(words) and not ABOUT_STRENGTH.search(words)
+        )
+        if fits and not name.startswith("."):
+            about.append(name)
+    positions = [name for name in about if ABOUT_PLACES.search(name.lower())]
+    about = [name for name in about if name not in positions]
+    for preferred in PREFERRED:
+        fitting = [name for name in about if Path(name).stem.lower() == preferred]
+        if len(fitting) == 1 and len(about) > 1:
+            notes.append(f"other files about lights are not used: {some_of([n for n in about if n != fitting[0]])}")
+            about = fitting
+    if len(about) == 1:
+        notes.append(f"lights taken from {about[0]}")
+        return about[0]
+    if about:
+        msg = f"{folder}: holds {len(about)} files about lights ({some_of(about)}); name one in {RECIPE_NAME}"
+        raise InputError(msg)
+    if positions:
+        msg = (
+            f"{folder}: {positions[0]} seems to hold positions of lights; say so in {RECIPE_NAME}: pixel_pitch_um = "
+            f'..., and under [lights] positions_mm = "{positions[0]}" (mm, origin at the image centre on the board)'
+        )
+        raise InputError(msg)
+    almost = [name for name in listing.others if name.lower().startswith(RECIPE_NAME) and name != RECIPE_NAME]
+    if almost:
+        msg = f"{folder}: {almost[0]} is not read: it must be called {RECIPE_NAME}"
+        raise InputError(msg)
+    msg = (
+        f"{folder}: no description of the lights: expected {RECIPE_NAME} with [lights], {DIRECTIONS}, "
+        f"or one .lp file; seen: {listing.in_words()}"
+    )
+    raise InputError(msg)
