@@ -1,0 +1,88 @@
+"""The same image twice: bit by bit, or the same light photographed twice."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bgars.check.records import Finding
+
+if TYPE_CHECKING:
+    from bgars.check.view import View
+    from bgars.records import Capture
+
+__all__ = ["alike_images", "check_duplicates", "same_images"]
+
+SAMPLE = 50_000
+SAME_LIGHT = 0.02
+"""Share of the usual difference between two lights (variance) that is left between two images under one light."""
+APART = 0.2
+"""Distance of two directions, of unit vectors, from which on their images differ: 12 degrees."""
+SHADED = 0.02
+"""Relative standard deviation by which lights shade a part that tells them apart."""
+
+
+def same_images(capture: Capture) -> tuple[int, int] | None:
+    """First two images that are equal bit by bit, unless both are empty; None where there are none."""
+    stack = capture.images.reshape(len(capture.images), -1)
+    step = max(1, stack.shape[1] // SAMPLE)
+    sample = stack[:, ::step]
+    for second in range(1, len(stack)):
+        if sample[second].min() == sample[second].max():
+            continue
+        for first in range(second):
+            if np.array_equal(sample[first], sample[second]) and np.array_equal(stack[first], stack[second]):
+                return first, second
+    return None
+
+
+def alike_images(view: View) -> list[tuple[int, int]]:
+    """Pairs of images under lights far apart that differ by noise only, where the others differ by shading.
+
+    The difference of two images under one light is noise: it has no structure, so its variance in the small copy is
+    that of noise; lights far apart shade a part differently. On a flat field all pairs look alike, and none is told.
+    """
+    use = view.use & ~view.clipped.any(axis=0)
+    if use.sum() < 100:  # noqa: PLR2004 - too few to tell
+        return []
+    values = view.values[:, use].astype(np.float64)
+    values /= np.maximum(values.mean(axis=0), 1e-9)
+    scale = np.median(values, axis=1)
+    values /= np.maximum(scale, 1e-9)[:, None]
+    pairs = list(combinations(range(len(values)), 2))
+    far = [pair for pair in pairs if np.linalg.norm(view.lights[pair[0]] - view.lights[pair[1]]) > APART]
+    if not far:
+        return []
+    differs = {pair: float(np.mean(np.minimum((values[pair[0]] - values[pair[1]]) ** 2, 1.0))) for pair in far}
+    usual = float(np.median(list(differs.values())))
+    if usual < SHADED**2:
+        return []
+    return [pair for pair in far if differs[pair] < SAME_LIGHT * usual]
+
+
+def check_duplicates(capture: Capture, view: View) -> list[Finding]:
+    """Find images that show the same light."""
+    same = same_images(capture)
+    if same is not None:
+        first, second = same
+        return [
+            Finding(
+                "duplicate",
+                "error",
+                f"{view.names[first]} and {view.names[second]} are the same picture",
+                "each light needs its own image: look for a missed trigger, or for one file copied or named twice",
+                image=second,
+            )
+        ]
+    return [
+        Finding(
+            "duplicate",
+            "error",
+            f"{view.names[first]} and {view.names[second]} show the same light, though the table names two",
+            "look for a missed trigger or a lamp that was fired twice, and take the image again",
+            image=second,
+        )
+        for first, second in alike_images(view)[:1]
+    ]

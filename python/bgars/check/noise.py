@@ -1,0 +1,59 @@
+"""Noise, of one image against the rest and of all."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bgars.check.records import Finding
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from bgars.check.windows import FrameFit
+
+__all__ = ["check_noise"]
+
+NOISIER = 1.8
+"""Ratio of one image's noise to the others': three times their variance."""
+LEAST = 0.6 / 255.0
+"""Noise below that of rounding to 8 bits, twice, is none."""
+NOISY = 0.06
+"""Noise over signal from which on normals of single pixels are off by 3 degrees or more under eight lights."""
+
+
+def check_noise(fit: FrameFit, level: float, names: Sequence[str]) -> list[Finding]:
+    """Find noise."""
+    if len(names) < 5 or not fit.noise.any():  # noqa: PLR2004 - three images leave nothing over
+        return []
+    index = int(np.argmax(fit.noise))
+    usual = float(np.median(np.delete(fit.noise, index)))
+    value = float(fit.noise[index])
+    if value > NOISIER * max(usual, LEAST):
+        return [
+            Finding(
+                "noise",
+                "warning",
+                f"{names[index]} has {value / max(usual, LEAST / 2):.1f} times the noise of the others",
+                "look for another gain or exposure of this image, or for interference, and take it again",
+                image=index,
+                value=value / max(usual, LEAST / 2),
+                limit=NOISIER,
+                unit="times",
+            )
+        ]
+    share = usual / max(level, 1e-9)
+    if share > NOISY:
+        return [
+            Finding(
+                "noise",
+                "warning",
+                f"the images are noisy: {share:.0%} of the signal",
+                "expose longer at lower gain, or average several images under each light",
+                value=share,
+                limit=NOISY,
+                unit="of the signal",
+            )
+        ]
+    return []

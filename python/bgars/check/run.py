@@ -1,0 +1,112 @@
+"""All checks of a capture, in the order in which one fault hides the next."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bgars.check.ambient import check_ambient
+from bgars.check.below_surface import check_below, raised
+from bgars.check.bit_depth import check_bit_depth
+from bgars.check.duplicates import check_duplicates
+from bgars.check.exposure import check_clipped, check_dark, dead_lamps
+from bgars.check.focus import check_focus
+from bgars.check.gains import check_gains
+from bgars.check.half_lit import check_half_lit
+from bgars.check.moments import lit_everywhere, moments_by
+from bgars.check.motion import check_motion
+from bgars.check.noise import check_noise
+from bgars.check.orientation import check_orientation
+from bgars.check.records import Finding, Findings
+from bgars.check.response import check_response
+from bgars.check.table import check_table
+from bgars.check.view import TILES, make_view
+from bgars.check.vignetting import check_vignetting
+from bgars.check.windows import cut_windows, fit_frames
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bgars.check.view import View
+    from bgars.records import Capture
+
+__all__ = ["check_capture"]
+
+FEW_LIT = 200
+"""Pixels of the small copy, lit and matt, below which single images are not judged."""
+
+
+def check_capture(capture: Capture) -> Findings:
+    """Check a capture before any number is made of it.
+
+    A reduced copy is looked at (and three windows at full resolution), so that it costs little.
+
+    Parameters
+    ----------
+    capture : Capture
+
+    Returns
+    -------
+    Findings
+        The worst first. A capture without evidence (a flat, evenly lit field) has no findings on what it cannot show.
+    """
+    view = make_view(capture)
+    inside = view.values.max(axis=0) > 0.0
+    below = check_below(view)
+    view = view.with_lights(raised(view.lights))
+    found = below + dead_lamps(view, inside) + check_bit_depth(capture)
+    found += check_dark(view, inside) + check_clipped(view, inside)
+    gone = [each.image for each in found if each.kind == "lamp-dead" and each.image is not None]
+    found += _between(capture, view, gone)
+    return Findings.of(found)
+
+
+def _between(capture: Capture, view: View, gone: list[int]) -> list[Finding]:
+    """Checks of images against each other; images without light are left out."""
+    alike = check_duplicates(capture, view)
+    turned = check_orientation(view)
+    if alike or turned:
+        return alike + turned
+    kept = np.setdiff1d(np.arange(len(view.lights)), gone)
+    for index in sorted(gone, reverse=True):
+        view = view.without(index)
+    if len(kept) < 4:  # noqa: PLR2004 - three images fit any surface
+        return []
+    found, lights = check_table(view)
+    # A frame that is lit in part upsets all that follows, as it does the comparison of tables.
+    halves = check_half_lit(view, lit_everywhere(view, lights), lights)
+    if halves:
+        return _renumbered(halves + [each for each in found if each.kind != "order"], kept)
+    found += _single(capture, view, lights, kept)
+    return _renumbered(found, kept)
+
+
+def _single(capture: Capture, view: View, lights: NDArray[np.float64], kept: NDArray[np.intp]) -> list[Finding]:
+    """Checks of single images under the right table."""
+    lit = lit_everywhere(view, lights)
+    found = check_ambient(view, lights) + check_vignetting(view, lit)
+    if int(lit.sum()) < FEW_LIT:
+        return found
+    bent = check_response(capture, view, lit_everywhere(view, lights, matt=False), lights)
+    found += bent
+    if any(each.severity != "note" for each in bent):
+        return found
+    uneven, factors = check_gains(view, moments_by(view, lit, view.tiles, TILES * TILES), lights)
+    lights = lights * factors[:, None]
+    found += uneven
+    windows = cut_windows(capture, view)
+    if windows is None or len(kept) != len(capture.rig):
+        return found
+    fit = fit_frames(windows, lights)
+    if fit is None:
+        return found
+    moved = check_motion(fit, lights, view.names)
+    # A shifted image looks blurred, a blurred one less noisy: the first cause is told.
+    return found + (moved or check_focus(fit, view.names) or check_noise(fit, windows.level, view.names))
+
+
+def _renumbered(found: list[Finding], kept: NDArray[np.intp]) -> list[Finding]:
+    from dataclasses import replace
+
+    return [each if each.image is None else replace(each, image=int(kept[each.image])) for each in found]
