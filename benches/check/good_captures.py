@@ -136,6 +136,8 @@ def _mislaid(capture: bgars.Capture, random: np.random.Generator, u_deg: float, 
 def _clouds(random: np.random.Generator, shape: tuple[int, int], size_px: float) -> NDArray[np.float64]:
     """Smooth random field of unit standard deviation."""
     rows, cols = np.fft.fftfreq(shape[0])[:, None], np.fft.rfftfreq(shape[1])[None, :]
-    filtered = np.fft.rfft2(random.normal(size=shape)) * np.exp(-2.0 * (np.pi * size_px / 2.5) ** 2 * (rows**2 + cols**2))
+    filtered = np.fft.rfft2(random.normal(size=shape)) * np.exp(
+        -2.0 * (np.pi * size_px / 2.5) ** 2 * (rows**2 + cols**2)
+    )
     field = np.fft.irfft2(filtered, shape)
     return (field - field.mean()) / field.std()

@@ -23,7 +23,12 @@ def main() -> None:
     parser.add_argument("--each", type=int, default=4, help="captures a fault")
     options = parser.parse_args()
     import os, pickle
-    good = pickle.load(open(os.environ["GOOD"], "rb")) if "GOOD" in os.environ else list(good_captures.captures(options.which))
+
+    good = (
+        pickle.load(open(os.environ["GOOD"], "rb"))
+        if "GOOD" in os.environ
+        else list(good_captures.captures(options.which))
+    )
     rows: list[dict[str, object]] = []
     for name, capture in good[:: options.few]:
         if options.only:
@@ -45,7 +50,9 @@ def main() -> None:
             right = bool(kinds) and kinds[0] in faults.causes(fault)
             rows.append({"fault": fault, "capture": name, "kinds": kinds, "right": right})
             if not right:
-                print("MISSED" if not kinds else "WRONG", fault, "|", name, [str(each)[:110] for each in told], flush=True)
+                print(
+                    "MISSED" if not kinds else "WRONG", fault, "|", name, [str(each)[:110] for each in told], flush=True
+                )
     faulty = [row for row in rows if row["fault"]]
     silent = [row for row in rows if not row["fault"]]
     if faulty:

@@ -15,6 +15,8 @@ from bgars.ball_records import BallLayout, FoundBall, FoundBalls
 from bgars.balls import find_balls
 from bgars.calibrate import calibrate_material
 from bgars.cfx import to_cfx
+from bgars.check.records import Finding, Findings
+from bgars.check_pipeline import check
 from bgars.errors import (
     BgarsError,
     CalibrationError,
@@ -100,6 +102,8 @@ __all__ = [
     "DepthMap",
     "Evaluation",
     "FileFormatError",
+    "Finding",
+    "Findings",
     "FoundBall",
     "FoundBalls",
     "GaugeStudy",
@@ -132,6 +136,7 @@ __all__ = [
     "anchors_from_part",
     "angular_error_deg",
     "calibrate_material",
+    "check",
     "estimate_normals",
     "evaluate",
     "find_balls",

@@ -29,6 +29,9 @@ RECORDS = {
 BASE = {
     "errors": 0,
     "bit_depth": 0,
+    "same_images": 3.2,
+    "noise_floor": 3.5,
+    "flatten": 3.5,
     "large_arrays": 0,
     "light_files": 1,
     "light_names": 1,
@@ -36,8 +39,8 @@ BASE = {
     "scalar_checks": 1,
     **RECORDS,
 }
-STAGES = dict.fromkeys(("io", "pixelwise", "reflectance", "integrate", "mesh", "balls", "inspection"), 4)
-PIPELINES = ("calibrate", "pipeline", "evaluate", "part_anchors", "recipes", "cfx")
+STAGES = dict.fromkeys(("io", "pixelwise", "reflectance", "integrate", "mesh", "balls", "inspection", "check"), 4)
+PIPELINES = ("check_pipeline", "calibrate", "pipeline", "evaluate", "part_anchors", "recipes", "cfx")
 JOINED = {"normals": 4.5, **dict.fromkeys(PIPELINES, 5), "part_surface": 5.2, "inspection_pipeline": 5.4}
 LATER = {**JOINED, "batch": 6, "report": 6, "studies": 6.5, "experiments": 6, "samples": 0, "cli": 7}
 LEVEL = {**BASE, **STAGES, **LATER, "simulate": 4}

@@ -8,34 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bgars.check.records import Finding
+from bgars.same_images import same_images
 
 if TYPE_CHECKING:
     from bgars.check.view import View
     from bgars.records import Capture
 
-__all__ = ["alike_images", "check_duplicates", "same_images"]
+__all__ = ["alike_images", "check_duplicates"]
 
-SAMPLE = 50_000
 SAME_LIGHT = 0.02
 """Share of the usual difference between two lights (variance) that is left between two images under one light."""
 APART = 0.2
 """Distance of two directions, of unit vectors, from which on their images differ: 12 degrees."""
 SHADED = 0.02
 """Relative standard deviation by which lights shade a part that tells them apart."""
-
-
-def same_images(capture: Capture) -> tuple[int, int] | None:
-    """First two images that are equal bit by bit, unless both are empty; None where there are none."""
-    stack = capture.images.reshape(len(capture.images), -1)
-    step = max(1, stack.shape[1] // SAMPLE)
-    sample = stack[:, ::step]
-    for second in range(1, len(stack)):
-        if sample[second].min() == sample[second].max():
-            continue
-        for first in range(second):
-            if np.array_equal(sample[first], sample[second]) and np.array_equal(stack[first], stack[second]):
-                return first, second
-    return None
 
 
 def alike_images(view: View) -> list[tuple[int, int]]:
@@ -64,14 +50,16 @@ def alike_images(view: View) -> list[tuple[int, int]]:
 
 def check_duplicates(capture: Capture, view: View) -> list[Finding]:
     """Find images that show the same light."""
-    same = same_images(capture)
+    same = same_images(capture.images)
     if same is not None:
         first, second = same
+        one, two = view.names[first], view.names[second]
+        told = f"{one} and {two}" if one != two else f"images {first} and {second} ({one}, named twice)"
         return [
             Finding(
                 "duplicate",
                 "error",
-                f"{view.names[first]} and {view.names[second]} are the same picture",
+                f"{told} are the same picture",
                 "each light needs its own image: look for a missed trigger, or for one file copied or named twice",
                 image=second,
             )

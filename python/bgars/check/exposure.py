@@ -21,11 +21,11 @@ STRAY = 0.2
 BRIGHT_PERCENT = 99.0
 DARK = 20.0 / 255.0
 """Brightest level, of full scale: below, 8 bits quantise slopes to 1 / 20 / sqrt(12) = 0.014 rad a light, 1 degree.
-In files of 16 bits, of the depth that their grey levels use."""
+In files of 16 bits cameras that expose so little are noisy, or have fewer bits: both need a word."""
 MOST_LIGHTS = 0.75
 """A highlight clips a pixel under the lights of one side only; clipped under so many of them, it is overexposed."""
-OVEREXPOSED = 0.01
-"""Share of pixels so overexposed that is told: the area of a handful of balls."""
+OVEREXPOSED = 0.02
+"""Share of pixels so overexposed that is told: more than the flat tops of all balls, a tenth of their radius, cover."""
 ONE_IMAGE = 0.05
 """Share of clipped pixels by which one image may exceed the median of all: highlights are alike under all lights."""
 
@@ -61,15 +61,17 @@ def dead_lamps(view: View, inside: NDArray[np.bool_]) -> list[Finding]:
 def check_dark(view: View, inside: NDArray[np.bool_]) -> list[Finding]:
     """Find underexposure of the whole capture."""
     brightest = float(np.percentile(view.values.max(axis=0)[inside], BRIGHT_PERCENT)) if inside.any() else 0.0
+    brightest *= view.used_scale
     if brightest >= DARK:
         return []
+    fewer = "" if view.used_scale > 0.5 else " (or, if the camera has fewer than 16 bits, state 'saturation')"  # noqa: PLR2004
     return [
         Finding(
             "dark",
             "warning",
             f"the images are dark: their brightest parts reach {brightest:.1%} of full scale",
             f"expose about {0.7 / max(brightest, 1e-3):.0f} times longer, so that matt parts come to 40 to 80 % of full "
-            "scale",
+            f"scale{fewer}",
             value=brightest,
             limit=DARK,
             unit="of full scale",

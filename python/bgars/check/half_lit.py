@@ -34,7 +34,9 @@ MIXED = 0.3
 """Share of a neighbouring image in part of a frame that is told: it turns the light there by over 10 degrees."""
 CLEARER = 2.0
 """How much more clearly it must be seen than in any image that is no neighbour: no surface is matt to the last."""
-WORDS = "check trigger, exposure time and the delay between lamps (global shutter, or lamps on before the exposure starts)"
+WORDS = (
+    "check trigger, exposure time and the delay between lamps (global shutter, or lamps on before the exposure starts)"
+)
 
 
 class _Mixture(NamedTuple):
@@ -125,9 +127,7 @@ def _jumps(profiles: Array, axis: int) -> Array:
     return difference
 
 
-def _agreeing(
-    ratio: NDArray[np.float32], use: Mask, axis: int, known: Mask, place: int, size: float
-) -> float:
+def _agreeing(ratio: NDArray[np.float32], use: Mask, axis: int, known: Mask, place: int, size: float) -> float:
     """Share of the columns (of an axis of rows) whose own step at one place is at least half, at most twice as large."""
     turned, used = (ratio, use) if axis == 1 else (ratio.T, use.T)
     turned, used = turned[known], used[known]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -59,7 +60,13 @@ def check_capture(capture: Capture) -> Findings:
     found += check_dark(view, inside) + check_clipped(view, inside)
     gone = [each.image for each in found if each.kind == "lamp-dead" and each.image is not None]
     found += _between(capture, view, gone)
-    return Findings.of(found)
+    return Findings.of([_with_file(each, capture) for each in found])
+
+
+def _with_file(finding: Finding, capture: Capture) -> Finding:
+    if finding.image is None or finding.image >= len(capture.files):
+        return finding
+    return replace(finding, file=capture.files[finding.image].name)
 
 
 def _between(capture: Capture, view: View, gone: list[int]) -> list[Finding]:
@@ -107,6 +114,5 @@ def _single(capture: Capture, view: View, lights: NDArray[np.float64], kept: NDA
 
 
 def _renumbered(found: list[Finding], kept: NDArray[np.intp]) -> list[Finding]:
-    from dataclasses import replace
-
+    """Findings with the images' numbers in the capture."""
     return [each if each.image is None else replace(each, image=int(kept[each.image])) for each in found]

@@ -55,9 +55,7 @@ def check_table(view: View) -> tuple[list[Finding], NDArray[np.float64]]:
             )
         )
     elif shadows.turned:
-        findings.append(
-            Finding("order", "error", HALF_TURN, HALF_TURN_ADVICE, value=min(shadows.t, 999.0), unit="t")
-        )
+        findings.append(Finding("order", "error", HALF_TURN, HALF_TURN_ADVICE, value=min(shadows.t, 999.0), unit="t"))
     if shadows.turned:
         lights = lights * np.array([-1.0, -1.0, 1.0])
     return findings, lights

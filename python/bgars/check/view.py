@@ -47,8 +47,8 @@ class View:
         Pixels of the capture along one pixel of this copy.
     names : tuple of str
         What to call the images.
-    noise : float
-        Standard deviation of a value by noise and quantisation, of full scale, at least.
+    used_scale : float
+        Full scale of `values`, of the files' full scale: below 1 where 16-bit files use fewer bits.
     """
 
     values: Floats
@@ -57,7 +57,7 @@ class View:
     lights: Array
     block_px: float
     names: tuple[str, ...]
-    noise: float
+    used_scale: float = 1.0
 
     @property
     def mean(self) -> Floats:
@@ -119,12 +119,11 @@ def make_view(capture: Capture) -> View:
     inside = _blocks(sub_mask[None].astype(np.float32), taps)[0]
     small = _blocks(value * sub_mask, taps) / np.maximum(inside, np.float32(1e-6))
     clipped = np.asarray(_blocks((raw >= capture.saturation).astype(np.float32) * sub_mask, taps) > 0)
-    levels = 255.0 if capture.images.dtype == np.uint8 else 65535.0
-    noise = float(np.hypot(0.3 / levels, 0.3 / 4095.0)) / taps
     use = (inside > 0.5) & (small.mean(axis=0) > MIN_SIGNAL) & np.isfinite(small).all(axis=0)  # noqa: PLR2004 - half
+    used = _used_scale(capture, raw) / capture.full_scale if np.isfinite(capture.full_scale) else 1.0
     files = [path.name for path in capture.files] or list(capture.rig.files)
     names = tuple(files[index] if index < len(files) else f"image {index}" for index in range(len(raw)))
-    return View(np.nan_to_num(small), use, clipped, lights, float(grid) / taps * taps, names, noise)
+    return View(np.nan_to_num(small), use, clipped, lights, float(grid), names, used)
 
 
 def linear_values(capture: Capture, raw: PixelArray, dark: PixelArray | None) -> Floats:

@@ -13,10 +13,12 @@ import typer
 
 import bgars
 from bgars.cli.calibrate import register as register_calibrate
+from bgars.cli.check import register as register_check
 from bgars.cli.console import EXIT_BAD_INPUT, activation, fail, print_json, say, shown_path, stage_progress
 from bgars.cli.describe import describe, describe_in_words
 from bgars.cli.evaluation import choice_in_words, evaluation_table
 from bgars.cli.experiment import register as register_experiment
+from bgars.cli.first_check import ForceOption, check_first
 from bgars.cli.grr import register as register_grr
 from bgars.cli.inspect import register as register_inspect
 from bgars.cli.mesh import register as register_mesh
@@ -26,7 +28,9 @@ from bgars.cli.report import register as register_report
 from bgars.cli.simulate import register as register_simulate
 from bgars.cli.spc import register as register_spc
 from bgars.errors import BgarsError
+from bgars.flatten import Flatten
 from bgars.light_files import read_filenames
+from bgars.noise_floor import without_background
 from bgars.normals import DEFAULT_METHOD, METHODS, Method
 
 __all__ = ["main"]
@@ -76,6 +80,13 @@ ChannelChoice = Annotated[
     typer.Option(help="How colour becomes one value (linear); the recipe's choice by default.", show_default=False),
 ]
 DirectxOption = Annotated[bool, typer.Option("--directx", help="Write normals.png with green = y down.")]
+FlattenOption = Annotated[
+    Flatten | None,
+    typer.Option(
+        help="Take one plane, or one quadratic surface, off the heights: what wrong or near lights bend a flat part to.",
+        show_default=False,
+    ),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")]
 
 
@@ -105,7 +116,9 @@ def demo(
 ) -> None:
     """Reconstruct a solder ball that ships with bgars, and say what to open."""
     folder = bgars.sample_capture()
-    summary, files = _reconstruct_to(folder, output, bgars.reconstruct, mesh_format="ply", directx=False)
+    summary, files = _reconstruct_to(
+        bgars.read_capture(folder), output, bgars.reconstruct, mesh_format="ply", directx=False
+    )
     scores = {
         name: bgars.evaluate(bgars.read_capture(folder), method=name).to_dict()["normals"]
         for name in ("lambertian", DEFAULT_METHOD)
@@ -137,21 +150,29 @@ def reconstruct(
     material: MaterialOption = None,
     channel: ChannelChoice = None,
     mesh_format: Annotated[Literal["ply", "obj", "stl", "glb"], typer.Option(help="Format of the mesh file.")] = "ply",
+    flatten: FlattenOption = None,
     directx: DirectxOption = False,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """The main job: a folder of photographs becomes normals, a height map, a mesh and an overview picture.
 
     Writes overview.png, normals.png (16 bit), height.tif and height.npy (float32, um when the pixel pitch is known),
     mesh.ply and summary.json; they replace all that an earlier run left of these in OUT. Heights between parts that do
-    not touch, such as a ball above its board, are not measured.
+    not touch, such as a ball above its board, are not measured. The capture is checked first ('bgars check'): where its
+    lights and images do not fit, nothing is written (exit code 2) unless --force says so.
     """
 
     def run(capture: bgars.Capture, **options: Any) -> bgars.Reconstruction:  # noqa: ANN401
         surface = _material_from(material, capture)
-        return bgars.reconstruct(capture, method=method, threshold=threshold, material=surface, **options)
+        return bgars.reconstruct(
+            capture, method=method, threshold=threshold, material=surface, flatten=flatten, **options
+        )
 
-    summary, files = _reconstruct_to(folder, output, run, channel=channel, mesh_format=mesh_format, directx=directx)
+    capture = bgars.read_capture(folder, channel=channel)
+    findings = check_first(capture, force=force)
+    summary, files = _reconstruct_to(capture, output, run, mesh_format=mesh_format, directx=directx)
+    summary |= findings.to_dict()
     if as_json:
         print_json(summary)
         return
@@ -163,6 +184,8 @@ def reconstruct(
         f"{height['iterations']} solver iterations."
     )
     say(choice_in_words(summary["normals"]))
+    if height["bow"] is not None:
+        say(f"doubt: {height['bow']}")
     _list_files(output, files)
 
 
@@ -175,10 +198,16 @@ def normals(
     material: MaterialOption = None,
     channel: ChannelChoice = None,
     directx: DirectxOption = False,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Only the normals: normals.png (16 bit), albedo.tif, confidence.tif, measured.png, lights_kept.png."""
+    """Only the normals: normals.png (16 bit), albedo.tif, confidence.tif, measured.png, lights_kept.png.
+
+    The capture is checked first ('bgars check'): where its lights and images do not fit, nothing is written (exit code
+    2) unless --force says so. Black background is not measured.
+    """
     capture = bgars.read_capture(folder, channel=channel)
+    findings = check_first(capture, force=force)
     surface = _material_from(material, capture)
     with stage_progress() as report:
         field = bgars.estimate_normals(
@@ -188,9 +217,10 @@ def normals(
             material=surface,
             progress=lambda fraction: report("normals", fraction),
         )
+    field = without_background(field, capture)
     summary, files = write_normals(field, output, directx=directx)
     if as_json:
-        print_json({"capture": capture.name, **summary})
+        print_json({"capture": capture.name, **summary, **findings.to_dict()})
         return
     say(
         f"{capture.name}: {summary['valid_pixels']} normals, {summary['mean_lights_kept']:.1f} of "
@@ -201,6 +231,7 @@ def normals(
 
 
 register_mesh(app)
+register_check(app)
 
 
 @app.command()
@@ -281,17 +312,16 @@ def main() -> None:
 
 
 def _reconstruct_to(
-    folder: Path,
+    capture: bgars.Capture,
     output: Path,
     run: Callable[..., bgars.Reconstruction],
     *,
     mesh_format: str,
     directx: bool,
-    channel: ChannelOption | None = None,
 ) -> tuple[dict[str, Any], dict[str, str]]:
     with stage_progress() as report:
         return write_reconstruction(
-            lambda: run(bgars.read_capture(folder, channel=channel), progress=report),
+            lambda: run(capture, progress=report),
             output,
             mesh_format=mesh_format,
             directx=directx,

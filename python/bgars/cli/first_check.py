@@ -1,0 +1,48 @@
+"""What every command says of a capture before any number."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from bgars.check_pipeline import check, refuse_wrong_geometry
+from bgars.cli.console import error_console
+
+if TYPE_CHECKING:
+    from bgars.check.records import Finding, Findings
+    from bgars.records import Capture
+
+__all__ = ["ForceOption", "check_first", "warn"]
+
+ForceOption = Annotated[
+    bool,
+    typer.Option(
+        "--force",
+        help="Go on though the images do not fit the lights (order, mirrored, below the surface, an image twice).",
+    ),
+]
+WAY_OUT = "'bgars check' shows it; --force goes on all the same"
+
+
+def check_first(capture: Capture, *, force: bool) -> Findings:
+    """Check a capture, print warnings and errors, stop where every number would be wrong.
+
+    Raises
+    ------
+    InputError
+        Errors of geometry without `force`.
+    """
+    findings = check(capture)
+    if not force:
+        refuse_wrong_geometry(findings, capture.name, way_out=WAY_OUT)
+    for finding in findings.told:
+        warn(finding)
+    return findings
+
+
+def warn(finding: Finding) -> None:
+    """Print a finding on the error stream: one line."""
+    style = "bold red" if finding.severity == "error" else "yellow"
+    error_console.print(f"{finding.severity}:", style=style, end=" ")
+    error_console.print(f"{finding.kind}: {finding.message}; {finding.advice}", markup=False)
