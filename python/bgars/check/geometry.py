@@ -34,22 +34,22 @@ __all__ = ["Verdict", "judge_table"]
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-BETTER = 0.75
-"""Ratio of misfits from which down on another table counts as better: a quarter of all that does not fit comes from the
+BETTER = 0.8
+"""Ratio of misfits from which down on another table counts as better: a fifth of all that does not fit comes from the
 given one. That it is no chance is for the test over tiles to say."""
 TINY = 1e-9
-SUSPECTS = 5
-"""Images that are tried as swapped with each other."""
+SUSPECTS = 3
+"""Images that are tried as swapped, each with all others."""
 MATT = 0.1
 """Misfit, of the mean, of a pixel that counts half: a tenth is what highlights and light from neighbours leave."""
 MIN_PIXELS = 60
-MOST_PIXELS = 3000
+MOST_PIXELS = 2000
 """Pixels of strongest relief on which every table is tried."""
 NOISE_CURL = 3.0
 """Changes of slope smaller than so many times the usual one (of the flattest half) count less and less."""
-LINEAR = 0.05
-"""Largest distance of two tables, of unit vectors, that light cannot tell from a linear map of each other: 3 degrees,
-what a table is good to."""
+LINEAR = 0.1
+"""Largest distance of two tables, of unit vectors, that count as linear maps of each other: 6 degrees, the largest
+error of some tens of directions that are good to one or two."""
 
 
 class Verdict(NamedTuple):
@@ -164,7 +164,7 @@ def _losses(evidence: _Evidence, given: Array, lights: Array) -> _Losses:
     misfit = np.minimum((left**2).sum(axis=0), 1.0)
     count = TILES * TILES
     photometric = np.bincount(evidence.number, weights=misfit, minlength=count)
-    if abs(np.linalg.det(linear)) < 0.2:  # noqa: PLR2004 - no map of one space onto another
+    if not tilted or abs(np.linalg.det(linear)) < 0.2:  # noqa: PLR2004 - no map of one space onto another
         unknown = np.full(count, np.nan)
         return _Losses(photometric, unknown, unknown)
     normal = np.tensordot(np.linalg.inv(linear), evidence.normal, axes=(1, 0))

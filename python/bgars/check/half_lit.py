@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bgars.check.evidence import critical_t
-from bgars.check.moments import loo_weights, moments_by
 from bgars.check.records import Finding
 
 if TYPE_CHECKING:
@@ -30,24 +28,17 @@ LASTS = 0.6
 AGREEING = 0.7
 """Share of the columns in which a step of the shutter must be seen for itself: it runs straight across the image."""
 BANDS = 24
-MIXED = 0.3
-"""Share of a neighbouring image in part of a frame that is told: it turns the light there by over 10 degrees."""
-CLEARER = 2.0
-"""How much more clearly it must be seen than in any image that is no neighbour: no surface is matt to the last."""
+MIN_BANDS = 3
+"""Bands, of `BANDS`, that must show another light, and that must not."""
+SAME_LIGHT = 0.1
+"""Share of the usual difference between neighbouring lights (variance) that noise leaves under one light."""
+SHADED = 0.03
+"""Relative standard deviation by which the lights shade a band that tells them apart."""
+BRIGHT = 3.0
+"""Of the pixel's mean: highlights beyond do not outweigh all else."""
 WORDS = (
     "check trigger, exposure time and the delay between lamps (global shutter, or lamps on before the exposure starts)"
 )
-
-
-class _Mixture(NamedTuple):
-    """How much of a neighbour's light an image shows beyond a row, how clearly, from which row on, and before it."""
-
-    image: int
-    neighbour: int
-    share: float
-    t: float
-    place: float
-    before: float
 
 
 class Step(NamedTuple):
@@ -58,8 +49,8 @@ class Step(NamedTuple):
     score: float
 
 
-def check_half_lit(view: View, lit: Mask, lights: Array) -> list[Finding]:
-    """Find frames with a step along rows or columns, or mixed with the image before or after."""
+def check_half_lit(view: View) -> list[Finding]:
+    """Find frames with a step along rows or columns, or with rows that belong to the image before or after."""
     found = []
     for axis, word in ((1, "row"), (2, "column")):
         steps = _steps(view, axis)
@@ -84,7 +75,7 @@ def check_half_lit(view: View, lit: Mask, lights: Array) -> list[Finding]:
             )
         )
         return found
-    return _mixed(view, lit, lights)
+    return _late(view)
 
 
 def _steps(view: View, axis: int) -> list[Step]:
@@ -153,69 +144,63 @@ def _profile(image: NDArray[np.float32], use: Mask, axis: int) -> Array:
     return profile
 
 
-def _mixed(view: View, lit: Mask, lights: Array) -> list[Finding]:
-    """Find a frame whose upper or lower rows show a neighbour's light as well as, or instead of, their own."""
-    count, rows = len(lights), view.values.shape[1]
-    if count < 6:  # noqa: PLR2004 - too few others to predict from
+def _late(view: View) -> list[Finding]:
+    """Find a frame whose upper or lower rows show a neighbour's light instead of their own.
+
+    There the two images differ by noise only, while images under other lights differ by shading and shadows; elsewhere
+    they differ as all do.
+    """
+    use = view.use & ~view.clipped.any(axis=0)
+    if use.sum() < BANDS * BANDS:
         return []
-    bands = np.broadcast_to((np.arange(rows) * BANDS // rows)[:, None], lit.shape)
-    moments = moments_by(view, lit, bands, BANDS)
-    weights = loo_weights(lights)
-    seen: list[_Mixture] = []
-    for image in range(count):
-        for neighbour in ((image - 1) % count, (image + 1) % count):
-            others = _without(weights, lights, image, neighbour)
-            # Residual of the image on its prediction without the neighbour, against what the neighbour adds to it.
-            shown, added = -others, -others
-            shown[image] += 1.0
-            added[neighbour] += 1.0
-            top = np.einsum("l,blm,m->b", shown, moments, added)
-            bottom = np.einsum("l,blm,m->b", added, moments, added)
-            seen.append(_Mixture(image, neighbour, *_best_split(top, bottom)))
-    best = max(seen, key=lambda each: each.t * (each.share > MIXED and each.before < MIXED))
-    near = {(best.image + step) % count for step in (-1, 0, 1)}
-    elsewhere = max((each.t for each in seen if each.image not in near), default=0.0)
-    clear = best.t > critical_t(BANDS, 2 * count * BANDS) and best.t > CLEARER * elsewhere
-    if best.share < MIXED or best.before > MIXED or not clear:
+    count = len(view.values)
+    values = np.minimum(view.values / np.maximum(view.mean, np.float32(1e-6)), np.float32(BRIGHT))[:, use]
+    rows = view.values.shape[1]
+    band = np.broadcast_to((np.arange(rows) * BANDS // rows)[:, None], use.shape)[use]
+
+    def product(first: int, second: int) -> Array:
+        return np.bincount(band, weights=(values[first] * values[second]).astype(np.float64), minlength=BANDS)
+
+    own = [np.maximum(product(index, index), 1e-9) for index in range(count)]
+
+    def differences(first: int, second: int) -> Array:
+        """Relative variance of the difference in each band, whatever the two lamps' strengths."""
+        return 1.0 - product(first, second) ** 2 / (own[first] * own[second])
+
+    pairs = {(index, (index + 1) % count): differences(index, (index + 1) % count) for index in range(count)}
+    usual = np.median(list(pairs.values()), axis=0)
+    shaded = usual > SHADED**2
+    best: tuple[int, int, int] | None = None
+    for (first, second), differs in pairs.items():
+        same = differs < SAME_LIGHT * usual
+        # Bands without shading, such as a bare margin, speak for neither.
+        for length in (_run(same | ~shaded), -_run((same | ~shaded)[::-1])):
+            inside = np.arange(BANDS) < length if length > 0 else np.arange(BANDS) >= BANDS + length
+            told, rest = shaded & inside, shaded & ~inside
+            if told.sum() < MIN_BANDS or rest.sum() < MIN_BANDS or same[rest].mean() > 1.0 - AGREEING:
+                continue
+            if best is None or abs(length) > abs(best[2]):
+                best = (first, second, length)
+    if best is None:
         return []
-    share = min(best.share, 1.0)
+    first, second, length = best
+    # Shutters run down the rows: rows read late see the next lamp, rows read early the one before.
+    image, neighbour = (second, first) if length > 0 else (first, second)
+    share = abs(length) / BANDS
     return [
         Finding(
             "half-lit",
-            "error" if share > 0.5 else "warning",  # noqa: PLR2004 - more the neighbour's than its own
-            f"from {best.place:.0%} of its rows on, {view.names[best.image]} shows {share:.0%} of the light of "
-            f"{view.names[best.neighbour]}",
+            "error",
+            f"{share:.0%} of the rows of {view.names[image]} show the light of {view.names[neighbour]}",
             WORDS,
-            image=best.image,
+            image=image,
             value=share,
-            limit=MIXED,
-            unit="of the neighbour's light",
+            limit=MIN_BANDS / BANDS,
+            unit="of the rows",
         )
     ]
 
 
-def _without(weights: Array, lights: Array, image: int, neighbour: int) -> Array:
-    """Weights that predict an image from all but itself and one neighbour."""
-    chosen = np.setdiff1d(np.arange(len(lights)), [image, neighbour])
-    row = np.zeros_like(weights[image])
-    row[chosen] = lights[image] @ np.linalg.pinv(lights[chosen])
-    return row
-
-
-def _best_split(top: Array, bottom: Array) -> tuple[float, float, float, float]:
-    """Mixed share beyond the row that splits best, Student's t of it against the rest, that row, the share before."""
-    best = (0.0, 0.0, 0.0, 0.0)
-    for split in range(3, len(top) - 2):
-        for late in (slice(split, None), slice(None, split)):
-            early = slice(None, split) if late.start is not None else slice(split, None)
-            if bottom[late].sum() <= 0 or bottom[early].sum() <= 0:
-                continue
-            there, here = (float(top[part].sum() / bottom[part].sum()) for part in (late, early))
-            error = 0.0
-            for part, mean in ((late, there), (early, here)):
-                left = top[part] - mean * bottom[part]
-                error += float((left**2).sum()) / float(bottom[part].sum()) ** 2
-            t = (there - here) / max(error**0.5, 1e-9)
-            if t > best[1]:
-                best = (there, t, split / len(top), abs(here))
-    return best
+def _run(same: Mask) -> int:
+    """Length of the run of True that a row of bands begins with."""
+    return len(same) if same.all() else int(np.argmin(same))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,8 +17,8 @@ __all__ = ["Hypothesis", "alternatives"]
 
 Array = NDArray[np.float64]
 
-SAME = 0.02
-"""Largest distance of directions, in radii of the sphere, of tables that are the same: 1 degree."""
+SAME = 0.1
+"""Largest distance of unit vectors of tables that are the same: 6 degrees, see `geometry.LINEAR`."""
 TURNS_DEG = (45.0, -45.0, 90.0, -90.0, 135.0, -135.0)
 
 
@@ -43,7 +42,7 @@ class Hypothesis:
 
 
 def alternatives(lights: Array, names: Sequence[str], suspects: Sequence[int]) -> list[Hypothesis]:
-    """Tables that differ from the given one, the most usual mistakes first; pairs of suspects are tried as swapped.
+    """Tables that differ from the given one, the most usual mistakes first; suspects are tried as swapped, each with all others.
 
     The half turn (x and y both the wrong way round) is none of them: shading shows a bump so lit as a hollow lit from
     the other side, and only cast shadows tell (`cast_shadows.py`).
@@ -100,7 +99,8 @@ def alternatives(lights: Array, names: Sequence[str], suspects: Sequence[int]) -
         )
         for shift in sorted((each for each in range(-(count // 2), count // 2 + 1) if each), key=abs)
     ]
-    for first, second in combinations(sorted(suspects), 2):
+    pairs = {(min(one, two), max(one, two)) for one in suspects for two in range(count) if one != two}
+    for first, second in sorted(pairs):
         order = np.arange(count)
         order[[first, second]] = second, first
         found.append(

@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 
 AS_OTHERS = 0.7
 """An image turned back must correlate with the others so well, of how well these do among each other."""
-BETTER = 0.25
-"""By how much more it must correlate than as it is."""
+AS_IT_IS = 0.4
+"""Most that it may correlate as it is, of the same: parts that look the same after a turn prove nothing."""
 BOX = 9
 
 
@@ -47,7 +47,7 @@ def check_orientation(view: View) -> list[Finding]:
         usual = float(np.median(np.delete(plain, index)))
         best = max(turns, key=lambda name: _correlation(turns[name](picture), others))
         value = _correlation(turns[best](picture), others)
-        if value > AS_OTHERS * usual and value > plain[index] + BETTER:
+        if value > AS_OTHERS * usual and plain[index] < AS_IT_IS * usual:
             found.append(
                 Finding(
                     "orientation",
@@ -56,7 +56,7 @@ def check_orientation(view: View) -> list[Finding]:
                     "turn it back; look for orientation tags that only some of the files carry",
                     image=index,
                     value=value,
-                    limit=float(plain[index]) + BETTER,
+                    limit=AS_OTHERS * usual,
                     unit="correlation",
                 )
             )

@@ -82,7 +82,7 @@ def _between(capture: Capture, view: View, gone: list[int]) -> list[Finding]:
         return []
     found, lights = check_table(view)
     # A frame that is lit in part upsets all that follows, as it does the comparison of tables.
-    halves = check_half_lit(view, lit_everywhere(view, lights), lights)
+    halves = check_half_lit(view)
     if halves:
         return _renumbered(halves + [each for each in found if each.kind != "order"], kept)
     found += _single(capture, view, lights, kept)
@@ -109,8 +109,15 @@ def _single(capture: Capture, view: View, lights: NDArray[np.float64], kept: NDA
     if fit is None:
         return found
     moved = check_motion(fit, lights, view.names)
-    # A shifted image looks blurred, a blurred one less noisy: the first cause is told.
-    return found + (moved or check_focus(fit, view.names) or check_noise(fit, windows.level, view.names))
+    blurred = check_focus(fit, view.names)
+    # A shifted image looks blurred, and the other way round; a blurred one less noisy: the clearer cause is told.
+    if moved and blurred and _excess(blurred[0]) > _excess(moved[0]):
+        moved = []
+    return found + (moved or blurred or check_noise(fit, windows.level, view.names))
+
+
+def _excess(finding: Finding) -> float:
+    return (finding.value or 0.0) / (finding.limit or 1.0)
 
 
 def _renumbered(found: list[Finding], kept: NDArray[np.intp]) -> list[Finding]:
