@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 U_TABLE = 0.025
 """Relative standard uncertainty of what a table of lights says of a lamp on level ground: intensity to 2 %, and a
 degree of direction, which changes the light at 45 degrees by as much."""
+OF_OTHERS = 4.0
+"""Times the usual deviation of the other lamps: where all are off, it is the table, or the light's fall-off."""
 MOST = 3
 """Lamps that are told, and taken out, one after the other."""
 MIN_LIGHTS = 6
@@ -67,7 +69,8 @@ def check_gains(view: View, moments: Array, lights: Array) -> tuple[list[Finding
         off = np.abs(np.log(np.maximum(gain, 1e-3)))
         off[factors != 1.0] = 0.0
         worst = int(np.argmax(off))
-        if off[worst] < critical * float(np.hypot(error[worst], table[worst])):
+        usual = float(np.median(np.delete(off, worst)))
+        if off[worst] < OF_OTHERS * usual or off[worst] < critical * float(np.hypot(error[worst], table[worst])):
             break
         factors[worst] *= gain[worst]
     if (factors != 1.0).sum() >= MOST:

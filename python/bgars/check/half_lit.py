@@ -28,10 +28,12 @@ LASTS = 0.6
 AGREEING = 0.7
 """Share of the columns in which a step of the shutter must be seen for itself: it runs straight across the image."""
 BANDS = 24
-MIN_BANDS = 3
+MIN_BANDS = 4
 """Bands, of `BANDS`, that must show another light, and that must not."""
-SAME_LIGHT = 0.1
+SAME_LIGHT = 0.06
 """Share of the usual difference between neighbouring lights (variance) that noise leaves under one light."""
+DIFFERS = 0.3
+"""Share of the same by which either image must differ from its other neighbour."""
 SHADED = 0.03
 """Relative standard deviation by which the lights shade a band that tells them apart."""
 BRIGHT = 3.0
@@ -169,9 +171,11 @@ def _late(view: View) -> list[Finding]:
 
     pairs = {(index, (index + 1) % count): differences(index, (index + 1) % count) for index in range(count)}
     usual = np.median(list(pairs.values()), axis=0)
-    shaded = usual > SHADED**2
     best: tuple[int, int, int] | None = None
     for (first, second), differs in pairs.items():
+        # Both images must differ from the next ones there: level ground that both lamps reach looks the same anyway.
+        before, after = pairs[(first - 1) % count, first], pairs[second, (second + 1) % count]
+        shaded = (usual > SHADED**2) & (np.minimum(before, after) > DIFFERS * usual)
         same = differs < SAME_LIGHT * usual
         # Bands without shading, such as a bare margin, speak for neither.
         for length in (_run(same | ~shaded), -_run((same | ~shaded)[::-1])):

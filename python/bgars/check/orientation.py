@@ -20,6 +20,9 @@ Array = NDArray[np.float64]
 
 AS_OTHERS = 0.7
 """An image turned back must correlate with the others so well, of how well these do among each other."""
+ALIKE = 0.4
+"""Correlation of an image with the others from which on they share detail that no light moves: shading alone, as that
+of a bare ball, is mirrored by a lamp on the other side, too."""
 AS_IT_IS = 0.4
 """Most that it may correlate as it is, of the same: parts that look the same after a turn prove nothing."""
 BOX = 9
@@ -45,6 +48,8 @@ def check_orientation(view: View) -> list[Finding]:
     for index, picture in enumerate(pictures):
         others = total - picture
         usual = float(np.median(np.delete(plain, index)))
+        if usual < ALIKE:
+            continue
         best = max(turns, key=lambda name: _correlation(turns[name](picture), others))
         value = _correlation(turns[best](picture), others)
         if value > AS_OTHERS * usual and plain[index] < AS_IT_IS * usual:

@@ -33,6 +33,8 @@ SHADOWED, SHINES = 0.25, 2.2
 GROW_PX = 3
 """Pixels around shadows and highlights that are left out, too."""
 RIDGE = 1e-6
+MIN_STEPS = 1000
+"""Pairs of pixels that a noise is measured on: to 3 percent."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +199,7 @@ def _noise(windows: Windows, left: Array) -> Array:
     step = (residual[..., 1:] - residual[..., :-1]) / np.float32(2.0**0.5)
     both = windows.lit[..., 1:] & windows.lit[..., :-1]
     chosen = step[:, both]
-    if chosen.shape[1] < 50:  # noqa: PLR2004 - too few for a spread
+    if chosen.shape[1] < MIN_STEPS:
         return np.zeros(len(left))
     mad = 1.4826 * np.median(np.abs(chosen), axis=1)
     variance = np.linalg.lstsq(left**2, mad.astype(np.float64) ** 2, rcond=1e-3)[0]
