@@ -208,7 +208,7 @@ def lamp_uneven(capture: bgars.Capture, random: np.random.Generator) -> bgars.Ca
 def one_turned(capture: bgars.Capture, random: np.random.Generator) -> bgars.Capture:
     images = capture.images.copy()
     index = _one(capture, random)
-    images[index] = images[index][::-1, ::-1] if random.random() < 0.5 else images[index][:, ::-1]  # noqa: PLR2004
+    images[index] = images[index][::-1, ::-1] if random.random() < 0.5 else images[index][:, ::-1]
     return replace(capture, images=images)
 
 

@@ -25,7 +25,7 @@ RELIEFS = 30
 def captures(which: str) -> Iterator[tuple[str, bgars.Capture]]:
     """Yield names and captures: a hundred, other ones for choosing thresholds than for judging."""
     judged = which == JUDGED_ON
-    start = 5000 if judged else 1000
+    start = 9000 if judged else 1000
     for seed in range(start, start + SIMULATED):
         yield f"array {seed}", array(seed)
     for seed in range(start, start + RELIEFS):
@@ -69,7 +69,7 @@ def array(seed: int) -> bgars.Capture:
     )
     camera = bgars.Camera(
         pixel_pitch_um=float(random.uniform(8, 14)),
-        bit_depth=8 if random.random() < 0.6 else 12,  # noqa: PLR2004 - shares of cameras
+        bit_depth=8 if random.random() < 0.6 else 12,
         full_well_e=float(random.uniform(8000, 30000)),
         read_noise_levels=float(random.uniform(0.3, 0.8)),
         supersample=2,

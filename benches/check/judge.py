@@ -22,7 +22,8 @@ def main() -> None:
     parser.add_argument("--few", type=int, default=1, help="every so many good captures only")
     parser.add_argument("--each", type=int, default=4, help="captures a fault")
     options = parser.parse_args()
-    import os, pickle
+    import os
+    import pickle
 
     good = (
         pickle.load(open(os.environ["GOOD"], "rb"))

@@ -24,8 +24,9 @@ DARK = 20.0 / 255.0
 In files of 16 bits cameras that expose so little are noisy, or have fewer bits: both need a word."""
 MOST_LIGHTS = 0.75
 """A highlight clips a pixel under the lights of one side only; clipped under so many of them, it is overexposed."""
-OVEREXPOSED = 0.02
-"""Share of pixels so overexposed that is told: more than the flat tops of all balls, a tenth of their radius, cover."""
+OVEREXPOSED, MUCH_OVEREXPOSED = 0.02, 0.1
+"""Share of pixels so overexposed that is noted (more than bright pads and flat tops cover), and that is a fault of the
+exposure: clipped pixels are left out of the normals in any case."""
 ONE_IMAGE = 0.05
 """Share of clipped pixels by which one image may exceed the median of all: highlights are alike under all lights."""
 
@@ -70,8 +71,8 @@ def check_dark(view: View, inside: NDArray[np.bool_]) -> list[Finding]:
             "dark",
             "warning",
             f"the images are dark: their brightest parts reach {brightest:.1%} of full scale",
-            f"expose about {0.7 / max(brightest, 1e-3):.0f} times longer, so that matt parts come to 40 to 80 % of full "
-            f"scale{fewer}",
+            f"expose about {0.7 / max(brightest, 1e-3):.0f} times longer, so that matt parts come to 40 to 80 % of "
+            f"full scale{fewer}",
             value=brightest,
             limit=DARK,
             unit="of full scale",
@@ -90,7 +91,7 @@ def check_clipped(view: View, inside: NDArray[np.bool_]) -> list[Finding]:
         return [
             Finding(
                 "clipped",
-                "warning",
+                "warning" if share > MUCH_OVEREXPOSED else "note",
                 f"{share:.0%} of the image is clipped under three lights of four or more",
                 "expose shorter, or give 'saturation' if the camera clips elsewhere: clipped pixels have no normal",
                 value=share,

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["check_focus"]
 
-BLURRED_PX2 = 0.5
-"""Variance of added blur that is told: standard deviation 0.7 px, about what a good lens has itself."""
+BLURRED_PX2 = 0.8
+"""Variance of added blur that is told: standard deviation 0.9 px, a little more than a good lens has itself."""
 OF_OTHERS = 8.0
 """Times the usual difference of the other images from their median."""
 

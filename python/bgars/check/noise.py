@@ -19,8 +19,9 @@ NOISIER = 1.8
 """Ratio of one image's noise to the others': three times their variance."""
 LEAST = 0.6 / 255.0
 """Noise below that of rounding to 8 bits, twice, is none."""
-NOISY = 0.06
-"""Noise over signal from which on normals of single pixels are off by 3 degrees or more under eight lights."""
+NOISY, VERY_NOISY = 0.06, 0.12
+"""Noise over signal at which normals of single pixels are off by 3 and by 6 degrees under eight lights: the standard
+error of the normals says the first, too, so that it is a note."""
 
 
 def check_noise(fit: FrameFit, level: float, names: Sequence[str]) -> list[Finding]:
@@ -48,7 +49,7 @@ def check_noise(fit: FrameFit, level: float, names: Sequence[str]) -> list[Findi
         return [
             Finding(
                 "noise",
-                "warning",
+                "warning" if share > VERY_NOISY else "note",
                 f"the images are noisy: {share:.0%} of the signal",
                 "expose longer at lower gain, or average several images under each light",
                 value=share,

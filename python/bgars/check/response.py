@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bgars.check.evidence import critical_t
 from bgars.check.records import Finding
-from bgars.check.view import TILES, tile_sums
+from bgars.check.view import tile_sums
 
 if TYPE_CHECKING:
     from bgars.check.view import View

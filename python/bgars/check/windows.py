@@ -33,6 +33,8 @@ SHADOWED, SHINES = 0.25, 2.2
 GROW_PX = 3
 """Pixels around shadows and highlights that are left out, too."""
 RIDGE = 1e-6
+LEAST_SINGULAR = 0.2
+"""Of the largest singular value: noise shares below are too alike to tell images apart."""
 MIN_STEPS = 1000
 """Pairs of pixels that a noise is measured on: to 3 percent."""
 
@@ -202,6 +204,10 @@ def _noise(windows: Windows, left: Array) -> Array:
     if chosen.shape[1] < MIN_STEPS:
         return np.zeros(len(left))
     mad = 1.4826 * np.median(np.abs(chosen), axis=1)
-    variance = np.linalg.lstsq(left**2, mad.astype(np.float64) ** 2, rcond=1e-3)[0]
+    measured, shares = mad.astype(np.float64) ** 2, left**2
+    # What a few lights cannot tell apart (small singular values) is taken as common to all images.
+    common = float(measured.sum() / shares.sum())
+    own = np.linalg.lstsq(shares, measured - common * shares.sum(axis=1), rcond=LEAST_SINGULAR)[0]
+    variance = common + own
     noise: Array = np.sqrt(np.maximum(variance, 0.0))
     return noise

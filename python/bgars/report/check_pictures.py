@@ -80,7 +80,7 @@ def _svg(capture: Capture, image: NDArray[np.floating], top: float, index: int |
     high, wide = grey.shape
     address = "data:image/png;base64," + base64.b64encode(data.getvalue()).decode("ascii")
     arrow = "" if index is None else _arrow(capture, index, wide, high)
-    return Markup(  # noqa: S704 - made of numbers and base64 only
+    return Markup(
         f'<svg viewBox="0 0 {wide} {high}" role="img" aria-label="{escape("photograph")}">'
         f'<image href="{address}" width="{wide}" height="{high}"/>{arrow}</svg>'
     )
