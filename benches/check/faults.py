@@ -32,10 +32,15 @@ def _levels(capture: bgars.Capture) -> Array:
     return capture.images.astype(np.float64)
 
 
+def _top(capture: bgars.Capture) -> float:
+    """Largest grey level of the files."""
+    return 255.0 if capture.images.dtype == np.uint8 else 65535.0
+
+
 def _stored(capture: bgars.Capture, levels: Array) -> bgars.Capture:
     """Levels as the camera writes them."""
-    top = np.iinfo(capture.images.dtype).max
-    return replace(capture, images=np.rint(np.clip(levels, 0, top)).astype(capture.images.dtype))
+    whole = np.rint(np.clip(levels, 0, _top(capture)))
+    return replace(capture, images=whole.astype(np.uint8) if _top(capture) < 256 else whole.astype(np.uint16))
 
 
 def _one(capture: bgars.Capture, random: np.random.Generator) -> int:
@@ -103,7 +108,7 @@ def same_file(capture: bgars.Capture, random: np.random.Generator) -> bgars.Capt
 def fired_twice(capture: bgars.Capture, random: np.random.Generator) -> bgars.Capture:
     levels = _levels(capture)
     index = _one(capture, random)
-    top = np.iinfo(capture.images.dtype).max
+    top = _top(capture)
     copy = levels[(index + 1) % len(levels)]
     levels[index] = copy + random.normal(0, 1.0, copy.shape) * np.sqrt(np.maximum(copy, 1) / top / 12000) * top
     return _stored(capture, levels)
@@ -111,11 +116,11 @@ def fired_twice(capture: bgars.Capture, random: np.random.Generator) -> bgars.Ca
 
 def too_dark(capture: bgars.Capture, random: np.random.Generator) -> bgars.Capture:
     factor = float(random.uniform(0.02, 0.06))
-    return _stored(capture, _offset(capture) + (_levels(capture) - _offset(capture)) * factor * 255 / 255)
+    return _stored(capture, _offset(capture) + (_levels(capture) - _offset(capture)) * factor)
 
 
 def too_bright(capture: bgars.Capture, random: np.random.Generator) -> bgars.Capture:
-    usual = float(np.median(_levels(capture).max(axis=0))) / np.iinfo(capture.images.dtype).max
+    usual = float(np.median(_levels(capture).max(axis=0))) / _top(capture)
     return _stored(capture, _levels(capture) * float(random.uniform(1.5, 3.0)) / usual)
 
 
@@ -167,24 +172,22 @@ def blurred(capture: bgars.Capture, random: np.random.Generator) -> bgars.Captur
 
 def noisy(capture: bgars.Capture, random: np.random.Generator) -> bgars.Capture:
     levels = _levels(capture)
-    index, top = _one(capture, random), np.iinfo(capture.images.dtype).max
+    index, top = _one(capture, random), _top(capture)
     levels[index] += random.normal(0.0, float(random.uniform(0.02, 0.05)) * top, levels[index].shape)
     return _stored(capture, levels)
 
 
 def gamma(capture: bgars.Capture, random: np.random.Generator) -> bgars.Capture:
-    top = np.iinfo(capture.images.dtype).max
+    top = _top(capture)
     linear = np.clip((_levels(capture) - _offset(capture)) / top, 0, 1)
     return replace(_stored(capture, linear ** (1 / float(random.uniform(1.8, 2.4))) * top), dark=None)
 
 
 def twelve_bits(capture: bgars.Capture, random: np.random.Generator) -> bgars.Capture:
     bits = int(random.choice([10, 12, 14]))
-    top = float(np.iinfo(capture.images.dtype).max)
     levels = _levels(capture)
     bright = float(np.percentile(levels, 99.7))
     codes = np.clip(levels / bright + random.uniform(-0.5, 0.5, levels.shape) / 255.0, 0, 1) * (2**bits - 1)
-    del top
     images = np.rint(codes).astype(np.uint16)
     dark = None if capture.dark is None else np.rint(capture.dark / bright * (2**bits - 1)).astype(np.uint16)
     return replace(capture, images=images, dark=dark, saturation=65535.0, full_scale=65535.0)
@@ -192,7 +195,7 @@ def twelve_bits(capture: bgars.Capture, random: np.random.Generator) -> bgars.Ca
 
 def lamp_dead(capture: bgars.Capture, random: np.random.Generator) -> bgars.Capture:
     levels = _levels(capture)
-    top = np.iinfo(capture.images.dtype).max
+    top = _top(capture)
     levels[_one(capture, random)] = _offset(capture) + random.normal(0.003, 0.003, levels.shape[1:]) * top
     return _stored(capture, levels)
 

@@ -130,10 +130,10 @@ def _terms(rows: NDArray[np.intp], cols: NDArray[np.intp], form: Flatten, shape:
 def _robust(design: Array, z: Array) -> Array:
     """Least squares that balls, steps and holes do not pull: weights of a Cauchy distribution."""
     weight = np.ones(len(z))
-    solution = np.zeros(design.shape[1])
+    solution: Array = np.zeros(design.shape[1])
     for _ in range(ROUNDS):
         scaled = design * weight[:, None]
-        solution = np.linalg.lstsq(scaled.T @ design, scaled.T @ z, rcond=None)[0]
+        solution = np.asarray(np.linalg.lstsq(scaled.T @ design, scaled.T @ z, rcond=None)[0], np.float64)
         left = z - design @ solution
         scale = 1.4826 * float(np.median(np.abs(left))) + 1e-9
         weight = 1.0 / (1.0 + (left / (2.0 * scale)) ** 2)

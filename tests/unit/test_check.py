@@ -53,7 +53,8 @@ def kinds(capture: bgars.Capture) -> list[str]:
 
 
 def test_good_captures_are_silent(relief: bgars.Capture, balls: bgars.Capture) -> None:
-    assert kinds(relief) == [] and kinds(balls) == []
+    assert kinds(relief) == []
+    assert kinds(balls) == []
     assert repr(bgars.check(relief)) == "Findings(nothing found)"
 
 
@@ -160,9 +161,11 @@ def test_a_lying_table_stops_commands(tmp_path: Path) -> None:
     found = json.loads(checked.stdout)["findings"]
     assert (found[0]["kind"], found[0]["severity"]) == ("below-surface", "error")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
-    assert "What to do" in page and "<script" not in page
+    assert "What to do" in page
+    assert "<script" not in page
     stopped = run("normals", folder, "-o", tmp_path / "out")
-    assert stopped.returncode == 2 and "below the surface" in stopped.stderr
+    assert stopped.returncode == 2
+    assert "below the surface" in stopped.stderr
     assert not (tmp_path / "out").exists()
     assert run("check", tmp_path / "nowhere").returncode == 2
 
@@ -188,9 +191,12 @@ def test_a_bow_is_said_and_taken_off() -> None:
     random = np.random.default_rng(1)
     dome = bgars.HeightMap.from_array(-(x**2 + y**2) / 1500.0 + random.normal(0.0, 0.2, x.shape))
     bow = find_bow(dome)
-    assert bow is not None and bow.height_px > 0 and "--flatten quadratic" in str(bow)
+    assert bow is not None
+    assert bow.height_px > 0
+    assert "--flatten quadratic" in str(bow)
     flat = flattened(dome, "quadratic")
-    assert float(flat.height_px.std()) < 0.25 and find_bow(flat) is None
+    assert float(flat.height_px.std()) < 0.25
+    assert find_bow(flat) is None
     sphere = bgars.HeightMap.from_array(np.sqrt(170.0**2 - np.minimum(x**2 + y**2, 160.0**2)))
     assert find_bow(sphere) is None
 
@@ -200,4 +206,5 @@ def test_black_background_is_not_measured(relief: bgars.Capture) -> None:
     images[:, :, :80] = np.random.default_rng(0).integers(0, 3, (8, 200, 80))
     capture = replace(relief, images=images)
     field = without_background(bgars.estimate_normals(capture, method="lambertian"), capture)
-    assert field.measured[:, :80].mean() < 0.05 and field.measured[:, 82:].mean() > 0.99
+    assert field.measured[:, :80].mean() < 0.05
+    assert field.measured[:, 82:].mean() > 0.99

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 __all__ = ["check_ambient", "shadow_floor"]
 
 AMBIENT = 0.20
-"""Light in cast shadows, of the light beside them: neighbours give up to 12 percent; so much tilts normals by degrees."""
+"""Light in cast shadows, of the light beside them: neighbours give up to 12 percent, and so much tilts
+normals by degrees."""
 NO_SHADOW = 0.8
 """Of the light beside them: so bright a place is in no shadow at all."""
 DARKEST_PERCENT = (5.0, 10.0)

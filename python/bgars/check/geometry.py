@@ -1,11 +1,11 @@
 """Whether the table of lights is the one that the images were taken under.
 
-Three witnesses. *Photometry*: a matt pixel's values are linear in the lights, so what least squares leaves over is small
-under the true table (only tables that are no linear map of the true one, such as two swapped lights, show here).
-*Integrability*: slopes of a surface have no curl; a mirrored or turned table gives slopes that have
-(the linear maps are told apart by this alone). *Saddles*: a mirrored table turns domes and hollows into saddles, which
-have no curl either where they are shallow, but no part is made of saddles alone. All are compared between tables tile by tile over the image, so that
-the error of the comparison comes from the images themselves. A flat field says nothing.
+Three witnesses. *Photometry*: a matt pixel's values are linear in the lights, so what least squares leaves over is
+small under the true table (only tables that are no linear map of the true one, such as two swapped lights, show here).
+*Integrability*: slopes of a surface have no curl; a mirrored or turned table gives slopes that have (the linear maps
+are told apart by this alone). *Saddles*: a mirrored table turns domes and hollows into saddles, which have no curl
+either where they are shallow, but no part is made of saddles alone. All are compared between tables tile by tile over
+the image, so that the error of the comparison comes from the images themselves. A flat field says nothing.
 
 References
 ----------
@@ -152,7 +152,8 @@ def _suspects(evidence: _Evidence, lights: Array) -> list[int]:
 def _varying(left: Array, keep: Mask) -> Array:
     """What is left over without what all pixels have in common: a flat field, or a lamp's strength, says nothing."""
     common = left.sum(axis=1) / np.maximum(keep.sum(axis=1), 1)
-    return (left - common[:, None]) * keep
+    varying: Array = (left - common[:, None]) * keep
+    return varying
 
 
 def _losses(evidence: _Evidence, given: Array, lights: Array) -> _Losses:
@@ -163,7 +164,7 @@ def _losses(evidence: _Evidence, given: Array, lights: Array) -> _Losses:
     left = _varying(fit_normals(evidence.values, evidence.keep, table).left, evidence.keep)
     misfit = np.minimum((left**2).sum(axis=0), 1.0)
     count = TILES * TILES
-    photometric = np.bincount(evidence.number, weights=misfit, minlength=count)
+    photometric = np.asarray(np.bincount(evidence.number, weights=misfit, minlength=count), np.float64)
     if not tilted or abs(np.linalg.det(linear)) < 0.2:  # noqa: PLR2004 - no map of one space onto another
         unknown = np.full(count, np.nan)
         return _Losses(photometric, unknown, unknown)

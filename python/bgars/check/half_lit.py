@@ -121,7 +121,7 @@ def _jumps(profiles: Array, axis: int) -> Array:
 
 
 def _agreeing(ratio: NDArray[np.float32], use: Mask, axis: int, known: Mask, place: int, size: float) -> float:
-    """Share of the columns (of an axis of rows) whose own step at one place is at least half, at most twice as large."""
+    """Share of the columns (of an axis of rows) whose own step at one place is half to twice as large."""
     turned, used = (ratio, use) if axis == 1 else (ratio.T, use.T)
     turned, used = turned[known], used[known]
     rows = slice(place - BESIDE, place + BESIDE)
@@ -161,13 +161,16 @@ def _late(view: View) -> list[Finding]:
     band = np.broadcast_to((np.arange(rows) * BANDS // rows)[:, None], use.shape)[use]
 
     def product(first: int, second: int) -> Array:
-        return np.bincount(band, weights=(values[first] * values[second]).astype(np.float64), minlength=BANDS)
+        return np.asarray(
+            np.bincount(band, weights=(values[first] * values[second]).astype(np.float64), minlength=BANDS), np.float64
+        )
 
     own = [np.maximum(product(index, index), 1e-9) for index in range(count)]
 
     def differences(first: int, second: int) -> Array:
         """Relative variance of the difference in each band, whatever the two lamps' strengths."""
-        return 1.0 - product(first, second) ** 2 / (own[first] * own[second])
+        left: Array = 1.0 - product(first, second) ** 2 / (own[first] * own[second])
+        return left
 
     pairs = {(index, (index + 1) % count): differences(index, (index + 1) % count) for index in range(count)}
     usual = np.median(list(pairs.values()), axis=0)

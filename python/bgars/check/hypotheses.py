@@ -42,7 +42,7 @@ class Hypothesis:
 
 
 def alternatives(lights: Array, names: Sequence[str], suspects: Sequence[int]) -> list[Hypothesis]:
-    """Tables that differ from the given one, the most usual mistakes first; suspects are tried as swapped, each with all others.
+    """Tables that differ from the given one, the most usual mistakes first; suspects swapped with each other image.
 
     The half turn (x and y both the wrong way round) is none of them: shading shows a bump so lit as a hollow lit from
     the other side, and only cast shadows tell (`cast_shadows.py`).

@@ -62,4 +62,4 @@ def fit_normals(values: Array, keep: Mask, lights: Array) -> MattFit:
     normal = np.linalg.solve(normal_matrix, right[..., None])[..., 0].T
     mean = (weight * values).sum(axis=0) / np.maximum(number, 1.0)
     left = weight * solved * (values - lights @ normal) / np.maximum(mean, 1e-9)
-    return MattFit(normal, left, solved)
+    return MattFit(np.asarray(normal, np.float64), left, solved)

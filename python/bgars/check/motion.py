@@ -28,8 +28,7 @@ MIN_LIGHTS = 6
 
 
 def own_shifts(fit: FrameFit, lights: Array) -> tuple[Array, Array]:
-    """(L, 2) shifts without what goes with the direction of the light, predicted from the other images, and (L,) their
-    usual size.
+    """(L, 2) shifts without what goes with the direction of the light, and (L,) the usual ones of the other images.
 
     Gradients of shading are not where those of albedo are: that shifts all images in proportion to their lights.
     """

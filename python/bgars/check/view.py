@@ -71,7 +71,8 @@ class View:
         rows, cols = self.values.shape[1:]
         across = np.arange(cols) * TILES // cols
         down = np.arange(rows) * TILES // rows
-        return down[:, None] * TILES + across[None, :]
+        numbers: NDArray[np.intp] = down[:, None] * TILES + across[None, :]
+        return numbers
 
     def with_lights(self, lights: Array) -> View:
         """Return the same images under another table of lights."""
@@ -131,13 +132,14 @@ def linear_values(capture: Capture, raw: PixelArray, dark: PixelArray | None) ->
     full = np.float32(_used_scale(capture, raw))
     table = capture.response
     if table is not None and raw.dtype.kind == "u":
-        value = table.take(raw)
-        offset = table.take(dark) if dark is not None else np.interp(capture.black_level, np.arange(len(table)), table)
+        value = table[raw.astype(np.intp)]
+        black = np.interp(capture.black_level, np.arange(len(table)), table)
+        offset = np.asarray(black) if dark is None else table[dark.astype(np.intp)]
         full = np.float32(table[-1])
     else:
         value = raw.astype(np.float32)
-        offset = dark.astype(np.float32) if dark is not None else np.float32(capture.black_level)
-    linear: Floats = ((value - np.asarray(offset, dtype=np.float32)) / full).astype(np.float32)
+        offset = np.asarray(capture.black_level) if dark is None else dark.astype(np.float32)
+    linear: Floats = ((value - offset.astype(np.float32)) / full).astype(np.float32)
     return linear
 
 
@@ -170,9 +172,12 @@ def _near_gain(capture: Capture, picked: tuple[slice, slice]) -> Floats:
 def _blocks(stack: Floats, taps: int) -> Floats:
     """(L, h, w) means of blocks of taps x taps."""
     count, rows, cols = stack.shape
-    return stack.reshape(count, rows // taps, taps, cols // taps, taps).mean(axis=(2, 4), dtype=np.float32)
+    blocks = stack.reshape(count, rows // taps, taps, cols // taps, taps)
+    means: Floats = blocks.mean(axis=(2, 4), dtype=np.float32)
+    return means
 
 
 def tile_sums(tiles: NDArray[np.intp], values: NDArray[np.floating], use: NDArray[np.bool_]) -> Array:
     """(T,) sums of an image over its tiles, where it is used."""
-    return np.bincount(tiles[use], weights=values[use].astype(np.float64), minlength=TILES * TILES)
+    sums = np.bincount(tiles[use], weights=values[use].astype(np.float64), minlength=TILES * TILES)
+    return np.asarray(sums, np.float64)

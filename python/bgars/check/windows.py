@@ -97,7 +97,7 @@ def cut_windows(capture: Capture, view: View) -> Windows | None:
     if not lit.any():
         return None
     level = float(np.median(middle[lit]))
-    return Windows(values / np.float32(level), lit, level)
+    return Windows((values / np.float32(level)).astype(np.float32), lit, level)
 
 
 def _best_corners(view: View, rows: int, cols: int, side: int) -> list[tuple[int, int]]:

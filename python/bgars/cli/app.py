@@ -83,7 +83,7 @@ DirectxOption = Annotated[bool, typer.Option("--directx", help="Write normals.pn
 FlattenOption = Annotated[
     Flatten | None,
     typer.Option(
-        help="Take one plane, or one quadratic surface, off the heights: what wrong or near lights bend a flat part to.",
+        help="Take one plane, or one quadratic surface, off the heights: so wrong or near lights bend flat parts.",
         show_default=False,
     ),
 ]

@@ -60,7 +60,8 @@ def small_image(capture: Capture, index: int) -> NDArray[np.float32]:
     """(h, w) linear light of one image, every so many pixels."""
     step = max(1, max(capture.mask.shape) // SIDE_PX)
     dark = None if capture.dark is None else capture.dark[::step, ::step]
-    return linear_values(capture, capture.images[index : index + 1, ::step, ::step], dark)[0]
+    light: NDArray[np.float32] = linear_values(capture, capture.images[index : index + 1, ::step, ::step], dark)[0]
+    return light
 
 
 def _white(image: NDArray[np.floating]) -> float:
