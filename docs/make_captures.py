@@ -56,8 +56,9 @@ def _figures(rows: list[dict[str, Any]]) -> list[str]:
         "Exit code of `bgars check`: 0 without an error, 1 with one, 2 where the capture cannot be read.",
         "",
         f"Of {len(faulty)} captures with one fault each {found} are found ({found / len(faulty):.0%}) and {named} are",
-        f"given the right cause first ({named / len(faulty):.0%}); {alarms} of {len(good)} good captures get a warning or",
-        "an error. Simulated arrays and reliefs, and rendered parts, each also turned; thresholds were chosen on others",
+        f"given the right cause first ({named / len(faulty):.0%}); {alarms} of {len(good)} good captures get a warning",
+        "or an error. Simulated arrays and reliefs, and rendered parts, each also turned; thresholds were chosen on",
+        "others, but the severities of noise, clipping and vignetting after a look at these parts",
         "(`make check-faults`). Three faults are only put where anything shows them: ambient light and a half turn of",
         "the table where there are cast shadows, a camera curve where there is matt relief.",
     ]

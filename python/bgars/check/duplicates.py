@@ -18,6 +18,8 @@ __all__ = ["alike_images", "check_duplicates"]
 
 SAME_LIGHT = 0.02
 """Share of the usual difference between two lights (variance) that is left between two images under one light."""
+OF_EXPECTED = 0.1
+"""Share, at most, of what two lights so far apart make differ: lights of a dense dome are alike anyway."""
 APART = 0.2
 """Distance of two directions, of unit vectors, from which on their images differ: 12 degrees."""
 SHADED = 0.02
@@ -45,7 +47,11 @@ def alike_images(view: View) -> list[tuple[int, int]]:
     usual = float(np.median(list(differs.values())))
     if usual < SHADED**2:
         return []
-    return [pair for pair in far if differs[pair] < SAME_LIGHT * usual]
+    # What a matt part shows differs as the square of the distance of two lights.
+    apart = {pair: float(np.square(view.lights[pair[0]] - view.lights[pair[1]]).sum()) for pair in far}
+    typical = float(np.median(list(apart.values())))
+    limit = {pair: usual * min(SAME_LIGHT, OF_EXPECTED * apart[pair] / typical) for pair in far}
+    return [pair for pair in far if differs[pair] < limit[pair]]
 
 
 def check_duplicates(capture: Capture, view: View) -> list[Finding]:

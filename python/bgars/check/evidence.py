@@ -12,7 +12,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FALSE_ALARMS", "critical_t", "odd_one_out", "paired_t"]
+__all__ = ["FALSE_ALARMS", "critical_t", "paired_t"]
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ def critical_t(witnesses: float, tests: int = 1) -> float:
     Examples
     --------
     >>> round(critical_t(1e9), 2), round(critical_t(30), 2)
-    (3.09, 3.38)
+    (3.09, 3.39)
     """
     freedom = max(witnesses - 1.0, 3.0)
     z = NormalDist().inv_cdf(1.0 - FALSE_ALARMS / max(tests, 1))
@@ -60,20 +60,3 @@ def paired_t(difference: Array, weight: Array) -> tuple[float, float]:
         return 0.0, count
     variance = float((share**2 * (difference - mean) ** 2).sum()) * count / (count - 1.0)
     return (mean / variance**0.5 if variance > 0.0 else float(np.sign(mean)) * 1e9), count
-
-
-def odd_one_out(values: Array) -> Array:
-    """(L,) each value's distance from the median of the others, over their robust standard deviation.
-
-    Examples
-    --------
-    >>> odd_one_out(np.array([1.0, 1.1, 0.9, 1.0, 3.0])).round(1).tolist()[-1]
-    26.7
-    """
-    distance = np.zeros(len(values))
-    for index in range(len(values)):
-        others = np.delete(values, index)
-        middle = float(np.median(others))
-        spread = 1.4826 * float(np.median(np.abs(others - middle)))
-        distance[index] = abs(values[index] - middle) / max(spread, 1e-12)
-    return distance
