@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral simulator experiments method schema constants studies performance bench instructions clean
+.PHONY: demo test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral simulator experiments method check-faults schema constants studies performance bench instructions clean
 
 demo: $(VENV)/.run-time ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
@@ -65,6 +65,9 @@ method: $(VENV)/.installed ## Draw the pictures of docs/reflectance.md and one o
 
 studies: $(VENV)/.installed ## Run the gauge studies of docs/studies.md again (15 minutes)
 	$(BIN)/python docs/make_studies.py
+
+check-faults: data $(VENV)/.installed ## Judge bgars check on captures with one fault each, rewrite the gallery of docs/captures.md (5 minutes; needs BGARS_DATA)
+	$(BIN)/python docs/make_captures.py
 
 schema: $(VENV)/.installed ## Write docs/result.schema.json, the JSON Schema of result.json, again
 	$(BIN)/python docs/make_result_schema.py

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from bgars.flatten import Bow, Flatten, find_bow, flattened
 from bgars.integrate import Difference, integrate_normals
 from bgars.mesh import check_faces, mesh_from_height, mesh_size
+from bgars.noise_floor import without_background
 from bgars.normals import DEFAULT_METHOD, Method, estimate_normals
 
 if TYPE_CHECKING:
@@ -36,11 +38,14 @@ class Reconstruction:
     height : HeightMap
     mesh : trimesh.Trimesh
         Made when it is first asked for; :func:`bgars.write_mesh` writes PLY and OBJ from `height` and `field` alone.
+    bow : Bow or None
+        A bow of the whole part that may be the lights' doing (before it was taken off).
     """
 
     capture: Capture
     field: NormalField
     height: HeightMap
+    bow: Bow | None = None
 
     @cached_property
     def mesh(self) -> trimesh.Trimesh:
@@ -56,7 +61,7 @@ class Reconstruction:
             "image_size_px": [int(self.capture.images.shape[2]), int(self.capture.images.shape[1])],
             "pixel_pitch_um": self.capture.pixel_pitch_um,
             "normals": summarise_field(self.field),
-            "height": self.height.summary(),
+            "height": {**self.height.summary(), "bow": None if self.bow is None else str(self.bow)},
             "mesh": {"vertices": vertices, "faces": faces},
         }
 
@@ -95,6 +100,7 @@ def reconstruct(
     material: SurfaceMaterial | None = None,
     difference: Difference = "trapezoid",
     weights: Literal["confidence"] | None = None,
+    flatten: Flatten | None = None,
     threads: int | None = None,
     progress: Callable[[Stage, float], object] | None = None,
 ) -> Reconstruction:
@@ -108,6 +114,8 @@ def reconstruct(
         See :func:`bgars.estimate_normals`.
     difference, weights
         See :func:`bgars.integrate_normals`.
+    flatten : {"plane", "quadratic"}, optional
+        Take one plane, or one quadratic surface, off all heights: what near or wrong lights bend a flat part to.
     threads : int, optional
         Most threads to work on; see :func:`bgars.estimate_normals`.
     progress : callable, optional
@@ -141,6 +149,7 @@ def reconstruct(
         threads=threads,
         progress=lambda fraction: report("normals", fraction),
     )
+    field = without_background(field, capture)
     report("normals", 1.0)
     height = integrate_normals(
         field,
@@ -150,8 +159,11 @@ def reconstruct(
         progress=lambda _, residual: report("height", solver_fraction(residual)),
     )
     report("height", 1.0)
+    bow = find_bow(height) if flatten != "quadratic" else None
+    if flatten is not None:
+        height = flattened(height, flatten)
     check_faces(*mesh_size(height))
-    return Reconstruction(capture, field, height)
+    return Reconstruction(capture, field, height, bow)
 
 
 def solver_fraction(residual: float, tolerance: float = 1e-8) -> float:

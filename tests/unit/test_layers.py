@@ -28,14 +28,14 @@ RECORDS = {
 }
 BASE = {
     **{"errors": 0, "version": 0, "extras": 0, "shown": 0.5, "normal_methods": 0, "large_arrays": 0},
-    **{"bit_depth": 0, "safe_files": 0.5, "mat_files": 0},
+    **{"bit_depth": 0, "safe_files": 0.5, "mat_files": 0, "same_images": 3.2, "noise_floor": 3.5, "flatten": 3.5},
     **{"light_names": 1, "light_formats": 1.2, "light_files": 1.5, "rig": 2, "scalar_checks": 1},
     **RECORDS,
 }
 STAGES = dict.fromkeys(
-    ("io", "pixelwise", "shape_images", "reflectance", "integrate", "mesh", "balls", "inspection"), 4
+    ("io", "pixelwise", "shape_images", "reflectance", "integrate", "mesh", "balls", "inspection", "checks"), 4
 )
-PIPELINES = ("calibrate", "pipeline", "evaluate", "part_anchors", "recipes", "cfx")
+PIPELINES = ("check_pipeline", "calibrate", "pipeline", "evaluate", "part_anchors", "recipes", "cfx")
 JOINED = {"normals": 4.5, **dict.fromkeys(PIPELINES, 5), "part_surface": 5.2, "inspection_pipeline": 5.4}
 LATER = {**JOINED, "batch": 6, "report": 6, "studies": 6.5, "experiments": 6, "samples": 0, "cli": 7}
 LEVEL = {**BASE, **STAGES, **LATER, "simulate": 4}

@@ -24,7 +24,7 @@ from bgars.cli.console import (
 )
 from bgars.cli.evaluation import choice_in_words, evaluation_table
 from bgars.cli.lazy import LazyGroup
-from bgars.cli.options import MethodOption
+from bgars.cli.options import ForceOption, MethodOption
 from bgars.errors import BgarsError
 from bgars.extras import EXTRA_OF, how_to_install
 from bgars.normal_methods import DEFAULT_METHOD, METHODS, Method
@@ -79,6 +79,13 @@ ChannelChoice = Annotated[
     typer.Option(help="How colour becomes one value (linear); the recipe's choice by default.", show_default=False),
 ]
 DirectxOption = Annotated[bool, typer.Option("--directx", help="Write normals.png with green = y down.")]
+FlattenOption = Annotated[
+    Literal["plane", "quadratic"] | None,
+    typer.Option(
+        help="Take one plane, or one quadratic surface, off the heights: so wrong or near lights bend flat parts.",
+        show_default=False,
+    ),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")]
 
 
@@ -108,7 +115,9 @@ def demo(
 ) -> None:
     """Reconstruct the sample solder ball that comes with bgars."""
     folder = bgars.sample_capture()
-    summary, files = _reconstruct_to(folder, output, bgars.reconstruct, mesh_format="ply", directx=False)
+    summary, files = _reconstruct_to(
+        bgars.read_capture(folder), output, bgars.reconstruct, mesh_format="ply", directx=False
+    )
     scores = {
         name: bgars.evaluate(bgars.read_capture(folder), method=name).to_dict()["normals"]
         for name in ("lambertian", DEFAULT_METHOD)
@@ -140,21 +149,30 @@ def reconstruct(
     material: MaterialOption = None,
     channel: ChannelChoice = None,
     mesh_format: Annotated[Literal["ply", "obj", "stl", "glb"], typer.Option(help="Format of the mesh file.")] = "ply",
+    flatten: FlattenOption = None,
     directx: DirectxOption = False,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Turn a folder of photographs into normals, a height map, a mesh and an overview picture.
 
     Writes overview.png, normals.png (16 bit), height.tif and height.npy (float32, um when the pixel pitch is known),
     mesh.ply and summary.json; files that an earlier run left in OUT are replaced. The height of one part above another
-    that it does not touch, such as a ball above its board, is not measured.
+    that it does not touch, such as a ball above its board, is not measured. The capture is checked first ('bgars
+    check'): where its lights and images do not fit, nothing is written (exit code 2) unless --force says so.
     """
+    from bgars.cli.first_check import check_first  # noqa: PLC0415 - loaded when it runs
 
     def run(capture: bgars.Capture, **options: Any) -> bgars.Reconstruction:  # noqa: ANN401
         surface = _material_from(material, capture)
-        return bgars.reconstruct(capture, method=method, threshold=threshold, material=surface, **options)
+        return bgars.reconstruct(
+            capture, method=method, threshold=threshold, material=surface, flatten=flatten, **options
+        )
 
-    summary, files = _reconstruct_to(folder, output, run, channel=channel, mesh_format=mesh_format, directx=directx)
+    capture = bgars.read_capture(folder, channel=channel)
+    findings = check_first(capture, force=force)
+    summary, files = _reconstruct_to(capture, output, run, mesh_format=mesh_format, directx=directx)
+    summary |= findings.to_dict()
     if as_json:
         print_json(summary)
         return
@@ -168,6 +186,8 @@ def reconstruct(
         f"{parts} connected part{'' if parts == 1 else 's'}, {height['iterations']} solver iterations."
     )
     say(method_line)
+    if height["bow"] is not None:
+        say(f"doubt: {height['bow']}")
     _list_files(output, files)
 
 
@@ -180,12 +200,20 @@ def normals(
     material: MaterialOption = None,
     channel: ChannelChoice = None,
     directx: DirectxOption = False,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Estimate the normals only: normals.png (16 bit), albedo.tif, confidence.tif, measured.png, lights_kept.png."""
-    from bgars.cli.outputs import write_normals  # noqa: PLC0415 - loaded when it runs
+    """Estimate the normals only: normals.png (16 bit), albedo.tif, confidence.tif, measured.png, lights_kept.png.
+
+    The capture is checked first ('bgars check'): where its lights and images do not fit, nothing is written (exit code
+    2) unless --force says so. Black background is not measured.
+    """
+    from bgars.cli.first_check import check_first  # noqa: PLC0415 - loaded when it runs
+    from bgars.cli.outputs import write_normals  # noqa: PLC0415
+    from bgars.noise_floor import without_background  # noqa: PLC0415
 
     capture = bgars.read_capture(folder, channel=channel)
+    findings = check_first(capture, force=force)
     surface = _material_from(material, capture)
     with stage_progress() as report:
         field = bgars.estimate_normals(
@@ -195,9 +223,10 @@ def normals(
             material=surface,
             progress=lambda fraction: report("normals", fraction),
         )
+    field = without_background(field, capture)
     summary, files = write_normals(field, output, directx=directx)
     if as_json:
-        print_json({"capture": capture.name, **summary})
+        print_json({"capture": capture.name, **summary, **findings.to_dict()})
         return
     trust, _, method_line = choice_in_words(summary).partition("\n")
     say(f"{capture.name}: {trust}")
@@ -288,19 +317,18 @@ def main() -> None:
 
 
 def _reconstruct_to(
-    folder: Path,
+    capture: bgars.Capture,
     output: Path,
     run: Callable[..., bgars.Reconstruction],
     *,
     mesh_format: str,
     directx: bool,
-    channel: ChannelOption | None = None,
 ) -> tuple[dict[str, Any], dict[str, str]]:
     from bgars.cli.outputs import write_reconstruction  # noqa: PLC0415 - loaded when it runs
 
     with stage_progress() as report:
         return write_reconstruction(
-            lambda: run(bgars.read_capture(folder, channel=channel), progress=report),
+            lambda: run(capture, progress=report),
             output,
             mesh_format=mesh_format,
             directx=directx,

@@ -12,7 +12,8 @@ import typer
 
 import bgars
 from bgars.cli.console import print_json, say, say_files, stage_progress, utc_now, warn
-from bgars.cli.options import MethodOption
+from bgars.cli.first_check import check_first
+from bgars.cli.options import ForceOption, MethodOption
 from bgars.errors import InputError
 from bgars.extras import how_to_install, missing
 from bgars.io.atomic import FolderNames, atomic_folder
@@ -85,6 +86,7 @@ def inspect(
     page: Annotated[
         bool, typer.Option("--report/--no-report", help="Write report.html and what belongs to it.")
     ] = True,
+    force: ForceOption = False,
     log_line: Annotated[
         bool, typer.Option("--log", help="Print one line of key=value pairs for a log instead of text.")
     ] = False,
@@ -96,6 +98,8 @@ def inspect(
 
     Writes report.html, which is the page to look at first, result.json, balls.csv and four pictures. Files that an
     earlier inspection left in OUT are removed before FOLDER is read: where it cannot be measured, no verdict is left.
+
+    The capture is checked first ('bgars check'): where its lights and images do not fit, there is no verdict.
 
     Exit code 0: the part passes. 1: it fails, or is undecided because something is too near its limit, was not
     measured, or has no limit; the output says which. 2: wrong use, a bad recipe, or a capture that cannot be measured.
@@ -114,6 +118,7 @@ def inspect(
     with stage_progress() as report, atomic_folder(output, NAMES) as place:
         part = None if recipe is None else bgars.read_part_recipe(recipe)
         capture = bgars.read_capture(folder)
+        check_first(capture, force=force)
         result = bgars.inspect(capture, part, method=method, surface=page, progress=report)
         result = replace(result, serial=serial, inspected_utc=utc_now())
         files = dict(FILES)

@@ -11,6 +11,7 @@ from typer.core import TyperCommand, TyperGroup
 __all__ = ["LAZY_COMMANDS", "LazyGroup"]
 
 LAZY_COMMANDS = {
+    "check": ("bgars.cli.check", "Say whether images and lights belong together, before any number."),
     "mesh": ("bgars.cli.mesh", "Turn a normal map or a height map into a mesh."),
     "inspect": ("bgars.cli.inspect", "Find, measure and judge the solder balls of a part."),
     "report": ("bgars.cli.report", "Write the page of an inspection again, from its result.json."),

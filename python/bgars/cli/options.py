@@ -8,7 +8,7 @@ import typer
 
 from bgars.normal_methods import Method
 
-__all__ = ["MethodOption"]
+__all__ = ["ForceOption", "MethodOption"]
 
 METHOD_HELP = (
     "reflectance: on balls, highlights included, by the material that is fitted on them, elsewhere robust-filter; "
@@ -20,3 +20,10 @@ METHOD_HELP = (
     "than 5 lights robust-filter."
 )
 MethodOption = Annotated[Method, typer.Option("--method", "-m", help=METHOD_HELP)]
+ForceOption = Annotated[
+    bool,
+    typer.Option(
+        "--force",
+        help="Go on though the images do not fit the lights (order, mirrored, below the surface, an image twice).",
+    ),
+]

@@ -14,6 +14,7 @@ from bgars.inspection.in_view import fitting_stretches
 from bgars.inspection.shadow_model import Balls, Lights
 from bgars.inspection.start import edge_steps
 from bgars.light_names import light_name, numbered
+from bgars.same_images import same_images
 
 if TYPE_CHECKING:
     from bgars.inspection.problem import Problem
@@ -29,7 +30,6 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-SAMPLE = 50_000
 GOOD_STEP = 0.5
 """Mean step of brightness over predicted edges, relative to the board, that needs no explanation."""
 MUCH_BETTER = 0.2  # of the same: what another explanation must gain
@@ -53,17 +53,12 @@ LOWEST_DEG, HIGHEST_DEG = 5.0, 88.0  # elevations within which lights are looked
 
 def refuse_repeated(capture: Capture) -> None:
     """Raise InputError where two images are the same, unless both are empty."""
-    stack = capture.images.reshape(len(capture.images), -1)
-    step = max(1, stack.shape[1] // SAMPLE)
-    sample = stack[:, ::step]
-    names = [path.name for path in capture.files] or [light_name(index, what="image") for index in range(len(stack))]
-    for second in range(1, len(stack)):
-        if sample[second].min() == sample[second].max():
-            continue
-        for first in range(second):
-            if np.array_equal(sample[first], sample[second]) and np.array_equal(stack[first], stack[second]):
-                msg = f"images: {names[first]} and {names[second]} are the same picture; each light needs its own"
-                raise InputError(msg)
+    same = same_images(capture.images)
+    if same is not None:
+        files = [path.name for path in capture.files]
+        first, second = (files[each] if files else light_name(each, what="image") for each in same)
+        msg = f"images: {first} and {second} are the same picture; each light needs its own"
+        raise InputError(msg)
 
 
 class Complaint(NamedTuple):

@@ -1,0 +1,1 @@
+"""Whether a capture shows what its description says, before any number is made of it."""

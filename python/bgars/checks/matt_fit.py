@@ -1,0 +1,65 @@
+"""Slopes of the small copy by least squares over the lights that show a matt surface: neither shadow nor highlight."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from bgars.checks.view import View
+
+__all__ = ["MIN_LIGHTS", "STEEP", "MattFit", "fit_normals", "matt_lights"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+SHADOWED = 0.15
+"""Of the pixel's median: darker than this under a light is taken as shadow, where no light is linear."""
+DROPPED = 4
+"""One light in so many, the brightest ones, is left out: highlights are bright. From `DROPS_FROM` lights on."""
+DROPS_FROM = 6
+MIN_LIGHTS = 4
+"""Lights of a pixel that takes part: one more than there are unknowns."""
+COPLANAR = 1e-5
+"""Determinant of the mean product of directions below which they lie in one plane, to about 5 degrees."""
+STEEP = 4.0
+"""Largest slope: 76 degrees."""
+
+
+class MattFit(NamedTuple):
+    """Normals times albedo (3, N), what is left over (L, N) relative to the mean, whether solved (N,)."""
+
+    normal: Array
+    left: Array
+    solved: Mask
+
+
+def matt_lights(view: View) -> Mask:
+    """(L, h, w) lights that show the matt part of a pixel."""
+    values = view.values
+    median = np.median(values, axis=0)
+    keep: Mask = (values > SHADOWED * median) & ~view.clipped & view.use
+    if len(values) >= DROPS_FROM:
+        last = len(values) - len(values) // DROPPED
+        limit = np.partition(values, last - 1, axis=0)[last - 1]
+        keep &= values <= limit
+    return keep
+
+
+def fit_normals(values: Array, keep: Mask, lights: Array) -> MattFit:
+    """Least squares of (L, N) values under (L, 3) lights, over the lights to keep; what is left over is 0 elsewhere."""
+    weight = keep.astype(np.float64)
+    products = (lights[:, :, None] * lights[:, None, :]).reshape(len(lights), 9)
+    normal_matrix = (weight.T @ products).reshape(-1, 3, 3)
+    right = (weight * values).T @ lights
+    number = weight.sum(axis=0)
+    scale = np.maximum(number, 1.0)[:, None, None]
+    determinant = np.linalg.det(normal_matrix / scale)
+    solved: Mask = (number >= MIN_LIGHTS) & (determinant > COPLANAR)
+    normal_matrix[~solved] = np.eye(3)
+    normal = np.linalg.solve(normal_matrix, right[..., None])[..., 0].T
+    mean = (weight * values).sum(axis=0) / np.maximum(number, 1.0)
+    left = weight * solved * (values - lights @ normal) / np.maximum(mean, 1e-9)
+    return MattFit(np.asarray(normal, np.float64), left, solved)

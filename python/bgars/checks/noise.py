@@ -1,0 +1,60 @@
+"""Noise, of one image against the rest and of all."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bgars.checks.records import Finding
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from bgars.checks.windows import FrameFit
+
+__all__ = ["check_noise"]
+
+NOISIER = 1.8
+"""Ratio of one image's noise to the others': three times their variance."""
+LEAST = 0.6 / 255.0
+"""Noise below that of rounding to 8 bits, twice, is none."""
+NOISY, VERY_NOISY = 0.06, 0.12
+"""Noise over signal at which normals of single pixels are off by 3 and by 6 degrees under eight lights: the standard
+error of the normals says the first, too, so that it is a note."""
+
+
+def check_noise(fit: FrameFit, level: float, names: Sequence[str]) -> list[Finding]:
+    """Find noise."""
+    if len(names) < 5 or not fit.noise.any():  # noqa: PLR2004 - three images leave nothing over
+        return []
+    index = int(np.argmax(fit.noise))
+    usual = float(np.median(np.delete(fit.noise, index)))
+    value = float(fit.noise[index])
+    if value > NOISIER * max(usual, LEAST):
+        return [
+            Finding(
+                "noise",
+                "warning",
+                f"{names[index]} has {value / max(usual, LEAST / 2):.1f} times the noise of the others",
+                "look for another gain or exposure of this image, or for interference, and take it again",
+                image=index,
+                value=value / max(usual, LEAST / 2),
+                limit=NOISIER,
+                unit="times",
+            )
+        ]
+    share = usual / max(level, 1e-9)
+    if share > NOISY:
+        return [
+            Finding(
+                "noise",
+                "warning" if share > VERY_NOISY else "note",
+                f"the images are noisy: {share:.0%} of the signal",
+                "expose longer at lower gain, or average several images under each light",
+                value=share,
+                limit=NOISY,
+                unit="of the signal",
+            )
+        ]
+    return []

@@ -1,0 +1,125 @@
+"""All checks of a capture, in the order in which one fault hides the next."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bgars.checks.ambient import check_ambient
+from bgars.checks.below_surface import check_below, raised
+from bgars.checks.bit_depth import check_bit_depth
+from bgars.checks.duplicates import check_duplicates
+from bgars.checks.exposure import check_clipped, check_dark, dead_lamps
+from bgars.checks.focus import check_focus
+from bgars.checks.gains import check_gains
+from bgars.checks.half_lit import check_half_lit
+from bgars.checks.moments import lit_everywhere, moments_by
+from bgars.checks.motion import check_motion
+from bgars.checks.noise import check_noise
+from bgars.checks.orientation import check_orientation
+from bgars.checks.records import Finding, Findings
+from bgars.checks.response import check_response
+from bgars.checks.table import check_table
+from bgars.checks.view import TILES, make_view
+from bgars.checks.vignetting import check_vignetting
+from bgars.checks.windows import cut_windows, fit_frames
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bgars.checks.view import View
+    from bgars.records import Capture
+
+__all__ = ["check_capture"]
+
+FEW_LIT = 200
+"""Pixels of the small copy, lit and matt, below which single images are not judged."""
+
+
+def check_capture(capture: Capture) -> Findings:
+    """Check a capture before any number is made of it.
+
+    A reduced copy is looked at (and three windows at full resolution), so that it costs little.
+
+    Parameters
+    ----------
+    capture : Capture
+
+    Returns
+    -------
+    Findings
+        The worst first. A capture without evidence (a flat, evenly lit field) has no findings on what it cannot show.
+    """
+    view = make_view(capture)
+    inside = view.values.max(axis=0) > 0.0
+    below = check_below(view)
+    view = view.with_lights(raised(view.lights))
+    found = below + dead_lamps(view, inside) + check_bit_depth(capture)
+    found += check_dark(view, inside) + check_clipped(view, inside)
+    gone = [each.image for each in found if each.kind == "lamp-dead" and each.image is not None]
+    found += _between(capture, view, gone)
+    return Findings.of([_with_file(each, capture) for each in found])
+
+
+def _with_file(finding: Finding, capture: Capture) -> Finding:
+    if finding.image is None or finding.image >= len(capture.files):
+        return finding
+    return replace(finding, file=capture.files[finding.image].name)
+
+
+def _between(capture: Capture, view: View, gone: list[int]) -> list[Finding]:
+    """Checks of images against each other; images without light are left out."""
+    alike = check_duplicates(capture, view)
+    turned = check_orientation(view)
+    if alike or turned:
+        return alike + turned
+    kept = np.setdiff1d(np.arange(len(view.lights)), gone)
+    for index in sorted(gone, reverse=True):
+        view = view.without(index)
+    if len(kept) < 4:  # noqa: PLR2004 - three images fit any surface
+        return []
+    found, lights = check_table(view)
+    # A frame that is lit in part upsets all that follows, as it does the comparison of tables.
+    halves = check_half_lit(view)
+    if halves:
+        return _renumbered(halves + [each for each in found if each.kind != "order"], kept)
+    found += _single(capture, view, lights, kept)
+    return _renumbered(found, kept)
+
+
+def _single(capture: Capture, view: View, lights: NDArray[np.float64], kept: NDArray[np.intp]) -> list[Finding]:
+    """Checks of single images under the right table."""
+    lit = lit_everywhere(view, lights)
+    found = check_ambient(view, lights) + check_vignetting(view, lit)
+    if int(lit.sum()) < FEW_LIT:
+        return found
+    bent = check_response(capture, view, lit_everywhere(view, lights, matt=False), lights)
+    found += bent
+    if any(each.severity != "note" for each in bent):
+        return found
+    uneven, factors = check_gains(view, moments_by(view, lit, view.tiles, TILES * TILES), lights)
+    lights = lights * factors[:, None]
+    found += uneven
+    windows = cut_windows(capture, view)
+    if windows is None or len(kept) != len(capture.rig):
+        return found
+    fit = fit_frames(windows, lights)
+    if fit is None:
+        return found
+    moved = check_motion(fit, lights, view.names)
+    blurred = check_focus(fit, view.names)
+    # A shifted image looks blurred, and the other way round; a blurred one less noisy: the clearer cause is told.
+    if moved and blurred and _excess(blurred[0]) > _excess(moved[0]):
+        moved = []
+    return found + (moved or blurred or check_noise(fit, windows.level, view.names))
+
+
+def _excess(finding: Finding) -> float:
+    return (finding.value or 0.0) / (finding.limit or 1.0)
+
+
+def _renumbered(found: list[Finding], kept: NDArray[np.intp]) -> list[Finding]:
+    """Findings with the images' numbers in the capture."""
+    return [each if each.image is None else replace(each, image=int(kept[each.image])) for each in found]

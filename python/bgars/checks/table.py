@@ -1,0 +1,61 @@
+"""Order and handedness of the lights, in words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bgars.checks.cast_shadows import judge_shadows
+from bgars.checks.geometry import judge_table
+from bgars.checks.records import Finding
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bgars.checks.view import View
+
+__all__ = ["check_table"]
+
+HALF_TURN = (
+    "cast shadows fall towards the lights: every light stands on the other side (x and y have the wrong sign, the "
+    "directions point from the light to the surface, the images are shifted by half the ring, or upside down)"
+)
+HALF_TURN_ADVICE = "change the sign of x and y in the table of lights, or turn the images by 180 degrees"
+
+
+def check_table(view: View) -> tuple[list[Finding], NDArray[np.float64]]:
+    """Compare the table of lights with what the images show.
+
+    Parameters
+    ----------
+    view : View
+        Its lights stand above the surface.
+
+    Returns
+    -------
+    findings : list of Finding
+    lights : (L, 3) float64
+        The table that the images were taken under, as far as they tell.
+    """
+    verdict = judge_table(view)
+    lights = view.lights if verdict.better is None else verdict.better.lights
+    shadows = judge_shadows(view.with_lights(lights))
+    findings = []
+    if verdict.better is not None:
+        text = verdict.better.told + (", and all by half a turn besides" if shadows.turned else "")
+        findings.append(
+            Finding(
+                verdict.better.kind,
+                "error",
+                f"{text} (t = {min(verdict.t, 999.0):.0f} over {verdict.tiles:.0f} parts of the image)",
+                verdict.better.advice,
+                value=min(verdict.t, 999.0),
+                unit="t",
+            )
+        )
+    elif shadows.turned:
+        findings.append(Finding("order", "error", HALF_TURN, HALF_TURN_ADVICE, value=min(shadows.t, 999.0), unit="t"))
+    if shadows.turned:
+        lights = lights * np.array([-1.0, -1.0, 1.0])
+    return findings, lights

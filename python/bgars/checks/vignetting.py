@@ -1,0 +1,77 @@
+"""Corners darker than the middle in every image alike."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bgars.checks.evidence import critical_t
+from bgars.checks.records import Finding
+from bgars.checks.view import TILES
+
+if TYPE_CHECKING:
+    from bgars.checks.view import View
+
+__all__ = ["check_vignetting", "corner_loss"]
+
+Mask = NDArray[np.bool_]
+
+LOSS, MUCH = 0.20, 0.35
+"""Light lost in the corners that is noted, and that costs signal; a factor common to all images bends no normal."""
+ROUND = 2.0
+"""How much more the loss goes with the distance from the middle than with any other second-order shape."""
+COVERED = 0.7
+"""Share of the tiles that must hold level, lit surface: a dark background is no vignetting."""
+
+
+def corner_loss(view: View, lit: Mask) -> tuple[float, float, bool]:
+    """Share of light lost in the corners, Student's t of it, and whether the loss is round."""
+    mean = view.mean
+    tiles = view.tiles
+    level = np.full(TILES * TILES, np.nan)
+    for tile in range(TILES * TILES):
+        inside = lit & (tiles == tile)
+        if inside.sum() >= 8:  # noqa: PLR2004 - a handful of pixels
+            level[tile] = np.log(max(float(np.median(mean[inside])), 1e-6))
+    known = np.isfinite(level)
+    if known.mean() < COVERED:
+        return 0.0, 0.0, False
+    rows, cols = view.values.shape[1:]
+    half = np.hypot(rows, cols) / 2.0
+    down, across = np.divmod(np.arange(TILES * TILES), TILES)
+    x = ((across + 0.5) / TILES - 0.5) * cols / half
+    y = ((down + 0.5) / TILES - 0.5) * rows / half
+    design = np.column_stack([np.ones_like(x), x, y, x**2 + y**2, x**2 - y**2, 2.0 * x * y])[known]
+    target = level[known]
+    weight = np.ones(len(target))
+    for _ in range(5):
+        normal = design.T @ (weight[:, None] * design)
+        solution = np.linalg.solve(normal, design.T @ (weight * target))
+        left = target - design @ solution
+        scale = 1.4826 * float(np.median(np.abs(left))) + 1e-6
+        weight = 1.0 / (1.0 + (left / (2.0 * scale)) ** 2)
+    error = float(np.sqrt(np.linalg.inv(normal)[3, 3] * (weight * left**2).sum() / max(weight.sum() - 6.0, 1.0)))
+    round_loss = -float(solution[3])
+    is_round = round_loss > ROUND * float(np.hypot(solution[4], solution[5]))
+    return 1.0 - float(np.exp(-max(round_loss, 0.0))), round_loss / max(error, 1e-9), bool(is_round)
+
+
+def check_vignetting(view: View, lit: Mask) -> list[Finding]:
+    """Find a lens, or lamps, that light the corners less."""
+    loss, t, is_round = corner_loss(view, lit)
+    if loss < LOSS or not is_round or t < critical_t(TILES * TILES):
+        return []
+    return [
+        Finding(
+            "vignetting",
+            "warning" if loss > MUCH else "note",
+            f"every image loses {loss:.0%} of its light towards the corners",
+            "take a flat field (a white card under all lamps) and divide by it, stop the lens down, or keep the part "
+            "in the middle",
+            value=loss,
+            limit=LOSS,
+            unit="of the light",
+        )
+    ]

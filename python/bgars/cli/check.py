@@ -1,0 +1,90 @@
+"""The command ``bgars check``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+import bgars
+from bgars.cli.console import print_json, say
+from bgars.io.atomic import atomic_file
+from bgars.io.given_paths import need_folder
+from bgars.report.check_page import check_page
+
+if TYPE_CHECKING:
+    from bgars.checks.records import Findings
+
+__all__ = ["EXIT_WRONG", "register"]
+
+EXIT_WRONG = 1
+PAGE_NAME = "check.html"
+PAGE_SUFFIXES = (".html", ".htm")
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("check")(check)
+
+
+def check(
+    folder: Annotated[
+        Path,
+        typer.Argument(metavar="FOLDER", help="Capture folder, as for bgars reconstruct.", show_default=False),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="PAGE",
+            help="Page with a picture for each finding: a file .html, or a folder that gets check.html.",
+            show_default=False,
+        ),
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
+    ] = False,
+) -> None:
+    """Say whether images and lights belong together, and what else is wrong with a capture, before any number.
+
+    Order and handedness of the lights, lights below the surface, the same image twice, dead and uneven lamps, exposure,
+    frames lit in part, ambient light, vignetting, motion, focus, noise, response, bit depth. What a capture cannot show
+    (a flat part has no shading) is not said.
+
+    Exit code 0: no error was found (there may be warnings). 1: an error was found: numbers from this capture would be
+    wrong. 2: wrong use, or a capture that cannot be read.
+    """
+    need_folder(folder)
+    capture = bgars.read_capture(folder)
+    findings = bgars.check(capture)
+    page = None if output is None else _page_path(output)
+    if page is not None:
+        page.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_file(page) as temporary:
+            temporary.write_text(check_page(capture, findings), encoding="utf-8")
+    if as_json:
+        print_json({"capture": capture.name, **findings.to_dict()})
+    else:
+        _tell(capture.name, findings)
+        if page is not None:
+            say()
+            say(f"  {page}  a picture for each finding")
+    if findings.errors:
+        raise typer.Exit(EXIT_WRONG)
+
+
+def _page_path(output: Path) -> Path:
+    return output if output.suffix.lower() in PAGE_SUFFIXES else output / PAGE_NAME
+
+
+def _tell(name: str, findings: Findings) -> None:
+    if not findings.findings:
+        say(f"{name}: nothing found")
+        return
+    errors, warnings = len(findings.errors), len(findings.told) - len(findings.errors)
+    say(f"{name}: {errors} error{'' if errors == 1 else 's'}, {warnings} warning{'' if warnings == 1 else 's'}")
+    for finding in findings:
+        say(f"{finding.severity}: {finding.kind}: {finding.message}")
+        say(f"  {finding.advice}")

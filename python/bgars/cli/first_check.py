@@ -1,0 +1,40 @@
+"""What every command says of a capture before any number."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bgars.check_pipeline import check, refuse_wrong_geometry
+from bgars.cli.console import error_console
+
+if TYPE_CHECKING:
+    from bgars.checks.records import Finding, Findings
+    from bgars.records import Capture
+
+__all__ = ["check_first", "warn"]
+
+WAY_OUT = "'bgars check' shows it; --force goes on all the same"
+
+
+def check_first(capture: Capture, *, force: bool) -> Findings:
+    """Check a capture, print warnings and errors, stop where every number would be wrong.
+
+    Raises
+    ------
+    InputError
+        Errors of geometry without `force`.
+    """
+    findings = check(capture)
+    if not force:
+        refuse_wrong_geometry(findings, capture.name, way_out=WAY_OUT)
+    for finding in findings.told:
+        warn(finding)
+    return findings
+
+
+def warn(finding: Finding) -> None:
+    """Print a finding on the error stream: one line."""
+    console = error_console()
+    style = "bold red" if finding.severity == "error" else "yellow"
+    console.print(f"{finding.severity}:", style=style, end=" ")
+    console.print(f"{finding.kind}: {finding.message}; {finding.advice}", markup=False)

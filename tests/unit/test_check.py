@@ -1,0 +1,210 @@
+"""Checks of captures: each fault found and named, good captures silent, commands that stop before a number."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import bgars
+import numpy as np
+import pytest
+from bgars.checks.evidence import critical_t, paired_t
+from bgars.checks.hypotheses import alternatives
+from bgars.flatten import find_bow, flattened
+from bgars.noise_floor import without_background
+from bgars.records import every_pixel
+from numpy.typing import NDArray
+
+
+@pytest.fixture(scope="module")
+def relief() -> bgars.Capture:
+    """A matt relief with texture and noise under a ring of eight lights."""
+    random = np.random.default_rng(3)
+    y, x = np.mgrid[:200, :240].astype(np.float64)
+    p = 0.5 * np.cos(x / 11.0) * np.cos(y / 17.0) + 0.2 * np.cos((x + y) / 8.0)
+    q = 0.5 * 11.0 / 17.0 * np.sin(x / 11.0) * np.sin(y / 17.0) - 0.2 * np.cos((x + y) / 8.0)
+    normal = np.stack([-p, -q, np.ones_like(p)]) / np.sqrt(1.0 + p**2 + q**2)
+    rig = bgars.LightRig.ring(8, elevation_deg=50.0)
+    texture = 0.55 + 0.12 * np.sin(x / 2.3) * np.cos(y / 3.1)
+    light = np.maximum(np.tensordot(rig.directions, normal, axes=(1, 0)), 0.0) * texture
+    images = np.clip(np.rint(255.0 * light + random.normal(0.0, 0.8, light.shape)), 0, 255).astype(np.uint8)
+    return bgars.Capture(images, rig, every_pixel((200, 240)), saturation=255.0)
+
+
+@pytest.fixture(scope="module")
+def balls() -> bgars.Capture:
+    """Shiny balls on a textured board."""
+    board = bgars.Board(texture=bgars.Texture(contrast=0.3, scale_um=150.0))
+    scene = bgars.Scene.ball_array(3, 3, board=board)
+    camera = bgars.Camera(full_well_e=15000.0, read_noise_levels=0.5, blur_px=0.7)
+    rig = bgars.LightRig.ring(8, elevation_deg=45.0)
+    return bgars.simulate(scene, rig, bgars.Material(i_d=0.3, i_s=0.5, hardness=25), camera, seed=2)[0]
+
+
+def with_lights(capture: bgars.Capture, directions: NDArray[np.float64]) -> bgars.Capture:
+    return replace(capture, rig=bgars.LightRig.from_directions(directions))
+
+
+def kinds(capture: bgars.Capture) -> list[str]:
+    return [finding.kind for finding in bgars.check(capture).told]
+
+
+def test_good_captures_are_silent(relief: bgars.Capture, balls: bgars.Capture) -> None:
+    assert kinds(relief) == []
+    assert kinds(balls) == []
+    assert repr(bgars.check(relief)) == "Findings(nothing found)"
+
+
+@pytest.mark.parametrize("name", ["relief", "balls"])
+@pytest.mark.parametrize(
+    ("change", "kind"),
+    [
+        (lambda lights: lights * [1, -1, 1], "handedness"),
+        (lambda lights: lights * [-1, 1, 1], "handedness"),
+        (lambda lights: np.roll(lights, 1, axis=0), "order"),
+        (lambda lights: lights[[3, 1, 2, 0, 4, 5, 6, 7]], "order"),
+        (lambda lights: lights * [1, 1, -1], "below-surface"),
+    ],
+    ids=["y down", "x mirrored", "shifted", "swapped", "z negative"],
+)
+def test_wrong_tables_are_named(name: str, change: object, kind: str, request: pytest.FixtureRequest) -> None:
+    capture: bgars.Capture = request.getfixturevalue(name)
+    findings = bgars.check(with_lights(capture, change(capture.rig.directions)))  # type: ignore[operator]
+    assert [each.kind for each in findings.geometry_errors] == [kind]
+
+
+def test_cast_shadows_tell_a_half_turn(balls: bgars.Capture) -> None:
+    assert kinds(with_lights(balls, balls.rig.directions * [-1, -1, 1])) == ["order"]
+
+
+def spoilt(capture: bgars.Capture, index: int, change: object) -> bgars.Capture:
+    levels = capture.images.astype(np.float64)
+    levels[index] = change(levels)  # type: ignore[operator]
+    return replace(capture, images=np.clip(np.rint(levels), 0, 255).astype(np.uint8))
+
+
+def moved(levels: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.roll(levels[5], 1, axis=1)
+
+
+def rows_of_the_next(levels: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.concatenate([levels[5, :90], levels[6, 90:]])
+
+
+def rows_dark(levels: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.concatenate([levels[5, :90], 0.6 * levels[5, 90:]])
+
+
+def noisy(levels: NDArray[np.float64]) -> NDArray[np.float64]:
+    return levels[5] + np.random.default_rng(0).normal(0.0, 8.0, levels[5].shape)
+
+
+@pytest.mark.parametrize(
+    ("change", "kind"),
+    [
+        (lambda levels: levels[6], "duplicate"),
+        (lambda levels: levels[6] + np.random.default_rng(0).normal(0.0, 1.0, levels[6].shape), "duplicate"),
+        (lambda levels: 0.0 * levels[5], "lamp-dead"),
+        (lambda levels: 0.7 * levels[5], "lamp-uneven"),
+        (lambda levels: levels[5, ::-1, ::-1], "orientation"),
+        (rows_dark, "half-lit"),
+        (rows_of_the_next, "half-lit"),
+        (moved, "motion"),
+        (noisy, "noise"),
+    ],
+    ids=["copy", "fired twice", "dead", "dim", "turned", "rows dark", "rows late", "moved", "noisy"],
+)
+def test_a_fault_of_one_image_is_named_with_its_image(relief: bgars.Capture, change: object, kind: str) -> None:
+    told = bgars.check(spoilt(relief, 5, change)).told
+    assert told[0].kind == kind
+    assert told[0].image in ({5, 6} if kind == "duplicate" else {5})
+
+
+def test_faults_of_all_images_are_named(relief: bgars.Capture, balls: bgars.Capture) -> None:
+    levels = relief.images / 255.0
+    assert kinds(replace(relief, images=np.rint(255.0 * levels ** (1 / 2.2)).astype(np.uint8))) == ["response"]
+    assert "dark" in kinds(replace(relief, images=np.rint(14.0 * levels).astype(np.uint8)))
+    assert "clipped" in kinds(replace(relief, images=np.clip(600.0 * levels, 0, 255).astype(np.uint8)))
+    bright = np.clip(balls.images + 0.3 * balls.images.max(axis=0), 0, 255).astype(np.uint8)
+    assert "ambient" in kinds(replace(balls, images=bright))
+
+
+def test_a_flat_field_is_no_evidence() -> None:
+    random = np.random.default_rng(0)
+    images = np.clip(np.rint(120.0 + random.normal(0.0, 1.0, (8, 100, 100))), 0, 255).astype(np.uint8)
+    rig = bgars.LightRig.ring(8)
+    for lights in (rig.directions, rig.directions * [1, -1, 1], rig.directions[::-1]):
+        capture = bgars.Capture(images, bgars.LightRig.from_directions(lights), every_pixel((100, 100)))
+        assert bgars.check(capture).errors == ()
+
+
+def test_a_lying_table_stops_commands(tmp_path: Path) -> None:
+    folder = tmp_path / "capture"
+    folder.mkdir()
+    source = Path(bgars.sample_capture())
+    for path in source.iterdir():
+        if path.is_file():
+            (folder / path.name).write_bytes(path.read_bytes())
+    lights = np.loadtxt(folder / "light_directions.txt")
+    np.savetxt(folder / "light_directions.txt", lights * [1, 1, -1])
+
+    def run(*words: object) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-m", "bgars", *map(str, words)], capture_output=True, text=True, check=False
+        )
+
+    checked = run("check", folder, "--json", "-o", tmp_path / "page.html")
+    assert checked.returncode == 1
+    found = json.loads(checked.stdout)["findings"]
+    assert (found[0]["kind"], found[0]["severity"]) == ("below-surface", "error")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "What to do" in page
+    assert "<script" not in page
+    stopped = run("normals", folder, "-o", tmp_path / "out")
+    assert stopped.returncode == 2
+    assert "below the surface" in stopped.stderr
+    assert not (tmp_path / "out").exists()
+    assert run("check", tmp_path / "nowhere").returncode == 2
+
+
+def test_tables_that_look_the_same_are_tried_once() -> None:
+    ring = bgars.LightRig.ring(8).directions
+    told = [each.told for each in alternatives(ring, [f"image {k}" for k in range(8)], [])]
+    # Of eight turns of a ring, half are a half turn away from another, and one is the given table; so with its mirrors.
+    assert len(told) == len(set(told)) == 6
+
+
+def test_the_t_test_keeps_its_rate_of_false_alarms() -> None:
+    random = np.random.default_rng(5)
+    alarms = 0
+    for _ in range(4000):
+        t, tiles = paired_t(random.normal(size=20), np.ones(20))
+        alarms += t > critical_t(tiles)
+    assert alarms <= 12
+
+
+def test_a_bow_is_said_and_taken_off() -> None:
+    y, x = np.mgrid[:300, :300].astype(np.float64) - 150.0
+    random = np.random.default_rng(1)
+    dome = bgars.HeightMap.from_array(-(x**2 + y**2) / 1500.0 + random.normal(0.0, 0.2, x.shape))
+    bow = find_bow(dome)
+    assert bow is not None
+    assert bow.height_px > 0
+    assert "--flatten quadratic" in str(bow)
+    flat = flattened(dome, "quadratic")
+    assert float(flat.height_px.std()) < 0.25
+    assert find_bow(flat) is None
+    sphere = bgars.HeightMap.from_array(np.sqrt(170.0**2 - np.minimum(x**2 + y**2, 160.0**2)))
+    assert find_bow(sphere) is None
+
+
+def test_black_background_is_not_measured(relief: bgars.Capture) -> None:
+    images = relief.images.copy()
+    images[:, :, :80] = np.random.default_rng(0).integers(0, 3, (8, 200, 80))
+    capture = replace(relief, images=images)
+    field = without_background(bgars.estimate_normals(capture, method="lambertian"), capture)
+    assert field.measured[:, :80].mean() < 0.05
+    assert field.measured[:, 82:].mean() > 0.99
