@@ -17,10 +17,12 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from PIL import Image
 
-__all__ = ["VERDICT_COLORS", "ShownCapture", "ShownField", "ShownHeight", "ShownPart"]
+__all__ = ["ABSENT", "VERDICT_COLORS", "ShownCapture", "ShownField", "ShownHeight", "ShownPart"]
 
 VERDICT_COLORS = {"pass": "#56B4E9", "fail": "#D55E00", "undecided": "#E69F00"}
 """Okabe and Ito, Color universal design, 2008: told apart by colour-blind readers."""
+ABSENT = {"fail": "missing", "undecided": "place not clear"}
+"""What a place without a ball is, by its verdict: seen to be empty, or not."""
 THUMBNAIL_PX = 320
 
 
@@ -186,13 +188,13 @@ class ShownPart(Shown):
 
     def _facts(self) -> dict[str, object]:
         part: Any = self
-        verdicts = [ball.verdict for ball in part.balls]
-        counts = [f"{verdicts.count(name)} {name}" for name in VERDICT_COLORS if name in verdicts]
+        states = [ball.verdict if ball.present else ABSENT[ball.verdict] for ball in part.balls]
+        counts = [f"{states.count(name)} {name}" for name in (*VERDICT_COLORS, *ABSENT.values()) if name in states]
         coplanarity = part.seating_coplanarity_um
         return {
             "name": repr(part.name),
             "verdict": part.verdict,
-            "balls": f"{len(verdicts)} ({', '.join(counts)})" if verdicts else 0,
+            "balls": f"{len(states)} ({', '.join(counts)})" if states else 0,
             "seating_coplanarity": f"{coplanarity:.2f} um" if math.isfinite(coplanarity) else "not measured",
         }
 

@@ -76,7 +76,7 @@ def part_checks(
         if "coplanarity" in name and unmeasured:
             verdict = "undecided"
             limit = f"{value:.1f} um (at most {allowed[1]:g} um) " if math.isfinite(value) else ""
-            reason = f"{WORDS[name]} {limit}proves nothing without the balls not measured: {_listed(unmeasured)}"
+            reason = f"{WORDS[name]} {limit}cannot be judged, as balls were not measured: {_listed(unmeasured)}"
         checks.append(PartCheck(name, value, u, bias, *allowed, verdict, reason))
     return tuple(checks)
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from bgars.shown import VERDICT_COLORS
+from bgars.shown import ABSENT, VERDICT_COLORS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -48,8 +48,6 @@ __all__ = [
     "window_size_in",
 ]
 
-ABSENT = {"fail": "missing", "undecided": "place not clear"}
-"""What a place without a ball is, by its verdict: seen to be empty, or not."""
 DASHES = (0, (3, 2))
 DPI = 110
 MAX_PICTURE_PX = 1100
