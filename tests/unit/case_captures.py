@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import bgars
@@ -55,6 +56,17 @@ def lp_lines(names: list[str], vectors: np.ndarray = LIGHTS, join: str = " ") ->
     return [
         join.join([name, *(f"{value:.6f}" for value in vector)]) for name, vector in zip(names, vectors, strict=True)
     ]
+
+
+def names_of(pattern: str, first: int = 1) -> list[str]:
+    return [pattern.format(index) for index in range(first, first + COUNT)]
+
+
+def with_names(change: Callable[[str], str]) -> list[str]:
+    return lp_lines([change(f"img_{index:02d}.png") for index in range(1, COUNT + 1)])
+
+
+PLAIN = with_names(str)
 
 
 def write_lp(

@@ -53,13 +53,13 @@ def read_led_parameters(path: Path) -> LightTable:
             msg = f"{path}: line {line.number} must hold {expected[0]} numbers ({what}), got {line.text[:100]!r}"
             raise FileFormatError(msg)
         rows.append([number for number in numbers if number is not None])
-    if not rows or len(rows) - 1 != int(rows[0][0]):
+    if not rows or len(rows) - 1 != rows[0][0]:
         msg = f"{path}: announces {rows[0][0] if rows else 0:g} lights, but {max(len(rows) - 1, 0)} follow"
         raise FileFormatError(msg)
     _, columns, image_rows, focal_px, x0, y0, distance_mm = rows[0]
     if abs(x0 - image_rows / 2) + abs(y0 - columns / 2) < abs(x0 - columns / 2) + abs(y0 - image_rows / 2):
         columns, image_rows = image_rows, columns  # the header of the data set names them the other way round
-    if not (focal_px > 0 and distance_mm > 0 and columns > 0 and image_rows > 0):
+    if not (np.isfinite(rows[0]).all() and focal_px > 0 and distance_mm > 0 and columns > 0 and image_rows > 0):
         msg = (
             f"{path}: focal length, image size and mean distance must be above 0, got {focal_px:g} and {distance_mm:g}"
         )
