@@ -39,6 +39,7 @@ from bgars.material_records import ReflectanceFit, SurfaceLobe, SurfaceMaterial
 from bgars.mesh import mesh_from_height
 from bgars.normals import estimate_normals
 from bgars.part_anchors import anchors_from_part
+from bgars.part_identity import PartIdentity
 from bgars.part_recipe import Limits, PartRecipe
 from bgars.part_result import BallResult, PartResult
 from bgars.pipeline import Reconstruction, reconstruct
@@ -66,6 +67,7 @@ from bgars.simulate import (
     Variation,
     simulate,
 )
+from bgars.store import Store, open_store
 from bgars.studies import (
     GaugeStudy,
     ProcessTrend,
@@ -111,6 +113,7 @@ __all__ = [
     "Lobe",
     "Material",
     "NormalField",
+    "PartIdentity",
     "PartRecipe",
     "PartResult",
     "PartSurface",
@@ -121,6 +124,7 @@ __all__ = [
     "Scene",
     "SimulatedTruth",
     "SimulationSetup",
+    "Store",
     "Study",
     "SurfaceLobe",
     "SurfaceMaterial",
@@ -140,6 +144,7 @@ __all__ = [
     "integrate_normals",
     "mesh_from_height",
     "named_recipes",
+    "open_store",
     "process_trend",
     "read_capture",
     "read_height",

@@ -22,6 +22,7 @@ from bgars.cli.inspect import register as register_inspect
 from bgars.cli.mesh import register as register_mesh
 from bgars.cli.options import MethodOption
 from bgars.cli.outputs import write_normals, write_reconstruction
+from bgars.cli.query import register as register_query
 from bgars.cli.report import register as register_report
 from bgars.cli.simulate import register as register_simulate
 from bgars.cli.spc import register as register_spc
@@ -264,6 +265,7 @@ def evaluate(
 
 register_inspect(app)
 register_report(app)
+register_query(app)
 register_grr(app)
 register_spc(app)
 register_calibrate(app)

@@ -13,6 +13,7 @@ from bgars.ball_records import BallLayout
 from bgars.errors import FileFormatError, InputError
 from bgars.io.result_schema import Reading, ResultTable
 from bgars.io.strict_toml import checked
+from bgars.part_identity import PartIdentity
 from bgars.part_material import MaterialParameter, PartMaterial
 from bgars.part_recipe import Limits, PartRecipe
 from bgars.part_result import FORMAT, FORMAT_VERSION, BallResult, PartCheck, PartResult, SeatingResult
@@ -123,6 +124,7 @@ def _result(table: ResultTable) -> PartResult:
         "board_coefficients_um": np.array(table.board_coefficients_um, dtype=np.float64),
         "recipe": None if table.recipe is None else _recipe(table.recipe),
         "material": None if table.material is None else _material(table.material),
+        "identity": PartIdentity(**_fields(table.identity)),
         "files": tuple((file.name, file.sha256) for file in table.files),
     }
     return PartResult(**values)
