@@ -35,6 +35,7 @@ from bgars.io.parquet import write_parquet
 from bgars.io.part_recipe import read_part_recipe
 from bgars.io.result_file import read_result
 from bgars.io.truth import read_truth
+from bgars.line import Batch, Naming, inspect_many
 from bgars.material_records import ReflectanceFit, SurfaceLobe, SurfaceMaterial
 from bgars.mesh import mesh_from_height
 from bgars.normals import estimate_normals
@@ -89,6 +90,7 @@ __all__ = [
     "BallLayout",
     "BallResult",
     "BallTruth",
+    "Batch",
     "BgarsError",
     "BilateralFit",
     "Board",
@@ -112,6 +114,7 @@ __all__ = [
     "Limits",
     "Lobe",
     "Material",
+    "Naming",
     "NormalField",
     "PartIdentity",
     "PartRecipe",
@@ -141,6 +144,7 @@ __all__ = [
     "find_balls",
     "gauge_rr",
     "inspect",
+    "inspect_many",
     "integrate_normals",
     "mesh_from_height",
     "named_recipes",

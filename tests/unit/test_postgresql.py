@@ -8,13 +8,15 @@ import shutil
 import socket
 import subprocess
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from stored_parts import filled_store, part
 
-pytest.importorskip("psycopg", reason="the driver psycopg is not installed")
+psycopg = pytest.importorskip("psycopg", reason="the driver psycopg is not installed")
+sqlalchemy = pytest.importorskip("sqlalchemy", reason="SQLAlchemy is not installed")
 
 
 def binary(name: str) -> str:
@@ -65,8 +67,6 @@ def server() -> Iterator[str]:
 
 
 def wait_for(port: int, running: subprocess.Popen[bytes]) -> None:
-    import psycopg
-
     for _ in range(300):
         assert running.poll() is None, "the server ended"
         try:
@@ -74,15 +74,13 @@ def wait_for(port: int, running: subprocess.Popen[bytes]) -> None:
         except psycopg.OperationalError as error:
             if "role" in str(error):
                 return
-            __import__("time").sleep(0.1)
+            time.sleep(0.1)
         else:
             return
     pytest.fail("the server does not answer")
 
 
 def test_postgresql_gets_every_new_part_once(server: str, tmp_path: Path) -> None:
-    import sqlalchemy
-
     store = filled_store(tmp_path / "store", 4)
     assert store.export(server)["bgars_parts"] == 4
     store.append(part(5))

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 import bgars
+from bgars.cli.batch import register as register_batch
 from bgars.cli.calibrate import register as register_calibrate
 from bgars.cli.console import EXIT_BAD_INPUT, activation, fail, print_json, say, shown_path, stage_progress
 from bgars.cli.describe import describe, describe_in_words
@@ -264,6 +265,7 @@ def evaluate(
 
 
 register_inspect(app)
+register_batch(app)
 register_report(app)
 register_query(app)
 register_grr(app)

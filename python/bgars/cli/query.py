@@ -63,7 +63,8 @@ def query(
     answer = opened.query(sql)
     names, rows = answer.column_names, [[_plain(value) for value in row.values()] for row in answer.to_pylist()]
     if len(set(names)) != len(names):  # rows come by name
-        rows = [list(row) for row in zip(*([_plain(v) for v in column.to_pylist()] for column in answer.columns))]
+        columns = ([_plain(value) for value in column.to_pylist()] for column in answer.columns)
+        rows = [list(row) for row in zip(*columns, strict=True)]
     if as_json:
         print_json({"columns": names, "rows": [dict(zip(names, row, strict=True)) for row in rows]})
     elif as_csv:
