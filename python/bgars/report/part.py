@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from bgars.errors import InputError
 from bgars.io.atomic import atomic_file
+from bgars.report.identity import identity_line
 from bgars.report.part_balls import part_figure
 from bgars.report.part_histograms import histogram_figure
 from bgars.report.part_maps import deviation_figure
@@ -67,7 +68,9 @@ def write_part_pictures(result: PartResult, capture: Capture, folder: str | Path
             "deviations.png": deviation_figure(result),
             "histograms.png": histogram_figure(result),
         }
+        line = identity_line(result.to_dict())
         for name, figure in figures.items():
+            figure.text(0.995, 0.003, line, ha="right", va="bottom", fontsize=6, color="0.35", parse_math=False)
             with atomic_file(folder / name) as temporary:
                 save(figure, temporary)
     return dict(PICTURES)
