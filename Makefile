@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral simulator experiments method schema constants studies performance instructions clean
+.PHONY: demo test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral simulator experiments method kills line schema constants studies performance instructions clean
 
 demo: $(VENV)/.installed ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
@@ -71,6 +71,12 @@ schema: $(VENV)/.installed ## Write docs/result.schema.json, the JSON Schema of 
 
 constants: $(VENV)/.installed ## Write docs/constants.md, the registry of constants, again
 	$(BIN)/python docs/make_constants.py
+
+KILLS ?= 200
+kills: $(VENV)/.installed ## Kill `bgars watch` at KILLS random times: every part is in the store once or still in the inbox (10 minutes)
+	rm -rf kill-test && mkdir kill-test
+	$(BIN)/python tests/unit/killed_watch.py kill-test $(KILLS) 1000
+	rm -rf kill-test
 
 instructions: ## Instructions a pixel of each kernel against the kept counts (needs valgrind)
 	python3 benches/count_instructions.py

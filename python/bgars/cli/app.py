@@ -27,6 +27,7 @@ from bgars.cli.query import register as register_query
 from bgars.cli.report import register as register_report
 from bgars.cli.simulate import register as register_simulate
 from bgars.cli.spc import register as register_spc
+from bgars.cli.watch import register as register_watch
 from bgars.errors import BgarsError
 from bgars.light_files import read_filenames
 from bgars.normals import DEFAULT_METHOD, METHODS, Method
@@ -266,6 +267,7 @@ def evaluate(
 
 register_inspect(app)
 register_batch(app)
+register_watch(app)
 register_report(app)
 register_query(app)
 register_grr(app)

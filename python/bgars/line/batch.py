@@ -192,8 +192,12 @@ def inspect_many(
     return batch
 
 
-def store_outcome(outcome: Outcome, store: Store | None, *, recipe: str = "", lot: str = "") -> PartResult | None:
+def store_outcome(
+    outcome: Outcome, store: Store | None, *, recipe: str = "", lot: str = "", moved_to: Path | None = None
+) -> PartResult | None:
     """Stamp a result with the time and keep it, or keep why there is none; return it where it is new.
+
+    `moved_to` is where the capture will lie, if elsewhere.
 
     Raises
     ------
@@ -202,14 +206,13 @@ def store_outcome(outcome: Outcome, store: Store | None, *, recipe: str = "", lo
     """
     if outcome.is_known:
         return None
+    folder = str((moved_to or Path(outcome.folder)).absolute())
     if outcome.result is None:
         if store is not None:
-            where = str(Path(outcome.folder).absolute())
-            store.append_failure(where, outcome.reason, serial=outcome.serial, recipe=recipe, lot=lot)
+            store.append_failure(folder, outcome.reason, serial=outcome.serial, recipe=recipe, lot=lot)
         return None
     now = datetime.now(timezone.utc).strftime(TIME_FORM)
     result = replace(outcome.result, inspected_utc=now)
-    folder = str(Path(outcome.folder).absolute())
     if store is not None and not store.append(result, capture_folder=folder, seconds=outcome.seconds):
         return None
     return result

@@ -116,6 +116,11 @@ class Store:
                 self._last_sequence = max([self._last_sequence, *table["sequence"].to_pylist()])
         return self._known
 
+    def last_sequence(self) -> int:
+        """Return the largest number in the order of parts; 0 for an empty store."""
+        self.known()
+        return self._last_sequence
+
     def refresh(self) -> None:
         """Forget what is known: the next look sees what other processes appended."""
         self._known = None

@@ -47,7 +47,8 @@ CREATE VIEW failures AS SELECT * EXCLUDE (filename, copy) FROM (
     SELECT *, row_number() OVER (PARTITION BY part_key ORDER BY sequence DESC, filename) AS copy FROM {failures}) f
 WHERE copy = 1 AND NOT EXISTS (
     SELECT 1 FROM parts_taken p
-    WHERE p.serial = f.serial AND p.capture_folder = f.capture_folder AND p.sequence > f.sequence);
+    WHERE p.sequence > f.sequence
+      AND ((f.serial <> '' AND p.serial = f.serial) OR p.capture_folder = f.capture_folder));
 """
 
 
