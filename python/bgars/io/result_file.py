@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from bgars.io.result_schema import MaterialTable, RecipeTable, Table
 
-__all__ = ["RESULT_NAME", "read_result"]
+__all__ = ["RESULT_NAME", "parse_result", "read_result"]
 
 RESULT_NAME = "result.json"
 OLDEST_VERSION = 2
@@ -55,7 +55,23 @@ def read_result(path: str | PathLike[str]) -> PartResult:
         if not path.is_file():
             msg = f"{path.parent}: holds no {RESULT_NAME}: not a folder that bgars inspect wrote"
             raise FileFormatError(msg)
-    values = _json(path)
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        msg = f"{path}: cannot be read ({error.strerror})"
+        raise FileFormatError(msg) from error
+    return parse_result(content, path)
+
+
+def parse_result(content: bytes, path: Path) -> PartResult:
+    """Return the result that the content of a ``result.json`` describes; messages name `path`.
+
+    Raises
+    ------
+    FileFormatError
+        As :func:`read_result`.
+    """
+    values = _json(content, path)
     _check_format(path, values)
     try:
         table = checked(ResultTable, values, path)
@@ -69,16 +85,13 @@ def read_result(path: str | PathLike[str]) -> PartResult:
         raise FileFormatError(msg) from None
 
 
-def _json(path: Path) -> Any:  # noqa: ANN401 - whatever the file holds
+def _json(content: bytes, path: Path) -> Any:  # noqa: ANN401 - whatever the file holds
     def refuse(word: str) -> float:
         msg = f"holds {word}, which is no JSON; what was not measured is null"
         raise ValueError(msg)
 
     try:
-        return json.loads(path.read_bytes().decode("utf-8"), parse_constant=refuse)
-    except OSError as error:
-        msg = f"{path}: cannot be read ({error.strerror})"
-        raise FileFormatError(msg) from error
+        return json.loads(content.decode("utf-8"), parse_constant=refuse)
     except (ValueError, RecursionError) as error:
         msg = f"{path}: is not valid JSON: cut off, or not a result ({error})"
         raise FileFormatError(msg) from error

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tempfile
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING
 from bgars.errors import BgarsError, InputError
 from bgars.io.capture import read_capture
 from bgars.io.provenance import capture_files, checksums
-from bgars.io.result_file import RESULT_NAME, read_result
+from bgars.io.result_file import RESULT_NAME, parse_result
 from bgars.report.page import write_page
 from bgars.report.page_source import PageSource, source_of
 
@@ -78,10 +77,7 @@ def _source(store: Store, serial: str, round_: int | None) -> PageSource:
         msg = f"{store.folder}: has no part with the serial number {serial!r}{wanted}"
         raise InputError(msg)
     row = rows[-1]
-    with tempfile.TemporaryDirectory() as place:
-        file = Path(place) / RESULT_NAME
-        file.write_text(row["result_json"], encoding="utf-8")
-        result = read_result(file)
+    result = parse_result(row["result_json"].encode(), store.folder / RESULT_NAME)
     return _with_photograph(result, Path(row["capture_folder"]))
 
 
