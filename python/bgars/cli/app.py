@@ -15,6 +15,7 @@ import bgars
 from bgars.cli.batch import register as register_batch
 from bgars.cli.calibrate import register as register_calibrate
 from bgars.cli.console import EXIT_BAD_INPUT, activation, fail, print_json, say, shown_path, stage_progress
+from bgars.cli.demo_line import demo_line
 from bgars.cli.describe import describe, describe_in_words
 from bgars.cli.evaluation import choice_in_words, evaluation_table
 from bgars.cli.experiment import register as register_experiment
@@ -30,6 +31,7 @@ from bgars.cli.spc import register as register_spc
 from bgars.cli.watch import register as register_watch
 from bgars.errors import BgarsError
 from bgars.light_files import read_filenames
+from bgars.line.demo import PARTS
 from bgars.normals import DEFAULT_METHOD, METHODS, Method
 
 __all__ = ["main"]
@@ -101,12 +103,23 @@ def top(
 
 @app.command()
 def demo(
+    what: Annotated[
+        Literal["ball", "line"], typer.Argument(help="ball: one solder ball. line: a station that drops 50 parts.")
+    ] = "ball",
     output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT", help="Folder for the results.")] = Path(
         "bgars-demo"
     ),
+    parts: Annotated[int, typer.Option(min=4, help="Parts of the line.")] = PARTS,
     as_json: JsonOption = False,
 ) -> None:
-    """Reconstruct a solder ball that ships with bgars, and say what to open."""
+    """Reconstruct a solder ball that ships with bgars, and say what to open; or simulate a station on a line.
+
+    'bgars demo line' simulates 50 parts, three of them with a defect, drops them into an inbox, inspects them as they
+    come (minutes), and writes the page of their lot.
+    """
+    if what == "line":
+        demo_line(output, parts=parts, as_json=as_json)
+        return
     folder = bgars.sample_capture()
     summary, files = _reconstruct_to(folder, output, bgars.reconstruct, mesh_format="ply", directx=False)
     scores = {

@@ -15,14 +15,14 @@ from rich.progress import Progress as Bar
 
 from bgars.cli.console import error_console, print_json, say
 from bgars.cli.inspect import EXIT_NOT_PASSED
-from bgars.cli.options import MethodOption
+from bgars.cli.options import LotOption, MethodOption, OperatorOption, StationOption
 from bgars.line import Batch, Naming, inspect_many
 from bgars.line.batch import Progress
 from bgars.normals import DEFAULT_METHOD
 from bgars.part_identity import PartIdentity
 from bgars.store import open_store
 
-__all__ = ["LotOption", "OperatorOption", "SerialFrom", "StationOption", "StoreOption", "register"]
+__all__ = ["SerialFrom", "StoreOption", "register"]
 
 MOST_FAILURES = 10
 LINE_EVERY_S = 10.0
@@ -39,9 +39,6 @@ SerialFrom = Annotated[
         "images. A [part] table in capture.toml goes first.",
     ),
 ]
-LotOption = Annotated[str, typer.Option(metavar="LOT", help="Lot of all parts.", show_default=False)]
-StationOption = Annotated[str, typer.Option(metavar="NAME", help="Station that took the images.", show_default=False)]
-OperatorOption = Annotated[str, typer.Option(metavar="NAME", help="Who runs it.", show_default=False)]
 
 
 def register(app: typer.Typer) -> None:

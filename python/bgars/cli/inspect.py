@@ -12,12 +12,14 @@ import typer
 
 import bgars
 from bgars.cli.console import print_json, say, say_files, stage_progress, utc_now
-from bgars.cli.options import MethodOption
+from bgars.cli.options import LotOption, MethodOption, OperatorOption, StationOption
 from bgars.errors import InputError
 from bgars.io.atomic import FolderNames, atomic_folder
 from bgars.io.given_paths import need_file, need_folder
 from bgars.io.parquet import need_pyarrow
+from bgars.line.naming import identity_of
 from bgars.normals import DEFAULT_METHOD
+from bgars.part_identity import PartIdentity
 from bgars.report.page import REPORT_FILES
 from bgars.report.page_budget import main_causes
 from bgars.report.part import PICTURES
@@ -71,8 +73,14 @@ def inspect(
     ] = None,
     method: MethodOption = DEFAULT_METHOD,
     serial: Annotated[
-        str, typer.Option(metavar="SERIAL", help="Serial number of the part, kept in the result.", show_default=False)
+        str,
+        typer.Option(
+            metavar="SERIAL", help="Serial number of the part; by default that of capture.toml.", show_default=False
+        ),
     ] = "",
+    lot: LotOption = "",
+    station: StationOption = "",
+    operator: OperatorOption = "",
     parquet: Annotated[
         # The help is markup: a bracket that is no style is escaped.
         bool,
@@ -107,7 +115,8 @@ def inspect(
         part = None if recipe is None else bgars.read_part_recipe(recipe)
         capture = bgars.read_capture(folder)
         result = bgars.inspect(capture, part, method=method, surface=True, progress=report)
-        result = replace(result, serial=serial, inspected_utc=utc_now())
+        named, identity = identity_of(capture, PartIdentity(lot=lot, station=station, operator=operator))
+        result = replace(result, serial=serial or named, identity=identity, inspected_utc=utc_now())
         files = FILES | bgars.write_part_pictures(result, capture, place)
         (place / "result.json").write_text(result.to_json(), encoding="utf-8")
         (place / "balls.csv").write_text(result.to_csv(), encoding="utf-8")

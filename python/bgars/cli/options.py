@@ -8,7 +8,7 @@ import typer
 
 from bgars.normals import Method
 
-__all__ = ["MethodOption"]
+__all__ = ["LotOption", "MethodOption", "OperatorOption", "StationOption"]
 
 METHOD_HELP = (
     "reflectance: on balls, highlights included, by the material that is fitted on them, elsewhere robust-filter; "
@@ -20,3 +20,6 @@ METHOD_HELP = (
     "than 5 lights robust-filter."
 )
 MethodOption = Annotated[Method, typer.Option("--method", "-m", help=METHOD_HELP)]
+LotOption = Annotated[str, typer.Option(metavar="LOT", help="Lot of all parts.", show_default=False)]
+StationOption = Annotated[str, typer.Option(metavar="NAME", help="Station that took the images.", show_default=False)]
+OperatorOption = Annotated[str, typer.Option(metavar="NAME", help="Who runs it.", show_default=False)]

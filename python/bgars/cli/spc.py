@@ -138,7 +138,8 @@ def _chart_query(
         for each in charts:
             chart = each.chart
             say(
-                f"{each.title}: {chart.centre:.5g}, limits {chart.low:.5g} to {chart.high:.5g}, {len(chart.signals)} signals"
+                f"{each.title}: {chart.centre:.5g}, limits {chart.low:.5g} to {chart.high:.5g}, "
+                f"{len(chart.signals)} signals"
             )
         say_files(output, FILES)
     if any(each.chart.signals for each in charts):

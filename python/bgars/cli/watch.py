@@ -10,8 +10,8 @@ from typing import Annotated
 
 import typer
 
-from bgars.cli.batch import LotOption, OperatorOption, SerialFrom, StationOption, StoreOption
-from bgars.cli.options import MethodOption
+from bgars.cli.batch import SerialFrom, StoreOption
+from bgars.cli.options import LotOption, MethodOption, OperatorOption, StationOption
 from bgars.io.given_paths import need_path
 from bgars.line.inbox import Inbox
 from bgars.line.naming import Naming

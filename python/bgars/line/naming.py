@@ -18,7 +18,7 @@ from bgars.part_identity import PartIdentity
 if TYPE_CHECKING:
     from bgars.records import Capture
 
-__all__ = ["CODE", "Naming"]
+__all__ = ["CODE", "Naming", "identity_of", "last_written_utc"]
 
 CODE = "code"
 """A pattern that asks for the code in the images."""
@@ -122,6 +122,14 @@ class Naming:
             raise InputError(msg)
         told = "".join(f"(?P<{piece}>[^/]+?)" if at % 2 else re.escape(piece) for at, piece in enumerate(pieces))
         return re.compile(told)
+
+
+def identity_of(capture: Capture, common: PartIdentity) -> tuple[str, PartIdentity]:
+    """Return serial number ("" = not named) and identity of a single capture: its side file, else what is common."""
+    known = {} if capture.folder is None else _side_file(capture.folder)
+    values = common.known() | known
+    serial = values.pop("serial", "")
+    return serial, PartIdentity(**(values | {"captured_utc": last_written_utc(capture)}))
 
 
 def last_written_utc(capture: Capture) -> str:
