@@ -72,6 +72,9 @@ schema: $(VENV)/.installed ## Write docs/result.schema.json, the JSON Schema of 
 constants: $(VENV)/.installed ## Write docs/constants.md, the registry of constants, again
 	$(BIN)/python docs/make_constants.py
 
+line: $(VENV)/.installed ## Measure batch, watch and store, and rewrite the tables of docs/line.md (10 minutes)
+	$(BIN)/python docs/make_line.py
+
 KILLS ?= 200
 kills: $(VENV)/.installed ## Kill `bgars watch` at KILLS random times: every part is in the store once or still in the inbox (10 minutes)
 	rm -rf kill-test && mkdir kill-test

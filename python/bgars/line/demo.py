@@ -82,7 +82,7 @@ def drop_part(inbox: Path, number: int, parts: int) -> None:
         defects=defects_of(number, parts),
         seed=number + 1,
     )
-    camera = Camera(pixel_pitch_um=16.0, shape=(260, 260))
+    camera = Camera(pixel_pitch_um=16.0, shape=(290, 290))
     setup = SimulationSetup(scene, LightRig.ring(LIGHTS), Material(), camera)
     capture, _ = simulate(setup.scene, setup.rig, setup.material, setup.camera)
     folder = inbox / serial_of(number)
