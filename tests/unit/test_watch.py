@@ -34,11 +34,13 @@ def inbox(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def watch(inbox: Path, *, count: int | None = 4, trigger: str = "", settle_s: float = 0.0, **options: object) -> Watch:
+def watch(
+    inbox: Path, *, count: int | None = 4, trigger: str = "", settle_s: float = 0.0, files: str = "", **options: object
+) -> Watch:
     store = bgars.open_store(inbox.parent / "store", create=True)
     told: list[str] = []
     made = Watch(
-        Inbox(inbox, count=count, trigger=trigger, settle_s=settle_s),
+        Inbox(inbox, count=count, trigger=trigger, settle_s=settle_s, files=files),
         store,
         rig=inbox.parent / "rig.toml",
         done=inbox / "_done",
@@ -90,6 +92,24 @@ def test_a_trigger_file_needs_no_settling(inbox: Path) -> None:
     assert not made.step()
     (inbox / "P1" / "ready").touch()
     assert made.step()
+
+
+def test_files_in_the_inbox_itself_become_a_folder_each(inbox: Path) -> None:
+    drop(inbox, "P1", 1)
+    for path in list((inbox / "P1").iterdir()):
+        path.rename(inbox / f"SN7_{path.name}")
+    (inbox / "P1").rmdir()
+    (inbox / "SN8_img0.png").write_bytes(b"one of four")
+    gathering = inbox / ".gathering-SN7"
+    gathering.mkdir()
+    (inbox / "SN7_img0.png").rename(gathering / "SN7_img0.png")  # where a kill left it
+    made = watch(inbox, files="{serial}_{image}.png")
+    assert made.step()
+    assert serials(inbox) == ["SN7"]
+    assert names(inbox, "_done/*/SN7/*.png") == [f"SN7_img{light}.png" for light in range(4)]
+    assert (inbox / "SN8_img0.png").is_file()
+    with pytest.raises(bgars.InputError, match="--files: must hold"):
+        watch(inbox, files="{serial}.png")
 
 
 def test_what_stays_incomplete_or_unreadable_is_moved_with_its_reason(inbox: Path) -> None:

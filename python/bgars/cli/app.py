@@ -14,6 +14,7 @@ import typer
 import bgars
 from bgars.cli.batch import register as register_batch
 from bgars.cli.calibrate import register as register_calibrate
+from bgars.cli.capture import register as register_capture
 from bgars.cli.console import EXIT_BAD_INPUT, activation, fail, print_json, say, shown_path, stage_progress
 from bgars.cli.demo_line import demo_line
 from bgars.cli.describe import describe, describe_in_words
@@ -279,6 +280,7 @@ def evaluate(
 
 
 register_inspect(app)
+register_capture(app)
 register_batch(app)
 register_watch(app)
 register_report(app)

@@ -60,6 +60,14 @@ def watch(
             metavar="NAME", help="File that is written last: with it nothing has to settle.", show_default=False
         ),
     ] = "",
+    files: Annotated[
+        str,
+        typer.Option(
+            metavar="PATTERN",
+            help="Images lie in INBOX itself, and are told apart by their names: '{serial}_{image}.png'.",
+            show_default=False,
+        ),
+    ] = "",
     settle: Annotated[float, typer.Option(min=0.0, help="Seconds without a change that make a part complete.")] = 0.5,
     poll: Annotated[float, typer.Option(min=0.01, help="Seconds between two looks.")] = 0.1,
     patience: Annotated[
@@ -112,7 +120,7 @@ def watch(
             need_path(path)
     with watched(inbox):
         watching = Watch(
-            Inbox(inbox, count=count, trigger=trigger, settle_s=settle),
+            Inbox(inbox, count=count, trigger=trigger, settle_s=settle, files=files),
             open_store(output, create=True),
             recipe,
             rig,

@@ -7,6 +7,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from bgars.errors import InputError
+from bgars.line.flat import FlatFiles
 from bgars.line.folders import IMAGES
 
 __all__ = ["Inbox", "Waiting"]
@@ -53,13 +55,24 @@ class Inbox:
         Name of a file that the camera's software writes last; "" = there is none.
     settle_s : float
         How long nothing may change, where there is no trigger.
+    files : str
+        Pattern of files that lie in the inbox itself, see :class:`bgars.line.flat.FlatFiles`; "" = parts are folders.
+
+    Raises
+    ------
+    InputError
+        A pattern without its names, or without a count.
     """
 
-    def __init__(self, folder: Path, *, count: int | None, trigger: str, settle_s: float) -> None:
+    def __init__(self, folder: Path, *, count: int | None, trigger: str, settle_s: float, files: str = "") -> None:
         self.folder = folder
         self.count = count
         self.trigger = trigger
         self.settle_s = settle_s
+        if files and count is None:
+            msg = "--files: goes with --count, which tells when a part is complete"
+            raise InputError(msg)
+        self.flat = FlatFiles(folder, files, count=count, settle_s=settle_s) if files and count else None
         self._waiting: dict[str, Waiting] = {}
 
     def look(self) -> list[Waiting]:
@@ -70,6 +83,8 @@ class Inbox:
         OSError
             The inbox itself cannot be read, such as on a network drive that is away.
         """
+        if self.flat is not None:
+            self.flat.gather()
         now = time.monotonic()
         found: dict[str, Waiting] = {}
         with os.scandir(self.folder) as entries:
