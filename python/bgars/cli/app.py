@@ -27,6 +27,7 @@ from bgars.cli.options import MethodOption
 from bgars.cli.outputs import write_normals, write_reconstruction
 from bgars.cli.query import register as register_query
 from bgars.cli.report import register as register_report
+from bgars.cli.send import register as register_send
 from bgars.cli.simulate import register as register_simulate
 from bgars.cli.spc import register as register_spc
 from bgars.cli.watch import register as register_watch
@@ -285,6 +286,7 @@ register_batch(app)
 register_watch(app)
 register_report(app)
 register_query(app)
+register_send(app)
 register_grr(app)
 register_spc(app)
 register_calibrate(app)
