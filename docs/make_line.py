@@ -196,7 +196,7 @@ def watch_table(folder: Path, cycles: int) -> tuple[list[str], float]:
 
 def store_table(folder: Path, parts: int) -> list[str]:
     """Size of a store, and what questions take."""
-    result = next(iter(bgars.read_results([folder / "watched"])[0]))[1]
+    result = next(iter(bgars.read_results([folder / "watched"], where="serial = 'SN0'")[0]))[1]
     store = bgars.open_store(folder / "asked", create=True)
     appends = []
     for number in range(parts):

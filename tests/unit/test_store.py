@@ -182,6 +182,13 @@ def test_a_newer_store_is_refused_in_one_line(tmp_path: Path) -> None:
         bgars.open_store(store.folder)
 
 
+def test_a_store_is_made_where_making_one_was_killed(tmp_path: Path) -> None:
+    folder = tmp_path / "store"
+    folder.mkdir()
+    (folder / ".store.7.ab.partial").write_bytes(b"{")
+    assert bgars.open_store(folder, create=True).append(part(0))
+
+
 def test_a_result_needs_its_time(tmp_path: Path) -> None:
     store = bgars.open_store(tmp_path / "store", create=True)
     with pytest.raises(bgars.InputError, match="needs the time of inspection"):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from bgars.errors import FileFormatError, InputError
 from bgars.io.parquet import need_pyarrow
-from bgars.store.append import append_rows, partition, write_durably
+from bgars.store.append import PARTIAL, append_rows, partition, write_durably
 from bgars.store.compact import compact
 from bgars.store.export import export
 from bgars.store.keys import failure_key, part_key
@@ -189,13 +189,20 @@ def open_store(folder: str | PathLike[str], *, create: bool = False) -> Store:
         if not create:
             msg = f"{folder}: is not a store of bgars: it holds no {MARK}"
             raise FileFormatError(msg)
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        if folder.exists() and not _is_free(folder) and not mark.is_file():
             msg = f"{folder}: must be a store, an empty folder, or a new name; it holds other files"
             raise InputError(msg)
         heading = {"format": FORMAT, "format_version": FORMAT_VERSION, "tables": sorted(TABLES)}
         write_durably(mark, json.dumps(heading, indent=2).encode() + b"\n")
     _check_mark(mark)
     return Store(folder)
+
+
+def _is_free(folder: Path) -> bool:
+    """Whether a store may be made here: nothing is in it but what a process left that was killed while making one."""
+    return folder.is_dir() and all(
+        path.name.startswith(".") and path.name.endswith(PARTIAL) for path in folder.iterdir()
+    )
 
 
 def _check_mark(mark: Path) -> None:
