@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral simulator experiments method check-faults schema constants studies performance bench instructions clean
+.PHONY: demo test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral simulator experiments method check-faults kills line schema constants studies performance bench instructions clean
 
 demo: $(VENV)/.run-time ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
@@ -77,6 +77,15 @@ constants: $(VENV)/.installed ## Write docs/constants.md, the registry of consta
 
 bench: $(VENV)/.run-time ## CPU seconds, wall time and memory of whole commands, into docs/performance.md
 	$(BIN)/python benches/commands.py --docs
+
+line: $(VENV)/.installed ## Measure batch, watch and store, and rewrite the tables of docs/line.md (10 minutes)
+	$(BIN)/python docs/make_line.py
+
+KILLS ?= 200
+kills: $(VENV)/.installed ## Kill `bgars watch` at KILLS random times: every part is in the store once or still in the inbox (10 minutes)
+	rm -rf kill-test && mkdir kill-test
+	$(BIN)/python tests/unit/killed_watch.py kill-test $(KILLS) 1000
+	rm -rf kill-test
 
 instructions: ## Instructions a pixel of each kernel against the kept counts (needs valgrind)
 	python3 benches/count_instructions.py

@@ -6,9 +6,9 @@ from .ball_records import FoundBalls as FoundBalls
 from .balls import find_balls as find_balls
 from .calibrate import calibrate_material as calibrate_material
 from .cfx import to_cfx as to_cfx
+from .check_pipeline import check as check
 from .checks.records import Finding as Finding
 from .checks.records import Findings as Findings
-from .check_pipeline import check as check
 from .errors import BgarsError as BgarsError
 from .errors import CalibrationError as CalibrationError
 from .errors import CaptureWarning as CaptureWarning
@@ -35,12 +35,16 @@ from .io.parquet import write_parquet as write_parquet
 from .io.part_recipe import read_part_recipe as read_part_recipe
 from .io.result_file import read_result as read_result
 from .io.truth import read_truth as read_truth
+from .line import Batch as Batch
+from .line import Naming as Naming
+from .line import inspect_many as inspect_many
 from .material_records import ReflectanceFit as ReflectanceFit
 from .material_records import SurfaceLobe as SurfaceLobe
 from .material_records import SurfaceMaterial as SurfaceMaterial
 from .mesh import mesh_from_height as mesh_from_height
 from .normals import estimate_normals as estimate_normals
 from .part_anchors import anchors_from_part as anchors_from_part
+from .part_identity import PartIdentity as PartIdentity
 from .part_recipe import Limits as Limits
 from .part_recipe import PartRecipe as PartRecipe
 from .part_result import BallResult as BallResult
@@ -79,6 +83,8 @@ from .simulate import SimulationSetup as SimulationSetup
 from .simulate import Texture as Texture
 from .simulate import Variation as Variation
 from .simulate import simulate as simulate
+from .store import Store as Store
+from .store import open_store as open_store
 from .studies import GaugeStudy as GaugeStudy
 from .studies import ProcessTrend as ProcessTrend
 from .studies import Study as Study

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.ball_records import BallKind
+from bgars.part_identity import PartIdentity
 from bgars.part_material import PartMaterial
 from bgars.part_recipe import PartRecipe
 from bgars.shown import ShownPart
@@ -22,10 +23,11 @@ __all__ = ["FORMAT", "FORMAT_VERSION", "BallResult", "PartCheck", "PartResult", 
 
 Verdict = Literal["pass", "fail", "undecided"]
 FORMAT = "bgars-result"
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4
 """Rises with every change of the keys of result.json, or of their meaning (docs/result.schema.json)."""
 DIGITS = 6
 CSV_DIGITS = 3
+CSV_PART = ("part_serial", "part_lot", "part_capture", "part_inspected_utc")
 TABLE = (
     ("ball", "name", ""),
     ("x um", "x_um", ".1f"),
@@ -268,6 +270,7 @@ class PartResult(ShownPart):
     inspected_utc: str = ""
     seating_budget: dict[str, float] = field(default_factory=dict)
     surface: PartSurface | None = field(default=None, repr=False)
+    identity: PartIdentity = field(default_factory=PartIdentity)
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything but the surface as plain Python values; None where something was not measured."""
@@ -275,6 +278,7 @@ class PartResult(ShownPart):
         values["balls"] = [ball.to_dict() for ball in self.balls]
         values["recipe"] = None if self.recipe is None else self.recipe.to_dict()
         values["material"] = None if self.material is None else _material_dict(self.material)
+        values["identity"] = dict(vars(self.identity))
         values["files"] = [{"name": name, "sha256": digest} for name, digest in self.files]
         for name in ("seatings", "checks"):
             values[name] = [{key: _plain(value, DIGITS) for key, value in vars(row).items()} for row in values[name]]
@@ -288,14 +292,18 @@ class PartResult(ShownPart):
         return json.dumps(self.to_dict(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
     def to_csv(self) -> str:
-        """Return the balls as CSV text, one line a ball; empty cells where something was not measured."""
+        """Return the balls as CSV text, one line a ball; empty cells where something was not measured.
+
+        The last columns say which part it is: serial number, lot, capture, time.
+        """
         text = io.StringIO()
         names = [entry.name for entry in fields(BallResult) if entry.name != "budget"]
         writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(names)
+        part = [self.serial, self.identity.lot, self.capture, self.inspected_utc]
+        writer.writerow([*names, *CSV_PART])
         for ball in self.balls:
             cells = [_csv_cell(name, getattr(ball, name)) for name in names]
-            writer.writerow(["; ".join(cell) if isinstance(cell, list) else cell for cell in cells])
+            writer.writerow([*("; ".join(cell) if isinstance(cell, list) else cell for cell in cells), *part])
         return text.getvalue()
 
     def to_table(self) -> str:

@@ -14,6 +14,7 @@ RECORDS = {
     "circle_pixels": 0,
     "ball_records": 1,
     "material_records": 1,
+    "part_identity": 2,
     "part_material": 2,
     "part_recipe": 2,
     "surface_records": 2,
@@ -37,7 +38,17 @@ STAGES = dict.fromkeys(
 )
 PIPELINES = ("check_pipeline", "calibrate", "pipeline", "evaluate", "part_anchors", "recipes", "cfx")
 JOINED = {"normals": 4.5, **dict.fromkeys(PIPELINES, 5), "part_surface": 5.2, "inspection_pipeline": 5.4}
-LATER = {**JOINED, "batch": 6, "report": 6, "studies": 6.5, "experiments": 6, "samples": 0, "cli": 7}
+LATER = {
+    **JOINED,
+    "batch": 6,
+    "report": 6,
+    "store": 6.2,
+    "line": 6.7,
+    "studies": 6.5,
+    "experiments": 6,
+    "samples": 0,
+    "cli": 7,
+}
 LEVEL = {**BASE, **STAGES, **LATER, "simulate": 4}
 
 

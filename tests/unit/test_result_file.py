@@ -98,8 +98,8 @@ def change(key: str, value: object) -> Callable[[dict[str, Any]], object]:
 
 SPOILT: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     "foreign": (lambda v: v.pop("format"), "is not a result of bgars: it must be an object"),
-    "older": (lambda v: v.pop("format_version"), "format_version: this bgars reads 2 to 3, got None"),
-    "newer": (change("format_version", 4), "format_version: this bgars reads 2 to 3, got 4"),
+    "older": (lambda v: v.pop("format_version"), "format_version: this bgars reads 2 to 4, got None"),
+    "newer": (change("format_version", 5), "format_version: this bgars reads 2 to 4, got 5"),
     "key gone": (lambda v: v["balls"][2].pop("top_um"), "balls.2.top_um: Field required"),
     "unknown key": (change("colour", "red"), "unknown key 'colour'"),
     "unknown key of a ball": (lambda v: v["balls"][0].update(x_mm=1), "unknown key 'balls.0.x_mm'; the nearest known"),

@@ -171,8 +171,8 @@ def test_what_is_no_process_is_refused() -> None:
     few = [("a", judged())] * 3
     with pytest.raises(bgars.InputError, match=r"results: must be at least 10 \(2 subgroups of 5\), got 3"):
         bgars.process_trend(few)
-    with pytest.raises(bgars.InputError, match="subgroup: must be 2 or more parts, got 1"):
-        bgars.process_trend(few, subgroup=1)
+    with pytest.raises(bgars.InputError, match="subgroup: must be 1 or more parts, got 0"):
+        bgars.process_trend(few, subgroup=0)
     with pytest.raises(bgars.InputError, match="target: must be above 0"):
         bgars.process_trend(few, target=math.nan)
     with pytest.raises(bgars.InputError, match="subgroups: must be"):

@@ -200,9 +200,9 @@ def test_grr_refuses_what_is_no_study_by_name_and_leaves_nothing(name: str, tmp_
         (["grr", "study", "--references", "ball.csv"], "ball must be a ball of part part1 for top_um, got 'Z9'"),
         (["spc", "none"], "none: no such file or folder"),
         (["spc", "empty"], "empty: holds no result.json, nor do the folders in it"),
-        (["spc", "study/part1/place1"], "results: must be at least 10 (2 subgroups of 5), got 3"),
+        (["spc", "study/part1/place1", "--subgroup", "5"], "results: must be at least 10 (2 subgroups of 5), got 3"),
         (["spc", "study/part1/place1", "study/part1/place1/1"], "is given more than once"),
-        (["spc", "study/part1/place1", "--subgroup", "1"], "subgroup: must be 2 or more parts, got 1"),
+        (["spc", "study/part1/place1", "--subgroup", "-1"], "subgroup: must be 1 or more parts, got -1"),
         (["spc", "name.csv"], "name.csv: is not valid JSON"),
     ],
 )

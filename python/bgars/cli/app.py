@@ -108,12 +108,27 @@ def top(
 
 @app.command()
 def demo(
+    what: Annotated[
+        Literal["ball", "line"], typer.Argument(help="ball: one solder ball. line: a station that drops 50 parts.")
+    ] = "ball",
     output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT", help="Folder for the results.")] = Path(
         "bgars-demo"
     ),
+    parts: Annotated[
+        int | None, typer.Option(min=4, help="Parts of the line; 50 by default.", show_default=False)
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Reconstruct the sample solder ball that comes with bgars."""
+    """Reconstruct the sample solder ball that comes with bgars, or simulate a station on a line.
+
+    'bgars demo line' simulates 50 parts, three of them with a defect, drops them into an inbox, inspects them as they
+    come (minutes), and writes the page of their lot.
+    """
+    if what == "line":
+        from bgars.cli.demo_line import demo_line  # noqa: PLC0415 - loaded when it runs
+
+        demo_line(output, parts=parts, as_json=as_json)
+        return
     folder = bgars.sample_capture()
     summary, files = _reconstruct_to(
         bgars.read_capture(folder), output, bgars.reconstruct, mesh_format="ply", directx=False

@@ -13,12 +13,14 @@ import typer
 import bgars
 from bgars.cli.console import print_json, say, say_files, stage_progress, utc_now, warn
 from bgars.cli.first_check import check_first
-from bgars.cli.options import ForceOption, MethodOption
+from bgars.cli.options import ForceOption, LotOption, MethodOption, OperatorOption, StationOption
 from bgars.errors import InputError
 from bgars.extras import how_to_install, missing
 from bgars.io.atomic import FolderNames, atomic_folder
 from bgars.io.given_paths import need_file, need_folder
+from bgars.line.naming import identity_of
 from bgars.normal_methods import DEFAULT_METHOD
+from bgars.part_identity import PartIdentity
 from bgars.report.page import REPORT_FILES
 from bgars.report.page_budget import main_causes
 from bgars.report.part import PICTURES
@@ -72,8 +74,14 @@ def inspect(
     ] = None,
     method: MethodOption = DEFAULT_METHOD,
     serial: Annotated[
-        str, typer.Option(metavar="SERIAL", help="Serial number of the part, kept in the result.", show_default=False)
+        str,
+        typer.Option(
+            metavar="SERIAL", help="Serial number of the part; by default that of capture.toml.", show_default=False
+        ),
     ] = "",
+    lot: LotOption = "",
+    station: StationOption = "",
+    operator: OperatorOption = "",
     parquet: Annotated[
         # The help is markup: a bracket that is no style is escaped.
         bool,
@@ -120,7 +128,8 @@ def inspect(
         capture = bgars.read_capture(folder)
         check_first(capture, force=force)
         result = bgars.inspect(capture, part, method=method, surface=page, progress=report)
-        result = replace(result, serial=serial, inspected_utc=utc_now())
+        named, identity = identity_of(capture, PartIdentity(lot=lot, station=station, operator=operator))
+        result = replace(result, serial=serial or named, identity=identity, inspected_utc=utc_now())
         files = dict(FILES)
         if pictures:
             files |= bgars.write_part_pictures(result, capture, place)

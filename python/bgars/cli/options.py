@@ -8,7 +8,7 @@ import typer
 
 from bgars.normal_methods import Method
 
-__all__ = ["ForceOption", "MethodOption"]
+__all__ = ["ForceOption", "LotOption", "MethodOption", "OperatorOption", "StationOption"]
 
 METHOD_HELP = (
     "reflectance: on balls, highlights included, by the material that is fitted on them, elsewhere robust-filter; "
@@ -27,3 +27,6 @@ ForceOption = Annotated[
         help="Go on though the images do not fit the lights (order, mirrored, below the surface, an image twice).",
     ),
 ]
+LotOption = Annotated[str, typer.Option(metavar="LOT", help="Lot of all parts.", show_default=False)]
+StationOption = Annotated[str, typer.Option(metavar="NAME", help="Station that took the images.", show_default=False)]
+OperatorOption = Annotated[str, typer.Option(metavar="NAME", help="Who runs it.", show_default=False)]

@@ -8,13 +8,18 @@ from typing import Annotated
 import typer
 
 from bgars.cli.console import print_json, say
+from bgars.errors import InputError
 from bgars.io.result_file import RESULT_NAME
+from bgars.line.lot_page import lot_facts, write_lot_page
+from bgars.line.pages import page_name, write_part_page
 from bgars.report.page import write_page
 from bgars.report.page_source import read_page_source
+from bgars.store import Store, is_store, open_store
 
 __all__ = ["register"]
 
 PAGE = "report.html"
+PAGES, OVERVIEW = "pages", "index.html"
 
 
 def register(app: typer.Typer) -> None:
@@ -25,30 +30,61 @@ def register(app: typer.Typer) -> None:
 def report(
     result: Annotated[
         Path,
-        typer.Argument(metavar="RESULT", help="Folder that bgars inspect wrote, or a result.json.", show_default=False),
+        typer.Argument(
+            metavar="RESULT",
+            help="Folder that bgars inspect wrote, or a result.json; or a store.",
+            show_default=False,
+        ),
     ],
+    serial: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[SERIAL]",
+            help="Serial number of a part of the store; without one the overview of its parts.",
+            show_default=False,
+        ),
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option(
             "--output",
             "-o",
             metavar="PAGE.html",
-            help="The page; report.html beside the result by default.",
+            help="The page; report.html beside the result by default, in the folder pages of a store.",
             show_default=False,
         ),
     ] = None,
+    lot: Annotated[
+        str | None, typer.Option(metavar="LOT", help="Overview of this lot of the store.", show_default=False)
+    ] = None,
+    round_: Annotated[
+        int | None,
+        typer.Option("--round", min=1, help="Which inspection of the serial number; the last by default."),
+    ] = None,
+    pages: Annotated[
+        bool, typer.Option("--pages", help="With the overview, write the pages of its last parts, too.")
+    ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
     ] = False,
 ) -> None:
-    """Write the page of an inspection again, from its result.json.
+    """Write the page of an inspection again, from its result.json, or pages of a store.
 
     One HTML file with verdict, reasons, the part, a table to sort and filter, charts and a 3-D view. It loads nothing:
     it can be mailed, archived, and opened without a network. The photograph is taken from photograph.jpg and
     report.json beside the result, where bgars inspect left them.
 
+    Of a store that bgars batch or bgars watch wrote: the page of part SERIAL, or without one the overview of a lot:
+    yield, defects, where they are, drift, the last parts. Pages of a store share one plotly.min.js beside them.
+
     Exit code 0: the page was written, whatever the verdict. 2: there is no result, or it is not one.
     """
+    if is_store(result):
+        _report_store(open_store(result), serial, output, lot, round_, pages=pages, as_json=as_json)
+        return
+    if serial is not None or lot is not None or round_ is not None or pages:
+        msg = f"{result}: is not a store: SERIAL, --lot, --round and --pages go with one"
+        raise InputError(msg)
     page = output or (result if result.is_dir() else result.parent) / PAGE
     source = read_page_source(result)
     write_page(source, page)
@@ -58,4 +94,34 @@ def report(
         return
     say(f"{page}: open it in a browser")
     for warning in source.warnings:
+        say(f"warning: {warning}")
+
+
+def _report_store(
+    store: Store,
+    serial: str | None,
+    output: Path | None,
+    lot: str | None,
+    round_: int | None,
+    *,
+    pages: bool,
+    as_json: bool,
+) -> None:
+    warnings: list[str] = []
+    if serial is not None:
+        page = output or store.folder / PAGES / page_name(serial, round_)
+        page.parent.mkdir(exist_ok=True)
+        warnings += write_part_page(store, serial, page, round_=round_).warnings
+    else:
+        page = output or store.folder / PAGES / OVERVIEW
+        page.parent.mkdir(exist_ok=True)
+        if pages:
+            for each in dict.fromkeys(row["serial"] for row in lot_facts(store, lot)["last"]):
+                warnings += write_part_page(store, each, page.with_name(page_name(each))).warnings
+        write_lot_page(store, page, lot=lot)
+    if as_json:
+        print_json({"store": str(store.folder), "output": str(page), "warnings": warnings})
+        return
+    say(f"{page}: open it in a browser")
+    for warning in warnings:
         say(f"warning: {warning}")

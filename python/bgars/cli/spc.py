@@ -12,13 +12,20 @@ import typer
 import bgars
 from bgars.cli.console import print_json, say, say_files, stage_progress
 from bgars.cli.inspect import EXIT_NOT_PASSED
+from bgars.errors import InputError
 from bgars.io.atomic import FolderNames, atomic_folder
 from bgars.io.given_paths import need_path
-from bgars.studies.pages import spc_page
+from bgars.store import open_store
+from bgars.studies.nelson import parse_rules
+from bgars.studies.pages import chart_page, spc_page
+from bgars.studies.query_chart import query_charts
 from bgars.studies.trend import DEFAULT_SUBGROUP, TARGET
+from bgars.studies.trend_files import expanded
 
 __all__ = ["register"]
 
+FEW_PARTS = 40
+"""Below it subgroups of five leave less than eight points, which is no chart."""
 FILES = {"spc.html": "the page to look at first", "spc.json": "every figure"}
 NAMES = FolderNames(frozenset(FILES), frozenset({"spc.json"}))
 
@@ -33,7 +40,8 @@ def spc(
         list[Path],
         typer.Argument(
             metavar="RESULT...",
-            help="Results of bgars inspect: result.json files, their folders, or folders of such folders.",
+            help="Results of bgars inspect: result.json files, their folders, folders of such folders, patterns of "
+            "these; or a store.",
             show_default=False,
         ),
     ],
@@ -43,26 +51,63 @@ def spc(
             "--output", "-o", metavar="OUT", help="Folder for the charts; made if missing.", show_default=False
         ),
     ],
-    subgroup: Annotated[int, typer.Option(help="Consecutive parts of a subgroup.")] = DEFAULT_SUBGROUP,
+    subgroup: Annotated[
+        int | None,
+        typer.Option(
+            help="Consecutive parts of a subgroup; 1: each part a point, with moving ranges (I-MR). By default "
+            f"{DEFAULT_SUBGROUP}, and 1 below {FEW_PARTS} parts.",
+            show_default=False,
+        ),
+    ] = None,
     target: Annotated[float, typer.Option(help="Ppk that is wanted.")] = TARGET,
     western_electric: Annotated[
         bool, typer.Option("--western-electric", help="Look for the zone patterns, too; more false alarms.")
     ] = False,
+    nelson: Annotated[
+        str,
+        typer.Option(
+            metavar="RULES", help="Look for these of Nelson's rules, such as 2,3,5; or all.", show_default=False
+        ),
+    ] = "",
+    where: Annotated[
+        str,
+        typer.Option(metavar="SQL", help="Which parts of a store, such as \"lot = 'L7'\".", show_default=False),
+    ] = "",
+    query: Annotated[
+        str,
+        typer.Option(
+            metavar="SQL",
+            help="Chart the numbers of this question to a store instead (I-MR); its other columns are labels.",
+            show_default=False,
+        ),
+    ] = "",
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
     ] = False,
 ) -> None:
-    """Chart many results over time: X-bar / S charts, Cp, Cpk, Pp, Ppk with confidence intervals.
+    """Chart many results over time: X-bar / S or I-MR charts, Cp, Cpk, Pp, Ppk with confidence intervals.
 
     Exit code 0: every characteristic with limits is in control and capable. 1: one is not, or it cannot be said; the
     output says which. 2: wrong use, too few results, or results that do not belong together.
     """
     for path in results:
-        need_path(path)
+        for place in expanded(path):
+            need_path(place)
+    rules = parse_rules(nelson)
+    if query:
+        _chart_query(results, query, output, rules, zone_rules=western_electric, as_json=as_json)
+        return
     with stage_progress() as report, atomic_folder(output, NAMES) as place:
-        ordered, warnings = bgars.read_results(results, progress=lambda fraction: report("results", fraction))
+        ordered, warnings = bgars.read_results(
+            results, where=where, progress=lambda fraction: report("results", fraction)
+        )
         found = bgars.process_trend(
-            ordered, subgroup=subgroup, target=target, zone_rules=western_electric, warnings=warnings
+            ordered,
+            subgroup=subgroup or (DEFAULT_SUBGROUP if len(ordered) >= FEW_PARTS else 1),
+            target=target,
+            zone_rules=western_electric,
+            nelson=rules,
+            warnings=warnings,
         )
         (place / "spc.html").write_text(spc_page(found), encoding="utf-8")
         text = json.dumps(found.to_dict(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
@@ -72,6 +117,32 @@ def spc(
     else:
         _tell(found, output)
     if found.verdict != "pass":
+        raise typer.Exit(EXIT_NOT_PASSED)
+
+
+def _chart_query(
+    stores: list[Path], sql: str, output: Path, rules: tuple[int, ...], *, zone_rules: bool, as_json: bool
+) -> None:
+    if len(stores) != 1:
+        msg = f"--query: goes with one store, got {len(stores)} paths"
+        raise InputError(msg)
+    charts = query_charts(open_store(stores[0]), sql, zone_rules=zone_rules, nelson=rules)
+    values = {"format": "bgars-charts", "query": sql, "charts": [each.to_dict() for each in charts]}
+    with atomic_folder(output, NAMES) as place:
+        (place / "spc.html").write_text(chart_page(charts, stores[0].name, sql), encoding="utf-8")
+        text = json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+        (place / "spc.json").write_text(text, encoding="utf-8")
+    if as_json:
+        print_json(values)
+    else:
+        for each in charts:
+            chart = each.chart
+            say(
+                f"{each.title}: {chart.centre:.5g}, limits {chart.low:.5g} to {chart.high:.5g}, "
+                f"{len(chart.signals)} signals"
+            )
+        say_files(output, FILES)
+    if any(each.chart.signals for each in charts):
         raise typer.Exit(EXIT_NOT_PASSED)
 
 

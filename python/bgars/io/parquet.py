@@ -20,6 +20,7 @@ __all__ = ["need_pyarrow", "write_parquet"]
 
 PART_COLUMNS = ("name", "serial", "capture", "inspected_utc", "verdict", "version")
 PREFIX = "part_"
+LOT = "part_lot"
 UNITS = {"_um": "um", "_deg": "deg"}
 WHOLE = {"row", "col", "lights_used"}
 TEXT = {"name", "verdict", "kind"}
@@ -28,8 +29,9 @@ TEXT = {"name", "verdict", "kind"}
 def write_parquet(result: PartResult, path: str | PathLike[str]) -> None:
     """Write the balls as a Parquet file; many of them read as one table.
 
-    Columns are those of ``balls.csv``, full digits, null = not measured, after six of the part (``part_name``,
-    ``part_serial``, ``part_capture``, ``part_inspected_utc``, ``part_verdict``, ``part_version``). Each column's
+    Columns are those of ``balls.csv``, full digits, null = not measured, after seven of the part
+    (``part_name``, ``part_serial``, ``part_capture``, ``part_inspected_utc``, ``part_verdict``, ``part_version``,
+    ``part_lot``). Each column's
     metadata holds its ``unit`` ("" for none) and ``description``; the table's, ``format`` and ``format_version``.
 
     Parameters
@@ -49,6 +51,7 @@ def write_parquet(result: PartResult, path: str | PathLike[str]) -> None:
     for name in PART_COLUMNS:
         about = str(ResultTable.model_fields[name].description)
         columns.append((PREFIX + name, about, [getattr(result, name)] * len(result.balls)))
+    columns.append((LOT, "lot or order of the part", [result.identity.lot] * len(result.balls)))
     for entry in fields(BallResult):
         if entry.name == "budget":
             continue

@@ -60,6 +60,17 @@ class CameraRecipe(Strict):
     distance_mm: Annotated[float, Field(gt=0, strict=True)]
 
 
+class PartIdentityTable(Strict):
+    """The ``[part]`` table: which part the images show."""
+
+    serial: str = ""
+    lot: str = ""
+    substrate: str = ""
+    position: str = ""
+    station: str = ""
+    operator: str = ""
+
+
 class LightsRecipe(Strict):
     """The ``[lights]`` table: exactly one of the first five keys."""
 
@@ -99,6 +110,7 @@ class CaptureRecipe(Strict):
     black_level: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
     saturation: Positive | None = None
     lights: LightsRecipe | None = None
+    part: PartIdentityTable | None = None
 
     @field_validator("camera", mode="before")
     @classmethod

@@ -13,6 +13,7 @@ from bgars.ball_records import BallLayout
 from bgars.errors import FileFormatError, InputError
 from bgars.io.result_schema import Reading, ResultTable
 from bgars.io.strict_toml import checked
+from bgars.part_identity import PartIdentity
 from bgars.part_material import MaterialParameter, PartMaterial
 from bgars.part_recipe import Limits, PartRecipe
 from bgars.part_result import FORMAT, FORMAT_VERSION, BallResult, PartCheck, PartResult, SeatingResult
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
     from bgars.io.result_schema import MaterialTable, RecipeTable, Table
 
-__all__ = ["RESULT_NAME", "read_result"]
+__all__ = ["RESULT_NAME", "parse_result", "read_result"]
 
 RESULT_NAME = "result.json"
 OLDEST_VERSION = 2
@@ -54,7 +55,23 @@ def read_result(path: str | PathLike[str]) -> PartResult:
         if not path.is_file():
             msg = f"{path.parent}: holds no {RESULT_NAME}: not a folder that bgars inspect wrote"
             raise FileFormatError(msg)
-    values = _json(path)
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        msg = f"{path}: cannot be read ({error.strerror})"
+        raise FileFormatError(msg) from error
+    return parse_result(content, path)
+
+
+def parse_result(content: bytes, path: Path) -> PartResult:
+    """Return the result that the content of a ``result.json`` describes; messages name `path`.
+
+    Raises
+    ------
+    FileFormatError
+        As :func:`read_result`.
+    """
+    values = _json(content, path)
     _check_format(path, values)
     try:
         table = checked(ResultTable, values, path)
@@ -68,16 +85,13 @@ def read_result(path: str | PathLike[str]) -> PartResult:
         raise FileFormatError(msg) from None
 
 
-def _json(path: Path) -> Any:  # noqa: ANN401 - whatever the file holds
+def _json(content: bytes, path: Path) -> Any:  # noqa: ANN401 - whatever the file holds
     def refuse(word: str) -> float:
         msg = f"holds {word}, which is no JSON; what was not measured is null"
         raise ValueError(msg)
 
     try:
-        return json.loads(path.read_bytes().decode("utf-8"), parse_constant=refuse)
-    except OSError as error:
-        msg = f"{path}: cannot be read ({error.strerror})"
-        raise FileFormatError(msg) from error
+        return json.loads(content.decode("utf-8"), parse_constant=refuse)
     except (ValueError, RecursionError) as error:
         msg = f"{path}: is not valid JSON: cut off, or not a result ({error})"
         raise FileFormatError(msg) from error
@@ -123,6 +137,7 @@ def _result(table: ResultTable) -> PartResult:
         "board_coefficients_um": np.array(table.board_coefficients_um, dtype=np.float64),
         "recipe": None if table.recipe is None else _recipe(table.recipe),
         "material": None if table.material is None else _material(table.material),
+        "identity": PartIdentity(**_fields(table.identity)),
         "files": tuple((file.name, file.sha256) for file in table.files),
     }
     return PartResult(**values)

@@ -170,6 +170,17 @@ class MaterialTable(Table):
     residuals_learnt: bool = Field(description="whether balls were corrected by what the others show beyond it")
 
 
+class IdentityTable(Table):
+    """What tells the part from the next one; empty = not known."""
+
+    lot: str = Field(description="lot or order")
+    substrate: str = Field(description="strip, tray or panel that carries the part")
+    position: str = Field(description="place on the substrate")
+    station: str = Field(description="machine that took the images")
+    operator: str = Field(description="who ran the machine")
+    captured_utc: str = Field(description="when the last image was written: ISO 8601, UTC")
+
+
 class FileTable(Table):
     """A file that the result was made from."""
 
@@ -181,7 +192,7 @@ class ResultTable(Table):
     """The result of one inspection; lengths in um, angles in degrees, null = not measured."""
 
     format: Literal["bgars-result"] = Field(description="says that this file is a result of bgars")
-    format_version: Literal[2, 3] = Field(description="rises with every change of the keys or their meaning")
+    format_version: Literal[2, 3, 4] = Field(description="rises with every change of the keys or their meaning")
     name: str = Field(description="name of the part (recipe), else of the capture")
     balls: list[BallTable] = Field(description="places in reading order, missing ones too; balls off the layout last")
     verdict: Verdict = Field(
@@ -231,12 +242,14 @@ class ResultTable(Table):
     seating_budget: Causes = Field(
         description="what u_seating_coplanarity_um is made of: standard uncertainty (k = 1) by cause, in um"
     )
+    identity: IdentityTable = Field(description="lot, place, station, operator: what tells the part from the next")
 
     @model_validator(mode="before")
     @classmethod
     def _earlier(cls, values: Any) -> Any:  # noqa: ANN401 - whatever the file holds
-        """Results of version 2 had no budgets."""
-        return {"seating_budget": {}} | values if isinstance(values, dict) else values
+        """Results of version 2 had no budgets, those before version 4 no identity beside the serial number."""
+        earlier = {"seating_budget": {}, "identity": dict.fromkeys(IdentityTable.model_fields, "")}
+        return earlier | values if isinstance(values, dict) else values
 
 
 def result_schema() -> dict[str, Any]:

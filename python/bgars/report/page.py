@@ -17,6 +17,7 @@ from bgars.errors import InputError
 from bgars.extras import how_to_install
 from bgars.io.atomic import atomic_file
 from bgars.part_result import PartResult
+from bgars.report.identity import identity_facts
 from bgars.report.page_budget import BUDGET_COLUMNS, budget_table
 from bgars.report.page_charts import coplanarity_chart, histogram_charts
 from bgars.report.page_chosen import chosen_marks
@@ -56,6 +57,7 @@ REPORT_FILES = {
 }
 TEMPLATES = Path(__file__).parent / "template"
 SEATS_TOLD = 3
+SHARED_PLOTLY = "plotly.min.js"
 
 
 def write_report(
@@ -122,10 +124,15 @@ def write_report(
     return written
 
 
-def write_page(source: PageSource, path: Path) -> None:
-    """Write the page of a source, whole or not at all."""
+def write_page(source: PageSource, path: Path, *, shared_plotly: bool = False) -> None:
+    """Write the page of a source, whole or not at all.
+
+    With `shared_plotly`, plotly.js lies beside the page, once for all pages of the folder, and not in each.
+    """
     _check_suffix(path)
-    text = page_text(source)
+    text = page_text(source, plotly_file=SHARED_PLOTLY if shared_plotly else "")
+    if shared_plotly:
+        _write_plotly(path.with_name(SHARED_PLOTLY))
     with atomic_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
@@ -149,9 +156,18 @@ def _made_source(result: PartResult, capture: Capture | None) -> PageSource:
     return source_of(result, capture)
 
 
-def page_text(source: PageSource) -> str:
-    """Return the page: the same source, the same text."""
-    plain_json = _json(source.result)
+def _write_plotly(path: Path) -> None:
+    text = str(plotly_script())
+    if path.is_file() and path.read_text(encoding="utf-8") == text:
+        return
+    with atomic_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def page_text(source: PageSource, *, plotly_file: str = "") -> str:
+    """Return the page: the same source, the same text; with `plotly_file`, it takes plotly.js from there."""
+    plain = source.result
+    plain_json = _json(plain)
     source = replace(source, result=with_micro(source.result))
     result = source.result
     figures, vectors = _figures(source)
@@ -159,7 +175,8 @@ def page_text(source: PageSource) -> str:
     places = chosen_marks(result, figures)
     # Apart from the others: it is only read when the view is opened.
     scene = figures.pop("scene", None)
-    plotly, js = plotly_script(), _script(_file("report.js"))
+    plotly, js = _markup("") if plotly_file else plotly_script(), _script(_file("report.js"))
+    allowed = [f"'sha256-{_hash(text)}'" for text in ((js,) if plotly_file else (plotly, js))]
     seats = [listed(seat["balls"], 8) for seat in result["seatings"][:SEATS_TOLD]]
     residual = result["shadow_residual_rms"]
     return _template().render(
@@ -195,7 +212,9 @@ def page_text(source: PageSource) -> str:
         css=_script(_file("report.css")),
         plotly=plotly,
         js=js,
-        script_hashes=_markup(" ".join(f"'sha256-{_hash(text)}'" for text in (plotly, js))),
+        script_hashes=_markup(" ".join([*allowed, *(["'self'", "file:"] if plotly_file else [])])),
+        plotly_file=plotly_file,
+        identity=identity_facts(plain),
         result_json=plain_json,
         page_json=_json({"figures": figures, "places": places}),
         scene_json=None if scene is None else _json(scene),

@@ -55,6 +55,7 @@ def write_part_pictures(result: PartResult, capture: Capture, folder: str | Path
         msg = f"capture: must have the {len(result.light_directions)} lights of the result, got {len(capture.images)}"
         raise InputError(msg)
     # Imported here: the names of the pictures are wanted where matplotlib is not.
+    from bgars.report.identity import identity_line  # noqa: PLC0415
     from bgars.report.part_balls import part_figure  # noqa: PLC0415
     from bgars.report.part_histograms import histogram_figure  # noqa: PLC0415
     from bgars.report.part_maps import deviation_figure  # noqa: PLC0415
@@ -69,7 +70,9 @@ def write_part_pictures(result: PartResult, capture: Capture, folder: str | Path
             "deviations.png": deviation_figure(result),
             "histograms.png": histogram_figure(result),
         }
+        line = identity_line(result.to_dict())
         for name, figure in figures.items():
+            figure.text(0.995, 0.003, line, ha="right", va="bottom", fontsize=6, color="0.35", parse_math=False)
             with atomic_file(folder / name) as temporary:
                 save(figure, temporary)
     return dict(PICTURES)

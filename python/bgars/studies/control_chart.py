@@ -10,14 +10,20 @@ import numpy as np
 from scipy import special
 
 from bgars.errors import InputError
+from bgars.studies.nelson import nelson_signals
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
-__all__ = ["WESTERN_ELECTRIC", "ControlChart", "Signal", "c4", "control_chart"]
+__all__ = ["WESTERN_ELECTRIC", "ControlChart", "Signal", "c4", "control_chart", "individuals_chart"]
 
 SIGMAS = 3.0
 MIN_SIZE, MIN_SUBGROUPS = 2, 2
+MIN_VALUES = 3
+D2, D4 = 1.128, 3.267
+"""Of moving ranges of two values (ISO 7870-2, table 2)."""
 BEYOND = "beyond 3 sigma"
 WESTERN_ELECTRIC = (
     ("2 of 3 beyond 2 sigma on one side", 2, 3, 2.0),
@@ -47,7 +53,7 @@ class Signal:
 
 @dataclass(frozen=True, eq=False)
 class ControlChart:
-    """An X-bar / S chart.
+    """An X-bar / S chart; with `size` 1 an I-MR chart, whose spreads are moving ranges (the first is NaN).
 
     Attributes
     ----------
@@ -60,7 +66,7 @@ class ControlChart:
     spread_centre, spread_low, spread_high : float
         Of the standard deviations.
     sigma : float
-        Within subgroups, S-bar / c4.
+        Within subgroups, S-bar / c4; of single values, mean moving range / d2.
     signals : tuple of Signal
     """
 
@@ -88,7 +94,9 @@ def c4(size: int) -> float:
     return math.sqrt(2.0 / (size - 1)) * math.exp(special.gammaln(size / 2) - special.gammaln((size - 1) / 2))
 
 
-def control_chart(subgroups: NDArray[np.float64], *, zone_rules: bool = False) -> ControlChart:
+def control_chart(
+    subgroups: NDArray[np.float64], *, zone_rules: bool = False, nelson: Sequence[int] = ()
+) -> ControlChart:
     """Return the X-bar / S chart of subgroups in the order of time.
 
     Limits are centre +- 3 S-bar / (c4 sqrt(size)) for the means and S-bar (1 +- 3 sqrt(1 - c4^2) / c4) for the standard
@@ -100,6 +108,8 @@ def control_chart(subgroups: NDArray[np.float64], *, zone_rules: bool = False) -
         At least 2 subgroups of at least 2 values, finite.
     zone_rules : bool
         Also look for the Western Electric patterns in the means.
+    nelson : sequence of int
+        Also look for these of Nelson's rules, 1 to 8, in the means.
 
     Raises
     ------
@@ -137,10 +147,68 @@ def control_chart(subgroups: NDArray[np.float64], *, zone_rules: bool = False) -
     signals += [
         Signal(int(at), "spread", BEYOND) for at in np.flatnonzero((spreads < spread_low) | (spreads > spread_high))
     ]
-    if zone_rules and half > 0:
-        signals += _zones((means - centre) / (half / SIGMAS))
-    ordered = tuple(sorted(signals, key=lambda signal: (signal.subgroup, signal.chart, signal.rule)))
-    return ControlChart(size, means, spreads, centre, low, high, spread, spread_low, spread_high, sigma, ordered)
+    signals += _patterns((means - centre) * (SIGMAS / half) if half > 0 else means * 0.0, zone_rules, nelson)
+    return ControlChart(
+        size, means, spreads, centre, low, high, spread, spread_low, spread_high, sigma, _in_order(signals)
+    )
+
+
+def individuals_chart(
+    values: NDArray[np.float64], *, zone_rules: bool = False, nelson: Sequence[int] = ()
+) -> ControlChart:
+    """Return the I-MR chart of single values in the order of time.
+
+    Limits are mean +- 3 MR-bar / d2 for the values and D4 MR-bar for the moving ranges of two, with d2 = 1.128 and
+    D4 = 3.267.
+
+    Parameters
+    ----------
+    values : (m,) float64
+        At least 3, finite.
+    zone_rules, nelson
+        As in :func:`control_chart`.
+
+    Raises
+    ------
+    InputError
+        Too few values, or values that are not finite.
+
+    References
+    ----------
+    ISO 7870-2:2013, section 7 (individuals and moving range).
+
+    Examples
+    --------
+    >>> chart = individuals_chart(np.array([1.0, 2.0, 1.0, 2.0]))
+    >>> round(chart.high, 2), round(chart.spread_high, 3)
+    (4.16, 3.267)
+    """
+    values = np.asarray(values, dtype=np.float64)
+    if values.ndim != 1 or len(values) < MIN_VALUES:
+        msg = f"values: must be at least {MIN_VALUES} in a row, got {values.shape}"
+        raise InputError(msg)
+    if not np.isfinite(values).all():
+        msg = "values: must be finite"
+        raise InputError(msg)
+    ranges = np.concatenate([[np.nan], np.abs(np.diff(values))])
+    centre, spread = float(values.mean()), float(np.nanmean(ranges))
+    sigma = spread / D2
+    low, high, spread_high = centre - SIGMAS * sigma, centre + SIGMAS * sigma, D4 * spread
+    signals = [Signal(int(at), "mean", BEYOND) for at in np.flatnonzero((values < low) | (values > high))]
+    signals += [Signal(int(at), "spread", BEYOND) for at in np.flatnonzero(ranges > spread_high)]
+    signals += _patterns((values - centre) / sigma if sigma > 0 else values * 0.0, zone_rules, nelson)
+    return ControlChart(1, values, ranges, centre, low, high, spread, 0.0, spread_high, sigma, _in_order(signals))
+
+
+def _in_order(signals: list[Signal]) -> tuple[Signal, ...]:
+    return tuple(sorted(set(signals), key=lambda signal: (signal.subgroup, signal.chart, signal.rule)))
+
+
+def _patterns(deviations: NDArray[np.float64], zone_rules: bool, nelson: Sequence[int]) -> list[Signal]:
+    """Signals of rules over several values; rule 1 of Nelson is the one that is always looked for."""
+    found = _zones(deviations) if zone_rules else []
+    found += [Signal(at, "mean", rule) for at, rule in nelson_signals(deviations, [n for n in nelson if n != 1])]
+    return found
 
 
 def _zones(deviations: NDArray[np.float64]) -> list[Signal]:

@@ -16,10 +16,13 @@ from bgars.studies.spc_figures import trend_figure
 from bgars.studies.svg import data_uri
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from bgars.studies.gauge_rr import GaugeStudy
+    from bgars.studies.query_chart import QueryChart
     from bgars.studies.trend import ProcessTrend
 
-__all__ = ["grr_page", "spc_page"]
+__all__ = ["chart_page", "grr_page", "spc_page"]
 
 UNKNOWN = "–"  # noqa: RUF001 - a dash of the width of a digit
 SMALL_CHANCE = 0.001
@@ -66,13 +69,38 @@ def grr_page(found: GaugeStudy) -> str:
 
 def spc_page(found: ProcessTrend) -> str:
     """Return the page of a process trend as HTML text."""
+    labels = part_labels(found)
     return (
         _environment()
         .get_template("spc.html")
         .render(
             found=found,
-            sections=[(trend, data_uri(partial(trend_figure, trend))) for trend in found.trends],
+            labels=labels,
+            sections=[(trend, data_uri(partial(trend_figure, trend, labels))) for trend in found.trends],
         )
+    )
+
+
+def chart_page(charts: Sequence[QueryChart], store: str, sql: str) -> str:
+    """Return the page of charts of a question as HTML text."""
+    sections = [(each, data_uri(partial(trend_figure, each, each.labels))) for each in charts]
+    return _environment().get_template("chart.html").render(sections=sections, store=store, sql=sql)
+
+
+def part_labels(found: ProcessTrend) -> tuple[str, ...]:
+    r"""Serial number and time of each part, two lines; nothing where neither is known.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> part_labels(SimpleNamespace(serials=("SN1",), times=("2026-01-31T12:00:00Z",)))
+    ('SN1\\n01-31 12:00',)
+    """
+    if not any(found.serials) and not any(found.times):
+        return ()
+    return tuple(
+        f"{serial}\n{time[5:16].replace('T', ' ')}".strip()
+        for serial, time in zip(found.serials, found.times, strict=True)
     )
 
 

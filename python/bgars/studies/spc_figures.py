@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
+    from bgars.studies.query_chart import QueryChart
     from bgars.studies.trend import Trend
 
 __all__ = ["trend_figure"]
@@ -27,24 +28,36 @@ LABEL_IN = 0.15
 """Height of a label of 8 points with the space above it."""
 LABEL_X = 1.025
 """Where labels start, in widths of the axes."""
+MOST_LABELS = 8
 
 
-def trend_figure(trend: Trend) -> Figure:
-    """X-bar chart over S chart, signals marked."""
+def trend_figure(trend: Trend | QueryChart, labels: Sequence[str] = ()) -> Figure:
+    """X-bar chart over S chart, or values over moving ranges, signals marked; `labels` name parts on the axis."""
     figure = new_figure(WIDTH_IN, HEIGHT_IN, "constrained")
     top, bottom = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [3, 2]})
     chart = trend.chart
     unit = f" ({trend.unit})" if trend.unit else ""
-    _chart(top, chart.means, (chart.low, chart.centre, chart.high), "mean" + unit)
-    _chart(bottom, chart.spreads, (chart.spread_low, chart.spread_centre, chart.spread_high), "std. deviation" + unit)
+    above, below = ("mean", "std. deviation") if chart.size > 1 else ("part", "moving range")
+    _chart(top, chart.means, (chart.low, chart.centre, chart.high), above + unit)
+    _chart(bottom, chart.spreads, (chart.spread_low, chart.spread_centre, chart.spread_high), below + unit)
     for name, axes, values in (("mean", top, chart.means), ("spread", bottom, chart.spreads)):
         at = sorted({signal.subgroup for signal in chart.signals if signal.chart == name})
         if at:
             axes.plot(np.array(at) + 1, values[at], "o", color=VERDICT_COLORS["fail"], markersize=8, label="signal")
             axes.legend(loc="upper left")
-    bottom.set_xlabel(f"subgroup of {chart.size} consecutive parts")
-    bottom.xaxis.get_major_locator().set_params(integer=True)
+    bottom.set_xlabel(f"subgroup of {chart.size} consecutive parts" if chart.size > 1 else "part")
+    if labels:
+        _name_parts(bottom, labels[:: chart.size][: len(chart.means)])
+    else:
+        bottom.xaxis.get_major_locator().set_params(integer=True)
     return figure
+
+
+def _name_parts(axes: Axes, labels: Sequence[str]) -> None:
+    """Serial number and time of some parts, evenly spread, below the axis."""
+    step = max(1, -(-len(labels) // MOST_LABELS))
+    places = list(range(0, len(labels), step))
+    axes.set_xticks([place + 1 for place in places], [labels[place] for place in places], fontsize=7)
 
 
 def _chart(axes: Axes, values: NDArray[np.float64], lines: tuple[float, float, float], title: str) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from bgars.errors import InputError
 from bgars.studies.capability import Capability, capability
 from bgars.studies.characteristics import CHARACTERISTICS, Characteristic, part_readings
-from bgars.studies.control_chart import ControlChart, control_chart
+from bgars.studies.control_chart import D2, MIN_VALUES, ControlChart, control_chart, individuals_chart
 from bgars.studies.plain import plain
 
 if TYPE_CHECKING:
@@ -29,6 +29,8 @@ DEFAULT_SUBGROUP = 5
 TARGET = 1.33
 TYPICAL_SUBGROUPS = 25
 MIN_SUBGROUPS = 2
+MOVING_RANGE_DF = 0.6
+"""Degrees of freedom a value of a sigma from moving ranges: of m normal values, its relative variance is 0.826 / m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,9 +93,12 @@ class ProcessTrend:
         Files, in the order of time.
     times : tuple of str
         When each was inspected; empty = not stamped.
+    serials : tuple of str
+        Serial number of each; empty = not known.
     part : str
         Name of the part.
     subgroup : int
+        1: charts of single parts and their moving ranges.
     target : float
     trends : tuple of Trend
     verdict : {"pass", "fail", "undecided"}
@@ -103,6 +108,7 @@ class ProcessTrend:
 
     results: tuple[str, ...]
     times: tuple[str, ...]
+    serials: tuple[str, ...]
     part: str
     subgroup: int
     target: float
@@ -132,6 +138,7 @@ def process_trend(
     subgroup: int = DEFAULT_SUBGROUP,
     target: float = TARGET,
     zone_rules: bool = False,
+    nelson: Sequence[int] = (),
     warnings: Sequence[str] = (),
 ) -> ProcessTrend:
     """Chart a process and state its capability.
@@ -146,11 +153,13 @@ def process_trend(
     results : sequence of (str, PartResult)
         In the order of time, from :func:`bgars.read_results`.
     subgroup : int
-        Consecutive parts of a subgroup.
+        Consecutive parts of a subgroup; 1: single parts and moving ranges (I-MR).
     target : float
         Ppk that is wanted.
     zone_rules : bool
         Also look for the Western Electric patterns.
+    nelson : sequence of int
+        Also look for these of Nelson's rules, 1 to 8.
     warnings : sequence of str
         Put before the own ones.
 
@@ -169,26 +178,28 @@ def process_trend(
     ----------
     ISO 22514-2 (Pp, Ppk, Cp, Cpk); L. Kish, Survey Sampling, 1965, section 5.4 (the design effect of clusters).
     """
-    if subgroup < MIN_SUBGROUPS:
-        msg = f"subgroup: must be 2 or more parts, got {subgroup}"
+    if subgroup < 1:
+        msg = f"subgroup: must be 1 or more parts, got {subgroup}"
         raise InputError(msg)
     if not (math.isfinite(target) and target > 0):
         msg = f"target: must be above 0, got {target}"
         raise InputError(msg)
     count = len(results) // subgroup
+    if subgroup == 1 and count < MIN_VALUES:
+        msg = f"results: must be at least {MIN_VALUES} for a chart of single parts, got {len(results)}"
+        raise InputError(msg)
     if count < MIN_SUBGROUPS:
         msg = f"results: must be at least {MIN_SUBGROUPS * subgroup} (2 subgroups of {subgroup}), got {len(results)}"
         raise InputError(msg)
     told = list(warnings)
+    points = "subgroups" if subgroup > 1 else "parts"
     if count < TYPICAL_SUBGROUPS:
-        told.append(
-            f"{count} subgroups: control limits and capability are rough; {TYPICAL_SUBGROUPS} or more are usual"
-        )
+        told.append(f"{count} {points}: control limits and capability are rough; {TYPICAL_SUBGROUPS} or more are usual")
     rest = len(results) - count * subgroup
     if rest:
         told.append(f"the last {rest} results do not fill a subgroup and are left out; first: {results[-rest][0]}")
     used = [result for _, result in results[: count * subgroup]]
-    trends = [_trend(used, each, subgroup, target, zone_rules) for each in CHARACTERISTICS]
+    trends = [_trend(used, each, subgroup, target, zone_rules, nelson) for each in CHARACTERISTICS]
     known = tuple(trend for trend in trends if isinstance(trend, Trend))
     recipe = used[0].recipe
     missing = [
@@ -203,6 +214,7 @@ def process_trend(
     return ProcessTrend(
         tuple(name for name, _ in results),
         tuple(result.inspected_utc for _, result in results),
+        tuple(result.serial for _, result in results),
         used[0].name,
         subgroup,
         target,
@@ -227,7 +239,12 @@ def _verdict(trends: Sequence[Trend], missing: list[str]) -> tuple[Verdict, tupl
 
 
 def _trend(
-    results: list[PartResult], characteristic: Characteristic, subgroup: int, target: float, zone_rules: bool
+    results: list[PartResult],
+    characteristic: Characteristic,
+    subgroup: int,
+    target: float,
+    zone_rules: bool,
+    nelson: Sequence[int],
 ) -> Trend | None:
     tables = [part_readings(result, characteristic) for result in results]
     names = dict.fromkeys(name for table in tables for name in table)
@@ -239,13 +256,21 @@ def _trend(
     groups = rows.reshape(len(values), -1)
     n, mean = rows.size, float(rows.mean())
     effective = n / (1.0 + (len(complete) - 1) * _correlation(rows))
-    overall, within = float(rows.std(ddof=1)), float(math.sqrt(groups.var(axis=1, ddof=1).mean()))
+    overall = float(rows.std(ddof=1))
+    if subgroup == 1:  # from part to part, ball by ball
+        within = float(np.abs(np.diff(rows, axis=0)).mean()) / D2
+        df_within = MOVING_RANGE_DF * effective
+    else:
+        within = float(math.sqrt(groups.var(axis=1, ddof=1).mean()))
+        df_within = (n - len(values)) * effective / n
     limits = characteristic.limits(results[0].recipe)
     lowest, highest = limits
-    share = effective / n
     outside = int(np.sum(rows < (-math.inf if lowest is None else lowest)))
     outside += int(np.sum(rows > (math.inf if highest is None else highest)))
-    chart = control_chart(values, zone_rules=zone_rules)
+    if subgroup == 1:
+        chart = individuals_chart(values[:, 0], zone_rules=zone_rules, nelson=nelson)
+    else:
+        chart = control_chart(values, zone_rules=zone_rules, nelson=nelson)
     left_out = tuple(name for name in names if name not in complete)
     figures = capability(mean, overall, limits, count=effective, df=max(effective - 1.0, 1.0))
     verdict, reason = _judged(characteristic, chart, figures, target, left_out, outside, limits)
@@ -263,7 +288,7 @@ def _trend(
         overall,
         within,
         overall=figures,
-        within=capability(mean, within, limits, count=effective, df=max((n - len(values)) * share, 1.0)),
+        within=capability(mean, within, limits, count=effective, df=max(df_within, 1.0)),
         outside=outside,
         left_out=left_out,
         verdict=verdict,
@@ -304,7 +329,8 @@ def _judged(
     if chart.signals:
         first = chart.signals[0]
         doubts.append(
-            f"not in control ({len(chart.signals)} signals; first: {first.chart} of subgroup {first.subgroup + 1}: "
+            f"not in control ({len(chart.signals)} signals; first: {first.chart} of "
+            f"{'subgroup' if chart.size > 1 else 'part'} {first.subgroup + 1}: "
             f"{first.rule}), so that no index holds for the parts to come"
         )
     if left_out:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import glob
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bgars.errors import InputError
 from bgars.io.given_paths import need_path
-from bgars.io.result_file import RESULT_NAME, read_result
+from bgars.io.result_file import RESULT_NAME, parse_result, read_result
+from bgars.store import is_store, open_store
 from bgars.studies.alike import check_alike
 from bgars.studies.study_folder import natural, subfolders
 
@@ -21,14 +23,16 @@ __all__ = ["read_results"]
 
 
 def read_results(
-    paths: Iterable[str | PathLike[str]], *, progress: Callable[[float], object] | None = None
+    paths: Iterable[str | PathLike[str]], *, where: str = "", progress: Callable[[float], object] | None = None
 ) -> tuple[tuple[tuple[str, PartResult], ...], tuple[str, ...]]:
     """Read many results and put them into the order of time.
 
     Parameters
     ----------
     paths : iterable of path
-        Results: ``result.json`` files, folders that hold one, or folders of such folders.
+        Results: ``result.json`` files, folders that hold one, folders of such folders, stores, or patterns of these.
+    where : str
+        Condition on the table ``parts`` of a store, such as ``"lot = 'L7'"``.
     progress : callable, optional
         Called with the fraction done.
 
@@ -45,8 +49,13 @@ def read_results(
     FileFormatError
         A file that is no result.
     """
-    files = [file for path in paths for file in _files(Path(path))]
-    if not files:
+    given = [place for path in paths for place in expanded(Path(path))]
+    stored = [each for path in given if is_store(path) for each in _of_store(path, where)]
+    files = [file for path in given if not is_store(path) for file in _files(path)]
+    if where and not any(map(is_store, given)):
+        msg = f"where: goes with a store, got {where!r} without one"
+        raise InputError(msg)
+    if not files and not stored:
         msg = "results: must be at least one result, got none"
         raise InputError(msg)
     real = [file.resolve() for file in files]
@@ -54,7 +63,7 @@ def read_results(
     if twice is not None:
         msg = f"{twice}: is given more than once"
         raise InputError(msg)
-    results = []
+    results = [(name, result) for name, result in stored]
     for done, file in enumerate(files):
         if progress is not None:
             progress(done / len(files))
@@ -62,6 +71,8 @@ def read_results(
     if progress is not None:
         progress(1.0)
     warnings = list(check_alike(results))
+    if not files and len(given) == 1:
+        return tuple(results), tuple(warnings)  # a store knows the order, whatever its clocks did
     unstamped = [name for name, result in results if not result.inspected_utc]
     if unstamped:
         warnings.append(
@@ -71,6 +82,41 @@ def read_results(
     else:
         results.sort(key=lambda each: (each[1].inspected_utc, natural(each[0])))
     return tuple(results), tuple(warnings)
+
+
+def expanded(path: Path) -> list[Path]:
+    """What a pattern stands for, where the shell does not expand it; a path that is there is itself.
+
+    Raises
+    ------
+    InputError
+        Nothing matches.
+    """
+    if path.exists() or not set("*?[") & set(str(path)):
+        return [path]
+    found = [Path(name) for name in sorted(glob.glob(str(path)), key=natural)]  # noqa: PTH207 - absolute patterns, too
+    if not found:
+        msg = f"{path}: nothing matches this pattern"
+        raise InputError(msg)
+    return found
+
+
+def _of_store(path: Path, where: str) -> list[tuple[str, PartResult]]:
+    """The results of a store in the order in which they came."""
+    chosen = f"where {where}" if where else ""
+    sql = f"select part_key, serial, round from parts {chosen} order by sequence"
+    store = open_store(path)
+    wanted = store.query(sql).to_pylist()
+    texts = store.query("select part_key, result_json from results").to_pylist()
+    by_key = {row["part_key"]: row["result_json"] for row in texts}
+    found = []
+    for row in wanted:
+        name = f"{path}: {row['serial']}" + (f", round {row['round']}" if row["round"] > 1 else "")
+        found.append((name, parse_result(by_key[row["part_key"]].encode(), path / RESULT_NAME)))
+    if not found:
+        msg = f"{path}: has no parts{f' where {where}' if where else ''}"
+        raise InputError(msg)
+    return found
 
 
 def _files(path: Path) -> list[Path]:

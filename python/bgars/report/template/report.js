@@ -184,16 +184,23 @@
   };
   // plotly.js ends the page, as text: to run it takes longer than all before, and only charts need it.
   const parsed = new Promise((next) => document.addEventListener("DOMContentLoaded", next));
-  const library = () => {
+  // Pages of a store share one copy of it, a file beside them.
+  let loading = null;
+  const library = () => (loading = loading || load());
+  const load = async () => {
     const text = document.getElementById("plotly");
     if (!text) return;
     const script = document.createElement("script");
-    script.textContent = text.textContent;
+    const { src } = text.dataset;
+    if (!src) script.textContent = text.textContent;
+    const loaded = src && new Promise((next) => { script.onload = script.onerror = next; });
+    if (src) script.src = src;
     text.replaceWith(script);
+    if (src) await loaded;
     if (!window.Plotly) document.documentElement.dataset.chartless = "yes";
   };
   const draw = async (node) => {
-    library();
+    await library();
     const name = node.dataset.figure;
     const { data, layout } = shape(node, dark.matches && !printing, printing ? paper(node) : {});
     const drawn = Plotly.newPlot(node, data, layout, name === "scene" ? { ...config, displayModeBar: true, modeBarButtons: VIEW_BUTTONS } : config);
@@ -224,7 +231,7 @@
     try {
       while (near.size) {
         await pause();
-        library();
+        await library();
         await pause();
         const [node] = [...near].sort((one, two) => offCentre(one) - offCentre(two));
         near.delete(node);

@@ -1,0 +1,233 @@
+"""Rewrite the measured tables of docs/line.md: `python docs/make_line.py` (ten minutes; leave the machine alone)."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import bgars
+import imageio.v3 as iio
+from bgars.line import demo
+from bgars.line.batch import store_outcome
+from bgars.line.inbox import Inbox
+from bgars.line.job import Job, run_job
+from bgars.line.notify import Notifier
+from bgars.line.watch import Watch
+
+PAGE = Path(__file__).parent / "line.md"
+BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
+WANTED_S = 1.0
+SIDE_PX, PIXEL_UM, BALLS = 2048, 5.1, 10
+
+
+def main() -> None:
+    """Measure, and put the tables between the marks."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--parts", type=int, default=24, help="parts of a batch")
+    options.add_argument("--cycles", type=int, default=5, help="large parts that are watched")
+    options.add_argument("--stored", type=int, default=1000, help="parts in the store that is asked")
+    given = options.parse_args()
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        top = heading()
+        watched, large_cpu_s = watch_table(folder, given.cycles)
+        tables = [top, *batch_table(folder, given.parts, large_cpu_s), *watched, *store_table(folder, given.stored)]
+    text = PAGE.read_text(encoding="utf-8")
+    head, tail = text.split(BEGIN)[0], text.split(END)[1]
+    PAGE.write_text(f"{head}{BEGIN}\n{chr(10).join(tables)}\n{END}{tail}", encoding="utf-8")
+
+
+def heading() -> str:
+    """What the tables were measured on."""
+    load = os.getloadavg()[0]
+    name = next(
+        (line.split(":")[1].strip() for line in Path("/proc/cpuinfo").read_text().splitlines() if "model name" in line),
+        platform.processor(),
+    )
+    busy = f"load {load:.1f} when it began" if load > 1 else "otherwise idle"
+    return (
+        f"## Measured\n\nBy `make line` on {os.cpu_count()} processors ({name}), {busy}. On a busy "
+        f"machine wall times say little: "
+        "compare the CPU seconds.\n"
+    )
+
+
+def batch_table(folder: Path, parts: int, large_cpu_s: float) -> list[str]:
+    """Parts a minute with one and two processes, and what follows for more."""
+    captures = folder / "captures"
+    captures.mkdir()
+    for number in range(parts):
+        demo.drop_part(captures, number, parts)
+        (captures / demo.serial_of(number) / "capture.toml").write_text(demo.RIG)
+    (folder / "part.toml").write_text(demo.RECIPE)
+    rows, cpu_s = [], {}
+    for processes in (1, 2):
+        store = folder / f"store{processes}"
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        line = ["batch", captures, "-r", folder / "part.toml", "-o", store, "--processes", processes, "--threads", 1]
+        done = subprocess.run(
+            [sys.executable, "-m", "bgars", *map(str, line), "--json"], capture_output=True, text=True, check=False
+        )
+        told = json.loads(done.stdout)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        cpu_s[processes] = used / parts
+        rows.append((processes, 60 * told["inspected"] / told["seconds"], used / parts, used / told["seconds"]))
+    append_s = append_time(folder, captures / demo.serial_of(0))
+    base = rows[0]
+    lines = [
+        f"**Batch:** {parts} parts of nine balls, 290 x 290 pixels, eight lights, one thread a process.\n",
+        "| processes | parts a minute | efficiency (wall) | CPU s a part | efficiency (CPU) | processors had |",
+        "|---:|---:|---:|---:|---:|---:|",
+    ]
+    for processes, rate, used, had in rows:
+        wall = rate / (processes * base[1])
+        lines.append(
+            f"| {processes} | {rate:.1f} | {wall:.2f} | {used:.2f} | {base[2] / used:.2f} | {had:.2f} of {processes} |"
+        )
+    lines += [
+        "",
+        f"Efficiency (CPU) is what one process needs for a part over what two need: what running side by side costs by "
+        f"itself. Beyond two it is calculated, not measured: the one process that writes the store needs "
+        f"{1e3 * append_s:.0f} ms a "
+        "part, which is the limit of any number of workers; images that are sent pass a network of 1 "
+        "Gbit/s (32 MB for a part "
+        "of 4 megapixels and eight lights).\n",
+        f"| workers | parts a minute, these | what binds | parts a minute, 4 megapixels, "
+        f"{large_cpu_s:.1f} CPU s, images sent | what binds |",
+        "|---:|---:|---|---:|---|",
+    ]
+    for workers in (4, 16, 64):
+        small = bound({"inspection": 60 * workers / cpu_s[2], "store": 60 / append_s})
+        large = bound({"inspection": 60 * workers / large_cpu_s, "network": 60 * 125e6 / 32e6, "store": 60 / append_s})
+        lines.append(f"| {workers} | {small[1]:.0f} | {small[0]} | {large[1]:.0f} | {large[0]} |")
+    return [*lines, ""]
+
+
+def bound(rates: dict[str, float]) -> tuple[str, float]:
+    """What is slowest, and its rate."""
+    return min(rates.items(), key=lambda pair: pair[1])
+
+
+def append_time(folder: Path, capture: Path) -> float:
+    """Median seconds of an append."""
+    store = bgars.open_store(folder / "appended", create=True)
+    outcome = run_job(Job(str(capture)))
+    assert outcome.result is not None
+    seconds = []
+    for number in range(30):
+        named = replace(outcome, result=replace(outcome.result, serial=f"N{number}"))
+        start = time.perf_counter()
+        store_outcome(named, store)
+        seconds.append(time.perf_counter() - start)
+    return statistics.median(seconds)
+
+
+def watch_table(folder: Path, cycles: int) -> tuple[list[str], float]:
+    """Seconds from the last image to the result, of a part with 100 balls at 4 megapixels."""
+    inbox = folder / "inbox"
+    inbox.mkdir()
+    scene = bgars.Scene.ball_array(BALLS, BALLS, jitter=bgars.Jitter(4.0, 1.0, 2.0), seed=1)
+    camera = bgars.Camera(pixel_pitch_um=PIXEL_UM, shape=(SIDE_PX, SIDE_PX))
+    capture, _ = bgars.simulate(scene, bgars.LightRig.ring(demo.LIGHTS), bgars.Material(), camera)
+    rig = folder / "capture.toml"
+    rig.write_text(demo.RIG.replace("16.0", str(PIXEL_UM)))
+    store = bgars.open_store(folder / "watched", create=True)
+    watch = Watch(
+        Inbox(inbox, count=None, trigger="ready", settle_s=0.0),
+        store,
+        None,
+        rig,
+        inbox / "_done",
+        inbox / "_failed",
+        notifier=Notifier(line_file=str(folder / "line")),
+        say=lambda _line: None,
+    )
+    walls, cpus, reads, inspections = [], [], [], []
+    for number in range(cycles + 1):
+        part = inbox / f"SN{number}"
+        part.mkdir()
+        for light, image in enumerate(capture.images):
+            iio.imwrite(part / f"light_{light:02d}.png", image)
+        rig_seconds = time.perf_counter()
+        (part / "ready").touch()
+        cpu = time.process_time()
+        assert watch.step()
+        walls.append(time.perf_counter() - rig_seconds)
+        cpus.append(time.process_time() - cpu)
+        done = next(inbox.glob(f"_done/*/SN{number}"))
+        start = time.process_time()
+        read = bgars.read_capture(done)
+        reads.append(time.process_time() - start)
+        start = time.process_time()
+        bgars.inspect(read)
+        inspections.append(time.process_time() - start)
+    rest = slice(1, None)
+    verdict = "met" if statistics.median(walls[rest]) <= WANTED_S else "**not met**"
+    rows = {
+        "from the last image (the trigger) to the line for the PLC, wall": statistics.median(walls[rest]),
+        "the same, longest": max(walls[rest]),
+        "the same, first part of the process": walls[0],
+        "the same, CPU s": statistics.median(cpus[rest]),
+        "of it reading the images, CPU s": statistics.median(reads[rest]),
+        "of it the inspection, CPU s": statistics.median(inspections[rest]),
+    }
+    lines = [
+        f"**Watch:** parts with {BALLS * BALLS} balls, {SIDE_PX} x {SIDE_PX} pixels, eight lights, 8 "
+        f"bit; {cycles} parts after a first one. "
+        f"Wanted: {WANTED_S:.1f} s, which is {verdict}.\n",
+        "| | s |",
+        "|---|---:|",
+        *(f"| {name} | {value:.2f} |" for name, value in rows.items()),
+        "",
+    ]
+    return lines, statistics.median(cpus[rest])
+
+
+def store_table(folder: Path, parts: int) -> list[str]:
+    """Size of a store, and what questions take."""
+    result = next(iter(bgars.read_results([folder / "watched"], where="serial = 'SN0'")[0]))[1]
+    store = bgars.open_store(folder / "asked", create=True)
+    appends = []
+    for number in range(parts):
+        start = time.perf_counter()
+        store.append(replace(result, serial=f"SN{number:05d}", inspected_utc=f"2026-01-{1 + number % 5:02d}T12:00:00Z"))
+        appends.append(time.perf_counter() - start)
+    start = time.perf_counter()
+    files = store.compact()
+    compaction_s = time.perf_counter() - start
+    size = sum(path.stat().st_size for path in store.folder.rglob("*.parquet"))
+    asked = {}
+    for name, sql in {
+        "yield by day": "select day, count(*) filter (verdict = 'pass') / count(*) from parts group by day",
+        "the ten balls that fail most": "select name, count(*) filter (verdict = 'fail') n from balls "
+        "group by name order by n desc limit 10",
+        "uncertainty by cause": "select reading, cause, median(u_um) from budgets group by reading, cause",
+    }.items():
+        start = time.perf_counter()
+        store.query(sql)
+        asked[name] = time.perf_counter() - start
+    lines = [
+        f"**Store:** {parts} parts of 100 balls, five days.\n",
+        "| | |",
+        "|---|---:|",
+        f"| append, median (longest) | {1e3 * statistics.median(appends):.0f} ms ({1e3 * max(appends):.0f} ms) |",
+        f"| compaction of {files['files_before']} files to {files['files_after']} | {compaction_s:.1f} s |",
+        f"| on disk, a part | {size / parts / 1e3:.0f} kB |",
+        *(f"| question: {name} | {seconds:.2f} s |" for name, seconds in asked.items()),
+    ]
+    return [*lines, ""]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,164 @@
+"""The command ``bgars batch``."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
+from rich.progress import Progress as Bar
+
+from bgars.cli.console import error_console, print_json, say
+from bgars.cli.inspect import EXIT_NOT_PASSED
+from bgars.cli.options import LotOption, MethodOption, OperatorOption, StationOption
+from bgars.line import Batch, Naming, inspect_many
+from bgars.line.batch import Progress
+from bgars.normals import DEFAULT_METHOD
+from bgars.part_identity import PartIdentity
+from bgars.store import open_store
+
+__all__ = ["SerialFrom", "StoreOption", "register"]
+
+MOST_FAILURES = 10
+LINE_EVERY_S = 10.0
+"""Between two lines of progress where there is no terminal."""
+StoreOption = Annotated[
+    Path, typer.Option("--output", "-o", metavar="STORE", help="Store; made if missing.", show_default=False)
+]
+SerialFrom = Annotated[
+    str,
+    typer.Option(
+        metavar="PATTERN",
+        help="Where serial numbers come from: a pattern of the folder's name with {serial}, {lot}, {substrate}, "
+        "{position}, {station}, {operator}, such as '{lot}/{serial}_{position}'; or 'code', the DataMatrix in the "
+        "images. A [part] table in capture.toml goes first.",
+    ),
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("batch")(batch)
+
+
+def batch(
+    folders: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="FOLDER...",
+            help="Captures, folders of captures, or patterns such as 'lots/L7/*', which bgars expands itself.",
+            show_default=False,
+        ),
+    ],
+    output: StoreOption,
+    recipe: Annotated[
+        Path | None,
+        typer.Option("--recipe", "-r", metavar="PART.toml", help="Layout and limits of the part.", show_default=False),
+    ] = None,
+    method: MethodOption = DEFAULT_METHOD,
+    processes: Annotated[
+        int | None,
+        typer.Option(
+            min=1, help="Parts side by side; with --threads, one thread a core by default.", show_default=False
+        ),
+    ] = None,
+    threads: Annotated[int | None, typer.Option(min=1, help="Threads of each process.", show_default=False)] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="tcp://HOST:PORT",
+            help="Work on this Dask cluster, which sees the same folders.",
+            show_default=False,
+        ),
+    ] = None,
+    send_images: Annotated[
+        bool, typer.Option("--send-images", help="Send the images to the cluster, which does not see the folders.")
+    ] = False,
+    serial_from: SerialFrom = "{serial}",
+    lot: LotOption = "",
+    station: StationOption = "",
+    operator: OperatorOption = "",
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
+    ] = False,
+) -> None:
+    """Inspect many captures into one store: all cores, failures kept with their reason, killed runs taken up again.
+
+    What the store has by the contents of images, recipe and version is not done again. No pages are written: see
+    'bgars report STORE' for the overview, 'bgars report STORE SERIAL' for a part, 'bgars query STORE' for questions.
+
+    Exit code 0: every part passes. 1: a part does not, or could not be inspected. 2: wrong use, or a store that cannot
+    be written. 130: interrupted; run it again to go on.
+    """
+    naming = Naming(serial_from, PartIdentity(lot=lot, station=station, operator=operator))
+    store = open_store(output, create=True)
+    with _progress() as report:
+        done = inspect_many(
+            folders,
+            recipe,
+            store=store,
+            method=method,
+            naming=naming,
+            processes=processes,
+            threads=threads,
+            scheduler=scheduler,
+            send_images=send_images,
+            progress=report,
+        )
+    if as_json:
+        told = {name: value for name, value in vars(done).items() if name not in {"results", "failures"}}
+        failures = [{"folder": folder, "reason": reason} for folder, reason in done.failures]
+        print_json({**told, "inspected": done.inspected, "failures": failures, "store": str(output)})
+    else:
+        _tell(done, output)
+    if done.failures or done.verdicts["fail"] or done.verdicts["undecided"]:
+        raise typer.Exit(EXIT_NOT_PASSED)
+
+
+def _tell(done: Batch, output: Path) -> None:
+    verdicts = ", ".join(f"{count} {verdict}" for verdict, count in done.verdicts.items())
+    rate = f", {60 * done.inspected / done.seconds:.1f} parts a minute" if done.inspected and done.seconds > 0 else ""
+    say(f"{done.inspected} parts inspected: {verdicts} ({done.seconds:.1f} s{rate})")
+    if done.known:
+        say(f"{done.known} were in the store and were not done again")
+    if done.failures:
+        say(f"{len(done.failures)} could not be inspected; they are tried again when this is run again:")
+        for folder, reason in done.failures[:MOST_FAILURES]:
+            say(f"  {folder}: {reason}")
+        if len(done.failures) > MOST_FAILURES:
+            say(f"  ... and {len(done.failures) - MOST_FAILURES} more: bgars query {output} 'select * from failures'")
+    say()
+    say(f'Next: bgars report {output}    or: bgars query {output} "select serial, verdict, reason from parts"')
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[Progress], None]]:
+    """A bar on a terminal, a line every ten seconds elsewhere; both on stderr, with rate and remaining time."""
+    if not error_console().is_terminal:
+        last = time.monotonic()
+
+        def tell(now: Progress) -> None:
+            nonlocal last
+            if time.monotonic() - last >= LINE_EVERY_S:
+                last = time.monotonic()
+                sys.stderr.write(f"{now.done} of {now.total}, {_words(now)}\n")
+                sys.stderr.flush()
+
+        yield tell
+        return
+    columns = (TextColumn("parts"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}"))
+    with Bar(*columns, console=error_console(), transient=True) as bar:
+        task = bar.add_task("", total=None)
+        yield lambda now: bar.update(task, completed=now.done, total=now.total, description=_words(now))
+
+
+def _words(now: Progress) -> str:
+    left = now.remaining_s
+    time_left = f"{left:.0f} s" if left < 100 else f"{left / 60:.0f} min"  # noqa: PLR2004
+    failed = f", {now.failed} not inspected" if now.failed else ""
+    return f"{now.per_minute:.1f} a minute, {time_left} left{failed}"

@@ -1,0 +1,63 @@
+"""The command ``bgars capture``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import bgars
+from bgars.cli.console import print_json, say, stage_progress
+from bgars.cli.describe import describe, describe_in_words
+from bgars.io.given_paths import need_file
+from bgars.line.camera import camera_of, take_capture
+
+__all__ = ["register"]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("capture")(capture)
+
+
+def capture(
+    camera: Annotated[
+        str,
+        typer.Argument(
+            metavar="CAMERA",
+            help="MODULE:CALLABLE that returns an object with grab(light) -> pixels, or folder:PATH, which shows the "
+            "images of a folder.",
+            show_default=False,
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="FOLDER", help="New capture folder.", show_default=False)
+    ],
+    lights: Annotated[int, typer.Option(min=1, help="Lights, one image each.")] = 8,
+    rig: Annotated[
+        Path | None,
+        typer.Option(metavar="capture.toml", help="Description of the rig, copied into it.", show_default=False),
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
+    ] = False,
+) -> None:
+    """Take an image under each light with a camera, write a capture folder, read it again and say what is in it.
+
+    The folder appears when all is in it, so that it may lie in the inbox of bgars watch.
+    """
+    need_file(rig)
+    with stage_progress() as report:
+        files = take_capture(
+            camera_of(camera), output, lights=lights, rig=rig, progress=lambda fraction: report("lights", fraction)
+        )
+    facts = None if rig is None else describe(bgars.read_capture(output))
+    if as_json:
+        print_json({"output": str(output), "files": files, "capture": facts})
+        return
+    say(f"{output}: {lights} images")
+    for line in [] if facts is None else describe_in_words(facts):
+        say(line)
+    if facts is None:
+        say("without --rig nothing says where the lights are: put a capture.toml into it")

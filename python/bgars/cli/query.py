@@ -1,0 +1,171 @@
+"""The commands ``bgars query`` and ``bgars store``."""
+
+from __future__ import annotations
+
+import csv
+import datetime
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from bgars.cli.console import print_json, say
+from bgars.errors import InputError
+from bgars.io.result_file import read_result
+from bgars.store import open_store
+from bgars.store.query import VIEWS
+
+__all__ = ["register"]
+
+MOST_WIDE = 60
+StoreArgument = Annotated[
+    Path, typer.Argument(metavar="STORE", help="Store that bgars batch or bgars watch wrote.", show_default=False)
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands."""
+    app.command("query")(query)
+    stores = typer.Typer(help="Look after a store of results.", no_args_is_help=True)
+    stores.command("compact")(compact)
+    stores.command("export")(export)
+    stores.command("add")(add)
+    app.add_typer(stores, name="store")
+
+
+def query(
+    store: StoreArgument,
+    sql: Annotated[
+        str,
+        typer.Argument(metavar="SQL", help="A question in SQL; without one, what can be asked.", show_default=False),
+    ] = "",
+    as_csv: Annotated[bool, typer.Option("--csv", help="Print CSV.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object: columns, and rows as objects.")
+    ] = False,
+) -> None:
+    """Ask a store of results, in SQL: which lot, which ball, since when, how often.
+
+    Tables: parts, balls, checks, budgets, failures, results; docs/queries.md has the questions of a quality engineer.
+    The question sees the store and no other file, and changes nothing.
+
+    Exit code 0: answered. 2: no store, or a question that DuckDB refuses.
+    """
+    if as_csv and as_json:
+        msg = "--csv and --json: give one of them"
+        raise InputError(msg)
+    opened = open_store(store)
+    if not sql:
+        _say_tables(opened, as_json=as_json)
+        return
+    answer = opened.query(sql)
+    names, rows = answer.column_names, [[_plain(value) for value in row.values()] for row in answer.to_pylist()]
+    if len(set(names)) != len(names):  # rows come by name
+        columns = ([_plain(value) for value in column.to_pylist()] for column in answer.columns)
+        rows = [list(row) for row in zip(*columns, strict=True)]
+    if as_json:
+        print_json({"columns": names, "rows": [dict(zip(names, row, strict=True)) for row in rows]})
+    elif as_csv:
+        writer = csv.writer(sys.stdout, lineterminator="\n")
+        writer.writerow(names)
+        writer.writerows([["; ".join(v) if isinstance(v, list) else v for v in row] for row in rows])
+    else:
+        _say_table(names, rows)
+
+
+def compact(store: StoreArgument, as_json: JsonOption = False) -> None:
+    """Join the many small files of a store; others may read and append meanwhile."""
+    counts = open_store(store).compact()
+    if as_json:
+        print_json(counts)
+    else:
+        say(f"{store}: {counts['files_before']} files became {counts['files_after']}")
+
+
+def export(
+    store: StoreArgument,
+    url: Annotated[
+        str,
+        typer.Argument(
+            metavar="URL",
+            help="Database as SQLAlchemy names it: sqlite:///parts.db, postgresql+psycopg://user@host/name.",
+            show_default=False,
+        ),
+    ],
+    as_json: JsonOption = False,
+) -> None:
+    r"""Copy new parts into a database, as tables bgars_parts, bgars_balls, bgars_checks, bgars_budgets, bgars_failures.
+
+    Needs pip install 'bgars\[sql]' and the database's driver. Run it again for what came since.
+    """
+    added = open_store(store).export(url)
+    if as_json:
+        print_json(dict(added))
+        return
+    for name, count in added.items():
+        say(f"{name}: {count} rows")
+
+
+def add(
+    store: StoreArgument,
+    results: Annotated[
+        list[Path],
+        typer.Argument(metavar="RESULT...", help="result.json files, or folders that hold one.", show_default=False),
+    ],
+    as_json: JsonOption = False,
+) -> None:
+    """Add results that bgars inspect wrote; makes the store where there is none."""
+    opened = open_store(store, create=True)
+    read = [(path, read_result(path)) for path in results]
+    count = sum(opened.append(result, capture_folder=str(path)) for path, result in read)
+    if as_json:
+        print_json({"added": count, "known": len(read) - count})
+    else:
+        say(f"{store}: {count} results added, {len(read) - count} were there")
+
+
+def _say_tables(opened: Any, *, as_json: bool) -> None:  # noqa: ANN401 - a Store
+    counts = {name: opened.query(f"select count(*) n from {name}")["n"][0].as_py() for name in VIEWS}
+    columns = {name: opened.query(f"select * from {name} limit 0").column_names for name in VIEWS}
+    if as_json:
+        print_json({"tables": {name: {"rows": counts[name], "columns": columns[name]} for name in VIEWS}})
+        return
+    for name, meaning in VIEWS.items():
+        say(f"{name} ({counts[name]} rows): {meaning}")
+        say(f"  {', '.join(columns[name])}")
+
+
+def _say_table(names: list[str], rows: list[list[Any]]) -> None:
+    cells = [names, *([_cell(value) for value in row] for row in rows)]
+    widths = [max(len(row[at]) for row in cells) for at in range(len(names))]
+    number = [all(isinstance(row[at], int | float) or row[at] is None for row in rows) for at in range(len(names))]
+    for row in cells:
+        padded = [
+            f"{cell:>{width}}" if right else f"{cell:<{width}}"
+            for cell, width, right in zip(row, widths, number, strict=True)
+        ]
+        say("  ".join(padded).rstrip())
+    say(f"({len(rows)} rows)" if len(rows) != 1 else "(1 row)")
+
+
+def _cell(value: Any) -> str:  # noqa: ANN401 - whatever was asked for
+    if value is None:
+        return "-"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    text = "; ".join(map(str, value)) if isinstance(value, list) else str(value)
+    text = " ".join(text.split())
+    return text if len(text) <= MOST_WIDE else f"{text[: MOST_WIDE - 3]}..."
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401 - as above
+    """What JSON and CSV can hold."""
+    if isinstance(value, float):
+        return value if value == value and abs(value) != float("inf") else None  # noqa: PLR0124 - NaN
+    if isinstance(value, datetime.datetime):
+        return value.isoformat(timespec="seconds") + "Z"
+    if isinstance(value, list):
+        return [_plain(each) for each in value]
+    return value if isinstance(value, int | str | bool | None) else str(value)

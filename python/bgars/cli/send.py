@@ -1,0 +1,65 @@
+"""The command ``bgars send``."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from types import FrameType
+from typing import Annotated
+
+import typer
+
+from bgars.cli.console import print_json, say
+from bgars.line.send import Mqtt, Sender
+from bgars.store import open_store
+
+__all__ = ["register"]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("send")(send)
+
+
+def send(
+    store: Annotated[
+        Path, typer.Argument(metavar="STORE", help="Store that bgars batch or bgars watch writes.", show_default=False)
+    ],
+    mqtt: Annotated[
+        str,
+        typer.Option(
+            metavar="mqtt://HOST/TOPIC",
+            help="Broker and topic; mqtts:// for TLS. User and password: BGARS_MQTT_USER, BGARS_MQTT_PASSWORD.",
+            show_default=False,
+        ),
+    ],
+    cfx: Annotated[bool, typer.Option("--cfx", help="Send IPC-CFX UnitsInspected, not the short message.")] = False,
+    follow: Annotated[
+        bool, typer.Option("--follow", help="Go on as parts come, over restarts of the broker, until it is ended.")
+    ] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
+    ] = False,
+) -> None:
+    """Send the results of a store to an MQTT broker: at least once, in order.
+
+    The store is the outbox. What the broker has is remembered beside it (STORE/sent), each part when it was
+    acknowledged; what it could not take is sent when it answers again, with growing pauses of a minute at most.
+
+    Exit code 0: everything was sent, or --follow was ended. 2: wrong use, or the broker does not answer.
+    """
+    sender = Sender(open_store(store), Mqtt(mqtt), cfx, say=say)
+
+    def stop(_signal: int, _frame: FrameType | None) -> None:
+        sender.is_stopping = True
+
+    earlier = [(number, signal.signal(number, stop)) for number in (signal.SIGTERM, signal.SIGINT)]
+    try:
+        sender.run(follow=follow)
+    finally:
+        for number, handler in earlier:
+            signal.signal(number, handler)
+    if as_json:
+        print_json({"sent": sender.sent, "to": sender.channel.name})
+    else:
+        say(f"{sender.sent} results sent to {sender.channel.name}")

@@ -1,0 +1,252 @@
+"""Many captures into one store, on this machine or on a cluster."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field, replace
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bgars.errors import InputError
+from bgars.io.part_recipe import read_part_recipe
+from bgars.line.dask_pool import run_on_cluster
+from bgars.line.folders import capture_folders
+from bgars.line.job import Job, Outcome, with_content
+from bgars.line.local_pool import run_local, share_cores, thread_environment
+from bgars.line.naming import Naming
+from bgars.normals import DEFAULT_METHOD, Method
+from bgars.store import Store, open_store
+from bgars.store.rows import TIME_FORM
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator, Iterable, Iterator
+    from os import PathLike
+
+    from bgars.part_result import PartResult
+
+__all__ = ["Batch", "Progress", "inspect_many", "store_outcome"]
+
+COMPACT_FROM = 200
+"""Parts of a run that are worth a compaction."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a run is.
+
+    Attributes
+    ----------
+    done, total : int
+        Captures.
+    failed : int
+        Of them, those that could not be inspected.
+    seconds : float
+        Since the start.
+    """
+
+    done: int
+    total: int
+    failed: int
+    seconds: float
+
+    @property
+    def per_minute(self) -> float:
+        """Captures a minute."""
+        return 60.0 * self.done / self.seconds if self.seconds > 0 else 0.0
+
+    @property
+    def remaining_s(self) -> float:
+        """Time that the others will take at this rate; infinite at the start."""
+        return (self.total - self.done) * self.seconds / self.done if self.done else float("inf")
+
+
+@dataclass
+class Batch:
+    """What a run did.
+
+    Attributes
+    ----------
+    total : int
+        Captures.
+    verdicts : dict of int
+        Of the parts that this run inspected.
+    known : int
+        Parts that were in the store.
+    failures : list of (str, str)
+        Folder and reason of each capture that could not be inspected.
+    results : list of PartResult
+        Without a store only, in the order of the folders.
+    seconds : float
+    processes, threads : int
+        0 on a cluster.
+    """
+
+    total: int
+    verdicts: dict[str, int] = field(default_factory=lambda: {"pass": 0, "fail": 0, "undecided": 0})
+    known: int = 0
+    failures: list[tuple[str, str]] = field(default_factory=list)
+    results: list[PartResult] = field(default_factory=list)
+    seconds: float = 0.0
+    processes: int = 0
+    threads: int = 0
+
+    @property
+    def inspected(self) -> int:
+        """Parts that this run inspected."""
+        return sum(self.verdicts.values())
+
+
+def inspect_many(
+    folders: Iterable[str | PathLike[str]],
+    recipe: str | PathLike[str] | None = None,
+    *,
+    store: Store | str | PathLike[str] | None = None,
+    method: Method = DEFAULT_METHOD,
+    naming: Naming | None = None,
+    processes: int | None = None,
+    threads: int | None = None,
+    scheduler: str | None = None,
+    send_images: bool = False,
+    progress: Callable[[Progress], object] | None = None,
+) -> Batch:
+    """Inspect many captures; failures are kept with their reason and stop nothing.
+
+    The results are the same in any order and for any number of processes and threads. What the store has, by the
+    contents of images, recipe and version, is not done again: a run that was killed goes on where it was.
+
+    Parameters
+    ----------
+    folders : iterable of path
+        Captures, folders of captures, or patterns such as ``"lots/L7/*"``.
+    recipe : path, optional
+        Part recipe.
+    store : Store or path, optional
+        Where results go as they come; made where there is nothing. Without one they are in ``Batch.results``.
+    method : str
+        Estimator of the normals.
+    naming : Naming, optional
+        Where serial numbers come from; the folder's name by default.
+    processes, threads : int, optional
+        Processes, and threads of each; together one a core by default.
+    scheduler : str, optional
+        Address of a Dask scheduler, ``tcp://HOST:PORT``: work there. Its workers see the folders under the same names,
+        unless `send_images`.
+    send_images : bool
+        Send the files to the cluster's workers.
+    progress : callable, optional
+        Called with a :class:`Progress` after every capture.
+
+    Returns
+    -------
+    Batch
+
+    Raises
+    ------
+    InputError
+        No captures, wrong numbers, a recipe that contradicts itself, or a scheduler that does not answer.
+    FileFormatError
+        A folder or the recipe is missing, or the store cannot be written: then nothing more is done.
+
+    Notes
+    -----
+    More than one process imports the caller's main module again: scripts need ``if __name__ == "__main__":``.
+
+    Examples
+    --------
+    >>> import bgars
+    >>> done = bgars.inspect_many([bgars.sample_capture()], processes=1)
+    >>> done.verdicts, done.results[0].serial
+    ({'pass': 0, 'fail': 0, 'undecided': 1}, 'one_ball')
+    """
+    for name, count in (("processes", processes), ("threads", threads)):
+        if count is not None and count < 1:
+            msg = f"{name}: must be 1 or more, got {count}"
+            raise InputError(msg)
+    captures = capture_folders(folders)
+    part = None if recipe is None else read_part_recipe(recipe)
+    if send_images and part is not None and part.material_file is not None:
+        msg = f"{recipe}: material.file: cannot be sent to a cluster; put it where the workers see it, without sending"
+        raise InputError(msg)
+    opened = store if isinstance(store, Store) or store is None else open_store(store, create=True)
+    used = share_cores(len(captures), processes, threads) if scheduler is None else (0, threads or 1)
+    batch = Batch(len(captures), processes=used[0], threads=used[1])
+    template = Job("", "" if recipe is None else str(recipe), method, naming or Naming(), threads=used[1])
+    jobs = _jobs(captures, template, opened, send=send_images)
+    started = time.monotonic()
+    results: dict[str, PartResult] = {}
+    for outcome in _run(jobs, used, scheduler):
+        stamped = store_outcome(
+            outcome, opened, recipe="" if part is None else part.name, lot=template.naming.common.lot
+        )
+        _count(batch, outcome, is_new=stamped is not None)
+        if opened is None and stamped is not None:
+            results[outcome.folder] = stamped
+        batch.seconds = time.monotonic() - started
+        if progress is not None:
+            done = batch.inspected + batch.known + len(batch.failures)
+            progress(Progress(done, batch.total, len(batch.failures), batch.seconds))
+    batch.results = [results[str(folder)] for folder in captures if str(folder) in results]
+    if opened is not None and batch.inspected >= COMPACT_FROM:
+        opened.compact()
+    return batch
+
+
+def store_outcome(
+    outcome: Outcome, store: Store | None, *, recipe: str = "", lot: str = "", moved_to: Path | None = None
+) -> PartResult | None:
+    """Stamp a result with the time and keep it, or keep why there is none; return it where it is new.
+
+    `moved_to` is where the capture will lie, if elsewhere.
+
+    Raises
+    ------
+    FileFormatError
+        The store cannot be written.
+    """
+    if outcome.is_known:
+        return None
+    folder = str((moved_to or Path(outcome.folder)).absolute())
+    if outcome.result is None:
+        if store is not None:
+            store.append_failure(folder, outcome.reason, serial=outcome.serial, recipe=recipe, lot=lot)
+        return None
+    now = datetime.now(timezone.utc).strftime(TIME_FORM)
+    result = replace(outcome.result, inspected_utc=now)
+    if store is not None and not store.append(result, capture_folder=folder, seconds=outcome.seconds):
+        return None
+    return result
+
+
+def _jobs(captures: list[Path], template: Job, store: Store | None, *, send: bool) -> Iterator[Job]:
+    known = frozenset() if store is None else frozenset(store.known())
+    by_serial: dict[str, set[str]] = {}
+    for key, serial in ({} if store is None else store.known()).items():
+        by_serial.setdefault(serial, set()).add(key)
+    for folder in captures:
+        job = replace(template, folder=str(folder))
+        try:
+            serial, _ = template.naming.of_name(folder)
+        except (InputError, OSError):
+            serial = ""
+        # A job takes only the keys that can be its own: there may be millions.
+        job = replace(job, known=frozenset(by_serial.get(serial, ())) if serial else known)
+        yield with_content(job) if send else job
+
+
+def _run(jobs: Iterator[Job], used: tuple[int, int], scheduler: str | None) -> Generator[Outcome, None, None]:
+    if scheduler is not None:
+        yield from run_on_cluster(jobs, scheduler)
+        return
+    processes, threads = used
+    with thread_environment(threads):
+        yield from run_local(jobs, processes)
+
+
+def _count(batch: Batch, outcome: Outcome, *, is_new: bool) -> None:
+    if outcome.result is not None and is_new:
+        batch.verdicts[outcome.result.verdict] += 1
+    elif outcome.reason:
+        batch.failures.append((outcome.folder, outcome.reason))
+    else:
+        batch.known += 1

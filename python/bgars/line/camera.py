@@ -1,0 +1,180 @@
+"""A camera with its lights, as small as it can be, and captures made with one."""
+
+from __future__ import annotations
+
+import importlib
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import imageio.v3 as iio
+import numpy as np
+
+from bgars.errors import BgarsError, FileFormatError, InputError
+from bgars.io.recipe import RECIPE_NAME, read_recipe
+from bgars.line.folders import IMAGES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+__all__ = ["Camera", "FolderCamera", "camera_of", "take_capture"]
+
+GREY, COLOUR = 2, 3
+
+
+class Camera(Protocol):
+    """Whatever takes a picture under a light.
+
+    A class for a camera of your own needs this one method: it switches light `light` on, exposes, switches it off, and
+    returns the pixels. docs/line.md has examples for the interfaces of makers.
+    """
+
+    def grab(self, light: int) -> NDArray[Any]:
+        """Return (rows, cols) or (rows, cols, 3) pixels, uint8 or uint16, under light `light`, from 0."""
+        ...
+
+
+class FolderCamera:
+    """Shows the images of a folder as if it took them: for tests, and for a station without its camera.
+
+    Examples
+    --------
+    >>> import bgars
+    >>> FolderCamera(bgars.sample_capture()).grab(0).shape
+    (240, 256)
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        folder = Path(folder)
+        self.files = sorted(
+            path
+            for path in folder.glob("*")
+            if path.suffix.lower() in IMAGES and not path.name.startswith(("mask", "dark", "."))
+        )
+        if not self.files:
+            msg = f"{folder}: holds no images"
+            raise FileFormatError(msg)
+
+    def grab(self, light: int) -> NDArray[Any]:
+        """Return the image of a light, in the order of the names."""
+        if not 0 <= light < len(self.files):
+            msg = f"light: must be 0 to {len(self.files) - 1}, got {light}"
+            raise InputError(msg)
+        return np.asarray(iio.imread(self.files[light]))
+
+
+def camera_of(name: str) -> Camera:
+    """Return the camera that is meant: ``folder:PATH``, or ``MODULE:CALLABLE`` that returns one.
+
+    Raises
+    ------
+    InputError
+        No such module or callable, or what it returns cannot grab.
+    """
+    kind, _, rest = name.partition(":")
+    if kind == "folder" and rest:
+        return FolderCamera(rest)
+    if not rest:
+        msg = f"camera: must be folder:PATH or MODULE:CALLABLE, got {name!r}"
+        raise InputError(msg)
+    if str(Path.cwd()) not in sys.path:
+        sys.path.insert(0, str(Path.cwd()))  # a driver beside the project, as python -m finds it
+    try:
+        make: Callable[[], Any] = getattr(importlib.import_module(kind), rest)
+    except (ImportError, AttributeError) as error:
+        msg = f"camera: {name!r} cannot be imported ({error})"
+        raise InputError(msg) from None
+    made: Camera = make()
+    if not callable(getattr(made, "grab", None)):
+        msg = f"camera: what {name!r} returns must have grab(light), got {type(made).__name__}"
+        raise InputError(msg)
+    return made
+
+
+def take_capture(
+    camera: Camera,
+    folder: str | Path,
+    *,
+    lights: int,
+    rig: str | Path | None = None,
+    progress: Callable[[float], object] = lambda _fraction: None,
+) -> list[str]:
+    """Take an image under each light and write a capture folder, whole or not at all.
+
+    Parameters
+    ----------
+    camera : Camera
+    folder : path
+        New. It appears when all is in it: an inbox may hold it.
+    lights : int
+    rig : path, optional
+        capture.toml that is copied into it; with ``images`` it names the files, else they are ``light_00.png``, ...
+    progress : callable
+        Called with the fraction done.
+
+    Returns
+    -------
+    list of str
+        The files.
+
+    Raises
+    ------
+    InputError
+        The folder is there, no lights, or the camera returned no image or one of another shape.
+    FileFormatError
+        It cannot be written.
+    """
+    folder = Path(folder)
+    if folder.exists():
+        msg = f"{folder}: must be a new folder; captures are never overwritten"
+        raise InputError(msg)
+    if lights < 1:
+        msg = f"lights: must be 1 or more, got {lights}"
+        raise InputError(msg)
+    names = [f"light_{light:02d}.png" for light in range(lights)]
+    if rig is not None:
+        described = read_recipe(Path(rig)).images
+        if described is not None and len(described) != lights:
+            msg = f"{rig}: images: must name {lights} files, one a light, got {len(described)}"
+            raise InputError(msg)
+        names = described or names
+    try:
+        folder.absolute().parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".bgars-partial-", dir=folder.absolute().parent) as place:
+            made = Path(place) / folder.name
+            made.mkdir()
+            first: NDArray[Any] | None = None
+            for light, name in enumerate(names):
+                image = _grabbed(camera, light, first)
+                first = image if first is None else first
+                iio.imwrite(made / name, image)
+                progress((light + 1) / lights)
+            if rig is not None:
+                shutil.copyfile(rig, made / RECIPE_NAME)
+                names = [*names, RECIPE_NAME]
+            made.rename(folder)
+    except BgarsError:
+        raise
+    except OSError as error:
+        msg = f"{folder}: cannot be written ({error.strerror or error})"
+        raise FileFormatError(msg) from error
+    return names
+
+
+def _grabbed(camera: Camera, light: int, first: NDArray[Any] | None) -> NDArray[Any]:
+    image = np.asarray(camera.grab(light))
+    is_image = image.ndim == GREY or (image.ndim == COLOUR and image.shape[2] == COLOUR)
+    if not is_image or image.dtype not in (np.uint8, np.uint16) or image.size == 0:
+        msg = (
+            f"camera: grab({light}) must return grey or RGB pixels of uint8 or uint16, got {image.dtype} {image.shape}"
+        )
+        raise InputError(msg)
+    if first is not None and (image.shape != first.shape or image.dtype != first.dtype):
+        told = f"{first.dtype} {first.shape}, got {image.dtype} {image.shape}"
+        msg = f"camera: grab({light}) must be like the first image {told}"
+        raise InputError(msg)
+    return image

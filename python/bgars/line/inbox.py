@@ -1,0 +1,140 @@
+"""Which parts in an inbox are complete, told by looking: network drives send no events, and clocks are set."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from bgars.errors import InputError
+from bgars.line.flat import FlatFiles
+from bgars.line.folders import IMAGES
+
+__all__ = ["Inbox", "Waiting"]
+
+Signature = tuple[tuple[str, int, int], ...]
+HIDDEN = (".", "_")
+
+
+@dataclass
+class Waiting:
+    """A part that lies in the inbox.
+
+    Attributes
+    ----------
+    folder : Path
+    signature : tuple
+        Name, size and time of each of its files: what must not change.
+    since_s : float
+        Since when it has not changed, by a clock that nobody sets.
+    first_s : float
+        When it was seen first.
+    """
+
+    folder: Path
+    signature: Signature
+    since_s: float
+    first_s: float
+
+    @property
+    def images(self) -> int:
+        """Image files; masks and dark frames count, too."""
+        return sum(Path(name).suffix.lower() in IMAGES for name, _, _ in self.signature)
+
+
+class Inbox:
+    """An inbox whose folders are parts.
+
+    Parameters
+    ----------
+    folder : Path
+    count : int or None
+        Images of a complete part; None: it is complete when nothing changes.
+    trigger : str
+        Name of a file that the camera's software writes last; "" = there is none.
+    settle_s : float
+        How long nothing may change, where there is no trigger.
+    files : str
+        Pattern of files that lie in the inbox itself, see :class:`bgars.line.flat.FlatFiles`; "" = parts are folders.
+
+    Raises
+    ------
+    InputError
+        A pattern without its names, or without a count.
+    """
+
+    def __init__(self, folder: Path, *, count: int | None, trigger: str, settle_s: float, files: str = "") -> None:
+        self.folder = folder
+        self.count = count
+        self.trigger = trigger
+        self.settle_s = settle_s
+        if files and count is None:
+            msg = "--files: goes with --count, which tells when a part is complete"
+            raise InputError(msg)
+        self.flat = FlatFiles(folder, files, count=count, settle_s=settle_s) if files and count else None
+        self._waiting: dict[str, Waiting] = {}
+
+    def look(self) -> list[Waiting]:
+        """Return the parts that lie there, oldest first by when they were seen; entries that vanish are skipped.
+
+        Raises
+        ------
+        OSError
+            The inbox itself cannot be read, such as on a network drive that is away.
+        """
+        if self.flat is not None:
+            self.flat.gather()
+        now = time.monotonic()
+        found: dict[str, Waiting] = {}
+        with os.scandir(self.folder) as entries:
+            folders = [entry for entry in entries if not entry.name.startswith(HIDDEN) and _is_folder(entry)]
+        for entry in sorted(folders, key=lambda entry: entry.name):
+            signature = _signature(Path(entry.path))
+            if signature is None:
+                continue
+            earlier = self._waiting.get(entry.name)
+            if earlier is not None and earlier.signature == signature:
+                found[entry.name] = earlier
+            else:
+                first = now if earlier is None else earlier.first_s
+                found[entry.name] = Waiting(Path(entry.path), signature, now, first)
+        self._waiting = found
+        return sorted(found.values(), key=lambda part: part.first_s)
+
+    def is_complete(self, part: Waiting) -> bool:
+        """Whether a part can be taken."""
+        if self.count is not None and part.images < self.count:
+            return False
+        if self.trigger:
+            return any(name == self.trigger for name, _, _ in part.signature)
+        return part.images > 0 and time.monotonic() - part.since_s >= self.settle_s
+
+    def is_unchanged(self, part: Waiting) -> bool:
+        """Whether a part is as it was when it was looked at."""
+        return _signature(part.folder) == part.signature
+
+    def missing(self, part: Waiting) -> str:
+        """What a part waits for, in words."""
+        if self.count is not None and part.images < self.count:
+            return f"{part.images} of {self.count} images"
+        if self.trigger and not any(name == self.trigger for name, _, _ in part.signature):
+            return f"no {self.trigger}"
+        return "no images" if not part.images else "still changing"
+
+
+def _is_folder(entry: os.DirEntry[str]) -> bool:
+    try:
+        return entry.is_dir()
+    except OSError:
+        return False
+
+
+def _signature(folder: Path) -> Signature | None:
+    """Name, size and time of each file; None where the folder or a file vanishes meanwhile."""
+    try:
+        with os.scandir(folder) as entries:
+            stats = [(entry.name, entry.stat()) for entry in entries]
+    except OSError:
+        return None
+    return tuple(sorted((name, stat.st_size, stat.st_mtime_ns) for name, stat in stats))

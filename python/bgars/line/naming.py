@@ -1,0 +1,165 @@
+"""Which part a capture shows: from its side file, a code in its images, or the name of its folder."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from dataclasses import dataclass, field, fields
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bgars.errors import InputError
+from bgars.io.recipe import RECIPE_NAME, read_recipe
+from bgars.part_identity import PartIdentity
+
+if TYPE_CHECKING:
+    from bgars.records import Capture
+
+__all__ = ["CODE", "Naming", "identity_of", "last_written_utc"]
+
+CODE = "code"
+"""A pattern that asks for the code in the images."""
+NAMES = ("serial", *(entry.name for entry in fields(PartIdentity) if entry.name != "captured_utc"))
+DEFAULT_PATTERN = "{serial}"
+
+
+@dataclass(frozen=True)
+class Naming:
+    """How a part is told from the next.
+
+    What ``[part]`` in its capture.toml says counts most, then the pattern, then what is the same for all.
+
+    Attributes
+    ----------
+    pattern : str
+        Of the folder's name, with ``{serial}`` and, where they are in it, ``{lot}``, ``{substrate}``, ``{position}``,
+        ``{station}``, ``{operator}``; ``/`` reaches into the folders above. ``code``: the DataMatrix or QR code that
+        the images show.
+    common : PartIdentity
+        Of all parts.
+
+    Raises
+    ------
+    InputError
+        A pattern without ``{serial}``, or with an unknown name.
+
+    Examples
+    --------
+    >>> serial, identity = Naming("{lot}/{serial}_{position}").of_name(Path("in/L7/SN12_3"))
+    >>> serial, identity.known()
+    ('SN12', {'lot': 'L7', 'position': '3'})
+    """
+
+    pattern: str = DEFAULT_PATTERN
+    common: PartIdentity = field(default_factory=PartIdentity)
+
+    def __post_init__(self) -> None:
+        """Check the pattern."""
+        if self.pattern == CODE:
+            _need_reader()
+        else:
+            self._expression()
+
+    def of_name(self, folder: Path, *, side: Path | None = None) -> tuple[str, PartIdentity]:
+        """Return serial number and identity as the folder's name and its side file say.
+
+        Parameters
+        ----------
+        folder : Path
+            Of the capture, as it is named.
+        side : Path, optional
+            Where its side file lies, if elsewhere.
+
+        Raises
+        ------
+        InputError
+            The name does not follow the pattern, and the side file names no serial number.
+        """
+        known = _side_file(folder if side is None else side)
+        found: dict[str, str] = {}
+        if self.pattern != CODE:
+            depth = self.pattern.count("/") + 1
+            told = "/".join(folder.absolute().parts[-depth:])
+            match = self._expression().fullmatch(told)
+            if match is not None:
+                found = match.groupdict()
+            elif not known.get("serial"):
+                msg = f"{folder}: its name must follow the pattern {self.pattern!r}, got {told!r}"
+                raise InputError(msg)
+        values = self.common.known() | found | known
+        serial = values.pop("serial", "")
+        return serial, PartIdentity(**values)
+
+    def of_capture(self, folder: Path, capture: Capture, serial: str) -> str:
+        """Return the serial number, read from the images where the pattern is ``code`` and nothing named one.
+
+        Raises
+        ------
+        InputError
+            The images show no code that can be read.
+        """
+        if self.pattern != CODE or serial:
+            return serial
+        text = _read_code(capture)
+        if not text:
+            msg = f"{folder}: no DataMatrix or QR code can be read in its images"
+            raise InputError(msg)
+        return text
+
+    def _expression(self) -> re.Pattern[str]:
+        """The pattern as a regular expression; every name once, each as short as it can be."""
+        pieces = re.split(r"\{(\w*)\}", self.pattern)
+        names = pieces[1::2]
+        unknown = next((name for name in names if name not in NAMES), None)
+        if unknown is not None:
+            msg = f"serial-from: knows {', '.join(f'{{{name}}}' for name in NAMES)}, got {{{unknown}}}"
+            raise InputError(msg)
+        if "serial" not in names or len(set(names)) < len(names):
+            msg = f"serial-from: must hold {{serial}}, and each name once, got {self.pattern!r}"
+            raise InputError(msg)
+        told = "".join(f"(?P<{piece}>[^/]+?)" if at % 2 else re.escape(piece) for at, piece in enumerate(pieces))
+        return re.compile(told)
+
+
+def identity_of(capture: Capture, common: PartIdentity) -> tuple[str, PartIdentity]:
+    """Return serial number ("" = not named) and identity of a single capture: its side file, else what is common."""
+    known = {} if capture.folder is None else _side_file(capture.folder)
+    values = common.known() | known
+    serial = values.pop("serial", "")
+    return serial, PartIdentity(**(values | {"captured_utc": last_written_utc(capture)}))
+
+
+def last_written_utc(capture: Capture) -> str:
+    """When the youngest image was written, as ISO 8601, UTC; "" without files."""
+    times = [path.stat().st_mtime for path in capture.files]
+    return datetime.fromtimestamp(max(times), timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ") if times else ""
+
+
+def _side_file(folder: Path) -> dict[str, str]:
+    path = folder / RECIPE_NAME
+    part = read_recipe(path).part if path.is_file() else None
+    return {} if part is None else {name: value for name, value in vars(part).items() if value}
+
+
+def _read_code(capture: Capture) -> str:
+    """The first code in any of the images, or in their mean, which has no cast shadow of full depth."""
+    reader = _need_reader()
+    images = [np.asarray(image, dtype=np.float32) for image in capture.images]
+    for image in [np.mean(images, axis=0), *images]:
+        top = float(np.percentile(image, 99.5))
+        grey = np.clip(image * (255.0 / max(top, 1e-9)), 0, 255).astype(np.uint8)
+        for found in reader.read_barcodes(np.ascontiguousarray(grey)):
+            if found.text:
+                return " ".join(str(found.text).split())
+    return ""
+
+
+def _need_reader() -> Any:  # noqa: ANN401 - a module
+    try:
+        return importlib.import_module("zxingcpp")
+    except ImportError:
+        msg = "serial-from code: needs zxing-cpp, which is not installed; install it with: pip install 'bgars[codes]'"
+        raise InputError(msg) from None

@@ -1,0 +1,146 @@
+"""A result on its way to a line: a command, an HTTP server, a PLC."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import socket
+import subprocess
+import urllib.error
+import urllib.request
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+from bgars.errors import BgarsError, InputError
+from bgars.store.append import write_durably
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from bgars.part_result import PartResult
+
+__all__ = ["Notifier"]
+
+TIMEOUT_S = 5.0
+COMMAND_S = 30.0
+
+
+@dataclass(frozen=True)
+class Notifier:
+    """Where results are told.
+
+    Attributes
+    ----------
+    command : str
+        Program and arguments; it gets the message on its standard input, and SERIAL, VERDICT in its environment as
+        BGARS_SERIAL, BGARS_VERDICT. No shell.
+    url : str
+        HTTP server that gets the message by POST.
+    line_file : str
+        File that holds the line of the last result.
+    tcp : str
+        HOST:PORT that gets the line of each result.
+    """
+
+    command: str = ""
+    url: str = ""
+    line_file: str = ""
+    tcp: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be reached, before the first part."""
+        if self.url and urlsplit(self.url).scheme not in {"http", "https"}:
+            msg = f"--post: must be an http:// or https:// address, got {self.url!r}"
+            raise InputError(msg)
+        if self.tcp:
+            host, _, port = self.tcp.rpartition(":")
+            if not host or not port.isdecimal():
+                msg = f"--tcp: must be HOST:PORT, got {self.tcp!r}"
+                raise InputError(msg)
+        if self.command:
+            try:
+                shlex.split(self.command)
+            except ValueError as error:
+                msg = f"--on-result: is no command ({error}), got {self.command!r}"
+                raise InputError(msg) from None
+
+    def tell(self, result: PartResult, folder: Path) -> list[str]:
+        """Tell a result; return what went wrong, one line each: the line goes on."""
+        return self.send(message(result, folder), result.summary_line())
+
+    def tell_failure(self, serial: str, folder: Path, reason: str) -> list[str]:
+        """Tell that a part could not be inspected: its verdict is "error"."""
+        values = {"serial": serial, "verdict": "error", "reason": reason, "folder": str(folder)}
+        line = f"serial={json.dumps(serial)} verdict=error reason={json.dumps(reason)}"
+        return self.send(values, line)
+
+    def send(self, values: dict[str, Any], line: str) -> list[str]:
+        """Send a message, and its line."""
+        problems = []
+        for name, action in self._actions(values, line):
+            try:
+                action()
+            except (OSError, BgarsError, subprocess.SubprocessError, urllib.error.URLError) as error:
+                problems.append(f"{name}: {error}".replace("\n", " "))
+        return problems
+
+    def _actions(self, values: dict[str, Any], line: str) -> Iterator[Any]:
+        if self.line_file:
+            yield "--result-file", lambda: write_durably(Path(self.line_file), f"{line}\n".encode())
+        if self.tcp:
+            yield f"--tcp {self.tcp}", lambda: _send_line(self.tcp, line)
+        if self.url:
+            yield f"--post {_bare(self.url)}", lambda: _post(self.url, values)
+        if self.command:
+            yield "--on-result", lambda: _run(self.command, values)
+
+
+def message(result: PartResult, folder: Path) -> dict[str, Any]:
+    """What a line needs of a result."""
+    return {
+        "serial": result.serial,
+        **result.identity.known(),
+        "part": result.name,
+        "verdict": result.verdict,
+        "reasons": list(result.reasons),
+        "inspected_utc": result.inspected_utc,
+        "balls": len(result.balls),
+        "failed_balls": [ball.name for ball in result.balls if ball.verdict == "fail"],
+        "folder": str(folder),
+        "version": result.version,
+    }
+
+
+def _send_line(address: str, line: str) -> None:
+    host, _, port = address.rpartition(":")
+    with socket.create_connection((host, int(port)), TIMEOUT_S) as connection:
+        connection.sendall(f"{line}\n".encode())
+
+
+def _post(url: str, values: dict[str, Any]) -> None:
+    request = urllib.request.Request(
+        url, json.dumps(values).encode(), {"Content-Type": "application/json"}, method="POST"
+    )
+    with urllib.request.urlopen(request, timeout=TIMEOUT_S):
+        pass
+
+
+def _run(command: str, values: dict[str, Any]) -> None:
+    told = {"BGARS_SERIAL": str(values["serial"]), "BGARS_VERDICT": str(values["verdict"])}
+    subprocess.run(
+        shlex.split(command),
+        input=json.dumps(values).encode(),
+        env={**os.environ, **told},
+        timeout=COMMAND_S,
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
+
+
+def _bare(url: str) -> str:
+    """The address without user, password and query, which must not come into a log."""
+    parts = urlsplit(url)
+    return f"{parts.scheme}://{parts.hostname or ''}{f':{parts.port}' if parts.port else ''}{parts.path}"

@@ -1,0 +1,61 @@
+"""Which part it is that was inspected: what tells it from the next one."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, fields
+
+from bgars.errors import InputError
+
+__all__ = ["PartIdentity"]
+
+MOST_CHARACTERS = 200
+
+
+@dataclass(frozen=True)
+class PartIdentity:
+    """Where a part comes from and who looked at it; "" = not known. Its serial number is that of the result.
+
+    Attributes
+    ----------
+    lot : str
+        Lot or order.
+    substrate : str
+        Strip, tray or panel that carries the part.
+    position : str
+        Place on the substrate, such as "3,7".
+    station : str
+        Machine that took the images.
+    operator : str
+        Who ran it.
+    captured_utc : str
+        When the last image was written, as ISO 8601, UTC.
+
+    Raises
+    ------
+    InputError
+        A value that is no printable line of at most 200 characters.
+
+    Examples
+    --------
+    >>> PartIdentity(lot="L7", position="3,7").known()
+    {'lot': 'L7', 'position': '3,7'}
+    """
+
+    lot: str = ""
+    substrate: str = ""
+    position: str = ""
+    station: str = ""
+    operator: str = ""
+    captured_utc: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse what would not stay one line in a log, a name of a file or a cell of a table."""
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if not isinstance(value, str) or len(value) > MOST_CHARACTERS or not (value.isprintable() or not value):
+                msg = f"{entry.name}: must be one printable line of at most {MOST_CHARACTERS} characters, got {value!r}"
+                raise InputError(msg)
+
+    def known(self) -> dict[str, str]:
+        """Return what is known, by name."""
+        return {name: value for name, value in asdict(self).items() if value}

@@ -1,0 +1,147 @@
+"""The tables of a store in somebody's database, through SQLAlchemy."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from bgars.errors import FileFormatError, InputError
+from bgars.store.query import query
+from bgars.store.schema import TABLES
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+__all__ = ["export"]
+
+BLOCK_PARTS = 100
+PREFIX = "bgars_"
+OWN_COLUMNS = {"day": "text", "recipe": "text", "round": "whole"}
+KEYS = {
+    "parts": ("part_key",),
+    "balls": ("part_key", "name"),
+    "checks": ("part_key", "name"),
+    "failures": ("part_key",),
+}
+
+
+def export(folder: Path, url: str) -> dict[str, int]:
+    """Copy parts that a database does not have yet, each with all its rows or not at all.
+
+    Parameters
+    ----------
+    folder : Path
+        The store.
+    url : str
+        As SQLAlchemy takes it: ``sqlite:///parts.db``, ``postgresql+psycopg://user@host/name``.
+
+    Returns
+    -------
+    dict of int
+        Rows that were added, by table of the database: ``bgars_parts``, ``bgars_balls``, ...
+
+    Raises
+    ------
+    InputError
+        SQLAlchemy or the database's driver is not installed, or the URL is none.
+    FileFormatError
+        The database refuses; what was complete stays.
+    """
+    alchemy = _need_sqlalchemy()
+    try:
+        engine = alchemy.create_engine(url)
+    except (alchemy.exc.ArgumentError, alchemy.exc.NoSuchModuleError, ImportError) as error:
+        msg = f"{_hidden(url)}: is not a database that can be reached from here ({_first_line(error)})"
+        raise InputError(msg) from None
+    try:
+        return _copy(alchemy, engine, folder)
+    except alchemy.exc.SQLAlchemyError as error:
+        msg = f"{_hidden(url)}: {_first_line(error)}"
+        raise FileFormatError(msg) from None
+    finally:
+        engine.dispose()
+
+
+def _copy(alchemy: Any, engine: Any, folder: Path) -> dict[str, int]:  # noqa: ANN401 - modules without types
+    metadata = alchemy.MetaData()
+    tables = {name: _table(alchemy, metadata, name) for name in TABLES}
+    metadata.create_all(engine)
+    with engine.connect() as connection:
+        there = set(connection.execute(alchemy.select(tables["parts"].c.part_key)).scalars())
+    keys = query(folder, "select part_key from parts order by sequence")["part_key"].to_pylist()
+    fresh = [key for key in keys if key not in there]
+    added = dict.fromkeys((f"{PREFIX}{name}" for name in TABLES), 0)
+    for start in range(0, len(fresh), BLOCK_PARTS):
+        block = ", ".join(f"'{key}'" for key in fresh[start : start + BLOCK_PARTS])
+        with engine.begin() as connection:
+            for name in ("parts", "balls", "checks", "budgets"):
+                names = [column.name for column in tables[name].columns if column.name != "row_id"]
+                sql = f"select {', '.join(_name(each) for each in names)} from {name} where part_key in ({block})"
+                added[f"{PREFIX}{name}"] += _insert(connection, tables[name], query(folder, sql))
+    with engine.begin() as connection:  # failures are few and may go: they are copied as they are now
+        connection.execute(tables["failures"].delete())
+        every = ", ".join(column.name for column in tables["failures"].columns)
+        rows = query(folder, f"select {every} from failures")
+        added[f"{PREFIX}failures"] += _insert(connection, tables["failures"], rows)
+    return added
+
+
+def _table(alchemy: Any, metadata: Any, name: str) -> Any:  # noqa: ANN401 - as above
+    types = {
+        "text": alchemy.Text,
+        "texts": alchemy.Text,
+        "real": alchemy.Double,
+        "whole": alchemy.BigInteger,
+        "truth": alchemy.Boolean,
+        "time": alchemy.DateTime,
+    }
+    columns = [(column.name, column.kind) for column in TABLES[name] if column.name != "result_json"]
+    columns += [(own, kind) for own, kind in OWN_COLUMNS.items() if own != "round" or name == "parts"]
+    keys = KEYS.get(name, ())
+    made = [alchemy.Column("row_id", alchemy.Integer, primary_key=True)] if not keys else []
+    # MySQL and others index text only with a length: keys are 64 digits, names of balls are short.
+    made += [
+        alchemy.Column(column, alchemy.String(200) if column in keys else types[kind], primary_key=column in keys)
+        for column, kind in columns
+    ]
+    return alchemy.Table(f"{PREFIX}{name}", metadata, *made)
+
+
+def _insert(connection: Any, table: Any, rows: Any) -> int:  # noqa: ANN401 - as above
+    values = [{name: _plain(value) for name, value in row.items()} for row in rows.to_pylist()]
+    if values:
+        connection.execute(table.insert(), values)
+    return len(values)
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401 - a cell
+    """Lists become one text: not every database has them. Days become text, as the store's folders have them."""
+    if isinstance(value, list):
+        return "; ".join(value)
+    return value.isoformat() if type(value).__name__ == "date" else value
+
+
+def _name(column: str) -> str:
+    return f'"{column}"'
+
+
+def _need_sqlalchemy() -> Any:  # noqa: ANN401 - a module
+    try:
+        return importlib.import_module("sqlalchemy")
+    except ImportError:
+        msg = "export: needs SQLAlchemy, which is not installed; install it with: pip install 'bgars[sql]'"
+        raise InputError(msg) from None
+
+
+def _hidden(url: str) -> str:
+    """The URL without a password, which must not come into a log."""
+    head, at, tail = url.rpartition("@")
+    if not at:
+        return url
+    scheme, separator, user = head.partition("://")
+    return f"{scheme}{separator}{user.split(':')[0]}@{tail}"
+
+
+def _first_line(error: Exception) -> str:
+    told = str(getattr(error, "orig", None) or error).strip().splitlines()
+    return told[0] if told else type(error).__name__

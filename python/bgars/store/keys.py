@@ -1,0 +1,47 @@
+"""What makes a part known: the contents that its result follows from."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from bgars.part_result import PartResult
+
+__all__ = ["failure_key", "key_of", "part_key"]
+
+
+def part_key(result: PartResult) -> str:
+    """Return the key of a result: the same inputs, serial, recipe, method and version give the same key.
+
+    Where files lie and when they were inspected does not count.
+    """
+    digests = [digest for _, digest in result.files]
+    return key_of(digests, serial=result.serial, method=result.method, version=result.version)
+
+
+def key_of(digests: Iterable[str], *, serial: str, method: str, version: str) -> str:
+    """Return the key of what is about to be inspected.
+
+    Parameters
+    ----------
+    digests : iterable of str
+        SHA-256 of the files that are read, those of the recipe too, in any order.
+    serial, method, version : str
+
+    Examples
+    --------
+    >>> key_of(["b", "a"], serial="S", method="m", version="1") == key_of(["a", "b"], serial="S", method="m",
+    ...                                                                   version="1")
+    True
+    """
+    told = json.dumps([sorted(digests), serial, method, version])
+    return hashlib.sha256(told.encode()).hexdigest()
+
+
+def failure_key(folder: str, *, serial: str, recipe: str, version: str) -> str:
+    """Return the key of a capture that could not be inspected, whose contents may be unreadable."""
+    return hashlib.sha256(json.dumps([folder, serial, recipe, version]).encode()).hexdigest()

@@ -1,0 +1,129 @@
+"""Questions to a store, answered by DuckDB."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+from bgars.errors import FileFormatError, InputError
+from bgars.store.schema import TABLES, arrow_schema
+
+__all__ = ["VIEWS", "connect", "need_duckdb", "query"]
+
+TRIES = 5
+"""A compaction may take files away between the listing and the reading; the next listing has what replaced them."""
+LOST = ("No files found", "Cannot open file", "No such file")
+VIEWS = {
+    "parts": "one row a part; round = 1, 2, ... counts the inspections of a serial number",
+    "balls": "one row a ball, with serial, lot, part and time of its part",
+    "checks": "one row a judged quantity of a part",
+    "budgets": "standard uncertainty by cause, of each reading",
+    "failures": "captures that could not be inspected, and why; gone once they are",
+    "results": "part_key, serial, result_json: everything else of a result",
+}
+# A part is taken from the first of its files, and its balls from the file of the same name: while a compaction runs,
+# there are two copies of both.
+PARTS = """
+CREATE TABLE parts_taken AS
+SELECT *, CASE WHEN serial = '' THEN 1
+          ELSE row_number() OVER (PARTITION BY serial, recipe ORDER BY inspected_utc, sequence) END AS round
+FROM (SELECT * EXCLUDE (filename, copy) FROM (
+    SELECT *, parse_filename(filename, true) AS stem,
+           row_number() OVER (PARTITION BY part_key ORDER BY filename) AS copy
+    FROM (SELECT * EXCLUDE (result_json) FROM {parts})) WHERE copy = 1);
+CREATE VIEW parts AS SELECT * EXCLUDE (stem) FROM parts_taken;
+CREATE VIEW results AS SELECT part_key, serial, result_json FROM (
+    SELECT *, row_number() OVER (PARTITION BY part_key ORDER BY filename) AS copy FROM {parts}) WHERE copy = 1;
+"""
+SIDES = """
+CREATE VIEW {name} AS
+SELECT p.serial, p.lot, p.part, p.inspected_utc, p.sequence, p.round,
+       s.* EXCLUDE (filename, day, recipe), p.day, p.recipe
+FROM {files} s JOIN parts_taken p ON s.part_key = p.part_key AND parse_filename(s.filename, true) = p.stem;
+"""
+FAILURES = """
+CREATE VIEW failures AS SELECT * EXCLUDE (filename, copy) FROM (
+    SELECT *, row_number() OVER (PARTITION BY part_key ORDER BY sequence DESC, filename) AS copy FROM {failures}) f
+WHERE copy = 1 AND NOT EXISTS (
+    SELECT 1 FROM parts_taken p
+    WHERE p.sequence > f.sequence
+      AND ((f.serial <> '' AND p.serial = f.serial) OR p.capture_folder = f.capture_folder));
+"""
+
+
+def query(folder: Path, sql: str) -> Any:  # noqa: ANN401 - pyarrow has no types
+    """Return the answer to a question, as an Arrow table.
+
+    Raises
+    ------
+    InputError
+        DuckDB is not installed, or refuses the question.
+    FileFormatError
+        A file of the store cannot be read.
+    """
+    duckdb = need_duckdb()
+    for attempt in range(TRIES):
+        try:
+            with connect(folder) as connection:
+                answer = connection.sql(sql)
+                if answer is None:
+                    break
+                return answer.to_arrow_table()
+        except duckdb.IOException as error:
+            if attempt + 1 == TRIES or not any(word in str(error) for word in LOST):
+                msg = f"{folder}: a file of the store cannot be read ({_one_line(error)})"
+                raise FileFormatError(msg) from error
+        except duckdb.Error as error:
+            msg = f"query: {_one_line(error)}"
+            raise InputError(msg) from error
+    msg = f"query: must be a question that has an answer, such as 'select count(*) from parts', got {sql!r}"
+    raise InputError(msg)
+
+
+def connect(folder: Path) -> Any:  # noqa: ANN401 - duckdb's connection
+    """Return a connection to a database in memory whose views are the tables of the store; it reaches nothing else."""
+    connection = need_duckdb().connect(":memory:")
+    connection.execute("SET TimeZone = 'UTC'")
+    connection.execute("SET autoinstall_known_extensions = false")
+    sources = {table: _source(connection, folder, table) for table in TABLES}
+    connection.execute(PARTS.format(**sources))
+    for name in ("balls", "checks", "budgets"):
+        connection.execute(SIDES.format(name=name, files=sources[name]))
+    connection.execute(FAILURES.format(**sources))
+    connection.execute(f"SET allowed_directories = [{_quoted(str(folder.resolve()))}]")
+    connection.execute("SET enable_external_access = false")
+    connection.execute("SET lock_configuration = true")
+    return connection
+
+
+def _source(connection: Any, folder: Path, table: str) -> str:  # noqa: ANN401 - as above
+    """What to select from: the files of a table, or its empty form where there are none."""
+    if next((folder / table).rglob("*.parquet"), None) is None:
+        empty = arrow_schema(table).empty_table()
+        connection.register(f"empty_{table}", empty)
+        return f"(SELECT *, '' AS filename, NULL::DATE AS day, NULL::VARCHAR AS recipe FROM empty_{table})"
+    files = _quoted(str(folder.resolve() / table / "*" / "*" / "*.parquet"))
+    return (
+        f"read_parquet({files}, filename = true, union_by_name = true, hive_partitioning = true, "
+        "hive_types = {'day': DATE, 'recipe': VARCHAR})"
+    )
+
+
+def need_duckdb() -> Any:  # noqa: ANN401 - a module
+    """Return DuckDB, or say how to get it."""
+    try:
+        return importlib.import_module("duckdb")
+    except ImportError:
+        msg = "query: needs duckdb, which is not installed; install it with: pip install 'bgars[store]'"
+        raise InputError(msg) from None
+
+
+def _quoted(text: str) -> str:
+    return "'" + text.replace("'", "''") + "'"
+
+
+def _one_line(error: Exception) -> str:
+    """DuckDB's message without the lines that point into the question."""
+    lines = [line.strip() for line in str(error).splitlines()]
+    return " ".join(line for line in lines if line and set(line) != {"^"} and not line.startswith("LINE "))

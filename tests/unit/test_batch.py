@@ -1,0 +1,220 @@
+"""Many captures into one store: each once, whatever is killed, in whatever order and number of processes."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import bgars
+import pytest
+from bgars.cli.app import app
+from bgars.line import job
+from bgars.line.folders import capture_folders
+from bgars.line.local_pool import share_cores
+from bgars.part_identity import PartIdentity
+from line_captures import RECIPE, captures, copy_capture
+from typer.testing import CliRunner
+
+KEPT = "select serial, result_json from results order by serial"
+
+
+def kept(store: Path) -> dict[str, dict]:
+    """Every result without its time."""
+    rows = bgars.open_store(store).query(KEPT).to_pylist()
+    assert len({row["serial"] for row in rows}) == len(rows), "nothing twice"
+    return {row["serial"]: json.loads(row["result_json"]) | {"inspected_utc": ""} for row in rows}
+
+
+def start_batch(*arguments: object) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "bgars", "batch", *map(str, arguments)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def parts_of(store: Path) -> int:
+    return len(list((store / "parts").rglob("*.parquet")))
+
+
+def wait_for_parts(store: Path, count: int) -> None:
+    deadline = time.monotonic() + 120
+    while parts_of(store) < count:
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def test_two_processes_give_what_one_gives_in_another_order(tmp_path: Path) -> None:
+    folders = captures(tmp_path / "in", "A1", "A2", "A3")
+    recipe = tmp_path / "part.toml"
+    recipe.write_text(RECIPE)
+    one = bgars.inspect_many(folders, recipe, store=tmp_path / "one", processes=1, threads=2)
+    two = bgars.inspect_many(folders[::-1], recipe, store=tmp_path / "two", processes=2, threads=1)
+    assert (one.inspected, two.inspected, two.processes, two.threads) == (3, 3, 2, 1)
+    assert kept(tmp_path / "one") == kept(tmp_path / "two")
+    assert list(kept(tmp_path / "one")) == ["A1", "A2", "A3"]
+    again = bgars.inspect_many([tmp_path / "in"], recipe, store=tmp_path / "one", processes=1)
+    assert (again.inspected, again.known) == (0, 3)
+
+
+def test_failures_are_kept_and_stop_nothing(tmp_path: Path) -> None:
+    good, cut, empty = captures(tmp_path / "in", "good", "cut", "nothing")
+    light = cut / "light_03.png"
+    light.write_bytes(light.read_bytes()[:500])
+    for path in empty.iterdir():
+        path.unlink()
+    told = []
+    done = bgars.inspect_many(
+        [empty, cut, good], store=tmp_path / "store", processes=1, progress=lambda now: told.append(now.done)
+    )
+    assert (done.inspected, len(done.failures), told) == (1, 2, [1, 2, 3])
+    reasons = bgars.open_store(tmp_path / "store").query("select serial, reason from failures order by serial")
+    assert reasons["serial"].to_pylist() == ["cut", "nothing"]
+    assert "light_03.png" in reasons["reason"][0].as_py()
+    light.write_bytes((good / "light_03.png").read_bytes())
+    again = bgars.inspect_many([cut, good], store=tmp_path / "store", processes=1)
+    assert (again.inspected, again.known) == (1, 1)
+    assert bgars.open_store(tmp_path / "store").query("select serial from failures")["serial"].to_pylist() == [
+        "nothing"
+    ]
+
+
+def test_files_that_change_meanwhile_give_no_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = copy_capture(tmp_path / "part")
+
+    def meddling(*arguments: object, **options: object) -> bgars.PartResult:
+        with (folder / "capture.toml").open("a") as file:
+            file.write("\n# changed\n")
+        return bgars.inspect(*arguments, **options)
+
+    monkeypatch.setattr(job, "inspect", meddling)
+    outcome = job.run_job(job.Job(str(folder)))
+    assert outcome.result is None
+    assert "changed while they were read" in outcome.reason
+
+
+def test_a_run_that_is_killed_goes_on_where_it_was(tmp_path: Path) -> None:
+    captures(tmp_path / "in", *(f"A{n}" for n in range(5)))
+    store = tmp_path / "store"
+    running = start_batch(tmp_path / "in", "-o", store, "--processes", 2)
+    wait_for_parts(store, 1)
+    children = [int(pid) for pid in Path(f"/proc/{running.pid}/task/{running.pid}/children").read_text().split()]
+    running.kill()
+    running.communicate()
+    first = parts_of(store)
+    assert 1 <= first < 5
+    done = bgars.inspect_many([tmp_path / "in"], store=store, processes=1)
+    assert done.inspected + done.known == 5
+    assert done.known >= first
+    assert len(kept(store)) == 5
+    deadline = time.monotonic() + 30
+    while any(Path(f"/proc/{pid}").exists() for pid in children):
+        assert time.monotonic() < deadline, "its processes go with it"
+        time.sleep(0.05)
+
+
+def test_a_process_that_is_killed_costs_nothing(tmp_path: Path) -> None:
+    captures(tmp_path / "in", *(f"A{n}" for n in range(5)))
+    store = tmp_path / "store"
+    running = start_batch(tmp_path / "in", "-o", store, "--processes", 2, "--json")
+    wait_for_parts(store, 1)
+    children = Path(f"/proc/{running.pid}/task/{running.pid}/children").read_text().split()
+    workers = [pid for pid in map(int, children) if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+    os.kill(workers[0], signal.SIGKILL)
+    out, err = running.communicate(timeout=200)
+    assert "Traceback" not in err
+    told = json.loads(out)
+    assert (told["inspected"], told["failures"]) == (5, [])
+    assert len(kept(store)) == 5
+
+
+def test_ctrl_c_is_clean(tmp_path: Path) -> None:
+    captures(tmp_path / "in", *(f"A{n}" for n in range(6)))
+    store = tmp_path / "store"
+    running = start_batch(tmp_path / "in", "-o", store, "--processes", 2)
+    wait_for_parts(store, 1)
+    running.send_signal(signal.SIGINT)
+    _, err = running.communicate(timeout=120)
+    assert running.returncode == 130
+    assert "Traceback" not in err
+    assert 1 <= len(kept(store)) < 6
+
+
+def test_the_program_expands_patterns(tmp_path: Path) -> None:
+    captures(tmp_path / "in", "A1", "A2", "B1")
+    assert [path.name for path in capture_folders([str(tmp_path / "in" / "A*")])] == ["A1", "A2"]
+    assert [path.name for path in capture_folders([tmp_path / "in", tmp_path / "in" / "B1"])] == ["A1", "A2", "B1"]
+    with pytest.raises(bgars.InputError, match="no folder matches this pattern"):
+        capture_folders([tmp_path / "C*"])
+    with pytest.raises(bgars.FileFormatError, match="no such folder"):
+        capture_folders([tmp_path / "C"])
+    with pytest.raises(bgars.InputError, match="folders: must be at least one capture"):
+        capture_folders([])
+
+
+def test_bad_numbers_and_recipes_are_refused_before_any_work(tmp_path: Path) -> None:
+    folder = copy_capture(tmp_path / "in")
+    with pytest.raises(bgars.InputError, match="processes: must be 1 or more, got 0"):
+        bgars.inspect_many([folder], processes=0)
+    with pytest.raises(bgars.FileFormatError, match=r"none\.toml"):
+        bgars.inspect_many([folder], tmp_path / "none.toml")
+    assert share_cores(1, None, 1) == (1, 1)
+    assert share_cores(9, 3, None)[0] == 3
+
+
+def test_names_tell_serial_lot_and_place(tmp_path: Path) -> None:
+    folder = tmp_path / "L7" / "SN12_3-4"
+    folder.mkdir(parents=True)
+    naming = bgars.Naming("{lot}/{serial}_{position}", PartIdentity(station="S1"))
+    serial, identity = naming.of_name(folder)
+    assert (serial, identity.known()) == ("SN12", {"lot": "L7", "position": "3-4", "station": "S1"})
+    with pytest.raises(bgars.InputError, match="its name must follow the pattern"):
+        bgars.Naming("{lot}-{serial}").of_name(tmp_path / "L7")
+    for pattern, words in {"SN": r"must hold \{serial\}", "{serial}{who}": "got {who}"}.items():
+        with pytest.raises(bgars.InputError, match=words):
+            bgars.Naming(pattern)
+
+
+def test_the_side_file_goes_before_the_name(tmp_path: Path) -> None:
+    folder = copy_capture(tmp_path / "folder")
+    with (folder / "capture.toml").open("a") as file:
+        file.write('\n[part]\nserial = "SN99"\nlot = "L3"\noperator = "ada"\n')
+    result = bgars.inspect_many([folder], processes=1).results[0]
+    assert (result.serial, result.identity.lot, result.identity.operator) == ("SN99", "L3", "ada")
+    assert result.identity.captured_utc.endswith("Z")
+    csv = result.to_csv().splitlines()
+    assert csv[0].endswith("part_serial,part_lot,part_capture,part_inspected_utc")
+    assert ",SN99,L3,folder," in csv[1]
+
+
+def test_the_serial_number_is_read_from_a_code_in_the_images(tmp_path: Path) -> None:
+    reader = pytest.importorskip("zxingcpp")
+    iio = pytest.importorskip("imageio.v3")
+    import numpy as np  # noqa: PLC0415
+
+    folder = copy_capture(tmp_path / "part")
+    code = np.asarray(reader.create_barcode("SN-4711", reader.BarcodeFormat.DataMatrix).to_image(scale=3))
+    for path in sorted(folder.glob("light_*.png")):
+        image = iio.imread(path)
+        image[: code.shape[0], : code.shape[1]] = code // 2
+        iio.imwrite(path, image)
+    naming = bgars.Naming("code")
+    capture = bgars.read_capture(folder)
+    assert naming.of_capture(folder, capture, "") == "SN-4711"
+    with pytest.raises(bgars.InputError, match="no DataMatrix or QR code can be read"):
+        naming.of_capture(folder, bgars.read_capture(bgars.sample_capture()), "")
+
+
+def test_the_command_says_what_it_did(tmp_path: Path) -> None:
+    folder = copy_capture(tmp_path / "A1")
+    run = CliRunner().invoke(
+        app, ["batch", str(folder), "-o", str(tmp_path / "s"), "--lot", "L1", "--processes", "1", "--json"]
+    )
+    told = json.loads(run.output)
+    assert (run.exit_code, told["inspected"], told["verdicts"]["undecided"]) == (1, 1, 1)
+    run = CliRunner().invoke(app, ["batch", str(folder), "-o", str(tmp_path / "s"), "--lot", "L1"])
+    assert run.exit_code == 0, "nothing new that does not pass"
+    assert "1 were in the store" in run.output
+    assert bgars.open_store(tmp_path / "s").query("select lot from parts")["lot"].to_pylist() == ["L1"]

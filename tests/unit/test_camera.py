@@ -1,0 +1,70 @@
+"""Captures through the small protocol of a camera."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bgars
+import numpy as np
+import pytest
+from bgars.cli.app import app
+from bgars.line.camera import FolderCamera, camera_of, take_capture
+from typer.testing import CliRunner
+
+RIG = "pixel_pitch_um = 3.4\n[lights]\nring = { count = 8, elevation_deg = 45.0 }\n"
+
+
+class Broken:
+    def __init__(self, *images: np.ndarray) -> None:
+        self.images = images
+
+    def grab(self, light: int) -> np.ndarray:
+        return self.images[light]
+
+
+def test_a_capture_through_a_camera_is_what_the_camera_showed(tmp_path: Path) -> None:
+    rig = tmp_path / "rig.toml"
+    rig.write_text(RIG)
+    out = tmp_path / "inbox" / "SN1"
+    run = CliRunner().invoke(app, ["capture", f"folder:{bgars.sample_capture()}", "-o", str(out), "--rig", str(rig)])
+    assert run.exit_code == 0, run.output
+    assert np.array_equal(bgars.read_capture(out).images, bgars.read_capture(bgars.sample_capture()).images)
+    assert [path.name for path in out.parent.iterdir()] == ["SN1"], "nothing half-written"
+
+
+def test_a_driver_of_ones_own_is_found_beside_the_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "my_station.py").write_text(
+        "import numpy as np\nclass Mine:\n"
+        "    def grab(self, light):\n        return np.full((4, 5), 10 * light, np.uint16)\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert take_capture(camera_of("my_station:Mine"), tmp_path / "c", lights=3) == [
+        f"light_{light:02d}.png" for light in range(3)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("images", "words"),
+    [
+        ([np.zeros((4, 4), np.float32)], r"grab\(0\) must return grey or RGB pixels"),
+        ([np.zeros((4, 4), np.uint8), np.zeros((4, 5), np.uint8)], r"grab\(1\) must be like the first image"),
+    ],
+)
+def test_a_camera_that_fails_leaves_nothing(images: list[np.ndarray], words: str, tmp_path: Path) -> None:
+    with pytest.raises(bgars.InputError, match=words):
+        take_capture(Broken(*images), tmp_path / "c", lights=len(images))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_wrong_use_gets_one_line(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    with pytest.raises(bgars.InputError, match="must be a new folder"):
+        take_capture(FolderCamera(bgars.sample_capture()), tmp_path / "there", lights=8)
+    with pytest.raises(bgars.FileFormatError, match="holds no images"):
+        FolderCamera(tmp_path)
+    for name, words in {"x": "must be folder:PATH", "no_such:Thing": "cannot be imported"}.items():
+        with pytest.raises(bgars.InputError, match=words):
+            camera_of(name)
+    with pytest.raises(bgars.InputError, match="light: must be 0 to 7, got 8"):
+        FolderCamera(bgars.sample_capture()).grab(8)

@@ -1,0 +1,88 @@
+"""Every question of docs/queries.md is answered, and bgars query prints the answer."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+from pathlib import Path
+
+import bgars
+import pytest
+from bgars.cli.app import app
+from stored_parts import filled_store
+from typer.testing import CliRunner
+
+PAGE = Path(__file__).parents[2] / "docs" / "queries.md"
+QUESTIONS = re.findall(r"```sql\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> bgars.Store:
+    made = filled_store(tmp_path_factory.mktemp("queries") / "store")
+    made.append_failure("/captures/broken", "light_03.png: is cut off", serial="SN0100")
+    return made
+
+
+def rows(store: bgars.Store, number: int) -> list[dict]:
+    return store.query(QUESTIONS[number - 1]).to_pylist()
+
+
+def test_the_page_has_ten_questions_and_one_more() -> None:
+    assert len(QUESTIONS) == 11
+
+
+@pytest.mark.parametrize("number", range(1, 12))
+def test_every_question_has_an_answer(store: bgars.Store, number: int) -> None:
+    assert rows(store, number), QUESTIONS[number - 1]
+
+
+def test_the_answers_are_right(store: bgars.Store) -> None:
+    yields = {row["lot"]: (row["parts"], row["yield_percent"]) for row in rows(store, 1)}
+    assert yields == {"L0": (4, 100.0), "L1": (4, 50.0)}
+    assert rows(store, 3)[0] == {"defect": "missing", "parts": 2, "percent": 25.0}
+    assert {row["ball"]: row["failed"] for row in rows(store, 4)} == {"A1": 1, "B2": 1}
+    assert rows(store, 5)[0]["verdict"] == "fail"
+    assert [row["parts"] for row in rows(store, 6)] == [4, 4]
+    assert len(rows(store, 7)) == 8
+    assert [row["cause"] for row in rows(store, 9)] == ["lamps", "noise"]
+    assert rows(store, 9)[0]["expanded_um"] == pytest.approx(1.6)
+    assert rows(store, 10)[0]["reason"] == "light_03.png: is cut off"
+
+
+def run(*arguments: object) -> object:
+    return CliRunner().invoke(app, ["query", *map(str, arguments)])
+
+
+def test_the_command_prints_tables_csv_and_json(store: bgars.Store) -> None:
+    sql = "select serial, verdict, mean_top_um, defects, inspected_utc from parts order by serial"
+    text = run(store.folder, sql).output
+    assert "SN0003" in text
+    assert "(8 rows)" in text
+    table = list(csv.reader(io.StringIO(run(store.folder, sql, "--csv").output)))
+    assert table[0] == ["serial", "verdict", "mean_top_um", "defects", "inspected_utc"]
+    assert (table[4][0], table[4][1], table[4][3]) == ("SN0003", "fail", "missing")
+    answer = json.loads(run(store.folder, sql, "--json").output)
+    assert answer["rows"][3]["defects"] == ["missing"]
+    assert answer["rows"][0]["inspected_utc"] == "2026-01-01T10:00:00Z"
+    twice = run(store.folder, "select serial, count(*), count(*) from parts group by serial order by serial", "--csv")
+    assert twice.output.splitlines()[1] == "SN0000,1,1"
+    assert "parts (8 rows)" in run(store.folder).output
+
+
+@pytest.mark.parametrize(
+    ("sql", "words"),
+    [
+        ("selec 1", "query: Parser Error"),
+        ("select * from nothing", "Table with name nothing does not exist"),
+        ("select * from read_csv('/etc/passwd')", "Permission Error"),
+        ("copy parts to '/tmp/bgars-test.csv'", "Permission Error"),
+        ("-- no question", "must be a question that has an answer"),
+    ],
+)
+def test_a_question_that_is_none_gets_one_line(store: bgars.Store, sql: str, words: str) -> None:
+    with pytest.raises(bgars.InputError) as caught:
+        store.query(sql)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
