@@ -186,8 +186,9 @@ def reconstruct(
 
     capture = bgars.read_capture(folder, channel=channel)
     findings = check_first(capture, force=force)
-    summary, files = _reconstruct_to(capture, output, run, mesh_format=mesh_format, directx=directx)
-    summary |= findings.to_dict()
+    summary, files = _reconstruct_to(
+        capture, output, run, mesh_format=mesh_format, directx=directx, checked=findings.to_dict()
+    )
     if as_json:
         print_json(summary)
         return
@@ -338,6 +339,7 @@ def _reconstruct_to(
     *,
     mesh_format: str,
     directx: bool,
+    checked: dict[str, Any] | None = None,
 ) -> tuple[dict[str, Any], dict[str, str]]:
     from bgars.cli.outputs import write_reconstruction  # noqa: PLC0415 - loaded when it runs
 
@@ -347,6 +349,7 @@ def _reconstruct_to(
             output,
             mesh_format=mesh_format,
             directx=directx,
+            checked=checked,
         )
 
 

@@ -35,12 +35,17 @@ RECONSTRUCTION = FolderNames(
 
 
 def write_reconstruction(
-    run: Callable[[], Reconstruction], output: Path, *, mesh_format: str, directx: bool
+    run: Callable[[], Reconstruction],
+    output: Path,
+    *,
+    mesh_format: str,
+    directx: bool,
+    checked: dict[str, Any] | None = None,
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Run a reconstruction and write its results; return its summary and what each file is.
 
     The output folder is tried first, so that no work is lost to an unwritable one. What an earlier reconstruction left
-    there goes when the new files come.
+    there goes when the new files come. `checked`: what the check of the capture found.
     """
     with atomic_folder(output, RECONSTRUCTION) as folder:
         result = run()
@@ -62,7 +67,7 @@ def write_reconstruction(
         bgars.write_normal_map(result.field, folder / "normals.png", directx=directx)
         bgars.write_height(result.height, folder / "height.tif")
         bgars.write_height(result.height, folder / "height.npy")
-        summary = {"bgars": bgars.__version__, **result.summary(), "files": list(files)}
+        summary = {"bgars": bgars.__version__, **result.summary(), **(checked or {}), "files": list(files)}
         (folder / MARK).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     return summary, files
 
