@@ -34,6 +34,7 @@ from bgars.io.normal_map import read_normal_map, write_normal_map
 from bgars.io.parquet import write_parquet
 from bgars.io.part_recipe import read_part_recipe
 from bgars.io.result_file import read_result
+from bgars.io.station_file import read_station, write_station
 from bgars.io.truth import read_truth
 from bgars.material_records import ReflectanceFit, SurfaceLobe, SurfaceMaterial
 from bgars.mesh import mesh_from_height
@@ -66,6 +67,9 @@ from bgars.simulate import (
     Variation,
     simulate,
 )
+from bgars.station import calibrate_flat, calibrate_lights, calibrate_scale
+from bgars.station_apply import with_station
+from bgars.station_record import Finding, FlatField, LightCalibration, ResponseCurve, Scale, Station
 from bgars.studies import (
     GaugeStudy,
     ProcessTrend,
@@ -100,12 +104,15 @@ __all__ = [
     "DepthMap",
     "Evaluation",
     "FileFormatError",
+    "Finding",
+    "FlatField",
     "FoundBall",
     "FoundBalls",
     "GaugeStudy",
     "HeightMap",
     "InputError",
     "Jitter",
+    "LightCalibration",
     "LightRig",
     "Limits",
     "Lobe",
@@ -118,9 +125,12 @@ __all__ = [
     "ProcessTrend",
     "Reconstruction",
     "ReflectanceFit",
+    "ResponseCurve",
+    "Scale",
     "Scene",
     "SimulatedTruth",
     "SimulationSetup",
+    "Station",
     "Study",
     "SurfaceLobe",
     "SurfaceMaterial",
@@ -131,7 +141,10 @@ __all__ = [
     "__version__",
     "anchors_from_part",
     "angular_error_deg",
+    "calibrate_flat",
+    "calibrate_lights",
     "calibrate_material",
+    "calibrate_scale",
     "estimate_normals",
     "evaluate",
     "find_balls",
@@ -150,6 +163,7 @@ __all__ = [
     "read_result",
     "read_results",
     "read_scene",
+    "read_station",
     "read_study",
     "read_truth",
     "reconstruct",
@@ -157,6 +171,7 @@ __all__ = [
     "sample_part_recipe",
     "simulate",
     "to_cfx",
+    "with_station",
     "write_height",
     "write_material",
     "write_mesh",
@@ -166,4 +181,5 @@ __all__ = [
     "write_part_pictures",
     "write_report",
     "write_simulation",
+    "write_station",
 ]

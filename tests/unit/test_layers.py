@@ -20,6 +20,8 @@ RECORDS = {
     "surface_map": 0,
     "records": 3,
     "part_result": 3,
+    "station_record": 3,
+    "station_apply": 3.5,
     "kernel_capture": 3.5,
     "kernel_outputs": 3.5,
     "anchoring": 3.5,
@@ -29,7 +31,7 @@ RECORDS = {
 BASE = {"errors": 0, "large_arrays": 0, "light_files": 1, "light_names": 1, "rig": 2, "scalar_checks": 1, **RECORDS}
 STAGES = dict.fromkeys(("io", "pixelwise", "reflectance", "integrate", "mesh", "balls", "inspection"), 4)
 PIPELINES = ("calibrate", "pipeline", "evaluate", "part_anchors", "recipes", "cfx")
-JOINED = {"normals": 4.5, **dict.fromkeys(PIPELINES, 5), "part_surface": 5.2, "inspection_pipeline": 5.4}
+JOINED = {"normals": 4.5, **dict.fromkeys(PIPELINES, 5), "station": 5, "part_surface": 5.2, "inspection_pipeline": 5.4}
 LATER = {**JOINED, "batch": 6, "report": 6, "studies": 6.5, "experiments": 6, "samples": 0, "cli": 7}
 LEVEL = {**BASE, **STAGES, **LATER, "simulate": 4}
 

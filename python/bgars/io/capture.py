@@ -8,12 +8,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from bgars.errors import FileFormatError, InputError
-from bgars.io.capture_lights import default_recipe, image_names, match, read_lights
+from bgars.io.capture_lights import Lights, default_recipe, image_names, match, read_lights
 from bgars.io.given_paths import need_folder
 from bgars.io.images import MAX_MEGAPIXELS, WEIGHTS, decode_stack, read_mask
 from bgars.io.recipe import RECIPE_NAME, CaptureRecipe, GammaResponse, TableResponse, read_recipe
 from bgars.io.response import Curve, gamma_curve, linearise, read_response_table, tabulate
+from bgars.io.station_file import read_station
 from bgars.records import Capture, every_pixel, float_full_scale
+from bgars.rig import LightRig
+from bgars.station_apply import with_station
+from bgars.station_record import Station
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,11 +25,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bgars.io.capture_lights import Lights
     from bgars.io.recipe import ChannelName
     from bgars.records import BoolArray, FloatArray, PixelArray
 
-__all__ = ["read_capture"]
+__all__ = ["read_capture", "read_unlit"]
 
 RGB = 3
 
@@ -37,6 +40,7 @@ def read_capture(
     images: Sequence[str] | None = None,
     max_megapixels: float = MAX_MEGAPIXELS,
     threads: int | None = None,
+    station: Station | str | PathLike[str] | None = None,
 ) -> Capture:
     """Read a folder of photographs, one light at a time, with the description of its lights.
 
@@ -57,6 +61,9 @@ def read_capture(
         Images whose header claims more are refused before anything is allocated.
     threads : int, optional
         Most threads to decode on; by default what ``RAYON_NUM_THREADS`` says, else one a core.
+    station : Station or path, optional
+        What is known of the station (:func:`bgars.read_station`): lights, response, flat field and scale are then
+        taken from it, one light an image in its order. By default what ``station`` in ``capture.toml`` names.
 
     Returns
     -------
@@ -81,10 +88,45 @@ def read_capture(
     folder = need_folder(folder)
     recipe_path = folder / RECIPE_NAME
     recipe = read_recipe(recipe_path) if recipe_path.exists() else default_recipe(folder)
-    lights = read_lights(folder, recipe)
-    names = image_names(folder, recipe, lights)
-    lights, names = match(folder, lights, names, images)
-    return _load(folder, recipe, lights, names, channel or recipe.channel, max_megapixels, threads)
+    if station is None and recipe.station is not None:
+        station = folder / recipe.station
+    known = station if station is None or isinstance(station, Station) else read_station(station)
+    if known is None or known.lights is None or recipe.lights is not None:
+        lights = read_lights(folder, recipe)
+        names = image_names(folder, recipe, lights)
+        lights, names = match(folder, lights, names, images)
+    else:
+        lights, names = _lights_by_order(folder, recipe, known.name, known.lights.rig, images)
+    capture = _load(folder, recipe, lights, names, channel or recipe.channel, max_megapixels, threads)
+    return capture if known is None else with_station(capture, known)
+
+
+def read_unlit(folder: str | PathLike[str], *, channel: ChannelName | None = None) -> Capture:
+    """Read the images of a folder whose lights are not known yet; an even ring at 45 degrees stands in for them.
+
+    As :func:`read_capture` in all else. Where the folder does describe lights, these are read.
+    """
+    folder = need_folder(folder)
+    recipe_path = folder / RECIPE_NAME
+    try:
+        recipe = read_recipe(recipe_path) if recipe_path.exists() else default_recipe(folder)
+    except InputError:
+        if recipe_path.exists():
+            raise
+        recipe = CaptureRecipe.model_validate({"mask": "mask.png" if (folder / "mask.png").exists() else None})
+    if recipe.lights is not None:
+        return read_capture(folder, channel=channel)
+    # Names of the images do not depend on lights that name none.
+    count = len(image_names(folder, recipe, Lights(LightRig.ring(3), np.ones((3, 1)), "")))
+    lights, names = _lights_by_order(folder, recipe, "", LightRig.ring(max(count, 3)), None)
+    return _load(folder, recipe, lights, names, channel or recipe.channel, MAX_MEGAPIXELS, None)
+
+
+def _lights_by_order(
+    folder: Path, recipe: CaptureRecipe, source: str, rig: LightRig, images: Sequence[str] | None
+) -> tuple[Lights, list[str]]:
+    lights = Lights(rig, np.ones((len(rig), 1)), source)
+    return match(folder, lights, image_names(folder, recipe, lights), images)
 
 
 class _Radiometry(NamedTuple):

@@ -96,6 +96,7 @@ class CaptureRecipe(Strict):
     black_level: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
     saturation: Positive | None = None
     lights: LightsRecipe | None = None
+    station: str | None = None
 
     @field_validator("camera", mode="before")
     @classmethod

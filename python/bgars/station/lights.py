@@ -1,0 +1,385 @@
+"""Lights calibrated on reference balls: one ball, several, or one that is moved from capture to capture."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bgars.errors import CalibrationError, InputError
+from bgars.light_names import light_name
+from bgars.records import Capture
+from bgars.rig import LightRig
+from bgars.scalar_checks import check_pitch
+from bgars.station.balls_seen import given_outlines, outlines_of
+from bgars.station.levels import linear_levels
+from bgars.station.light_bundle import solve_lights
+from bgars.station.matt_lights import shading_on
+from bgars.station.mirror_lights import highlights_on
+from bgars.station_record import BallView, Finding, LightCalibration
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from bgars.station.levels import Levels
+    from bgars.station.light_bundle import LightSolution
+    from bgars.station.outline import Outline
+
+__all__ = ["Sphere", "calibrate_lights"]
+
+Array = NDArray[np.float64]
+Sphere = Literal["mirror", "matt"]
+
+MANY_RADII = 0.5
+MISFIT = 3.0
+"""Reduced chi square from which on balls contradict each other."""
+OFF_SIGMAS = 5.0
+FAR_DEG = 15.0
+"""Turn of a light against the rig that the capture brings, from which on the order of the images is doubted."""
+PART_OF_WAY = 0.02
+"""Distance of a ball from the image centre, of what an ordinary lens stands away: 0.02 turns directions by 1 degree."""
+
+
+class _Ball(NamedTuple):
+    capture: Capture
+    outline: Outline
+    places: Array
+    covariances: Array
+    jacobians: Array | None = None
+
+
+def calibrate_lights(
+    capture: Capture | Sequence[Capture],
+    sphere: Sphere = "mirror",
+    outline: ArrayLike | Sequence[ArrayLike | None] | None = None,
+    *,
+    near: bool | None = None,
+    diameter_um: float | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> LightCalibration:
+    """Find where the lights are, from a mirror or a matt ball in view.
+
+    Parameters
+    ----------
+    capture : Capture or sequence of Capture
+        The ball under each light; or several captures, with the ball moved in between. Their rig is a starting guess
+        only: what comes out does not depend on it.
+    sphere : {"mirror", "matt"}
+        A bearing ball, a chrome or a glossy black one; or a matt one.
+    outline : (3,) or (N, 3) array_like, or a sequence of these, optional
+        x, y (from the image centre, x right, y up) and radius of the ball, or of several balls, in pixels; with several
+        captures, one entry a capture. By default the circle is looked for, or taken from a mask that is a disc.
+    near : bool, optional
+        True: positions in space, which takes two balls or one ball moved. False: directions. By default positions where
+        the balls show that directions differ from place to place.
+    diameter_um : float, optional
+        Diameter of the ball: gives the pixel pitch where the captures state none.
+    progress : callable, optional
+        Called with the fraction done.
+
+    Returns
+    -------
+    LightCalibration
+        The rig with standard uncertainties (`u_deg`), intensities where they can be measured, residuals, findings.
+
+    Raises
+    ------
+    CalibrationError
+        No ball, a ball cut off or burnt out, a light whose highlight is on no ball.
+    InputError
+        Captures with different numbers of images, or an outline of a wrong shape.
+
+    Notes
+    -----
+    A mirror ball turns a step of the highlight into twice the angle: of a ball of 200 pixels radius one pixel is half a
+    degree, and a radius that is wrong by 1 pixel tilts a light at 45 degrees by 0.2 degrees, all lights alike
+    (`u_common_deg`).
+
+    References
+    ----------
+    Zhou, W. & Kambhamettu, C. (2002). Estimation of illuminant direction and intensity of multiple light sources.
+    Powell, M. W., Sarkar, S. & Goldgof, D. (2001). A simple strategy for calibrating the geometry of light sources.
+
+    Examples
+    --------
+    >>> import bgars
+    >>> ball = bgars.simulate(bgars.Scene.hemisphere(300.0), bgars.LightRig.ring(8), bgars.Material(i_s=0.0), bgars.Camera())[0]
+    >>> found = bgars.calibrate_lights(ball, sphere="matt")
+    >>> float(abs(found.rig.elevations_deg - 45.0).max()) < 1.0
+    True
+    """
+    captures = [capture] if isinstance(capture, Capture) else list(capture)
+    if sphere not in {"mirror", "matt"}:
+        msg = f"sphere: must be 'mirror' or 'matt', got {sphere!r}"
+        raise InputError(msg)
+    outlines = _outlines_a_capture(captures, outline)
+    check_pitch(diameter_um, "diameter_um")
+    balls: list[_Ball] = []
+    findings: list[Finding] = []
+    levels_of: list[Levels] = []
+    strengths: list[Array] = []
+    lamps: list[Array] = []
+    for index, (one, given) in enumerate(zip(captures, outlines, strict=True)):
+        levels = linear_levels(one)
+        levels_of.append(levels)
+        found, said = outlines_of(one, levels, given, matt=sphere == "matt")
+        findings += said
+        for ball in found:
+            camera_px = _camera_px(one, ball, diameter_um)
+            if sphere == "mirror":
+                seen = highlights_on(one, levels, ball, camera_px)
+                balls.append(_Ball(one, ball, seen.places_px, seen.covariances_px2))
+                findings += seen.findings
+                lamps.append(seen.lamp_deg)
+                strengths.append(seen.flux)
+            else:
+                shading = shading_on(one, levels, ball)
+                findings += shading.findings
+                strengths.append(shading.strengths)
+                balls.append(
+                    _as_highlights(one, ball, shading.directions, shading.own_covariances, shading.outline_jacobians)
+                )
+        if progress is not None:
+            progress((index + 1) / len(captures))
+    _need_all(balls, captures)
+    camera_px = _camera_px(captures[0], balls[0].outline, diameter_um) if sphere == "mirror" else math.inf
+    if math.isinf(camera_px):
+        findings += _lens_note(balls)
+    u_outlines = np.array([ball.outline.u_px for ball in balls])
+    solution = solve_lights(
+        np.array([ball.places for ball in balls]),
+        np.array([ball.covariances for ball in balls]),
+        np.array([ball.outline.circle_px for ball in balls]),
+        u_outlines,
+        camera_px,
+        near,
+    )
+    pitch_um = captures[0].pixel_pitch_um
+    if diameter_um is not None:
+        pitch_um = float(np.mean([diameter_um / (2.0 * circle[2]) for circle in solution.outlines_px]))
+    if solution.nearness.any() and pitch_um is None:
+        if near:
+            msg = f"{captures[0].name}: positions of lights need a scale: pixel_pitch_um in capture.toml, or diameter_um of the ball"
+            raise InputError(msg)
+        findings.append(
+            Finding(
+                "doubt",
+                "the balls show that the lights are near, but no scale is known: state the diameter of the ball to get positions",
+                "near-without-scale",
+            )
+        )
+        solution = solve_lights(*_arrays(balls), u_outlines, camera_px, near=False)
+    intensities, u_intensities = _intensities(sphere, captures, levels_of, strengths, solution, findings)
+    rig = _rig(solution, pitch_um, intensities)
+    findings += _judge(solution, balls, captures, rig)
+    known = [lamp[np.isfinite(lamp)] for lamp in lamps]
+    lamp = float(np.median(np.concatenate(known))) if known and sum(map(len, known)) else math.nan
+    own = solution.u_own_deg
+    return LightCalibration(
+        rig=rig,
+        u_deg=solution.u_deg,
+        u_own_deg=own,
+        u_common_deg=np.sqrt(np.maximum(solution.u_deg**2 - own**2, 0.0)),
+        sphere=sphere,
+        balls=tuple(_views(balls, solution)),
+        residual_px=_rms(solution.residuals_px),
+        u_positions_um=_u_positions(solution, pitch_um),
+        u_intensities=u_intensities,
+        lamp_deg=lamp,
+        findings=tuple(findings),
+    )
+
+
+def _arrays(balls: list[_Ball]) -> tuple[Array, Array, Array]:
+    return (
+        np.array([ball.places for ball in balls]),
+        np.array([ball.covariances for ball in balls]),
+        np.array([ball.outline.circle_px for ball in balls]),
+    )
+
+
+def _outlines_a_capture(captures: list[Capture], outline: object) -> list[Array | None]:
+    if not captures:
+        msg = "capture: must be one capture or more, got none"
+        raise InputError(msg)
+    counts = [len(capture.images) for capture in captures]
+    if len(set(counts)) > 1:
+        odd = next(index for index, count in enumerate(counts) if count != counts[0])
+        msg = f"capture: {captures[odd].name} has {counts[odd]} images, {captures[0].name} has {counts[0]}: one a light, in one order"
+        raise InputError(msg)
+    if outline is None or len(captures) == 1:
+        return [given_outlines(outline)] * len(captures)  # type: ignore[arg-type]
+    if len(outline) != len(captures):  # type: ignore[arg-type]
+        msg = f"outline: must have one entry for each of the {len(captures)} captures, got {len(outline)}"  # type: ignore[arg-type]
+        raise InputError(msg)
+    return [given_outlines(one) for one in outline]  # type: ignore[attr-defined]
+
+
+def _camera_px(capture: Capture, outline: Outline, diameter_um: float | None) -> float:
+    """Distance of the camera in pixels; infinite where it is not known."""
+    pitch_um = capture.pixel_pitch_um if diameter_um is None else diameter_um / (2.0 * outline.radius_px)
+    if capture.camera_distance_mm is None or pitch_um is None:
+        return math.inf
+    return 1000.0 * capture.camera_distance_mm / pitch_um
+
+
+def _as_highlights(capture: Capture, outline: Outline, directions: Array, own: Array, jacobians: Array) -> _Ball:
+    """Lights of a matt ball, written as the highlights that a mirror of its place would show.
+
+    The outline's errors move both, by different amounts; the difference is added to the covariance of each light.
+    """
+    radius = outline.radius_px
+    places = outline.circle_px[:2] + radius * directions[:, :2] / np.sqrt(2.0 + 2.0 * directions[:, 2:])
+    covariances = np.zeros((len(directions), 2, 2))
+    for index, direction in enumerate(directions):
+        level = np.cross([0.0, 0.0, 1.0], direction)
+        level = np.array([1.0, 0.0, 0.0]) if np.linalg.norm(level) < 1e-9 else level / np.linalg.norm(level)  # noqa: PLR2004
+        across = np.stack([level, np.cross(direction, level)])
+        step = 1e-4
+        ahead = direction + step * across
+        ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+        there = outline.circle_px[:2] + radius * ahead[:, :2] / np.sqrt(2.0 + 2.0 * ahead[:, 2:])
+        to_px = (there - places[index]).T / step
+        shading = across @ jacobians[index] * outline.u_px
+        # A highlight that moves with the outline stands for a direction that stays: only the rest is an error.
+        covariance = own[index] + shading @ shading.T
+        covariances[index] = to_px @ covariance @ to_px.T
+    fixed = type(outline)(outline.x_px, outline.y_px, radius, 1e-6, 1e-6, outline.edge_px, outline.arc, outline.given)
+    return _Ball(capture, fixed, places, covariances, jacobians)
+
+
+def _need_all(balls: list[_Ball], captures: list[Capture]) -> None:
+    seen = np.array([np.isfinite(ball.places).all(axis=1) for ball in balls]).any(axis=0)
+    if not seen.all():
+        missing = [light_name(int(index), captures[0].files) for index in np.flatnonzero(~seen)]
+        shown = ", ".join(missing[:4]) + (", ..." if len(missing) > 4 else "")  # noqa: PLR2004
+        msg = f"{captures[0].name}: {shown}: no highlight on {'the ball' if len(balls) == 1 else 'any ball'}"
+        raise CalibrationError(msg)
+
+
+def _lens_note(balls: list[_Ball]) -> list[Finding]:
+    """Say what an ordinary lens would do, where none is stated."""
+    notes = []
+    for ball in balls:
+        stated = ball.capture.camera_distance_mm
+        side = max(ball.capture.images.shape[1:])
+        aside = math.hypot(ball.outline.x_px, ball.outline.y_px) / side
+        if stated is None and aside > 0.15:  # noqa: PLR2004 - of the image
+            notes.append(
+                Finding(
+                    "note",
+                    f"{ball.capture.name}: the ball is {100 * aside:.0f} % of the image aside and no camera is stated: taken as "
+                    "telecentric; state camera in capture.toml where the lens is an ordinary one",
+                    "camera-unknown",
+                )
+            )
+    return notes
+
+
+def _rig(solution: LightSolution, pitch_um: float | None, intensities: Array) -> LightRig:
+    if solution.nearness.any() and pitch_um is not None and (solution.nearness > 0).all():
+        positions = solution.directions / solution.nearness[:, None] * pitch_um
+        return LightRig.from_positions(positions, intensities=intensities, u_deg=solution.u_deg)
+    return LightRig.from_directions(solution.directions, intensities=intensities, u_deg=solution.u_deg)
+
+
+def _u_positions(solution: LightSolution, pitch_um: float | None) -> Array | None:
+    if not solution.nearness.any() or pitch_um is None:
+        return None
+    found = np.zeros((len(solution.directions), 3))
+    for index, (direction, w) in enumerate(zip(solution.directions, solution.nearness, strict=True)):
+        columns = np.column_stack([*(solution.tangents[index] / w), -direction / w**2])
+        found[index] = np.sqrt(np.diag(columns @ solution.covariance[index] @ columns.T))
+    return found * pitch_um
+
+
+def _intensities(
+    sphere: str,
+    captures: list[Capture],
+    levels: list[Levels],
+    strengths: list[Array],
+    solution: LightSolution,
+    findings: list[Finding],
+) -> tuple[Array, Array | None]:
+    """Relative intensities, mean 1, and their scatter from ball to ball."""
+    usable = [row / row.mean() for row in strengths if np.isfinite(row).all() and (row > 0).all()]
+    if usable:
+        mean = np.mean(usable, axis=0)
+        spread = np.std(usable, axis=0) if len(usable) > 1 else np.full(len(mean), 0.01 if sphere == "matt" else 0.03)
+        return mean / mean.mean(), np.maximum(spread, 0.002)
+    board = [np.median(one.images.reshape(len(one.images), -1), axis=1) for one in levels]
+    level = np.mean(board, axis=0) / np.maximum(solution.directions[:, 2], 0.05)
+    least = 10.0
+    if np.min(board) > least:
+        findings.append(
+            Finding(
+                "note",
+                "intensities by the median level of the images (a matt board in view); the highlights are clipped",
+                "board-intensities",
+            )
+        )
+        return level / level.mean(), np.full(len(level), 0.03)
+    findings.append(
+        Finding(
+            "note",
+            f"{captures[0].name}: intensities not measured (clipped highlights, dark board): taken as equal; calibrate flat gives them",
+            "no-intensities",
+        )
+    )
+    return np.ones(len(solution.directions)), None
+
+
+def _judge(solution: LightSolution, balls: list[_Ball], captures: list[Capture], rig: LightRig) -> list[Finding]:
+    """What the result says about itself, and about the rig that was declared."""
+    found: list[Finding] = []
+    files = captures[0].files
+    if len(balls) > 1 and solution.reduced_chi_square > MISFIT:
+        found.append(
+            Finding(
+                "doubt",
+                f"the balls contradict each other: residuals of {_rms(solution.residuals_px):.2f} px are "
+                f"{math.sqrt(solution.reduced_chi_square):.1f} times what was expected; uncertainties are raised by that",
+                "balls-contradict",
+                solution.reduced_chi_square,
+                MISFIT,
+            )
+        )
+        size = np.nanmax(np.linalg.norm(solution.residuals_px, axis=2), axis=0)
+        usual = float(np.median(size))
+        for index in np.flatnonzero(size > OFF_SIGMAS * usual):
+            message = (
+                f"{light_name(int(index), files)}: off by {size[index]:.2f} px between balls, others {usual:.2f} px"
+            )
+            found.append(
+                Finding("doubt", message, "light-off", float(size[index]), OFF_SIGMAS * usual, "px", int(index))
+            )
+    declared = captures[0].rig
+    if len(declared) == len(rig) and captures[0].folder is not None and declared.u_deg is None:
+        turn = np.degrees(np.arccos(np.clip(declared.directions @ rig.directions.T, -1.0, 1.0)))
+        off = np.diag(turn)
+        nearest = turn.argmin(axis=1)
+        if (
+            (off > FAR_DEG).any()
+            and len(set(nearest.tolist())) == len(rig)
+            and turn.min(axis=1).max() < off.max() / 2.0
+        ):
+            first = int(np.flatnonzero(nearest != np.arange(len(rig)))[0])
+            message = (
+                f"images in another order than the lights of the capture: {light_name(first, files)} is declared where "
+                f"light {int(nearest[first])} is"
+            )
+            found.append(Finding("note", message, "order", light=first))
+    return found
+
+
+def _views(balls: list[_Ball], solution: LightSolution) -> list[BallView]:
+    return [
+        BallView(ball.capture.name, circle, ball.outline.u_px, ball.places, residuals)
+        for ball, circle, residuals in zip(balls, solution.outlines_px, solution.residuals_px, strict=True)
+    ]
+
+
+def _rms(residuals: Array) -> float:
+    return float(np.sqrt(np.nanmean(np.square(residuals).sum(axis=2))))
