@@ -20,7 +20,7 @@ from bgars.cli.experiment import register as register_experiment
 from bgars.cli.grr import register as register_grr
 from bgars.cli.inspect import register as register_inspect
 from bgars.cli.mesh import register as register_mesh
-from bgars.cli.options import MethodOption
+from bgars.cli.options import MethodOption, StationOption
 from bgars.cli.outputs import write_normals, write_reconstruction
 from bgars.cli.report import register as register_report
 from bgars.cli.simulate import register as register_simulate
@@ -136,6 +136,7 @@ def reconstruct(
     threshold: ThresholdOption = None,
     material: MaterialOption = None,
     channel: ChannelChoice = None,
+    station: StationOption = None,
     mesh_format: Annotated[Literal["ply", "obj", "stl", "glb"], typer.Option(help="Format of the mesh file.")] = "ply",
     directx: DirectxOption = False,
     as_json: JsonOption = False,
@@ -151,7 +152,9 @@ def reconstruct(
         surface = _material_from(material, capture)
         return bgars.reconstruct(capture, method=method, threshold=threshold, material=surface, **options)
 
-    summary, files = _reconstruct_to(folder, output, run, channel=channel, mesh_format=mesh_format, directx=directx)
+    summary, files = _reconstruct_to(
+        folder, output, run, channel=channel, mesh_format=mesh_format, directx=directx, station=station
+    )
     if as_json:
         print_json(summary)
         return
@@ -174,11 +177,12 @@ def normals(
     threshold: ThresholdOption = None,
     material: MaterialOption = None,
     channel: ChannelChoice = None,
+    station: StationOption = None,
     directx: DirectxOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Only the normals: normals.png (16 bit), albedo.tif, confidence.tif, measured.png, lights_kept.png."""
-    capture = bgars.read_capture(folder, channel=channel)
+    capture = bgars.read_capture(folder, channel=channel, station=station)
     surface = _material_from(material, capture)
     with stage_progress() as report:
         field = bgars.estimate_normals(
@@ -288,10 +292,11 @@ def _reconstruct_to(
     mesh_format: str,
     directx: bool,
     channel: ChannelOption | None = None,
+    station: Path | None = None,
 ) -> tuple[dict[str, Any], dict[str, str]]:
     with stage_progress() as report:
         return write_reconstruction(
-            lambda: run(bgars.read_capture(folder, channel=channel), progress=report),
+            lambda: run(bgars.read_capture(folder, channel=channel, station=station), progress=report),
             output,
             mesh_format=mesh_format,
             directx=directx,

@@ -12,7 +12,7 @@ import typer
 
 import bgars
 from bgars.cli.console import print_json, say, say_files, stage_progress, utc_now
-from bgars.cli.options import MethodOption
+from bgars.cli.options import MethodOption, StationOption
 from bgars.errors import InputError
 from bgars.io.atomic import FolderNames, atomic_folder
 from bgars.io.given_paths import need_file, need_folder
@@ -70,6 +70,7 @@ def inspect(
         ),
     ] = None,
     method: MethodOption = DEFAULT_METHOD,
+    station: StationOption = None,
     serial: Annotated[
         str, typer.Option(metavar="SERIAL", help="Serial number of the part, kept in the result.", show_default=False)
     ] = "",
@@ -102,10 +103,11 @@ def inspect(
     if parquet:
         need_pyarrow()
     need_file(recipe)
+    need_file(station)
     need_folder(folder)
     with stage_progress() as report, atomic_folder(output, NAMES) as place:
         part = None if recipe is None else bgars.read_part_recipe(recipe)
-        capture = bgars.read_capture(folder)
+        capture = bgars.read_capture(folder, station=station)
         result = bgars.inspect(capture, part, method=method, surface=True, progress=report)
         result = replace(result, serial=serial, inspected_utc=utc_now())
         files = FILES | bgars.write_part_pictures(result, capture, place)

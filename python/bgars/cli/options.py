@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from bgars.normals import Method
 
-__all__ = ["MethodOption"]
+__all__ = ["MethodOption", "StationOption"]
 
 METHOD_HELP = (
     "reflectance: on balls, highlights included, by the material that is fitted on them, elsewhere robust-filter; "
@@ -20,3 +21,11 @@ METHOD_HELP = (
     "than 5 lights robust-filter."
 )
 MethodOption = Annotated[Method, typer.Option("--method", "-m", help=METHOD_HELP)]
+StationOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="station.toml",
+        help="The calibrated station (docs/station.md): its lights, response, flat field and scale are used.",
+        show_default=False,
+    ),
+]

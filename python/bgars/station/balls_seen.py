@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bgars.errors import CalibrationError, InputError
+from bgars.station.matt_lights import shading_misfit
 from bgars.station.outline import Outline, as_outline, find_outline, refine_outline
 from bgars.station_record import Finding
 
@@ -25,7 +27,7 @@ WRONG_SIGMAS, WRONG_SHARE = 4.0, 0.01
 SOFT_PX = 2.5
 """Width of an edge from which on a ball is out of focus."""
 SOFT_SHARE = 0.03
-MATT_FLOOR_PX = 0.15
+MATT_FLOOR_PX = 0.25
 """Shading of a matt ball runs into its edge."""
 NOT_SEEN_U_PX = 0.5
 """Uncertainty of a stated outline that the images do not show."""
@@ -69,7 +71,11 @@ def outlines_of(
     outlines: list[Outline] = []
     if given is None:
         start = _disc_of_mask(capture)
-        found = find_outline(pictures) if start is None else (refine_outline(pictures, start) or as_outline(start))
+        found = (
+            find_outline(pictures, partial(shading_misfit, levels) if matt else None)
+            if start is None
+            else (refine_outline(pictures, start) or as_outline(start))
+        )
         if found is None:
             msg = (
                 f"{capture.name}: no ball found: no circle in the images; give its outline, or use a background that "

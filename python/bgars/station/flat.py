@@ -28,6 +28,8 @@ DEGREES = (2, 3, 4, 5, 6, 8, 10)
 BETTER = 0.98
 """A higher degree must lower the error on blocks left out by 2 %."""
 LEAST_LEVEL, CLIPPED_SHARE = 10.0, 0.001
+ROUNDING = 5e-4
+"""Share of the level that rounded grey levels leave in the mean of a block."""
 STRUCTURE = 0.01
 """Residual of the maps from which on the board, or dust, is in the light."""
 FALLOFF = 0.05
@@ -77,7 +79,7 @@ def calibrate_flat(capture: Capture) -> tuple[FlatField, tuple[Finding, ...]]:
             msg = f"{capture.name}: {name}: the board is too dark ({np.median(inside):.1f} of 255, {LEAST_LEVEL:g} is least)"
             raise CalibrationError(msg)
     noise = levels.noise / np.sqrt(np.maximum(weights, 1.0))
-    degree = _degree(means, weights, x, y)
+    degree = _degree(means, weights, x, y, noise)
     rows = _rows(x, y, degree)
     root = np.sqrt(weights)
     coefficients, *_ = np.linalg.lstsq(rows * root[:, None], (means * root).T, rcond=None)
@@ -143,15 +145,17 @@ def _rows(x: Array, y: Array, degree: int) -> Array:
     return np.column_stack([of_x[i] * of_y[j] for i in range(degree + 1) for j in range(degree + 1 - i)])
 
 
-def _degree(means: Array, weights: Array, x: Array, y: Array) -> int:
+def _degree(means: Array, weights: Array, x: Array, y: Array, noise: Array) -> int:
     """Degree with the least error on every other block (in a chequered order), no higher than pays."""
     half = (np.arange(len(x)) * 7 // 3) % 2 == 0
     best, chosen = math.inf, DEGREES[0]
+    # What noise and rounding leave of the blocks is no reason for another term.
+    floor = 4.0 * float(np.mean(noise**2)) + (ROUNDING * float(means.mean())) ** 2
     for degree in DEGREES:
         terms = (degree + 1) * (degree + 2) // 2
         if terms * 3 > min(int(half.sum()), int((~half).sum())):
             break
-        error = 0.0
+        error = floor
         for kept in (half, ~half):
             rows = _rows(x[kept], y[kept], degree) * np.sqrt(weights[kept])[:, None]
             law, *_ = np.linalg.lstsq(rows, (means[:, kept] * np.sqrt(weights[kept])).T, rcond=None)

@@ -32,14 +32,11 @@ __all__ = ["Sphere", "calibrate_lights"]
 Array = NDArray[np.float64]
 Sphere = Literal["mirror", "matt"]
 
-MANY_RADII = 0.5
 MISFIT = 3.0
 """Reduced chi square from which on balls contradict each other."""
 OFF_SIGMAS = 5.0
 FAR_DEG = 15.0
 """Turn of a light against the rig that the capture brings, from which on the order of the images is doubted."""
-PART_OF_WAY = 0.02
-"""Distance of a ball from the image centre, of what an ordinary lens stands away: 0.02 turns directions by 1 degree."""
 
 
 class _Ball(NamedTuple):
@@ -47,7 +44,8 @@ class _Ball(NamedTuple):
     outline: Outline
     places: Array
     covariances: Array
-    jacobians: Array | None = None
+    own_deg: Array | None = None
+    u_outline_px: Array | None = None
 
 
 def calibrate_lights(
@@ -177,6 +175,9 @@ def calibrate_lights(
     known = [lamp[np.isfinite(lamp)] for lamp in lamps]
     lamp = float(np.median(np.concatenate(known))) if known and sum(map(len, known)) else math.nan
     own = solution.u_own_deg
+    alone = [ball.own_deg for ball in balls if ball.own_deg is not None]
+    if alone:
+        own = np.minimum(np.sqrt(np.mean(np.square(alone), axis=0) / len(alone)), solution.u_deg)
     return LightCalibration(
         rig=rig,
         u_deg=solution.u_deg,
@@ -247,7 +248,8 @@ def _as_highlights(capture: Capture, outline: Outline, directions: Array, own: A
         covariance = own[index] + shading @ shading.T
         covariances[index] = to_px @ covariance @ to_px.T
     fixed = type(outline)(outline.x_px, outline.y_px, radius, 1e-6, 1e-6, outline.edge_px, outline.arc, outline.given)
-    return _Ball(capture, fixed, places, covariances, jacobians)
+    own_deg = np.degrees(np.sqrt(0.5 * np.trace(own, axis1=1, axis2=2)))
+    return _Ball(capture, fixed, places, covariances, own_deg, outline.u_px)
 
 
 def _need_all(balls: list[_Ball], captures: list[Capture]) -> None:
@@ -376,7 +378,13 @@ def _judge(solution: LightSolution, balls: list[_Ball], captures: list[Capture],
 
 def _views(balls: list[_Ball], solution: LightSolution) -> list[BallView]:
     return [
-        BallView(ball.capture.name, circle, ball.outline.u_px, ball.places, residuals)
+        BallView(
+            ball.capture.name,
+            circle,
+            ball.outline.u_px if ball.u_outline_px is None else ball.u_outline_px,
+            ball.places,
+            residuals,
+        )
         for ball, circle, residuals in zip(balls, solution.outlines_px, solution.residuals_px, strict=True)
     ]
 

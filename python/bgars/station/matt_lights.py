@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from bgars.station.levels import Levels
     from bgars.station.outline import Outline
 
-__all__ = ["SeenShading", "shading_on"]
+__all__ = ["SeenShading", "shading_misfit", "shading_on"]
 
 Array = NDArray[np.float64]
 
@@ -100,6 +100,19 @@ def shading_on(capture: Capture, levels: Levels, outline: Outline) -> SeenShadin
         u_strengths[light] = residual / math.sqrt(max(int(used.sum()) / 50.0, 1.0))
         own[light], jacobians[light] = _spread(points, values, used, outline, levels.noise, direction)
     return SeenShading(directions, own, jacobians, strengths, u_strengths, findings)
+
+
+def shading_misfit(levels: Levels, outline: Outline) -> float:
+    """Root mean square residual of the first lights on a circle, of its levels: small where it is the ball."""
+    points, index = _pixels(levels.images.shape[1:], outline)
+    if len(index) < 100:  # noqa: PLR2004 - too few to say
+        return math.inf
+    left = 0.0
+    for image in levels.images[:3]:
+        values = image.ravel()[index]
+        _, residual = _fit(_normals(points, outline.circle_px), values, values < levels.clip, levels.noise)
+        left = max(left, residual / max(float(np.percentile(values, 99.0)), 1.0))
+    return left
 
 
 def _pixels(shape: tuple[int, ...], outline: Outline) -> tuple[Array, NDArray[np.intp]]:

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 __all__ = ["Outline", "as_outline", "find_outline", "refine_outline"]
 
@@ -17,6 +21,8 @@ COARSE_PX = 200
 """Longer side of the image on which the circle is looked for."""
 LEAST_SHARE, MOST_SHARE = 0.06, 0.62
 """Radii looked for, of the shorter side; more than half of it is a ball that is cut off."""
+FAINT = 1e-3
+"""Change of the logarithm of the level, over a pixel, that is no edge."""
 STRONGEST = 4000
 """Edge pixels that vote."""
 WINDOWS = (0.10, 0.05, 0.025)
@@ -89,12 +95,18 @@ def as_outline(circle_px: Array, u_px: float = 0.5) -> Outline:
     return Outline(x, y, radius, u_px, u_px, given=True)
 
 
-def find_outline(pictures: list[Array]) -> Outline | None:
-    """Look for the outline of one ball in several pictures of it (H, W); None where there is no circle."""
+def find_outline(pictures: list[Array], misfit: Callable[[Outline], float] | None = None) -> Outline | None:
+    """Look for the outline of one ball in several pictures of it (H, W); None where there is no circle.
+
+    `misfit` says how badly a circle explains what is inside it, where that can be told; else the ball is the largest
+    of the plainest circles.
+    """
     starts = [start for picture in pictures if (start := _vote(picture)) is not None]
     # A mirror ball shows the horizon as a circle of 1 / sqrt(2) of its radius, often plainer than its own outline.
     starts += [start * [1.0, 1.0, math.sqrt(2.0)] for start in starts]
     found = [refined for start in starts if (refined := refine_outline(pictures, start)) is not None]
+    if misfit is not None and found:
+        return min(found, key=misfit)
     return max(found, key=lambda one: min(one.arc, PLAIN_ARC) * one.radius_px, default=None)
 
 
@@ -127,7 +139,7 @@ def _vote(picture: Array) -> Array | None:
     down, right = ndimage.gaussian_filter(tones, 1.0, order=(1, 0)), ndimage.gaussian_filter(tones, 1.0, order=(0, 1))
     size = np.hypot(down, right)
     places = np.argsort(size.ravel())[::-1][:STRONGEST]
-    places = places[size.ravel()[places] > 1e-3]
+    places = places[size.ravel()[places] > FAINT]
     if places.size == 0:
         return None
     rows, cols = np.unravel_index(places, size.shape)
