@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
 
 Array = NDArray[np.float64]
 
@@ -25,22 +26,35 @@ def ring(count: int, elevation_deg: float, azimuth0_deg: float = 10.0) -> Array:
 
 
 def add_lamp(
-    picture: Array, light: Array, ball: tuple[float, float, float], lamp_deg: float, level: float, fine: int = 40
+    picture: Array,
+    light: Array,
+    ball: tuple[float, float, float],
+    lamp_deg: float,
+    level: float,
+    near: bool,
+    fine: int = 30,
 ) -> None:
-    """Add a distant lamp as the ball mirrors it, finely sampled: a share of a per cent of a pixel is seen in it."""
+    """Add a lamp as the ball mirrors it, finely sampled: a share of a per cent of a pixel is seen in it."""
     height, width = picture.shape
     cx, cy, radius = ball
-    place = radius * light[:2] / np.sqrt(2.0 + 2.0 * light[2]) + [cx, cy]
+
+    def angle(x: Array, y: Array) -> Array:
+        nx, ny = (x - cx) / radius, (y - cy) / radius
+        nz = np.sqrt(np.maximum(1.0 - nx**2 - ny**2, 0.0))
+        mirrored = np.stack([2 * nz * nx, 2 * nz * ny, 2 * nz**2 - 1], axis=-1)
+        way = np.broadcast_to(light, mirrored.shape)
+        if near:
+            way = unit(light - np.stack([x, y, radius * (1.0 + nz)], axis=-1))
+        return np.where(nx**2 + ny**2 < 1, np.arccos(np.clip(np.sum(mirrored * way, axis=-1), -1, 1)), np.pi)
+
+    x, y = np.meshgrid(np.arange(width) + 0.5 - width / 2.0, height / 2.0 - np.arange(height) - 0.5)
+    row, col = np.unravel_index(angle(x, y).argmin(), picture.shape)
     half = int(radius * np.radians(lamp_deg)) + 3
-    row, col = int(height / 2.0 - place[1]), int(place[0] + width / 2.0)
     step = (np.arange(fine) + 0.5) / fine
     rows, cols = np.arange(row - half, row + half + 1), np.arange(col - half, col + half + 1)
-    x = ((cols[:, None] + step).ravel() - width / 2.0 - cx) / radius
-    y = (height / 2.0 - (rows[:, None] + step).ravel() - cy) / radius
-    nx, ny = np.meshgrid(x, y)
-    nz = np.sqrt(np.maximum(1.0 - nx**2 - ny**2, 0.0))
-    seen = 2 * nz * nx * light[0] + 2 * nz * ny * light[1] + (2 * nz**2 - 1) * light[2]
-    cover = (seen > np.cos(np.radians(lamp_deg / 2))).reshape(len(rows), fine, len(cols), fine).mean(axis=(1, 3))
+    x, y = np.meshgrid((cols[:, None] + step).ravel() - width / 2.0, height / 2.0 - (rows[:, None] + step).ravel())
+    inside = angle(x, y) < np.radians(lamp_deg / 2)
+    cover = inside.reshape(len(rows), fine, len(cols), fine).mean(axis=(1, 3))
     picture[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1] += level * cover
 
 
@@ -95,7 +109,7 @@ def render(
             distance = np.linalg.norm(way, axis=-1)
             return way / distance[..., None], (np.linalg.norm(light) / distance) ** 2
 
-        def board_level(at: Array) -> Array:
+        def board_level(at: Array, index: int = index) -> Array:
             way, fall = to_light(at)
             toward = np.sum((centre - at) * way, axis=-1)
             miss = np.linalg.norm(centre - at - toward[..., None] * way, axis=-1)
@@ -104,8 +118,7 @@ def render(
 
         way, fall = to_light(points)
         if kind == "mirror":
-            angle = np.arccos(np.clip(np.sum(mirrored * way, axis=-1), -1, 1))
-            seen = np.where(near & (angle < np.radians(lamp_deg / 2)), lamp_level * power[index], room)
+            seen = np.full(inside.shape, room)
             down = inside & (mirrored[..., 2] < -1e-3)
             reach = np.where(down, -points[..., 2] / np.where(down, mirrored[..., 2], -1.0), 0.0)
             ground = points + reach[..., None] * mirrored
@@ -116,11 +129,9 @@ def render(
             shade = albedo * (room + power[index] * fall * np.maximum(np.sum(normals * way, axis=-1), 0.0))
             level = np.where(inside, shade, board_level(points * [1, 1, 0]))
         picture = level.reshape(height, samples, width, samples).mean(axis=(1, 3))
-        if kind == "mirror" and not near:
-            add_lamp(picture, light, ball, lamp_deg, 0.6 * (lamp_level * power[index] - room))
+        if kind == "mirror":
+            add_lamp(picture, light, ball, lamp_deg, 0.6 * (lamp_level * power[index] - room), near)
         if blur_px > 0:
-            from scipy.ndimage import gaussian_filter
-
             picture = gaussian_filter(picture, blur_px)
         picture = exposure * picture + rng.normal(0.0, noise, picture.shape)
         full = 2**bits - 1

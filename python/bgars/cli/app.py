@@ -18,6 +18,7 @@ from bgars.cli.describe import describe, describe_in_words
 from bgars.cli.evaluation import choice_in_words, evaluation_table
 from bgars.cli.experiment import register as register_experiment
 from bgars.cli.grr import register as register_grr
+from bgars.cli.init import register as register_init
 from bgars.cli.inspect import register as register_inspect
 from bgars.cli.mesh import register as register_mesh
 from bgars.cli.options import MethodOption, StationOption
@@ -25,6 +26,7 @@ from bgars.cli.outputs import write_normals, write_reconstruction
 from bgars.cli.report import register as register_report
 from bgars.cli.simulate import register as register_simulate
 from bgars.cli.spc import register as register_spc
+from bgars.cli.teach import register as register_teach
 from bgars.errors import BgarsError
 from bgars.light_files import read_filenames
 from bgars.normals import DEFAULT_METHOD, METHODS, Method
@@ -271,6 +273,8 @@ register_report(app)
 register_grr(app)
 register_spc(app)
 register_calibrate(app)
+register_init(app)
+register_teach(app)
 register_simulate(app)
 register_experiment(app)
 

@@ -112,6 +112,11 @@ def calibrate_lights(
     if sphere not in {"mirror", "matt"}:
         msg = f"sphere: must be 'mirror' or 'matt', got {sphere!r}"
         raise InputError(msg)
+    if sphere == "matt":
+        if near:
+            msg = "near: positions of lights need a mirror ball: shading does not say from which point a light is seen"
+            raise InputError(msg)
+        near = False
     outlines = _outlines_a_capture(captures, outline)
     check_pitch(diameter_um, "diameter_um")
     balls: list[_Ball] = []
