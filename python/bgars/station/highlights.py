@@ -15,9 +15,9 @@ from scipy import ndimage
 from scipy.optimize import least_squares
 from scipy.special import chndtr
 
-from bgars.station.mirror import Sphere, reflected
+from bgars.station.mirror import Sphere, image_of, reflected
 
-__all__ = ["Highlight", "Spot", "blurred_disc", "find_spot", "fit_highlight", "glare", "spread_of"]
+__all__ = ["Highlight", "Spot", "blurred_disc", "find_spot", "fit_highlight", "glare", "middle_of", "spread_of"]
 
 Array = NDArray[np.float64]
 
@@ -52,6 +52,8 @@ class Spot:
     area_px: float
     second_share: float
     """Area of the next spot, of this one's."""
+    pixels: NDArray[np.intp]
+    """(N, 2) rows and columns of its bright pixels."""
 
 
 @dataclass(frozen=True)
@@ -123,9 +125,9 @@ def find_spot(image: Array, still: Array, usable: NDArray[np.bool_], clip: float
         for index in order[1:]
         if np.hypot(*(np.array(ndimage.center_of_mass(labels == which[index])) - [row, col])) > 3.0 * extent
     ]
-    return Spot(
-        row, col, extent, float(change[where].max()), float(areas[order[0]]), max(apart, default=0.0) / areas[order[0]]
-    )
+    second = max(apart, default=0.0) / float(areas[order[0]])
+    peak_level = float(change[where].max())
+    return Spot(row, col, extent, peak_level, float(areas[order[0]]), second, np.column_stack([rows, cols]))
 
 
 def fit_highlight(
@@ -157,7 +159,9 @@ def fit_highlight(
         scaled: Array = ((seen - np.minimum(base + offset + disc, clip)) / spread).ravel()
         return scaled
 
-    first = np.array([*start, math.log(max(spot.peak_level, 1.0)), math.log(max(spot.extent_px, 0.8)), 0.0, 0.0])
+    first = np.array(
+        [*start, math.log(max(spot.peak_level, 1.0)), math.log(max(math.sqrt(spot.area_px / math.pi), 0.6)), 0.0, 0.0]
+    )
     low = [start[0] - half, start[1] - half, -5.0, math.log(0.3), math.log(BLUR_PX[0]), -np.inf]
     high = [start[0] + half, start[1] + half, 20.0, math.log(3.0 * half), math.log(BLUR_PX[1]), np.inf]
     fit = least_squares(
@@ -181,6 +185,15 @@ def fit_highlight(
         saturated,
         misfit,
     )
+
+
+def middle_of(spot: Spot, shape: tuple[int, ...], sphere: Sphere, camera_px: float = math.inf) -> Array:
+    """(2,) place of the mean direction of the bright pixels: equal areas of a ball's image are equal solid angles."""
+    x = spot.pixels[:, 1] + 0.5 - shape[1] / 2.0
+    y = shape[0] / 2.0 - spot.pixels[:, 0] - 0.5
+    _, directions = reflected(np.column_stack([x, y]), sphere, camera_px)
+    mean = directions.mean(axis=0)
+    return image_of((mean / np.linalg.norm(mean))[None, :], np.zeros(1), sphere, camera_px)[0]
 
 
 def blurred_disc(apart_px: Array, radius_px: float, blur_px: float) -> Array:

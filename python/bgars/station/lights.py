@@ -35,6 +35,8 @@ Sphere = Literal["mirror", "matt"]
 MISFIT = 3.0
 """Reduced chi square from which on balls contradict each other."""
 OFF_SIGMAS = 5.0
+UNSURE_DEG = 2.0
+"""Standard uncertainty of a direction that is worth a word."""
 FAR_DEG = 15.0
 """Turn of a light against the rig that the capture brings, from which on the order of the images is doubted."""
 
@@ -362,6 +364,9 @@ def _judge(solution: LightSolution, balls: list[_Ball], captures: list[Capture],
             found.append(
                 Finding("doubt", message, "light-off", float(size[index]), OFF_SIGMAS * usual, "px", int(index))
             )
+    for index in np.flatnonzero(solution.u_deg > UNSURE_DEG):
+        message = f"{light_name(int(index), files)}: its direction is known to {solution.u_deg[index]:.1f} deg only"
+        found.append(Finding("doubt", message, "unsure", float(solution.u_deg[index]), UNSURE_DEG, "deg", int(index)))
     declared = captures[0].rig
     if len(declared) == len(rig) and captures[0].folder is not None and declared.u_deg is None:
         turn = np.degrees(np.arccos(np.clip(declared.directions @ rig.directions.T, -1.0, 1.0)))

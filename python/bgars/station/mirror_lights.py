@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bgars.errors import CalibrationError
 from bgars.light_names import light_name
-from bgars.station.highlights import REACH, find_spot, fit_highlight, glare
+from bgars.station.highlights import REACH, find_spot, fit_highlight, glare, middle_of
 from bgars.station.mirror import sphere_of_outline
 from bgars.station.small_spots import SMALL_PX, place_small_spots
 from bgars.station_record import Finding
@@ -29,7 +29,10 @@ SECOND_SHARE = 0.35
 """Area of a second spot, of the first one's, from which on it is unclear which is the lamp."""
 WIDE_DEG, TOO_WIDE_DEG = 8.0, 25.0
 """Angle of a lamp from which on its middle is doubted, and refused: a burnt-out image, or no mirror."""
-POOR_FIT = 3.0
+POOR_FIT, FAR_SHARE = 3.0, 0.3
+"""Misfit of a disc, and distance of its middle from that of the bright pixels, of its radius, that make it none."""
+ROUGH_SHARE = 0.15
+"""Uncertainty of the middle of a highlight of any shape, of its radius."""
 
 
 class SeenHighlights(NamedTuple):
@@ -98,15 +101,16 @@ def highlights_on(capture: Capture, levels: Levels, outline: Outline, camera_px:
     for index in sorted(set(spots) - set(small)):
         fit = fit_highlight(levels.images[index], still, spots[index], sphere, levels.clip, levels.noise, camera_px)
         name = light_name(index, capture.files)
-        if fit is None:
-            message = f"{capture.name}: {name}: its highlight is no disc: nothing to take a middle of"
-            findings.append(Finding("doubt", message, "no-disc", light=index))
+        middle = middle_of(spots[index], still.shape, sphere, camera_px)
+        radius = math.sqrt(spots[index].area_px / math.pi)
+        off = math.inf if fit is None else math.hypot(fit.x_px - middle[0], fit.y_px - middle[1])
+        if fit is None or (fit.saturated and (fit.misfit > POOR_FIT or off > FAR_SHARE * radius)):
+            # A star, a streak, a bloom: its middle is that of its bright pixels, to a share of its size.
+            places[index] = middle
+            covariances[index] = (ROUGH_SHARE * radius) ** 2 * np.eye(2)
+            message = f"{capture.name}: {name}: its highlight is no disc; the middle of its bright pixels is taken"
+            findings.append(Finding("note", message, "no-disc", light=index))
             continue
-        if fit.misfit > POOR_FIT:
-            message = (
-                f"{capture.name}: {name}: its highlight is no clean disc (misfit {fit.misfit:.1f}, 1 is as stated)"
-            )
-            findings.append(Finding("note", message, "poor-highlight", fit.misfit, POOR_FIT, "", index))
         places[index], covariances[index] = (fit.x_px, fit.y_px), fit.covariance_px2
         lamp_deg[index], flux[index] = fit.lamp_deg, fit.flux
     return SeenHighlights(places, covariances, lamp_deg, flux, findings)
