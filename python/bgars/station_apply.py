@@ -114,7 +114,10 @@ def _with_flat(capture: Capture, flat: FlatField, name: str) -> Capture:
     shape = capture.images.shape
     if (shape[1], shape[2]) != tuple(flat.size_px) or shape[0] != len(flat.coefficients):
         has = f"{len(flat.coefficients)} maps of {flat.size_px[1]} x {flat.size_px[0]} pixels"
-        msg = f"{capture.name}: {shape[0]} images of {shape[2]} x {shape[1]} pixels, but the flat field of {name} has {has}"
+        msg = (
+            f"{capture.name}: {shape[0]} images of {shape[2]} x {shape[1]} pixels, but the flat field of {name} "
+            f"has {has}"
+        )
         raise InputError(msg)
     full = capture.full_scale if math.isfinite(capture.full_scale) else float(capture.images.max())
     table = capture.response
@@ -158,7 +161,7 @@ def _flat_intensities(rig: LightRig, flat: FlatField, capture: Capture) -> Light
 
 
 def _modelled(capture: Capture, light: int) -> Array | float:
-    """Level of a flat board that the near-light model explains already, against the image centre: 1 of distant lights."""
+    """Level of a flat board that the near-light model explains, against the image centre: 1 of distant lights."""
     rig = capture.rig
     if rig.positions_um is None or capture.pixel_pitch_um is None:
         return 1.0

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from bgars.rig import LightRig
 
-__all__ = ["BallView", "Finding", "FlatField", "LightCalibration", "ResponseCurve", "Scale", "Station"]
+__all__ = ["BallView", "Finding", "FlatField", "LightCalibration", "ResponseCurve", "Scale", "Severity", "Station"]
 
 Array = NDArray[np.float64]
 Severity = Literal["note", "doubt", "fail"]
@@ -128,8 +128,8 @@ class FlatField:
     Attributes
     ----------
     coefficients : (L, T) float64
-        Of Legendre polynomials P_i(x) P_j(y), i + j <= degree, x and y from -1 to 1 across the image, y up; in the order
-        of :func:`bgars.station_apply.legendre_terms`. Levels are those of the flat board, 255 = full scale.
+        Of Legendre polynomials P_i(x) P_j(y), i + j <= degree, x and y from -1 to 1 across the image, y up; the order
+        is that of :func:`bgars.station_apply.legendre_terms`. Levels are those of the flat board, 255 = full scale.
     degree : int
         Of the polynomials.
     size_px : (int, int)

@@ -169,15 +169,13 @@ def test_a_grid_gives_the_pixel_pitch_and_the_distortion(target: str) -> None:
     x, y = (x + 0.5) / fine - width / 2, height / 2 - (y + 0.5) / fine
     half2 = (height**2 + width**2) / 4
     for _ in range(4):  # the inverse of the distortion: where a pixel looks
-        bend = 1 + k * ((x / (1 if _ == 0 else 1)) ** 2 + y**2) / half2
+        bend = 1 + k * (x**2 + y**2) / half2
         u, v = x / bend, y / bend
         bend = 1 + k * (u**2 + v**2) / half2
         u, v = x / bend, y / bend
     a, b = (u * np.cos(turn) + v * np.sin(turn)) / pitch_px, (v * np.cos(turn) - u * np.sin(turn)) / pitch_px
-    if target == "dots":
-        dark = np.hypot(a - np.rint(a), b - np.rint(b)) < 0.25
-    else:
-        dark = (np.floor(a) + np.floor(b)) % 2 == 0
+    dots = np.hypot(a - np.rint(a), b - np.rint(b)) < 0.25
+    dark = dots if target == "dots" else (np.floor(a) + np.floor(b)) % 2 == 0
     picture = np.where(dark, 40.0, 200.0).reshape(height, fine, width, fine).mean(axis=(1, 3))
     images = np.rint(picture + np.random.default_rng(0).normal(0, 1, (3, height, width))).astype(np.uint8)
     capture = bgars.Capture(

@@ -100,7 +100,7 @@ def test_near_lamps_come_out_in_space_from_three_places_of_a_ball() -> None:
     assert (np.abs(off_px) < 4 * found.u_positions_um / 20.0).all()
 
 
-def test_a_second_lamp_is_named(lights: Array, mirror: NDArray[np.uint8]) -> None:
+def test_a_second_lamp_is_named(mirror: NDArray[np.uint8]) -> None:
     images = mirror.copy()
     images[2] = np.maximum(mirror[2], mirror[5])
     doubts = bgars.calibrate_lights(capture_of(images)).doubts
@@ -121,7 +121,7 @@ def test_a_ball_that_is_cut_off_is_refused(mirror: NDArray[np.uint8]) -> None:
 
 def test_a_burnt_out_ball_is_refused(matt: NDArray[np.uint8]) -> None:
     burnt = np.clip(matt.astype(np.int32) * 4, 0, 255).astype(np.uint8)
-    with pytest.raises(bgars.CalibrationError, match="burnt out: .* % of the ball is clipped; expose shorter"):
+    with pytest.raises(bgars.CalibrationError, match=r"burnt out: .* % of the ball is clipped; expose shorter"):
         bgars.calibrate_lights(capture_of(burnt), sphere="matt", outline=BALL)
     with pytest.raises(bgars.CalibrationError, match="burnt out: its highlight covers"):
         bgars.calibrate_lights(capture_of(burnt), outline=BALL)
@@ -135,7 +135,7 @@ def test_a_ball_out_of_focus_is_doubted(lights: Array) -> None:
 
 def test_images_without_a_ball_are_refused() -> None:
     noise = np.random.default_rng(0).integers(20, 24, (4, 120, 120)).astype(np.uint8)
-    with pytest.raises(bgars.CalibrationError, match="no ball found|no highlight"):
+    with pytest.raises(bgars.CalibrationError, match=r"no ball found|no highlight"):
         bgars.calibrate_lights(capture_of(noise))
 
 

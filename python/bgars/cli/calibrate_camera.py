@@ -63,14 +63,15 @@ def response(
             if len(capture.images) != SUMS:
                 msg = f"{folder}: --sums needs three images (a, b, both), got {len(capture.images)}"
                 raise InputError(msg)
-            curve, findings = response_from_sums(*capture.images, full)
+            curve, findings = response_from_sums(capture.images[0], capture.images[1], capture.images[2], full)
     keep_part(output, {"response": curve}, findings)
     if as_json:
         values = {"levels": curve.levels.tolist(), "radiances": curve.radiances.tolist(), "gamma": curve.gamma}
         print_json({**values, "nonlinearity": curve.nonlinearity, **said_values(findings), "file": str(output)})
         return
     say(
-        f"Response by {curve.source}: gamma about {curve.gamma:.2f}, {100 * curve.nonlinearity:.1f} % off a straight line."
+        f"Response by {curve.source}: gamma about {curve.gamma:.2f}, {100 * curve.nonlinearity:.1f} % off a "
+        "straight line."
     )
     tell_findings(findings, output)
 

@@ -114,7 +114,8 @@ def flat(folder: FolderArgument, output: OutputOption, as_json: JsonOption = Fal
         print_json({"degree": found.degree, "residual": found.residual, **said_values(findings), "file": str(output)})
         return
     say(
-        f"Even maps of {len(found.coefficients)} lights, polynomials of degree {found.degree}; {100 * found.residual:.2f} % is left."
+        f"Even maps of {len(found.coefficients)} lights, polynomials of degree {found.degree}; "
+        f"{100 * found.residual:.2f} % is left."
     )
     tell_findings(findings, output)
 
@@ -139,7 +140,7 @@ def station(
     name: Annotated[str, typer.Option(help="Name of the station.")] = "station",
     as_json: JsonOption = False,
 ) -> None:
-    """Do all at once: scale from a grid, lights from a ball, evenness from a board; write station.toml and station.html."""
+    """Do all at once: scale from a grid, lights from a ball, evenness from a board."""
     if (grid is None) != (grid_pitch_mm is None):
         msg = "--grid and --grid-pitch-mm: give both or none"
         raise InputError(msg)
@@ -291,6 +292,7 @@ def _lights_values(found: LightCalibration) -> dict[str, Any]:
 
 
 def said_values(findings: tuple[Finding, ...]) -> dict[str, Any]:
+    """Findings as plain values."""
     return {"findings": [finding.to_dict() for finding in findings]}
 
 
@@ -312,6 +314,7 @@ def _tell_lights(found: LightCalibration) -> None:
 
 
 def tell_findings(findings: tuple[Finding, ...], output: Path) -> None:
+    """Say what was noticed, and where the result is."""
     for finding in findings:
         say(f"{finding.severity}: {finding.message}")
     say(f"Written: {output}, and its page {output.with_suffix('.html')}")

@@ -58,7 +58,8 @@ def teach(
         print_json({**recipe.to_dict(), "file": str(output), "parts": taught.parts})
         return
     say(
-        f"{taught.name}: {taught.rows} x {taught.cols} places, {len(taught.depopulated)} of them empty, pitch {taught.pitch_um:.1f} um,"
+        f"{taught.name}: {taught.rows} x {taught.cols} places, {len(taught.depopulated)} of them empty, pitch "
+        f"{taught.pitch_um:.1f} um,"
     )
     say(f"balls of {taught.diameter_um:.1f} um, {taught.height_um:.1f} um high, from {taught.parts} part(s).")
     say(f"Written: {output}. Read its limits before you use it.")

@@ -91,7 +91,8 @@ class PartTable(StrictNumbers):
     )
     positions: str | None = Field(
         None,
-        description="instead of the lattice: CSV file with the columns name, x_um, y_um, or X, Y, Diameter in mm (x right, y up)",
+        description="instead of the lattice: CSV file with the columns name, x_um, y_um, or X, Y, Diameter in mm "
+        "(x right, y up)",
     )
     diameter_um: Positive | None = Field(None, description="nominal horizontal diameter")
     height_um: Positive | None = Field(None, description="nominal height of the tops above the board")

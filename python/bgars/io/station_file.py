@@ -87,7 +87,10 @@ class ResponseTable(Strict):
     def _grows(self) -> ResponseTable:
         least = 2
         if len(self.levels) != len(self.radiances) or len(self.levels) < least:
-            msg = f"levels and radiances: must be equally many, 2 or more, got {len(self.levels)} and {len(self.radiances)}"
+            msg = (
+                f"levels and radiances: must be equally many, 2 or more, got {len(self.levels)} and "
+                f"{len(self.radiances)}"
+            )
             raise ValueError(msg)
         if min(np.diff(self.levels)) <= 0 or min(np.diff(self.radiances)) <= 0:
             msg = "levels and radiances: must grow from entry to entry"
@@ -141,7 +144,12 @@ def is_station_file(path: str | PathLike[str]) -> bool:
 
 def station_keys() -> list[tuple[str, str]]:
     """Return every key of the file and what it means, for the documentation."""
-    tables = {"lights": LightsTable, "flat": FlatTable, "response": ResponseTable, "scale": ScaleTable}
+    tables: dict[str, type[Strict]] = {
+        "lights": LightsTable,
+        "flat": FlatTable,
+        "response": ResponseTable,
+        "scale": ScaleTable,
+    }
     keys = [(name, str(entry.description)) for name, entry in StationFile.model_fields.items() if name not in tables]
     for table, model in tables.items():
         keys += [(f"{table}.{name}", str(entry.description)) for name, entry in model.model_fields.items()]

@@ -1,4 +1,4 @@
-"""A station, calibrated once: where the lights are, how even they are, what the camera makes of light, and the scale."""
+"""A station, calibrated once: where the lights are, how even they are, the camera's response, and the scale."""
 
 from bgars.station.drift import drift
 from bgars.station.flat import calibrate_flat

@@ -133,7 +133,10 @@ def _judge(capture: Capture, outline: Outline, height: int, width: int) -> list[
         )
         raise CalibrationError(msg)
     if outline.radius_px < LEAST_RADIUS_PX:
-        msg = f"{capture.name}: the ball is too small: its radius must be {LEAST_RADIUS_PX:g} px or more, got {outline.radius_px:.1f}"
+        msg = (
+            f"{capture.name}: the ball is too small: its radius must be {LEAST_RADIUS_PX:g} px or more, got "
+            f"{outline.radius_px:.1f}"
+        )
         raise CalibrationError(msg)
     limit = max(SOFT_PX, SOFT_SHARE * outline.radius_px)
     if outline.edge_px > limit:

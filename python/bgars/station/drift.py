@@ -12,7 +12,7 @@ from bgars.light_names import light_name
 from bgars.station.flat import calibrate_flat
 from bgars.station.lights import calibrate_lights
 from bgars.station_apply import flat_maps
-from bgars.station_record import Finding
+from bgars.station_record import Finding, Severity
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -97,7 +97,7 @@ def drift(
             words = (
                 f"{name}: {100 * change[index]:+.1f} % in strength against the other lights (limit {100 * limit:.1f} %)"
             )
-            severity = "fail" if abs(change[index]) > limit else "note"
+            severity: Severity = "fail" if abs(change[index]) > limit else "note"
             found.append(Finding(severity, words, "light-strength", float(change[index]), limit, "", index))
     return tuple(found)
 
@@ -110,7 +110,7 @@ def _origins(station: Station, outline_px: np.ndarray, capture: Capture) -> np.n
         return rig.directions
     x, y, radius = outline_px * pitch_um
     way = rig.positions_um - np.array([x, y, radius])
-    # Where the highlight lies on the ball changes the direction by a part of the radius: half the way to the light's side.
+    # A light is seen from its highlight, half way between the top of the ball and the light's side of it.
     way = way - 0.5 * radius * (way / np.linalg.norm(way, axis=1, keepdims=True) + [0.0, 0.0, 1.0])
     directions: np.ndarray = way / np.linalg.norm(way, axis=1, keepdims=True)
     return directions
@@ -118,7 +118,6 @@ def _origins(station: Station, outline_px: np.ndarray, capture: Capture) -> np.n
 
 def _even(station: Station, capture: Capture, limit_intensity: float) -> tuple[Finding, ...]:
     """Compare the flat board: strength of each light against the others, and its evenness."""
-
     if station.flat is None:
         msg = f"station: {station.name} has no flat field to compare with"
         raise InputError(msg)
@@ -131,8 +130,11 @@ def _even(station: Station, capture: Capture, limit_intensity: float) -> tuple[F
     change = new / new.mean() / (old / old.mean()) - 1.0
     for index in range(len(new)):
         name = light_name(index, capture.files)
-        words = f"{name}: {100 * change[index]:+.1f} % in strength against the other lights (limit {100 * limit_intensity:.1f} %)"
-        severity = "fail" if abs(change[index]) > limit_intensity else "note"
+        words = (
+            f"{name}: {100 * change[index]:+.1f} % in strength against the other lights (limit "
+            f"{100 * limit_intensity:.1f} %)"
+        )
+        severity: Severity = "fail" if abs(change[index]) > limit_intensity else "note"
         found.append(Finding(severity, words, "light-strength", float(change[index]), limit_intensity, "", index))
         uneven = float(np.abs(flat_maps(now, index) / flat_maps(station.flat, index) - 1.0).max())
         words = f"{name}: its evenness changed by {100 * uneven:.1f} % (limit {100 * LIMIT_EVENNESS:.1f} %)"

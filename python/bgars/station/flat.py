@@ -76,7 +76,10 @@ def calibrate_flat(capture: Capture) -> tuple[FlatField, tuple[Finding, ...]]:
             msg = f"{capture.name}: {name}: {100 * clipped:.1f} % of the board is clipped; expose shorter"
             raise CalibrationError(msg)
         if float(np.median(inside)) < LEAST_LEVEL:
-            msg = f"{capture.name}: {name}: the board is too dark ({np.median(inside):.1f} of 255, {LEAST_LEVEL:g} is least)"
+            msg = (
+                f"{capture.name}: {name}: the board is too dark ({np.median(inside):.1f} of 255, "
+                f"{LEAST_LEVEL:g} is least)"
+            )
             raise CalibrationError(msg)
     noise = levels.noise / np.sqrt(np.maximum(weights, 1.0))
     degree = _degree(means, weights, x, y, noise)
@@ -86,7 +89,7 @@ def calibrate_flat(capture: Capture) -> tuple[FlatField, tuple[Finding, ...]]:
     fitted = (rows @ coefficients).T
     off = np.sqrt(np.average((means - fitted) ** 2, axis=1, weights=weights))
     left = np.sqrt(np.maximum(off**2 - float(np.average(noise**2, weights=weights)), 0.0)) / fitted.mean(axis=1)
-    flat = FlatField(coefficients.T.copy(), degree, (height, width), float(left.max()))
+    flat = FlatField(np.array(coefficients.T, dtype=np.float64), degree, (height, width), float(left.max()))
     return flat, tuple(_findings(capture, flat, left))
 
 
@@ -107,7 +110,8 @@ def falloff_findings(flat: FlatField, lights: LightCalibration, pitch_um: float)
     return [
         Finding(
             "note",
-            f"{light_name(light)}: falls off {100 * size:.1f} % otherwise than a point at its place; the flat field corrects it",
+            f"{light_name(light)}: falls off {100 * size:.1f} % otherwise than a point at its place; the flat "
+            "field corrects it",
             "falloff",
             size,
             FALLOFF,
@@ -133,7 +137,7 @@ def _blocks(images: Array, mask: NDArray[np.bool_], step: int) -> tuple[Array, A
     row, col = np.mgrid[:height, :width].astype(np.float64)
     x = total(np.where(mask, (col + 0.5) / width * 2.0 - 1.0, 0.0))
     y = total(np.where(mask, 1.0 - (row + 0.5) / height * 2.0, 0.0))
-    use = count > 0.5 * step**2  # noqa: PLR2004 - half a block
+    use = count > 0.5 * step**2
     n = count[use]
     return sums[:, use] / n, n, x[use] / n, y[use] / n
 
@@ -169,7 +173,10 @@ def _findings(capture: Capture, flat: FlatField, left: Array) -> list[Finding]:
     found = []
     for light in np.flatnonzero(left > STRUCTURE):
         name = light_name(int(light), capture.files)
-        message = f"{capture.name}: {name}: {100 * left[light]:.1f} % of structure is left in the board: texture, dust, shine or a shadow"
+        message = (
+            f"{capture.name}: {name}: {100 * left[light]:.1f} % of structure is left in the board: texture, "
+            "dust, shine or a shadow"
+        )
         found.append(Finding("doubt", message, "flat-structure", float(left[light]), STRUCTURE, "", int(light)))
     corners = [flat_maps(flat, light) for light in range(len(flat.coefficients))]
     least = min(float(one.min()) for one in corners)

@@ -168,7 +168,8 @@ def fit_highlight(
         residuals, first, bounds=(low, high), loss="soft_l1", x_scale=[0.1, 0.1, 0.1, 0.1, 0.1, 1.0], max_nfev=EFFORT
     )
     misfit = float(np.sqrt(np.mean(np.minimum(fit.fun**2, 100.0))))
-    normal = fit.jac.T @ fit.jac
+    jacobian = np.asarray(fit.jac, dtype=np.float64)
+    normal = jacobian.T @ jacobian
     covariance = np.linalg.pinv(normal)[:2, :2] * max(1.0, misfit**2) + GRID_PX**2 * np.eye(2)
     x_px, y_px, log_level, log_extent, log_blur, _ = fit.x
     if np.hypot(x_px - start[0], y_px - start[1]) > max(2.0, spot.extent_px):
@@ -193,7 +194,8 @@ def middle_of(spot: Spot, shape: tuple[int, ...], sphere: Sphere, camera_px: flo
     y = shape[0] / 2.0 - spot.pixels[:, 0] - 0.5
     _, directions = reflected(np.column_stack([x, y]), sphere, camera_px)
     mean = directions.mean(axis=0)
-    return image_of((mean / np.linalg.norm(mean))[None, :], np.zeros(1), sphere, camera_px)[0]
+    place: Array = image_of((mean / np.linalg.norm(mean))[None, :], np.zeros(1), sphere, camera_px)[0]
+    return place
 
 
 def blurred_disc(apart_px: Array, radius_px: float, blur_px: float) -> Array:

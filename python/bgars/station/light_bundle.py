@@ -91,10 +91,13 @@ def solve_lights(
     CalibrationError
         Positions are asked for, but a light is seen on one ball only.
     """
-    seen = np.isfinite(places_px).all(axis=2)
+    seen: NDArray[np.bool_] = np.asarray(np.isfinite(places_px).all(axis=2))
     if near and int(seen.sum(axis=0).min()) < 2:  # noqa: PLR2004 - rays that cross
         index = int(seen.sum(axis=0).argmin())
-        msg = f"light {index} (counted from 0): its position needs its highlight on two balls or more, got {int(seen[:, index].sum())}"
+        msg = (
+            f"light {index} (counted from 0): its position needs its highlight on two balls or more, got "
+            f"{int(seen[:, index].sum())}"
+        )
         raise CalibrationError(msg)
     distant = _solve(places_px, covariances_px2, outlines_px, u_outlines_px, camera_px, near=False)
     if near is False or int(seen.sum(axis=0).min()) < 2:  # noqa: PLR2004
@@ -110,7 +113,7 @@ def _solve(
     places: Array, covariances: Array, outlines: Array, u_outlines: Array, camera_px: float, near: bool
 ) -> LightSolution:
     balls, lights = places.shape[:2]
-    seen = np.isfinite(places).all(axis=2)
+    seen: NDArray[np.bool_] = np.asarray(np.isfinite(places).all(axis=2))
     first = np.array([_first(places[:, light], outlines, camera_px) for light in range(lights)])
     across = _tangents(first)
     whiten = np.zeros((balls, lights, 2, 2))
@@ -133,7 +136,8 @@ def _solve(
 
     def residuals(values: Array) -> Array:
         scaled = np.einsum("blij,blj->bli", whiten, np.where(seen[..., None], off(values), 0.0))
-        return np.concatenate([scaled[seen].ravel(), values[lights * size :]])
+        rows: Array = np.concatenate([scaled[seen].ravel(), values[lights * size :]])
+        return rows
 
     start = np.zeros(lights * size + 3 * balls)
     fit = least_squares(
@@ -143,10 +147,11 @@ def _solve(
     spare = 2 * int(seen.sum()) - lights * size
     chi = float(np.square(fit.fun).sum() / spare) if spare > 0 else math.nan
     raised = max(1.0, chi) if spare > 0 else 1.0
-    normal = fit.jac.T @ fit.jac
-    covariance = np.linalg.pinv(normal) * raised
+    jacobian = np.asarray(fit.jac, dtype=np.float64)
+    normal = jacobian.T @ jacobian
+    covariance: Array = np.asarray(np.linalg.pinv(normal) * raised, dtype=np.float64)
     part = lights * size
-    alone = np.linalg.pinv(normal[:part, :part]) * raised
+    alone: Array = np.asarray(np.linalg.pinv(normal[:part, :part]) * raised, dtype=np.float64)
     return LightSolution(
         directions,
         nearness,

@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bgars.errors import CalibrationError, InputError
+from bgars.errors import InputError
 from bgars.light_names import light_name
 from bgars.records import Capture
 from bgars.rig import LightRig
 from bgars.scalar_checks import check_pitch
-from bgars.station.balls_seen import given_outlines, outlines_of
-from bgars.station.levels import linear_levels
 from bgars.station.light_bundle import solve_lights
-from bgars.station.matt_lights import shading_on
-from bgars.station.mirror_lights import highlights_on
+from bgars.station.observe import observe, outlines_a_capture
 from bgars.station_record import BallView, Finding, LightCalibration
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from bgars.station.levels import Levels
     from bgars.station.light_bundle import LightSolution
-    from bgars.station.outline import Outline
+    from bgars.station.observe import Observed, SeenBall
 
 __all__ = ["Sphere", "calibrate_lights"]
 
@@ -39,15 +35,6 @@ UNSURE_DEG = 2.0
 """Standard uncertainty of a direction that is worth a word."""
 FAR_DEG = 15.0
 """Turn of a light against the rig that the capture brings, from which on the order of the images is doubted."""
-
-
-class _Ball(NamedTuple):
-    capture: Capture
-    outline: Outline
-    places: Array
-    covariances: Array
-    own_deg: Array | None = None
-    u_outline_px: Array | None = None
 
 
 def calibrate_lights(
@@ -105,7 +92,8 @@ def calibrate_lights(
     Examples
     --------
     >>> import bgars
-    >>> ball = bgars.simulate(bgars.Scene.hemisphere(300.0), bgars.LightRig.ring(8), bgars.Material(i_s=0.0), bgars.Camera())[0]
+    >>> scene, matt = bgars.Scene.hemisphere(300.0), bgars.Material(i_s=0.0)
+    >>> ball, _ = bgars.simulate(scene, bgars.LightRig.ring(8), matt, bgars.Camera())
     >>> found = bgars.calibrate_lights(ball, sphere="matt")
     >>> float(abs(found.rig.elevations_deg - 45.0).max()) < 1.0
     True
@@ -119,68 +107,13 @@ def calibrate_lights(
             msg = "near: positions of lights need a mirror ball: shading does not say from which point a light is seen"
             raise InputError(msg)
         near = False
-    outlines = _outlines_a_capture(captures, outline)
     check_pitch(diameter_um, "diameter_um")
-    balls: list[_Ball] = []
-    findings: list[Finding] = []
-    levels_of: list[Levels] = []
-    strengths: list[Array] = []
-    lamps: list[Array] = []
-    for index, (one, given) in enumerate(zip(captures, outlines, strict=True)):
-        levels = linear_levels(one)
-        levels_of.append(levels)
-        found, said = outlines_of(one, levels, given, matt=sphere == "matt")
-        findings += said
-        for ball in found:
-            camera_px = _camera_px(one, ball, diameter_um)
-            if sphere == "mirror":
-                seen = highlights_on(one, levels, ball, camera_px)
-                balls.append(_Ball(one, ball, seen.places_px, seen.covariances_px2))
-                findings += seen.findings
-                lamps.append(seen.lamp_deg)
-                strengths.append(seen.flux)
-            else:
-                shading = shading_on(one, levels, ball)
-                findings += shading.findings
-                strengths.append(shading.strengths)
-                balls.append(
-                    _as_highlights(one, ball, shading.directions, shading.own_covariances, shading.outline_jacobians)
-                )
-        if progress is not None:
-            progress((index + 1) / len(captures))
-    _need_all(balls, captures)
-    camera_px = _camera_px(captures[0], balls[0].outline, diameter_um) if sphere == "mirror" else math.inf
-    if math.isinf(camera_px):
-        findings += _lens_note(balls)
-    u_outlines = np.array([ball.outline.u_px for ball in balls])
-    solution = solve_lights(
-        np.array([ball.places for ball in balls]),
-        np.array([ball.covariances for ball in balls]),
-        np.array([ball.outline.circle_px for ball in balls]),
-        u_outlines,
-        camera_px,
-        near,
-    )
-    pitch_um = captures[0].pixel_pitch_um
-    if diameter_um is not None:
-        pitch_um = float(np.mean([diameter_um / (2.0 * circle[2]) for circle in solution.outlines_px]))
-    if solution.nearness.any() and pitch_um is None:
-        if near:
-            msg = f"{captures[0].name}: positions of lights need a scale: pixel_pitch_um in capture.toml, or diameter_um of the ball"
-            raise InputError(msg)
-        findings.append(
-            Finding(
-                "doubt",
-                "the balls show that the lights are near, but no scale is known: state the diameter of the ball to get positions",
-                "near-without-scale",
-            )
-        )
-        solution = solve_lights(*_arrays(balls), u_outlines, camera_px, near=False)
-    intensities, u_intensities = _intensities(sphere, captures, levels_of, strengths, solution, findings)
+    seen = observe(captures, sphere, outlines_a_capture(captures, outline), diameter_um, progress)
+    balls, findings = seen.balls, seen.findings
+    solution, pitch_um = _solve(captures, seen, diameter_um, near, findings)
+    intensities, u_intensities = _intensities(sphere, captures, seen, solution, findings)
     rig = _rig(solution, pitch_um, intensities)
     findings += _judge(solution, balls, captures, rig)
-    known = [lamp[np.isfinite(lamp)] for lamp in lamps]
-    lamp = float(np.median(np.concatenate(known))) if known and sum(map(len, known)) else math.nan
     own = solution.u_own_deg
     alone = [ball.own_deg for ball in balls if ball.own_deg is not None]
     if alone:
@@ -195,96 +128,38 @@ def calibrate_lights(
         residual_px=_rms(solution.residuals_px),
         u_positions_um=_u_positions(solution, pitch_um),
         u_intensities=u_intensities,
-        lamp_deg=lamp,
+        lamp_deg=seen.lamp_deg,
         findings=tuple(findings),
     )
 
 
-def _arrays(balls: list[_Ball]) -> tuple[Array, Array, Array]:
-    return (
-        np.array([ball.places for ball in balls]),
-        np.array([ball.covariances for ball in balls]),
-        np.array([ball.outline.circle_px for ball in balls]),
-    )
-
-
-def _outlines_a_capture(captures: list[Capture], outline: object) -> list[Array | None]:
-    if not captures:
-        msg = "capture: must be one capture or more, got none"
-        raise InputError(msg)
-    counts = [len(capture.images) for capture in captures]
-    if len(set(counts)) > 1:
-        odd = next(index for index, count in enumerate(counts) if count != counts[0])
-        msg = f"capture: {captures[odd].name} has {counts[odd]} images, {captures[0].name} has {counts[0]}: one a light, in one order"
-        raise InputError(msg)
-    if outline is None or len(captures) == 1:
-        return [given_outlines(outline)] * len(captures)  # type: ignore[arg-type]
-    if len(outline) != len(captures):  # type: ignore[arg-type]
-        msg = f"outline: must have one entry for each of the {len(captures)} captures, got {len(outline)}"  # type: ignore[arg-type]
-        raise InputError(msg)
-    return [given_outlines(one) for one in outline]  # type: ignore[attr-defined]
-
-
-def _camera_px(capture: Capture, outline: Outline, diameter_um: float | None) -> float:
-    """Distance of the camera in pixels; infinite where it is not known."""
-    pitch_um = capture.pixel_pitch_um if diameter_um is None else diameter_um / (2.0 * outline.radius_px)
-    if capture.camera_distance_mm is None or pitch_um is None:
-        return math.inf
-    return 1000.0 * capture.camera_distance_mm / pitch_um
-
-
-def _as_highlights(capture: Capture, outline: Outline, directions: Array, own: Array, jacobians: Array) -> _Ball:
-    """Lights of a matt ball, written as the highlights that a mirror of its place would show.
-
-    The outline's errors move both, by different amounts; the difference is added to the covariance of each light.
-    """
-    radius = outline.radius_px
-    places = outline.circle_px[:2] + radius * directions[:, :2] / np.sqrt(2.0 + 2.0 * directions[:, 2:])
-    covariances = np.zeros((len(directions), 2, 2))
-    for index, direction in enumerate(directions):
-        level = np.cross([0.0, 0.0, 1.0], direction)
-        level = np.array([1.0, 0.0, 0.0]) if np.linalg.norm(level) < 1e-9 else level / np.linalg.norm(level)  # noqa: PLR2004
-        across = np.stack([level, np.cross(direction, level)])
-        step = 1e-4
-        ahead = direction + step * across
-        ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
-        there = outline.circle_px[:2] + radius * ahead[:, :2] / np.sqrt(2.0 + 2.0 * ahead[:, 2:])
-        to_px = (there - places[index]).T / step
-        shading = across @ jacobians[index] * outline.u_px
-        # A highlight that moves with the outline stands for a direction that stays: only the rest is an error.
-        covariance = own[index] + shading @ shading.T
-        covariances[index] = to_px @ covariance @ to_px.T
-    fixed = type(outline)(outline.x_px, outline.y_px, radius, 1e-6, 1e-6, outline.edge_px, outline.arc, outline.given)
-    own_deg = np.degrees(np.sqrt(0.5 * np.trace(own, axis1=1, axis2=2)))
-    return _Ball(capture, fixed, places, covariances, own_deg, outline.u_px)
-
-
-def _need_all(balls: list[_Ball], captures: list[Capture]) -> None:
-    seen = np.array([np.isfinite(ball.places).all(axis=1) for ball in balls]).any(axis=0)
-    if not seen.all():
-        missing = [light_name(int(index), captures[0].files) for index in np.flatnonzero(~seen)]
-        shown = ", ".join(missing[:4]) + (", ..." if len(missing) > 4 else "")  # noqa: PLR2004
-        msg = f"{captures[0].name}: {shown}: no highlight on {'the ball' if len(balls) == 1 else 'any ball'}"
-        raise CalibrationError(msg)
-
-
-def _lens_note(balls: list[_Ball]) -> list[Finding]:
-    """Say what an ordinary lens would do, where none is stated."""
-    notes = []
-    for ball in balls:
-        stated = ball.capture.camera_distance_mm
-        side = max(ball.capture.images.shape[1:])
-        aside = math.hypot(ball.outline.x_px, ball.outline.y_px) / side
-        if stated is None and aside > 0.15:  # noqa: PLR2004 - of the image
-            notes.append(
-                Finding(
-                    "note",
-                    f"{ball.capture.name}: the ball is {100 * aside:.0f} % of the image aside and no camera is stated: taken as "
-                    "telecentric; state camera in capture.toml where the lens is an ordinary one",
-                    "camera-unknown",
-                )
+def _solve(
+    captures: list[Capture], seen: Observed, diameter_um: float | None, near: bool | None, findings: list[Finding]
+) -> tuple[LightSolution, float | None]:
+    """Lights of all balls, and the pixel pitch that puts them in micrometres."""
+    balls = seen.balls
+    places = np.array([ball.places for ball in balls])
+    covariances = np.array([ball.covariances for ball in balls])
+    circles = np.array([ball.outline.circle_px for ball in balls])
+    u_circles = np.array([ball.outline.u_px for ball in balls])
+    solution = solve_lights(places, covariances, circles, u_circles, seen.camera_px, near)
+    pitch_um = captures[0].pixel_pitch_um
+    if diameter_um is not None:
+        pitch_um = float(np.mean([diameter_um / (2.0 * circle[2]) for circle in solution.outlines_px]))
+    if solution.nearness.any() and pitch_um is None:
+        if near:
+            msg = (
+                f"{captures[0].name}: positions of lights need a scale: pixel_pitch_um in capture.toml, or "
+                "diameter_um of the ball"
             )
-    return notes
+            raise InputError(msg)
+        message = (
+            "the balls show that the lights are near, but no scale is known: state the diameter of the ball to get "
+            "positions"
+        )
+        findings.append(Finding("doubt", message, "near-without-scale"))
+        solution = solve_lights(places, covariances, circles, u_circles, seen.camera_px, near=False)
+    return solution, pitch_um
 
 
 def _rig(solution: LightSolution, pitch_um: float | None, intensities: Array) -> LightRig:
@@ -307,18 +182,17 @@ def _u_positions(solution: LightSolution, pitch_um: float | None) -> Array | Non
 def _intensities(
     sphere: str,
     captures: list[Capture],
-    levels: list[Levels],
-    strengths: list[Array],
+    seen: Observed,
     solution: LightSolution,
     findings: list[Finding],
 ) -> tuple[Array, Array | None]:
     """Relative intensities, mean 1, and their scatter from ball to ball."""
-    usable = [row / row.mean() for row in strengths if np.isfinite(row).all() and (row > 0).all()]
+    usable = [row / row.mean() for row in seen.strengths if np.isfinite(row).all() and (row > 0).all()]
     if usable:
         mean = np.mean(usable, axis=0)
         spread = np.std(usable, axis=0) if len(usable) > 1 else np.full(len(mean), 0.01 if sphere == "matt" else 0.03)
         return mean / mean.mean(), np.maximum(spread, 0.002)
-    board = [np.median(one.images.reshape(len(one.images), -1), axis=1) for one in levels]
+    board = [np.median(one.images.reshape(len(one.images), -1), axis=1) for one in seen.levels]
     level = np.mean(board, axis=0) / np.maximum(solution.directions[:, 2], 0.05)
     least = 10.0
     if np.min(board) > least:
@@ -333,14 +207,15 @@ def _intensities(
     findings.append(
         Finding(
             "note",
-            f"{captures[0].name}: intensities not measured (clipped highlights, dark board): taken as equal; calibrate flat gives them",
+            f"{captures[0].name}: intensities not measured (clipped highlights, dark board): taken as equal; "
+            "calibrate flat gives them",
             "no-intensities",
         )
     )
     return np.ones(len(solution.directions)), None
 
 
-def _judge(solution: LightSolution, balls: list[_Ball], captures: list[Capture], rig: LightRig) -> list[Finding]:
+def _judge(solution: LightSolution, balls: list[SeenBall], captures: list[Capture], rig: LightRig) -> list[Finding]:
     """What the result says about itself, and about the rig that was declared."""
     found: list[Finding] = []
     files = captures[0].files
@@ -349,7 +224,8 @@ def _judge(solution: LightSolution, balls: list[_Ball], captures: list[Capture],
             Finding(
                 "doubt",
                 f"the balls contradict each other: residuals of {_rms(solution.residuals_px):.2f} px are "
-                f"{math.sqrt(solution.reduced_chi_square):.1f} times what was expected; uncertainties are raised by that",
+                f"{math.sqrt(solution.reduced_chi_square):.1f} times what was expected; uncertainties are raised "
+                "by that",
                 "balls-contradict",
                 solution.reduced_chi_square,
                 MISFIT,
@@ -386,7 +262,7 @@ def _judge(solution: LightSolution, balls: list[_Ball], captures: list[Capture],
     return found
 
 
-def _views(balls: list[_Ball], solution: LightSolution) -> list[BallView]:
+def _views(balls: list[SeenBall], solution: LightSolution) -> list[BallView]:
     return [
         BallView(
             ball.capture.name,

@@ -70,15 +70,24 @@ def shading_on(capture: Capture, levels: Levels, outline: Outline) -> SeenShadin
         used = values < levels.clip
         peak = float(np.percentile(values, 99.0))
         if peak < LEAST_LEVEL:
-            msg = f"{capture.name}: {name}: too dark on the ball ({peak:.1f} of 255 at its brightest, {LEAST_LEVEL:g} is least)"
+            msg = (
+                f"{capture.name}: {name}: too dark on the ball ({peak:.1f} of 255 at its brightest, "
+                f"{LEAST_LEVEL:g} is least)"
+            )
             raise CalibrationError(msg)
         if 1.0 - used.mean() > SATURATED_SHARE:
-            msg = f"{capture.name}: {name}: burnt out: {100 * (1 - used.mean()):.0f} % of the ball is clipped; expose shorter"
+            msg = (
+                f"{capture.name}: {name}: burnt out: {100 * (1 - used.mean()):.0f} % of the ball is clipped; "
+                "expose shorter"
+            )
             raise CalibrationError(msg)
         vector, residual = _fit(_normals(points, outline.circle_px), values, used, levels.noise)
         strength = float(np.linalg.norm(vector))
         if vector[2] <= 0:
-            msg = f"{capture.name}: {name}: no light from above: the fit points to ({', '.join(f'{v:.2f}' for v in vector / strength)})"
+            msg = (
+                f"{capture.name}: {name}: no light from above: the fit points to "
+                f"({', '.join(f'{v:.2f}' for v in vector / strength)})"
+            )
             raise CalibrationError(msg)
         direction = vector / strength
         if residual > NOT_LAMBERT * peak:
@@ -86,7 +95,8 @@ def shading_on(capture: Capture, levels: Levels, outline: Outline) -> SeenShadin
             findings.append(
                 Finding(
                     "note",
-                    f"{capture.name}: {name}: the ball does not follow Lambert's law ({100 * residual / peak:.1f} % off): "
+                    f"{capture.name}: {name}: the ball does not follow Lambert's law ({100 * residual / peak:.1f} "
+                    "% off): "
                     f"a general monotone law is taken ({100 * left / peak:.1f} % off)",
                     "not-lambert",
                     residual / peak,
@@ -179,7 +189,7 @@ def _monotone(normals: Array, values: Array, used: NDArray[np.bool_], start: Arr
 def _spread(
     points: Array, values: Array, used: NDArray[np.bool_], outline: Outline, noise: float, direction: Array
 ) -> tuple[Array, Array]:
-    """Covariance (2, 2) of two turns by leaving out sectors, and change (3, 3) of the direction by the outline (per px)."""
+    """Covariance (2, 2) of two turns by leaving out sectors; change (3, 3) of the direction by the outline, per px."""
     circle = outline.circle_px
     normals = _normals(points, circle)
     sector = ((np.arctan2(*(points - circle[:2]).T[::-1]) / (2 * math.pi) + 0.5) * SECTORS).astype(int) % SECTORS

@@ -1,6 +1,6 @@
 """Reflection on a mirror ball: from a pixel to the direction that it shows, and back.
 
-Points are (x, y, z) in pixels of the board plane: x right, y up, z toward the camera, origin = image centre on the board.
+Points are (x, y, z) in pixels of the board plane: x right, y up, z toward the camera, origin = image centre there.
 The ball rests on the board. The camera is telecentric, or a pinhole on the optical axis.
 """
 

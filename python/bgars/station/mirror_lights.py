@@ -76,11 +76,15 @@ def highlights_on(capture: Capture, levels: Levels, outline: Outline, camera_px:
             )
             raise CalibrationError(msg)
         if wide_deg > WIDE_DEG:
-            message = f"{capture.name}: {name}: its highlight is {wide_deg:.0f} deg wide: a broad lamp, a rough ball, or burnt out"
+            message = (
+                f"{capture.name}: {name}: its highlight is {wide_deg:.0f} deg wide: a broad lamp, a rough "
+                "ball, or burnt out"
+            )
             findings.append(Finding("doubt", message, "wide-highlight", wide_deg, WIDE_DEG, "deg", index))
         if spot.second_share > SECOND_SHARE:
             message = (
-                f"{capture.name}: {name}: two highlights on the ball (the second has {100 * spot.second_share:.0f} % of "
+                f"{capture.name}: {name}: two highlights on the ball (the second has "
+                f"{100 * spot.second_share:.0f} % of "
                 "the first one's area); the larger is taken"
             )
             findings.append(Finding("doubt", message, "two-highlights", spot.second_share, SECOND_SHARE, "", index))

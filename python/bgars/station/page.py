@@ -24,7 +24,8 @@ body { font: 15px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto
 h1, h2 { font-weight: 600; } h2 { margin-top: 2.2rem; border-bottom: 1px solid #ccc; }
 table { border-collapse: collapse; } td, th { padding: .15rem .7rem; text-align: right; }
 th { border-bottom: 1px solid #888; font-weight: 600; } td:first-child, th:first-child { text-align: left; }
-.doubt, .fail { color: #a33; font-weight: 600; } svg { max-width: 100%; margin: 1rem 2rem 0 0; } .missing { color: #777; }
+.doubt, .fail { color: #a33; font-weight: 600; } svg { max-width: 100%; margin: 1rem 2rem 0 0; }
+.missing { color: #777; }
 """
 SIDE = 300
 
@@ -110,15 +111,18 @@ def _sky(directions: np.ndarray, u_deg: np.ndarray) -> str:
         cx, cy = SIDE / 2 * (1 + 0.92 * x), SIDE / 2 * (1 - 0.92 * y)
         size = max(20 * math.radians(u) * SIDE / 2, 1.0)
         marks.append(
-            f'<circle cx="{cx:.1f}" cy="{cy:.1f}" r="{size:.1f}" fill="#4477aa55"/><circle cx="{cx:.1f}" cy="{cy:.1f}" r="2"/>'
+            f'<circle cx="{cx:.1f}" cy="{cy:.1f}" r="{size:.1f}" fill="#4477aa55"/><circle cx="{cx:.1f}" '
+            f'cy="{cy:.1f}" r="2"/>'
         )
         marks.append(f'<text x="{cx + 6:.1f}" y="{cy - 4:.1f}" font-size="11">{index}</text>')
     rings = "".join(
-        f'<circle cx="{SIDE / 2}" cy="{SIDE / 2}" r="{SIDE / 2 * 0.92 * math.cos(math.radians(e)):.1f}" fill="none" stroke="#ccc"/>'
+        f'<circle cx="{SIDE / 2}" cy="{SIDE / 2}" r="{SIDE / 2 * 0.92 * math.cos(math.radians(e)):.1f}" '
+        'fill="none" stroke="#ccc"/>'
         for e in (0, 30, 60)
     )
     title = "Lights as the camera sees them; rings at elevations of 0, 30 and 60 degrees; shaded: 20 u"
-    return f'<svg width="{SIDE}" height="{SIDE}" role="img" aria-label="{title}"><title>{title}</title>{rings}{"".join(marks)}</svg>'
+    sides = f'width="{SIDE}" height="{SIDE}"'
+    return f'<svg {sides} role="img" aria-label="{title}"><title>{title}</title>{rings}{"".join(marks)}</svg>'
 
 
 def _flat(flat: FlatField) -> Iterable[str]:
@@ -126,7 +130,8 @@ def _flat(flat: FlatField) -> Iterable[str]:
     rows = [[str(index), f"{100 * level / levels.mean():.1f} %"] for index, level in enumerate(levels)]
     yield _table(["light", "level, of the mean"], rows)
     yield (
-        f"<p>Polynomials of degree {flat.degree} over {flat.size_px[1]} x {flat.size_px[0]} pixels; {100 * flat.residual:.2f} % of the "
+        f"<p>Polynomials of degree {flat.degree} over {flat.size_px[1]} x {flat.size_px[0]} pixels; "
+        f"{100 * flat.residual:.2f} % of the "
         "level is left, noise taken off: what limits it is the board's own texture.</p>"
     )
 
@@ -137,15 +142,20 @@ def _response(curve: ResponseCurve) -> Iterable[str]:
     )
     yield (
         f'<svg width="{SIDE}" height="{SIDE}" role="img"><title>Light over grey level</title>'
-        f'<rect width="{SIDE}" height="{SIDE}" fill="none" stroke="#ccc"/><line x1="0" y1="{SIDE}" x2="{SIDE}" y2="0" stroke="#ccc"/>'
+        f'<rect width="{SIDE}" height="{SIDE}" fill="none" stroke="#ccc"/><line x1="0" y1="{SIDE}" x2="{SIDE}" '
+        'y2="0" stroke="#ccc"/>'
         f'<polyline points="{points}" fill="none" stroke="#4477aa" stroke-width="2"/></svg>'
     )
-    yield f"<p>By {html.escape(curve.source)}: {100 * curve.nonlinearity:.1f} % off a straight line, gamma about {curve.gamma:.2f}; u {100 * curve.u_radiance:.2f} % of full scale.</p>"
+    yield (
+        f"<p>By {html.escape(curve.source)}: {100 * curve.nonlinearity:.1f} % off a straight line, gamma about "
+        f"{curve.gamma:.2f}; u {100 * curve.u_radiance:.2f} % of full scale.</p>"
+    )
 
 
 def _scale(scale: Scale) -> Iterable[str]:
     yield (
-        f"<p>A pixel is {scale.pixel_pitch_um:.4f} um (u {scale.pixel_pitch_u_um:.2g} um) by {scale.points} points, residual "
+        f"<p>A pixel is {scale.pixel_pitch_um:.4f} um (u {scale.pixel_pitch_u_um:.2g} um) by {scale.points} "
+        "points, residual "
         f"{scale.residual_px:.3f} px; distortion at the corners {100 * scale.distortion:.2f} %.</p>"
     )
 

@@ -71,7 +71,10 @@ def response_from_bracket(
     """
     times = np.asarray(exposures, dtype=np.float64)
     if times.ndim != 1 or len(times) != len(images) or len(times) < 2 or not (np.isfinite(times) & (times > 0)).all():  # noqa: PLR2004
-        msg = f"exposures: must be finite and above 0, one an image, two or more, got {times.tolist()} for {len(images)} images"
+        msg = (
+            f"exposures: must be finite and above 0, one an image, two or more, got {times.tolist()} for "
+            f"{len(images)} images"
+        )
         raise InputError(msg)
     levels = np.stack([np.asarray(image, dtype=np.float64).ravel() for image in images], axis=1) / full_scale
     good = ((levels > LOW) & (levels < HIGH)).sum(axis=1) >= 2  # noqa: PLR2004 - two exposures
@@ -125,7 +128,8 @@ def response_from_sums(
 
     def residuals(slopes: Array) -> Array:
         f_both, f_first, f_second = (np.exp(ramp @ slopes) for ramp in ramps)
-        return np.append(weight * np.log((f_first + f_second) / f_both), bend @ slopes)
+        rows: Array = np.append(weight * np.log((f_first + f_second) / f_both), bend @ slopes)
+        return rows
 
     fit = least_squares(residuals, np.ones(SEGMENTS), bounds=(0.05, 10.0))
     off = 1.4826 * float(np.median(np.abs(fit.fun[: len(weight)])))
@@ -167,7 +171,8 @@ def _spread_sample(levels: Array) -> Array:
     spread = np.linspace(levels.mean(axis=1).min(), levels.mean(axis=1).max(), SAMPLES // 2)
     even = np.searchsorted(levels.mean(axis=1)[order], spread).clip(0, len(order) - 1)
     also = np.linspace(0, len(order) - 1, SAMPLES // 2).astype(int)
-    return levels[order[np.unique(np.concatenate([even, also]))]]
+    rows: Array = levels[order[np.unique(np.concatenate([even, also]))]]
+    return rows
 
 
 def _curve(slopes: Array, u: float, source: str) -> tuple[ResponseCurve, tuple[Finding, ...]]:
@@ -176,7 +181,10 @@ def _curve(slopes: Array, u: float, source: str) -> tuple[ResponseCurve, tuple[F
     curve = np.maximum.accumulate(curve + 1e-9 * np.arange(KNOTS))
     found = ResponseCurve(knots, curve / curve[-1], u, source)
     if found.nonlinearity > max(LINEAR, 3.0 * u):
-        message = f"the camera is not linear: up to {100 * found.nonlinearity:.1f} % of full scale off a straight line, about gamma {found.gamma:.2f}"
+        message = (
+            f"the camera is not linear: up to {100 * found.nonlinearity:.1f} % of full scale off a straight "
+            f"line, about gamma {found.gamma:.2f}"
+        )
         return found, (Finding("doubt", message, "not-linear", found.nonlinearity, LINEAR),)
     return found, (
         Finding(

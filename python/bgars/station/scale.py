@@ -34,7 +34,7 @@ OUTLIER_SIGMAS = 5.0
 SEEN_SIGMAS = 3.0
 """Tilt and distortion are kept where they are so many standard deviations from 0."""
 UNKNOWN_PITCH_U = 1e-4
-"""Relative standard uncertainty of a grid's pitch where none is stated: a printed foil is worse, an etched glass better."""
+"""Relative standard uncertainty of a grid's pitch where none is stated: etched glass is better, print worse."""
 
 
 def calibrate_scale(
@@ -96,18 +96,18 @@ def fit_grid(
         raise CalibrationError(msg)
     half = 0.5 * math.hypot(*size_px)
     for _ in range(3):
-        fit, residuals = _lens(index[use], places_px[use], half)
+        values, jacobian, residuals = _lens(index[use], places_px[use], half)
         size = np.linalg.norm(residuals, axis=1)
         limit = OUTLIER_SIGMAS * max(float(np.median(size)), 1e-3)
         if (size <= limit).all():
             break
         use[np.flatnonzero(use)[size > limit]] = False
-    a, b, _, _, px, py, k = fit.x
+    a, b, _, _, px, py, k = values
     count = int(use.sum())
-    spare = max(2 * count - len(fit.x), 1)
+    spare = max(2 * count - len(values), 1)
     rms = float(np.sqrt(np.square(residuals).sum() / spare))
-    covariance = np.linalg.pinv(fit.jac.T @ fit.jac) * rms**2
-    step_px = _step_at_centre(fit.x, half)
+    covariance = np.linalg.pinv(jacobian.T @ jacobian) * rms**2
+    step_px = _step_at_centre(values, half)
     u_px = math.sqrt(float(covariance[0, 0] + covariance[1, 1]) / 2.0)
     u_grid = UNKNOWN_PITCH_U * pitch_um if u_pitch_um is None else u_pitch_um
     pitch = pitch_um / step_px
@@ -128,7 +128,8 @@ def fit_grid(
         findings.append(
             Finding(
                 "note",
-                f"{name}: the lens distorts by {100 * k:+.2f} % at the corners; places of balls there are off by {abs(k) * half:.1f} px",
+                f"{name}: the lens distorts by {100 * k:+.2f} % at the corners; places of balls there are off by "
+                f"{abs(k) * half:.1f} px",
                 "distortion",
                 float(k),
             )
@@ -137,7 +138,8 @@ def fit_grid(
         findings.append(
             Finding(
                 "note",
-                f"{name}: the scale changes by {200 * math.hypot(px, py):.2f} % across the image: the grid is tilted against the camera",
+                f"{name}: the scale changes by {200 * math.hypot(px, py):.2f} % across the image: the grid is "
+                "tilted against the camera",
                 "tilt",
                 2.0 * math.hypot(px, py),
             )
@@ -153,7 +155,8 @@ def fit_grid(
     ), tuple(findings)
 
 
-def _lens(index: Array, places: Array, half: float) -> tuple[object, Array]:
+def _lens(index: Array, places: Array, half: float) -> tuple[Array, Array, Array]:
+    """Parameters, Jacobian and residuals of the grid as the lens shows it."""
     rows = np.zeros((2 * len(index), 4))
     rows[0::2] = np.column_stack([index[:, 0], -index[:, 1], np.ones(len(index)), np.zeros(len(index))])
     rows[1::2] = np.column_stack([index[:, 1], index[:, 0], np.zeros(len(index)), np.ones(len(index))])
@@ -162,8 +165,11 @@ def _lens(index: Array, places: Array, half: float) -> tuple[object, Array]:
     def off(p: Array) -> Array:
         return places - _project(p, index, half)
 
-    fit = least_squares(lambda p: off(p).ravel(), np.append(start, np.zeros(3)), x_scale=[1, 1, 1, 1, 1e-3, 1e-3, 1e-3])
-    return fit, off(fit.x)
+    def residuals(p: Array) -> Array:
+        return off(p).ravel()
+
+    fit = least_squares(residuals, np.append(start, np.zeros(3)), x_scale=[1, 1, 1, 1, 1e-3, 1e-3, 1e-3])
+    return fit.x, np.asarray(fit.jac, dtype=np.float64), off(fit.x)
 
 
 def _project(p: Array, index: Array, half: float) -> Array:
@@ -197,11 +203,11 @@ def _turn(a: float, b: float) -> float:
 def _number(places: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Column and row of each point, from neighbour to neighbour; False where it is not reached."""
     tree = cKDTree(places)
-    distances, _ = tree.query(places, k=2)
+    distances = np.asarray(tree.query(places, k=2)[0], dtype=np.float64)
     pitch = float(np.median(distances[:, 1]))
     pairs = tree.query_pairs(1.3 * pitch, output_type="ndarray")
     steps = places[pairs[:, 1]] - places[pairs[:, 0]]
-    angle = np.angle(np.mean(np.exp(4j * np.arctan2(steps[:, 1], steps[:, 0])))) / 4.0
+    angle = float(np.angle(np.mean(np.exp(4j * np.arctan2(steps[:, 1], steps[:, 0]))))) / 4.0
     turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
     index = np.zeros((len(places), 2))
     reached = np.zeros(len(places), np.bool_)
@@ -224,8 +230,8 @@ def _number(places: Array) -> tuple[Array, NDArray[np.bool_]]:
 
 def _dots(picture: Array) -> Array:
     """(N, 2) row and column of dots: weighted centres of what differs from the ground."""
-    ground = ndimage.median_filter(picture[::4, ::4], size=max(3, min(picture.shape) // 40 * 2 + 1))
-    ground = np.kron(ground, np.ones((4, 4)))[: picture.shape[0], : picture.shape[1]]
+    ground: Array = ndimage.median_filter(picture[::4, ::4], size=max(3, min(picture.shape) // 40 * 2 + 1))
+    ground = np.kron(np.asarray(ground, dtype=np.float64), np.ones((4, 4)))[: picture.shape[0], : picture.shape[1]]
     ground = np.pad(
         ground, [(0, picture.shape[0] - ground.shape[0]), (0, picture.shape[1] - ground.shape[1])], mode="edge"
     )
@@ -258,10 +264,10 @@ def _dots(picture: Array) -> Array:
 def _crossings(picture: Array) -> Array:
     """(N, 2) row and column of saddle points: where the determinant of the Hessian is most negative."""
     smooth = ndimage.gaussian_filter(picture, SHARP)
-    rr = ndimage.gaussian_filter(picture, SHARP, order=(2, 0))
-    cc = ndimage.gaussian_filter(picture, SHARP, order=(0, 2))
-    rc = ndimage.gaussian_filter(picture, SHARP, order=(1, 1))
-    saddle = rc**2 - rr * cc
+    rr: Array = ndimage.gaussian_filter(picture, SHARP, order=(2, 0))
+    cc: Array = ndimage.gaussian_filter(picture, SHARP, order=(0, 2))
+    rc: Array = ndimage.gaussian_filter(picture, SHARP, order=(1, 1))
+    saddle: Array = rc**2 - rr * cc
     peak = (saddle == ndimage.maximum_filter(saddle, size=9)) & (saddle > 0.3 * np.percentile(saddle, 99.9))
     rows, cols = np.nonzero(peak)
     found = []

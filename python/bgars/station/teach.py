@@ -62,7 +62,10 @@ def teach(results: Sequence[PartResult], name: str) -> Taught:
     layouts = [_layout(result) for result in results]
     for result, layout in zip(results, layouts, strict=True):
         if layout != layouts[0]:
-            msg = f"{result.name}: {len(layout)} balls on other places than {results[0].name} ({len(layouts[0])}): not the same part"
+            msg = (
+                f"{result.name}: {len(layout)} balls on other places than {results[0].name} "
+                f"({len(layouts[0])}): not the same part"
+            )
             raise InputError(msg)
     places = layouts[0]
     rows, cols = max(row for row, _ in places) + 1, max(col for _, col in places) + 1
@@ -89,8 +92,10 @@ def teach(results: Sequence[PartResult], name: str) -> Taught:
 def teach_text(taught: Taught) -> str:
     """Return the recipe as the text of a ``part.toml``."""
     lines = [
-        f"# Taught from {taught.parts} golden part(s): nominal = median; limits = nominal +- the larger of 4 sqrt(s^2 + u^2)",
-        "# and 5 %; position, coplanarity and warpage: the largest golden reading + 4 u. Put the drawing's limits here.",
+        f"# Taught from {taught.parts} golden part(s): nominal = median; limits = nominal +- the larger of 4 "
+        "sqrt(s^2 + u^2)",
+        "# and 5 %; position, coplanarity and warpage: the largest golden reading + 4 u. Put the drawing's "
+        "limits here.",
         f"name = {json.dumps(taught.name)}",
         f"rows = {taught.rows}",
         f"cols = {taught.cols}",
