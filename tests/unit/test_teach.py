@@ -24,7 +24,7 @@ def test_depopulated_places_are_ranges(tmp_path: Path) -> None:
     [
         ("G8:F6", "from its first place to its last"),
         ("F6:", "two names such as"),
-        ("F6:Z99", "must be on the 11 x 11 lattice"),
+        ("F6:Y99", "must be on the 11 x 11 lattice"),
     ],
 )
 def test_a_wrong_range_is_refused(tmp_path: Path, entry: str, words: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -106,7 +107,8 @@ def outlines_of(
                     "px",
                 )
             )
-            outlines.append(as_outline(circle, float(off.max())))
+            u_px = np.maximum(off, NOT_SEEN_U_PX)
+            outlines.append(replace(as_outline(circle), u_centre_px=float(u_px[:2].max()), u_radius_px=float(u_px[2])))
         else:
             outlines.append(seen)
     for index, outline in enumerate(outlines):

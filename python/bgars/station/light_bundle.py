@@ -132,7 +132,8 @@ def _solve(
     def off(values: Array) -> Array:
         directions, nearness, circles = unpack(values)
         fitted = np.array([image_of(directions, nearness, sphere_of_outline(c, camera_px), camera_px) for c in circles])
-        return places - fitted
+        rest: Array = places - fitted
+        return rest
 
     def residuals(values: Array) -> Array:
         scaled = np.einsum("blij,blj->bli", whiten, np.where(seen[..., None], off(values), 0.0))

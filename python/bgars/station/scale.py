@@ -230,8 +230,8 @@ def _number(places: Array) -> tuple[Array, NDArray[np.bool_]]:
 
 def _dots(picture: Array) -> Array:
     """(N, 2) row and column of dots: weighted centres of what differs from the ground."""
-    ground: Array = ndimage.median_filter(picture[::4, ::4], size=max(3, min(picture.shape) // 40 * 2 + 1))
-    ground = np.kron(np.asarray(ground, dtype=np.float64), np.ones((4, 4)))[: picture.shape[0], : picture.shape[1]]
+    coarse = ndimage.median_filter(picture[::4, ::4], size=max(3, min(picture.shape) // 40 * 2 + 1))
+    ground = np.kron(np.asarray(coarse, dtype=np.float64), np.ones((4, 4)))[: picture.shape[0], : picture.shape[1]]
     ground = np.pad(
         ground, [(0, picture.shape[0] - ground.shape[0]), (0, picture.shape[1] - ground.shape[1])], mode="edge"
     )
@@ -271,11 +271,11 @@ def _crossings(picture: Array) -> Array:
     peak = (saddle == ndimage.maximum_filter(saddle, size=9)) & (saddle > 0.3 * np.percentile(saddle, 99.9))
     rows, cols = np.nonzero(peak)
     found = []
-    down, right = np.gradient(smooth)
+    slopes = [np.asarray(slope, dtype=np.float64) for slope in np.gradient(smooth)]
     for row, col in zip(rows, cols, strict=True):
         # The saddle of the quadratic through the neighbourhood: where its gradient is 0.
         hessian = np.array([[rr[row, col], rc[row, col]], [rc[row, col], cc[row, col]]])
-        step = -np.linalg.solve(hessian, [down[row, col], right[row, col]])
+        step = -np.linalg.solve(hessian, np.array([slope[row, col] for slope in slopes]))
         if np.abs(step).max() < 1.5 and 2 < row < picture.shape[0] - 3 and 2 < col < picture.shape[1] - 3:  # noqa: PLR2004
             found.append((row + step[0], col + step[1]))
     return np.array(found).reshape(-1, 2)
