@@ -108,7 +108,8 @@ def highlights_on(capture: Capture, levels: Levels, outline: Outline, camera_px:
         middle = middle_of(spots[index], still.shape, sphere, camera_px)
         radius = math.sqrt(spots[index].area_px / math.pi)
         off = math.inf if fit is None else math.hypot(fit.x_px - middle[0], fit.y_px - middle[1])
-        if fit is None or (fit.saturated and (fit.misfit > POOR_FIT or off > FAR_SHARE * radius)):
+        unsure = fit is not None and float(np.linalg.eigvalsh(fit.covariance_px2)[-1]) > (FAR_SHARE * radius) ** 2
+        if fit is None or (fit.saturated and (unsure or fit.misfit > POOR_FIT or off > FAR_SHARE * radius)):
             # A star, a streak, a bloom: its middle is that of its bright pixels, to a share of its size.
             places[index] = middle
             covariances[index] = (ROUGH_SHARE * radius) ** 2 * np.eye(2)

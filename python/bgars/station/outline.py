@@ -27,12 +27,12 @@ STRONGEST = 4000
 """Edge pixels that vote."""
 WINDOWS = (0.10, 0.05, 0.025)
 """Half widths of the band in which the edge is looked for, of the radius, in turn."""
-LEAST_WINDOW_PX = 3.0
+LEAST_WINDOW_PX, WIDE_EDGE = 3.0, 2.5
 ROUNDS = 12
 SCALE_PX = 0.25
 """Scatter of edge points beyond which they lose weight, unless all scatter more."""
-LARGEST_SCALE_PX, LARGEST_SCALE_SHARE = 0.35, 0.004
-"""Scatter, and share of the radius, that an outline has at most."""
+LARGEST_SCALE_PX, LARGEST_SCALE_SHARE, LARGEST_SCALE_EDGE = 0.35, 0.004, 0.2
+"""Scatter that an outline has at most: pixels, share of the radius, share of the width of its edge."""
 SEEN = 3.0
 """Edge points count where they lie within so many scales."""
 CORRELATED_POINTS = 3.0
@@ -172,7 +172,8 @@ def _fit_edge(picture: Array, start_px: Array) -> Outline | None:
     circle = np.array(start_px, dtype=np.float64)
     fit: Outline | None = None
     for share in WINDOWS:
-        half = max(share * circle[2], LEAST_WINDOW_PX)
+        # An edge that is wider than the band would look like none.
+        half = max(share * circle[2], LEAST_WINDOW_PX, 0.0 if fit is None else WIDE_EDGE * fit.edge_px)
         angles, radii, widths = _edge_points(picture, circle, half)
         if len(angles) < 12:  # noqa: PLR2004 - three unknowns, and something to judge them by
             return None
@@ -211,7 +212,7 @@ def _edge_points(picture: Array, circle: Array, half_px: float) -> tuple[Array, 
     at = slope.argmax(axis=1)
     lines = np.arange(count)
     peak = slope[lines, at]
-    around = np.median(slope, axis=1)
+    around = np.percentile(slope, 20.0, axis=1)
     use = (peak > 3.0 * around + 1e-9) & (peak > 0.1 * np.percentile(peak, 90)) & (at > 1) & (at < len(radii) - 2)
     if not use.any():
         return angles[:0], angles[:0], angles[:0]
@@ -241,7 +242,8 @@ def _circle(points: Array, widths: Array, start: Array, count: int) -> Outline |
     offset = points - circle[:2]
     off = np.hypot(*offset.T) - circle[2]
     # Edges of noise scatter over the whole band: they are no outline, however many there are.
-    good = np.abs(off) < SEEN * min(scale, max(LARGEST_SCALE_PX, LARGEST_SCALE_SHARE * circle[2]))
+    soft_px = LARGEST_SCALE_EDGE * float(np.median(widths))
+    good = np.abs(off) < SEEN * min(scale, max(LARGEST_SCALE_PX, LARGEST_SCALE_SHARE * circle[2], soft_px))
     arc = float(good.sum()) / count
     if arc < LEAST_ARC:
         return None
