@@ -127,10 +127,10 @@ def test_a_burnt_out_ball_is_refused(matt: NDArray[np.uint8]) -> None:
     assert {"wide-highlight"} <= {doubt.code for doubt in as_mirror.doubts}
 
 
-def test_a_ball_out_of_focus_is_doubted(lights: Array) -> None:
+def test_a_ball_out_of_focus_is_refused(lights: Array) -> None:
     soft = render(lights, ball=BALL, size=(260, 260), kind="matt", board=0.05, samples=2, blur_px=5.0)
-    found = bgars.calibrate_lights(capture_of(soft), sphere="matt")
-    assert "out-of-focus" in [doubt.code for doubt in found.doubts]
+    with pytest.raises(bgars.CalibrationError, match="no sharp circle in the images .out of focus"):
+        bgars.calibrate_lights(capture_of(soft), sphere="matt")
 
 
 def test_images_without_a_ball_are_refused() -> None:

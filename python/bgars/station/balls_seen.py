@@ -79,8 +79,8 @@ def outlines_of(
         )
         if found is None:
             msg = (
-                f"{capture.name}: no ball found: no circle in the images; give its outline, or use a background that "
-                "differs from the ball"
+                f"{capture.name}: no ball found: no sharp circle in the images (out of focus, or of the level of its "
+                "background); photograph it again, or give its outline"
             )
             raise CalibrationError(msg)
         outlines.append(found)
