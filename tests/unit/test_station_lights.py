@@ -129,7 +129,7 @@ def test_a_burnt_out_ball_is_refused(matt: NDArray[np.uint8]) -> None:
 
 def test_a_ball_out_of_focus_is_refused(lights: Array) -> None:
     soft = render(lights, ball=BALL, size=(260, 260), kind="matt", board=0.05, samples=2, blur_px=5.0)
-    with pytest.raises(bgars.CalibrationError, match="no sharp circle in the images .out of focus"):
+    with pytest.raises(bgars.CalibrationError, match=r"no sharp circle in the images .out of focus"):
         bgars.calibrate_lights(capture_of(soft), sphere="matt")
 
 
