@@ -34,6 +34,8 @@ from .io.normal_map import write_normal_map as write_normal_map
 from .io.parquet import write_parquet as write_parquet
 from .io.part_recipe import read_part_recipe as read_part_recipe
 from .io.result_file import read_result as read_result
+from .io.station_file import read_station as read_station
+from .io.station_file import write_station as write_station
 from .io.truth import read_truth as read_truth
 from .line import Batch as Batch
 from .line import Naming as Naming
@@ -83,6 +85,15 @@ from .simulate import SimulationSetup as SimulationSetup
 from .simulate import Texture as Texture
 from .simulate import Variation as Variation
 from .simulate import simulate as simulate
+from .station import calibrate_flat as calibrate_flat
+from .station import calibrate_lights as calibrate_lights
+from .station import calibrate_scale as calibrate_scale
+from .station_apply import with_station as with_station
+from .station_record import FlatField as FlatField
+from .station_record import LightCalibration as LightCalibration
+from .station_record import ResponseCurve as ResponseCurve
+from .station_record import Scale as Scale
+from .station_record import Station as Station
 from .store import Store as Store
 from .store import open_store as open_store
 from .studies import GaugeStudy as GaugeStudy

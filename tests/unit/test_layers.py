@@ -21,6 +21,8 @@ RECORDS = {
     "surface_map": 0,
     "records": 3,
     "part_result": 3,
+    "station_record": 3,
+    "station_apply": 3.5,
     "kernel_capture": 3.5,
     "kernel_outputs": 3.5,
     "anchoring": 3.5,
@@ -37,7 +39,7 @@ STAGES = dict.fromkeys(
     ("io", "pixelwise", "shape_images", "reflectance", "integrate", "mesh", "balls", "inspection", "checks"), 4
 )
 PIPELINES = ("check_pipeline", "calibrate", "pipeline", "evaluate", "part_anchors", "recipes", "cfx")
-JOINED = {"normals": 4.5, **dict.fromkeys(PIPELINES, 5), "part_surface": 5.2, "inspection_pipeline": 5.4}
+JOINED = {"normals": 4.5, **dict.fromkeys(PIPELINES, 5), "station": 5, "part_surface": 5.2, "inspection_pipeline": 5.4}
 LATER = {
     **JOINED,
     "batch": 6,

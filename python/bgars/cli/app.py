@@ -24,7 +24,7 @@ from bgars.cli.console import (
 )
 from bgars.cli.evaluation import choice_in_words, evaluation_table
 from bgars.cli.lazy import LazyGroup
-from bgars.cli.options import ForceOption, MethodOption
+from bgars.cli.options import ForceOption, MethodOption, StationOption
 from bgars.errors import BgarsError
 from bgars.extras import EXTRA_OF, how_to_install
 from bgars.normal_methods import DEFAULT_METHOD, METHODS, Method
@@ -163,6 +163,7 @@ def reconstruct(
     threshold: ThresholdOption = None,
     material: MaterialOption = None,
     channel: ChannelChoice = None,
+    station: StationOption = None,
     mesh_format: Annotated[Literal["ply", "obj", "stl", "glb"], typer.Option(help="Format of the mesh file.")] = "ply",
     flatten: FlattenOption = None,
     directx: DirectxOption = False,
@@ -184,7 +185,7 @@ def reconstruct(
             capture, method=method, threshold=threshold, material=surface, flatten=flatten, **options
         )
 
-    capture = bgars.read_capture(folder, channel=channel)
+    capture = bgars.read_capture(folder, channel=channel, station=station)
     findings = check_first(capture, force=force)
     summary, files = _reconstruct_to(
         capture, output, run, mesh_format=mesh_format, directx=directx, checked=findings.to_dict()
@@ -215,6 +216,7 @@ def normals(
     threshold: ThresholdOption = None,
     material: MaterialOption = None,
     channel: ChannelChoice = None,
+    station: StationOption = None,
     directx: DirectxOption = False,
     force: ForceOption = False,
     as_json: JsonOption = False,
@@ -228,7 +230,7 @@ def normals(
     from bgars.cli.outputs import write_normals  # noqa: PLC0415
     from bgars.noise_floor import without_background  # noqa: PLC0415
 
-    capture = bgars.read_capture(folder, channel=channel)
+    capture = bgars.read_capture(folder, channel=channel, station=station)
     findings = check_first(capture, force=force)
     surface = _material_from(material, capture)
     with stage_progress() as report:

@@ -15,7 +15,7 @@ from rich.progress import Progress as Bar
 
 from bgars.cli.console import error_console, print_json, say
 from bgars.cli.inspect import EXIT_NOT_PASSED
-from bgars.cli.options import LotOption, MethodOption, OperatorOption, StationOption
+from bgars.cli.options import LotOption, MethodOption, OperatorOption, StationNameOption
 from bgars.line import Batch, Naming, inspect_many
 from bgars.line.batch import Progress
 from bgars.normals import DEFAULT_METHOD
@@ -81,7 +81,7 @@ def batch(
     ] = False,
     serial_from: SerialFrom = "{serial}",
     lot: LotOption = "",
-    station: StationOption = "",
+    station_name: StationNameOption = "",
     operator: OperatorOption = "",
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
@@ -95,7 +95,7 @@ def batch(
     Exit code 0: every part passes. 1: a part does not, or could not be inspected. 2: wrong use, or a store that cannot
     be written. 130: interrupted; run it again to go on.
     """
-    naming = Naming(serial_from, PartIdentity(lot=lot, station=station, operator=operator))
+    naming = Naming(serial_from, PartIdentity(lot=lot, station=station_name, operator=operator))
     store = open_store(output, create=True)
     with _progress() as report:
         done = inspect_many(

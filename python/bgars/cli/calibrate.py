@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import bgars
+from bgars.cli.calibrate_camera import register as register_camera
+from bgars.cli.calibrate_station import register as register_station
 from bgars.cli.console import print_json, say, stage_progress
 from bgars.io.masks import read_mask
 from bgars.io.material_file import material_path
@@ -33,6 +35,8 @@ def register(app: typer.Typer) -> None:
     )
     group.callback()(lambda: None)
     group.command("material")(material)
+    register_station(group)
+    register_camera(group)
     app.add_typer(group)
 
 

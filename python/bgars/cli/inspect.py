@@ -13,7 +13,7 @@ import typer
 import bgars
 from bgars.cli.console import print_json, say, say_files, stage_progress, utc_now, warn
 from bgars.cli.first_check import check_first
-from bgars.cli.options import ForceOption, LotOption, MethodOption, OperatorOption, StationOption
+from bgars.cli.options import ForceOption, LotOption, MethodOption, OperatorOption, StationNameOption, StationOption
 from bgars.errors import InputError
 from bgars.extras import how_to_install, missing
 from bgars.io.atomic import FolderNames, atomic_folder
@@ -73,6 +73,7 @@ def inspect(
         ),
     ] = None,
     method: MethodOption = DEFAULT_METHOD,
+    station: StationOption = None,
     serial: Annotated[
         str,
         typer.Option(
@@ -80,7 +81,7 @@ def inspect(
         ),
     ] = "",
     lot: LotOption = "",
-    station: StationOption = "",
+    station_name: StationNameOption = "",
     operator: OperatorOption = "",
     parquet: Annotated[
         # The help is markup: a bracket that is no style is escaped.
@@ -120,15 +121,16 @@ def inspect(
 
         need_pyarrow()
     need_file(recipe)
+    need_file(station)
     need_folder(folder)
     pictures = _is_drawn(pictures, "the pictures are left out: drawing them", "matplotlib")
     page = _is_drawn(page, "report.html is left out: it", "plotly")
     with stage_progress() as report, atomic_folder(output, NAMES) as place:
         part = None if recipe is None else bgars.read_part_recipe(recipe)
-        capture = bgars.read_capture(folder)
+        capture = bgars.read_capture(folder, station=station)
         check_first(capture, force=force)
         result = bgars.inspect(capture, part, method=method, surface=page, progress=report)
-        named, identity = identity_of(capture, PartIdentity(lot=lot, station=station, operator=operator))
+        named, identity = identity_of(capture, PartIdentity(lot=lot, station=station_name, operator=operator))
         result = replace(result, serial=serial or named, identity=identity, inspected_utc=utc_now())
         files = dict(FILES)
         if pictures:

@@ -24,6 +24,14 @@ LAZY_COMMANDS = {
     "grr": ("bgars.cli.grr", "Say how well the gauge repeats: gauge R&R by analysis of variance."),
     "spc": ("bgars.cli.spc", "Chart many results over time: X-bar / S charts, Cp, Cpk, Pp, Ppk."),
     "calibrate": ("bgars.cli.calibrate", "Learn what every capture of a station shares, and keep it in a file."),
+    "init": (
+        "bgars.cli.init",
+        "Write capture.toml: from these options, or by asking on a terminal",
+    ),
+    "teach": (
+        "bgars.cli.teach",
+        "Write a part recipe from golden parts: layout, empty places, nominal sizes",
+    ),
     "simulate": ("bgars.cli.simulate", "Photograph a simulated part with known truth."),
     "experiment": ("bgars.cli.experiment", "Reproduce the paper's figures on simulated captures."),
 }

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from bgars.normal_methods import Method
 
-__all__ = ["ForceOption", "LotOption", "MethodOption", "OperatorOption", "StationOption"]
+__all__ = ["ForceOption", "LotOption", "MethodOption", "OperatorOption", "StationNameOption", "StationOption"]
 
 METHOD_HELP = (
     "reflectance: on balls, highlights included, by the material that is fitted on them, elsewhere robust-filter; "
@@ -28,5 +29,15 @@ ForceOption = Annotated[
     ),
 ]
 LotOption = Annotated[str, typer.Option(metavar="LOT", help="Lot of all parts.", show_default=False)]
-StationOption = Annotated[str, typer.Option(metavar="NAME", help="Station that took the images.", show_default=False)]
+StationNameOption = Annotated[
+    str, typer.Option(metavar="NAME", help="Name of the station that took the images.", show_default=False)
+]
 OperatorOption = Annotated[str, typer.Option(metavar="NAME", help="Who runs it.", show_default=False)]
+StationOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="station.toml",
+        help="The calibrated station (docs/station.md): its lights, response, flat field and scale are used.",
+        show_default=False,
+    ),
+]

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from bgars.cli.batch import SerialFrom, StoreOption
-from bgars.cli.options import LotOption, MethodOption, OperatorOption, StationOption
+from bgars.cli.options import LotOption, MethodOption, OperatorOption, StationNameOption
 from bgars.io.given_paths import need_path
 from bgars.line.inbox import Inbox
 from bgars.line.naming import Naming
@@ -98,7 +98,7 @@ def watch(
     method: MethodOption = DEFAULT_METHOD,
     serial_from: SerialFrom = "{serial}",
     lot: LotOption = "",
-    station: StationOption = "",
+    station_name: StationNameOption = "",
     operator: OperatorOption = "",
     most: Annotated[
         int | None, typer.Option("--stop-after", min=1, help="End after so many parts.", show_default=False)
@@ -127,7 +127,7 @@ def watch(
             done or inbox / "_done",
             failed or inbox / "_failed",
             method=method,
-            naming=Naming(serial_from, PartIdentity(lot=lot, station=station, operator=operator)),
+            naming=Naming(serial_from, PartIdentity(lot=lot, station=station_name, operator=operator)),
             notifier=Notifier(on_result, post, result_file, tcp),
             patience_s=patience,
             poll_s=poll,

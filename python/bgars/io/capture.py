@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from bgars.errors import CaptureWarning, InputError
 from bgars.io.capture_headers import Headers, read_headers
 from bgars.io.capture_images import choose_images, match
-from bgars.io.capture_lights import read_lights
+from bgars.io.capture_lights import Lights, read_lights
 from bgars.io.capture_radiometry import (
     Decoding,
     Levels,
@@ -21,13 +22,17 @@ from bgars.io.capture_radiometry import (
     subtract_offset,
 )
 from bgars.io.given_paths import need_folder
-from bgars.io.image_listing import list_folder
+from bgars.io.image_listing import Listing, list_folder
 from bgars.io.image_tags import upright
 from bgars.io.images import MAX_MEGAPIXELS, WEIGHTS
-from bgars.io.light_discovery import default_recipe
+from bgars.io.light_discovery import choose_mask, default_recipe
 from bgars.io.masks import opaque_everywhere, read_mask
 from bgars.io.recipe import RECIPE_NAME, CaptureRecipe, read_recipe
+from bgars.io.station_file import read_station
 from bgars.records import Capture, every_pixel
+from bgars.rig import LightRig
+from bgars.station_apply import with_station
+from bgars.station_record import Station
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -36,11 +41,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bgars.io.capture_lights import Lights
     from bgars.io.recipe import ChannelName
     from bgars.records import BoolArray, FloatArray, PixelArray
 
-__all__ = ["read_capture"]
+__all__ = ["read_capture", "read_unlit"]
 
 RGB = 3
 
@@ -52,6 +56,7 @@ def read_capture(
     images: Sequence[str] | None = None,
     max_megapixels: float = MAX_MEGAPIXELS,
     threads: int | None = None,
+    station: Station | str | PathLike[str] | None = None,
 ) -> Capture:
     """Read a folder of photographs, one light at a time, with the description of its lights.
 
@@ -75,6 +80,9 @@ def read_capture(
         Images whose header claims more are refused before anything is allocated.
     threads : int, optional
         Most threads to decode on; by default what ``RAYON_NUM_THREADS`` says, else one a core.
+    station : Station or path, optional
+        What is known of the station (:func:`bgars.read_station`): lights, response, flat field and scale are then
+        taken from it, one light an image in its order. By default what ``station`` in ``capture.toml`` names.
 
     Returns
     -------
@@ -101,16 +109,77 @@ def read_capture(
     listing = list_folder(folder)
     recipe_path = folder / RECIPE_NAME
     has_recipe = RECIPE_NAME in (*listing.others, *listing.folders)
-    recipe = read_recipe(recipe_path) if has_recipe else default_recipe(folder, listing, notes)
-    lights = read_lights(folder, recipe, notes)
+    if has_recipe:
+        recipe = read_recipe(recipe_path)
+    else:
+        recipe = _undescribed(folder, listing, notes, may_lack_lights=station is not None)
+    known = _station(folder, recipe, station)
+    if known is None or known.lights is None or recipe.lights is not None:
+        lights = read_lights(folder, recipe, notes)
+    else:
+        lights = _by_order(known.lights.rig, known.name)
+    capture = _load_chosen(folder, recipe, lights, listing, images, channel, max_megapixels, threads, notes)
+    for note in notes:
+        warnings.warn(f"{folder}: {note}", CaptureWarning, stacklevel=2)
+    return capture if known is None else with_station(capture, known)
+
+
+def read_unlit(folder: str | PathLike[str], *, channel: ChannelName | None = None) -> Capture:
+    """Read the images of a folder whose lights are not known yet; an even ring at 45 degrees stands in for them.
+
+    As :func:`read_capture` in all else. Where the folder does describe lights, these are read.
+    """
+    folder = need_folder(folder)
+    notes: list[str] = []
+    listing = list_folder(folder)
+    if RECIPE_NAME in listing.others:
+        recipe = read_recipe(folder / RECIPE_NAME)
+    else:
+        recipe = _undescribed(folder, listing, notes, may_lack_lights=True)
+    if recipe.lights is not None:
+        return read_capture(folder, channel=channel)
+    lights = _by_order(LightRig.ring(max(len(recipe.images or listing.images), 3)), str(folder))
+    return _load_chosen(folder, recipe, lights, listing, None, channel, MAX_MEGAPIXELS, None, notes)
+
+
+def _undescribed(folder: Path, listing: Listing, notes: list[str], *, may_lack_lights: bool) -> CaptureRecipe:
+    """The recipe of a folder without one; without lights, too, where something else knows them."""
+    try:
+        return default_recipe(folder, listing, notes)
+    except InputError:
+        if not may_lack_lights:
+            raise
+    return CaptureRecipe.model_validate({"mask": choose_mask(listing, notes)})
+
+
+def _station(folder: Path, recipe: CaptureRecipe, given: Station | str | PathLike[str] | None) -> Station | None:
+    if given is None and recipe.station is not None:
+        given = folder / recipe.station
+    return given if given is None or isinstance(given, Station) else read_station(given)
+
+
+def _by_order(rig: LightRig, source: str) -> Lights:
+    """Lights that name no images: they take them as they come."""
+    return Lights(replace(rig, files=()), np.ones((len(rig), 1)), source)
+
+
+def _load_chosen(
+    folder: Path,
+    recipe: CaptureRecipe,
+    lights: Lights,
+    listing: Listing,
+    images: Sequence[str] | None,
+    channel: ChannelName | None,
+    max_megapixels: float,
+    threads: int | None,
+    notes: list[str],
+) -> Capture:
+    """Choose the images of the lights, and read them."""
     chosen = choose_images(folder, recipe, lights, listing, notes)
     lights, names = match(folder, lights, chosen, images)
     if recipe.mask is None and chosen.mask is not None:
         recipe = recipe.model_copy(update={"mask": chosen.mask})
-    capture = _load(folder, recipe, lights, names, channel or recipe.channel, max_megapixels, threads, notes)
-    for note in notes:
-        warnings.warn(f"{folder}: {note}", CaptureWarning, stacklevel=2)
-    return capture
+    return _load(folder, recipe, lights, names, channel or recipe.channel, max_megapixels, threads, notes)
 
 
 def _load(

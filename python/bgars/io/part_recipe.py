@@ -86,9 +86,13 @@ class PartTable(StrictNumbers):
     pitch_u_um: Positive | None = Field(
         None, description="standard uncertainty of pitch_um, of the whole lattice alike; not known by default"
     )
-    depopulated: list[str] | None = Field(None, description='names of lattice places without a ball, such as ["C3"]')
+    depopulated: list[str] | None = Field(
+        None, description='lattice places without a ball, by name or as ranges, such as ["C3", "F6:K10"]'
+    )
     positions: str | None = Field(
-        None, description="instead of the lattice: CSV file with the columns name, x_um, y_um (x right, y up)"
+        None,
+        description="instead of the lattice: CSV file with the columns name, x_um, y_um, or X, Y, Diameter in mm "
+        "(x right, y up)",
     )
     diameter_um: Positive | None = Field(None, description="nominal horizontal diameter")
     height_um: Positive | None = Field(None, description="nominal height of the tops above the board")
@@ -189,7 +193,8 @@ def _layout(table: PartTable, path: Path) -> BallLayout:
         msg = f"rows x cols: must be {MAX_BALLS} balls or fewer, got {rows} x {cols}"
         raise InputError(msg)
     seen: set[str] = set()
-    for name in table.depopulated or ():
+    empty = tuple(name for entry in table.depopulated or () for name in _places_of(entry))
+    for name in empty:
         try:
             row, col = ball_place(name)
         except InputError as error:
@@ -206,7 +211,22 @@ def _layout(table: PartTable, path: Path) -> BallLayout:
     if len(seen) == rows * cols:
         msg = f"depopulated: must leave a ball, got all {len(seen)} places of the {rows} x {cols} lattice"
         raise InputError(msg)
-    return BallLayout(rows, cols, pitch_um, tuple(table.depopulated or ()))
+    return BallLayout(rows, cols, pitch_um, empty)
+
+
+def _places_of(entry: str) -> tuple[str, ...]:
+    """Names of a place, or of all places of a rectangle such as F6:K10."""
+    if ":" not in entry:
+        return (entry,)
+    try:
+        (top, left), (bottom, right) = (ball_place(name.strip()) for name in entry.split(":"))
+    except (InputError, ValueError) as error:
+        msg = f"depopulated: a range must be two names such as F6:K10, got {entry!r}"
+        raise InputError(msg) from error
+    if top > bottom or left > right or (bottom - top + 1) * (right - left + 1) > MAX_BALLS:
+        msg = f"depopulated: a range goes from its first place to its last, down and to the right, got {entry!r}"
+        raise InputError(msg)
+    return tuple(ball_name(row, col) for row in range(top, bottom + 1) for col in range(left, right + 1))
 
 
 def _check_sizes(table: PartTable, q: float | None) -> None:

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 __all__ = ["read_positions"]
 
 COLUMNS = ["name", "x_um", "y_um"]
+MILLIMETRES = ["x", "y", "diameter"]
+UM_PER_MM = 1000.0
 MAX_BALLS = 32_767
 
 
@@ -25,7 +27,8 @@ def read_positions(path: Path, diameter_um: float | None = None) -> tuple[tuple[
     Parameters
     ----------
     path : Path
-        CSV file with the header ``name,x_um,y_um``.
+        CSV file with the header ``name,x_um,y_um``; or ``X,Y,Diameter`` in millimetres, whose balls are named by their
+        line: 1, 2, ... (the diameters are checked and not used).
     diameter_um : float, optional
         Nominal diameter: places nearer to each other are refused.
 
@@ -45,6 +48,9 @@ def read_positions(path: Path, diameter_um: float | None = None) -> tuple[tuple[
     except (csv.Error, UnicodeDecodeError) as error:
         msg = f"{path}: is not a CSV table ({error})"
         raise FileFormatError(msg) from error
+    if lines and [cell.lower() for cell in lines[0]] == MILLIMETRES:
+        places = [_place_mm(path, number, cells) for number, cells in enumerate(lines[1:], start=2) if any(cells)]
+        lines = [COLUMNS, *([name, str(x_um), str(y_um)] for name, x_um, y_um in places)]
     if not lines or lines[0] != COLUMNS:
         header = ",".join(lines[0]) if lines else ""
         msg = f"{path}: line 1: must be the header {','.join(COLUMNS)}, got {header!r}"
@@ -71,6 +77,17 @@ def _place(path: Path, number: int, cells: list[str]) -> tuple[str, float, float
         msg = f"{path}: line {number}: must be a name and two finite numbers, got {','.join(cells)!r}"
         raise FileFormatError(msg) from None
     return name, x_um, y_um
+
+
+def _place_mm(path: Path, number: int, cells: list[str]) -> tuple[str, float, float]:
+    try:
+        x_mm, y_mm, diameter_mm = (float(cell) for cell in cells)
+        if not (math.isfinite(x_mm) and math.isfinite(y_mm) and math.isfinite(diameter_mm) and diameter_mm > 0):
+            raise ValueError
+    except ValueError:
+        msg = f"{path}: line {number}: must be x, y and a diameter above 0 in mm, got {','.join(cells)!r}"
+        raise FileFormatError(msg) from None
+    return str(number - 1), round(x_mm * UM_PER_MM, 6), round(y_mm * UM_PER_MM, 6)
 
 
 def _refuse_close(path: Path, places: list[tuple[str, float, float]], least_um: float) -> None:

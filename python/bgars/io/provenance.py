@@ -36,7 +36,7 @@ def capture_files(capture: Capture) -> tuple[Path, ...]:
         return capture.files
     path = capture.folder / RECIPE_NAME
     recipe = read_recipe(path) if path.is_file() else default_recipe(capture.folder, list_folder(capture.folder), [])
-    named = [RECIPE_NAME, FILENAMES if recipe.images is None else None, recipe.dark, recipe.mask]
+    named = [RECIPE_NAME, FILENAMES if recipe.images is None else None, recipe.dark, recipe.mask, recipe.station]
     if isinstance(recipe.response, TableResponse):
         named.append(recipe.response.table)
     if recipe.lights is not None:

@@ -111,6 +111,7 @@ class CaptureRecipe(Strict):
     saturation: Positive | None = None
     lights: LightsRecipe | None = None
     part: PartIdentityTable | None = None
+    station: str | None = None
 
     @field_validator("camera", mode="before")
     @classmethod

@@ -1,0 +1,118 @@
+"""The commands ``bgars calibrate response | scale``."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+import bgars
+from bgars.cli.calibrate_station import FolderArgument, JsonOption, OutputOption, keep_part, said_values, tell_findings
+from bgars.cli.console import print_json, say
+from bgars.errors import InputError
+from bgars.io.capture import read_unlit
+from bgars.station import response_from_bracket, response_from_sums, srgb_response
+from bgars.station_record import Finding
+
+__all__ = ["register"]
+
+SUMS = 3
+
+
+def register(group: typer.Typer) -> None:
+    """Add the commands to the group ``calibrate``."""
+    group.command("response")(response)
+    group.command("scale")(scale)
+
+
+def response(
+    output: OutputOption,
+    folder: Annotated[
+        Path | None,
+        typer.Argument(metavar="FOLDER", help="Images of one scene; not needed with --srgb.", show_default=False),
+    ] = None,
+    exposures: Annotated[
+        str | None,
+        typer.Option(
+            metavar="T,T,...", help="Exposure times of the images, any unit, in their order.", show_default=False
+        ),
+    ] = None,
+    sums: Annotated[
+        bool, typer.Option("--sums", help="The three images are light a, light b, and both together.")
+    ] = False,
+    srgb: Annotated[bool, typer.Option("--srgb", help="Take the sRGB curve.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Find what light a grey level stands for; says when the camera is not linear."""
+    if [exposures is not None, sums, srgb].count(True) != 1:
+        msg = "--exposures, --sums, --srgb: give one of them"
+        raise InputError(msg)
+    findings: tuple[Finding, ...] = ()
+    if srgb:
+        curve = srgb_response()
+    elif folder is None:
+        msg = "FOLDER: needed with --exposures and --sums"
+        raise InputError(msg)
+    else:
+        capture = read_unlit(folder)
+        full = capture.full_scale if math.isfinite(capture.full_scale) else float(capture.images.max())
+        if exposures is not None:
+            curve, findings = response_from_bracket(list(capture.images), _times(exposures), full)
+        else:
+            if len(capture.images) != SUMS:
+                msg = f"{folder}: --sums needs three images (a, b, both), got {len(capture.images)}"
+                raise InputError(msg)
+            curve, findings = response_from_sums(capture.images[0], capture.images[1], capture.images[2], full)
+    keep_part(output, {"response": curve}, findings)
+    if as_json:
+        values = {"levels": curve.levels.tolist(), "radiances": curve.radiances.tolist(), "gamma": curve.gamma}
+        print_json({**values, "nonlinearity": curve.nonlinearity, **said_values(findings), "file": str(output)})
+        return
+    say(
+        f"Response by {curve.source}: gamma about {curve.gamma:.2f}, {100 * curve.nonlinearity:.1f} % off a "
+        "straight line."
+    )
+    tell_findings(findings, output)
+
+
+def scale(
+    folder: FolderArgument,
+    output: OutputOption,
+    pitch_mm: Annotated[
+        float, typer.Option(metavar="MM", help="Distance of neighbouring dots or crossings.", show_default=False)
+    ],
+    u_pitch_mm: Annotated[
+        float | None,
+        typer.Option(metavar="MM", help="Its standard uncertainty; 0.01 % by default.", show_default=False),
+    ] = None,
+    target: Annotated[Literal["dots", "chessboard"], typer.Option(help="What is on the target.")] = "dots",
+    as_json: JsonOption = False,
+) -> None:
+    """Measure a pixel on a grid that lies where parts lie; says how far the lens distorts."""
+    u_um = None if u_pitch_mm is None else 1000.0 * u_pitch_mm
+    found, findings = bgars.calibrate_scale(read_unlit(folder), 1000.0 * pitch_mm, target=target, u_pitch_um=u_um)
+    keep_part(output, {"scale": found}, findings)
+    if as_json:
+        values = {"pixel_pitch_um": found.pixel_pitch_um, "pixel_pitch_u_um": found.pixel_pitch_u_um}
+        print_json(
+            {
+                **values,
+                "distortion": found.distortion,
+                "points": found.points,
+                **said_values(findings),
+                "file": str(output),
+            }
+        )
+        return
+    say(f"A pixel is {found.pixel_pitch_um:.4f} um (u {found.pixel_pitch_u_um:.2g} um), by {found.points} points.")
+    tell_findings(findings, output)
+
+
+def _times(text: str) -> list[float]:
+    try:
+        return [float(value) for value in text.split(",")]
+    except ValueError:
+        msg = f"--exposures: must be numbers with commas between, got {text!r}"
+        raise InputError(msg) from None

@@ -1,0 +1,320 @@
+"""The commands ``bgars calibrate lights | flat | response | scale | station | drift``."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+import bgars
+from bgars.cli.console import print_json, say, stage_progress, utc_now
+from bgars.errors import InputError
+from bgars.io.capture import read_unlit
+from bgars.io.station_file import is_station_file, read_station, write_station
+from bgars.station import drift as station_drift
+from bgars.station.flat import falloff_findings
+from bgars.station.page import write_station_page
+
+if TYPE_CHECKING:
+    from bgars.records import Capture
+    from bgars.station_record import Finding, LightCalibration, Station
+
+__all__ = ["FolderArgument", "JsonOption", "OutputOption", "keep_part", "register", "said_values", "tell_findings"]
+
+EXIT_MOVED = 1
+CIRCLE = 3
+
+OutputOption = Annotated[
+    Path,
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="station.toml",
+        help="Station file; made, or its part of this calibration replaced. station.html is written beside it.",
+        show_default=False,
+    ),
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")]
+FoldersArgument = Annotated[
+    list[Path],
+    typer.Argument(metavar="FOLDER...", help="Capture folders, one a place of the ball; lights need not be described."),
+]
+FolderArgument = Annotated[Path, typer.Argument(metavar="FOLDER", help="Capture folder.", show_default=False)]
+SphereOption = Annotated[
+    Literal["mirror", "matt"],
+    typer.Option(help="mirror: a bearing ball, a chrome or glossy black one. matt: a dull, light one."),
+]
+OutlineOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="COL,ROW,RADIUS",
+        help="Outline of the ball in pixels as an image viewer shows it (0,0 = middle of the first pixel), where it "
+        "cannot be found; once a folder, or several balls of one folder.",
+        show_default=False,
+    ),
+]
+NearOption = Annotated[
+    bool | None,
+    typer.Option(
+        "--near/--distant",
+        help="Positions in mm (two places of the ball or more), or directions; by default what the balls show.",
+        show_default=False,
+    ),
+]
+DiameterOption = Annotated[
+    float | None,
+    typer.Option(metavar="MM", help="Diameter of the ball: the scale where capture.toml has none.", show_default=False),
+]
+
+
+def register(group: typer.Typer) -> None:
+    """Add the commands to the group ``calibrate``."""
+    group.command("lights")(lights)
+    group.command("flat")(flat)
+    group.command("station")(station)
+    group.command("drift")(drift)
+
+
+def lights(
+    folders: FoldersArgument,
+    output: OutputOption,
+    sphere: SphereOption = "mirror",
+    outline: OutlineOption = None,
+    near: NearOption = None,
+    diameter_mm: DiameterOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Find where the lights are, on a ball (docs/station.md shows how to photograph it).
+
+    Exit code 2 where there is no ball, or a light does not show on it; nothing is written then.
+    """
+    found = _calibrate_lights([read_unlit(folder) for folder in folders], sphere, outline, near, diameter_mm)
+    keep_part(output, {"lights": found}, found.findings)
+    if as_json:
+        print_json({"bgars": bgars.__version__, **_lights_values(found), "file": str(output)})
+        return
+    _tell_lights(found)
+    tell_findings(found.findings, output)
+
+
+def flat(folder: FolderArgument, output: OutputOption, as_json: JsonOption = False) -> None:
+    """Measure how even each light is, on a flat, matt, white or grey board.
+
+    Inspection and reconstruction with that station then divide by these maps: vignetting, unequal lights and their
+    fall-off no longer bend the surface.
+    """
+    known = _existing(output)
+    found, findings = bgars.calibrate_flat(_raw(folder, known))
+    if known.lights is not None and known.scale is not None:
+        findings = (*findings, *falloff_findings(found, known.lights, known.scale.pixel_pitch_um))
+    keep_part(output, {"flat": found}, findings)
+    if as_json:
+        print_json({"degree": found.degree, "residual": found.residual, **said_values(findings), "file": str(output)})
+        return
+    say(
+        f"Even maps of {len(found.coefficients)} lights, polynomials of degree {found.degree}; "
+        f"{100 * found.residual:.2f} % is left."
+    )
+    tell_findings(findings, output)
+
+
+def station(
+    folders: FoldersArgument,
+    output: OutputOption,
+    sphere: SphereOption = "mirror",
+    outline: OutlineOption = None,
+    near: NearOption = None,
+    diameter_mm: DiameterOption = None,
+    board: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Flat board under each light.", show_default=False)
+    ] = None,
+    grid: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Grid of dots, or a chessboard.", show_default=False)
+    ] = None,
+    grid_pitch_mm: Annotated[
+        float | None, typer.Option(metavar="MM", help="Pitch of the grid.", show_default=False)
+    ] = None,
+    target: Annotated[Literal["dots", "chessboard"], typer.Option(help="Kind of the grid.")] = "dots",
+    name: Annotated[str, typer.Option(help="Name of the station.")] = "station",
+    as_json: JsonOption = False,
+) -> None:
+    """Do all at once: scale from a grid, lights from a ball, evenness from a board."""
+    if (grid is None) != (grid_pitch_mm is None):
+        msg = "--grid and --grid-pitch-mm: give both or none"
+        raise InputError(msg)
+    parts: dict[str, Any] = {}
+    findings: list[Finding] = []
+    with stage_progress() as report:
+        if grid is not None and grid_pitch_mm is not None:
+            parts["scale"], said = bgars.calibrate_scale(read_unlit(grid), 1000.0 * grid_pitch_mm, target=target)
+            findings += said
+        report("scale", 1.0)
+        captures = [read_unlit(folder) for folder in folders]
+        if "scale" in parts:
+            captures = [replace(one, pixel_pitch_um=parts["scale"].pixel_pitch_um) for one in captures]
+        found = _calibrate_lights(captures, sphere, outline, near, diameter_mm)
+        parts["lights"] = found
+        findings += found.findings
+        report("lights", 1.0)
+        if board is not None:
+            parts["flat"], said = bgars.calibrate_flat(read_unlit(board))
+            findings += said
+            if "scale" in parts:
+                findings += falloff_findings(parts["flat"], found, parts["scale"].pixel_pitch_um)
+        report("flat", 1.0)
+    keep_part(output, parts, tuple(findings), name=name)
+    if as_json:
+        print_json(
+            {"bgars": bgars.__version__, **_lights_values(found), **said_values(tuple(findings)), "file": str(output)}
+        )
+        return
+    _tell_lights(found)
+    if "scale" in parts:
+        scale = parts["scale"]
+        say(f"A pixel is {scale.pixel_pitch_um:.4f} um (u {scale.pixel_pitch_u_um:.2g} um).")
+    tell_findings(tuple(findings), output)
+
+
+def drift(
+    folder: FolderArgument,
+    station: Annotated[Path, typer.Option(metavar="station.toml", help="The station.", show_default=False)],
+    reference: Annotated[
+        Literal["mirror", "matt", "flat"] | None,
+        typer.Option(help="What is in view; by default the kind of ball of the calibration.", show_default=False),
+    ] = None,
+    outline: OutlineOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Say what moved since the calibration, on a new capture of its reference.
+
+    Exit code 0: nothing beyond its limit. 1: something moved. 2: wrong use, or the reference cannot be read.
+    """
+    known = read_station(station)
+    capture = read_unlit(folder)
+    circles = _circles(outline, [capture])
+    found = station_drift(known, capture, reference=reference, outline=None if circles is None else circles[0])
+    moved = [finding for finding in found if finding.severity == "fail"]
+    if as_json:
+        print_json({"station": str(station), "moved": len(moved), **said_values(found)})
+    else:
+        for finding in found:
+            if finding.severity != "note":
+                say(f"{finding.severity}: {finding.message}")
+        say(
+            f"{known.name}: {len(moved)} beyond the limit of {len(found)} comparisons"
+            if moved
+            else f"{known.name}: nothing moved"
+        )
+    if moved:
+        raise typer.Exit(EXIT_MOVED)
+
+
+def _calibrate_lights(
+    captures: list[Capture], sphere: str, outline: list[str] | None, near: bool | None, diameter_mm: float | None
+) -> LightCalibration:
+    circles = _circles(outline, captures)
+    with stage_progress() as report:
+        return bgars.calibrate_lights(
+            captures,
+            sphere,  # type: ignore[arg-type]
+            circles[0] if circles is not None and len(captures) == 1 else circles,
+            near=near,
+            diameter_um=None if diameter_mm is None else 1000.0 * diameter_mm,
+            progress=lambda fraction: report("lights", fraction),
+        )
+
+
+def _circles(outline: list[str] | None, captures: list[Capture]) -> list[list[list[float]]] | None:
+    """Circles x, y, radius from the image centre, as a list a capture."""
+    if not outline:
+        return None
+    found = []
+    height, width = captures[0].images.shape[1:]
+    for text in outline:
+        try:
+            col, row, radius = (float(value) for value in text.split(","))
+        except ValueError:
+            msg = f"--outline: must be COL,ROW,RADIUS, got {text!r}"
+            raise InputError(msg) from None
+        found.append([col + 0.5 - width / 2.0, height / 2.0 - row - 0.5, radius])
+    if len(captures) == 1:
+        return [found]
+    if len(found) != len(captures):
+        msg = f"--outline: give one for each of the {len(captures)} folders, got {len(found)}"
+        raise InputError(msg)
+    return [[circle] for circle in found]
+
+
+def _existing(path: Path) -> Station:
+    if path.suffix.lower() != ".toml":
+        msg = f"{path}: a station file must end in .toml"
+        raise InputError(msg)
+    if not path.exists():
+        return bgars.Station(path.stem)
+    if not is_station_file(path):
+        msg = f"{path}: is there already and no station file; name another one"
+        raise InputError(msg)
+    return read_station(path)
+
+
+def _raw(folder: Path, known: Station) -> Capture:
+    """A capture with the response that is known already."""
+    capture = read_unlit(folder)
+    return bgars.with_station(capture, bgars.Station(known.name, response=known.response))
+
+
+def keep_part(output: Path, parts: dict[str, Any], findings: tuple[Finding, ...], name: str | None = None) -> None:
+    """Write the station with its new parts, and its page."""
+    known = _existing(output)
+    codes = {finding.code for finding in findings}
+    kept = tuple(finding for finding in known.findings if finding.code not in codes)
+    new = replace(known, **parts, calibrated_utc=utc_now(), findings=(*kept, *findings), name=name or known.name)
+    write_station(new, output)
+    write_station_page(new, output.with_suffix(".html"))
+
+
+def _lights_values(found: LightCalibration) -> dict[str, Any]:
+    rig = found.rig
+    return {
+        "sphere": found.sphere,
+        "directions": rig.directions.tolist(),
+        "positions_mm": None if rig.positions_um is None else (rig.positions_um / 1000.0).tolist(),
+        "intensities": rig.intensities.tolist(),
+        "u_deg": found.u_deg.tolist(),
+        "u_own_deg": found.u_own_deg.tolist(),
+        "u_common_deg": found.u_common_deg.tolist(),
+        "outlines_px": [ball.outline_px.tolist() for ball in found.balls],
+        "residual_px": found.residual_px,
+        **said_values(found.findings),
+    }
+
+
+def said_values(findings: tuple[Finding, ...]) -> dict[str, Any]:
+    """Findings as plain values."""
+    return {"findings": [finding.to_dict() for finding in findings]}
+
+
+def _tell_lights(found: LightCalibration) -> None:
+    rig = found.rig
+    kind = "near lights, positions in mm" if rig.is_near else "distant lights"
+    say(f"{len(rig)} {kind}, on {len(found.balls)} {found.sphere} ball(s):")
+    say("  light  azimuth  elevation   u (deg)   own  common  strength" + ("   x, y, z (mm)" if rig.is_near else ""))
+    for index in range(len(rig)):
+        place = (
+            ""
+            if rig.positions_um is None
+            else "   " + ", ".join(f"{value / 1000.0:.2f}" for value in rig.positions_um[index])
+        )
+        say(
+            f"  {index:>5}  {rig.azimuths_deg[index]:7.2f}  {rig.elevations_deg[index]:9.2f}  {found.u_deg[index]:8.3f}"
+            f" {found.u_own_deg[index]:5.3f}   {found.u_common_deg[index]:5.3f}  {rig.intensities[index]:8.3f}{place}"
+        )
+
+
+def tell_findings(findings: tuple[Finding, ...], output: Path) -> None:
+    """Say what was noticed, and where the result is."""
+    for finding in findings:
+        say(f"{finding.severity}: {finding.message}")
+    say(f"Written: {output}, and its page {output.with_suffix('.html')}")

@@ -1,0 +1,65 @@
+"""The command ``bgars teach``: a part recipe from golden parts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import bgars
+from bgars.cli.console import print_json, say, stage_progress
+from bgars.cli.options import StationOption
+from bgars.errors import InputError
+from bgars.io.atomic import atomic_file
+from bgars.station.teach import teach as learn
+from bgars.station.teach import teach_text
+
+__all__ = ["register"]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("teach")(teach)
+
+
+def teach(
+    golden: Annotated[
+        list[Path],
+        typer.Argument(metavar="GOLDEN...", help="Capture folders of parts that are good.", show_default=False),
+    ],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="part.toml", help="The recipe; made.", show_default=False)
+    ],
+    name: Annotated[str, typer.Option(help="Name of the part; the file's name by default.", show_default=False)] = "",
+    station: StationOption = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a recipe that is there.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
+    ] = False,
+) -> None:
+    """Write a part recipe from golden parts: layout, empty places, nominal sizes, and limits by a rule the file states.
+
+    The limits are what these parts keep with room; a drawing's limits are better. Exit code 2 where the parts differ.
+    """
+    if output.exists() and not force:
+        msg = f"{output}: is there already; --force replaces it"
+        raise InputError(msg)
+    results = []
+    with stage_progress() as report:
+        for index, folder in enumerate(golden):
+            results.append(bgars.inspect(bgars.read_capture(folder, station=station)))
+            report("golden", (index + 1) / len(golden))
+    taught = learn(results, name or output.stem)
+    with atomic_file(output) as place:
+        place.write_text(teach_text(taught), encoding="utf-8")
+        recipe = bgars.read_part_recipe(place)
+    if as_json:
+        print_json({**recipe.to_dict(), "file": str(output), "parts": taught.parts})
+        return
+    say(
+        f"{taught.name}: {taught.rows} x {taught.cols} places, {len(taught.depopulated)} of them empty, pitch "
+        f"{taught.pitch_um:.1f} um,"
+    )
+    say(f"balls of {taught.diameter_um:.1f} um, {taught.height_um:.1f} um high, from {taught.parts} part(s).")
+    say(f"Written: {output}. Read its limits before you use it.")

@@ -1,0 +1,300 @@
+"""The file ``station.toml``: what a calibration found, for every later capture of the same station."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from bgars.errors import FileFormatError, InputError
+from bgars.io.atomic import atomic_file
+from bgars.io.strict_toml import Strict, checked, read_values
+from bgars.rig import LightRig
+from bgars.station_record import Finding, FlatField, LightCalibration, ResponseCurve, Scale, Station
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+__all__ = ["STATION_FORMAT", "is_station_file", "read_station", "station_keys", "write_station"]
+
+STATION_FORMAT = "bgars-station"
+STATION_VERSION = 1
+MM = 1000.0
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Vector = tuple[Number, Number, Number]
+
+
+class LightsTable(Strict):
+    """The ``[lights]`` table."""
+
+    sphere: str = Field("", description="what was in view: mirror or matt")
+    directions: list[Vector] | None = Field(None, description="unit vectors from the board to the lights, one an image")
+    positions_mm: list[Vector] | None = Field(None, description="or positions, origin = image centre on the board")
+    intensities: list[Positive] = Field(description="relative, mean 1")
+    u_deg: list[Positive] = Field(description="standard uncertainty of each direction, on either axis across it")
+    u_own_deg: list[NotNegative] = Field(description="its part of each light alone")
+    u_common_deg: list[NotNegative] = Field(
+        description="its part that moves all lights together: outlines of the balls"
+    )
+    u_positions_mm: list[Vector] | None = Field(None, description="standard uncertainties of positions_mm")
+    u_intensities: list[NotNegative] | None = Field(None, description="of intensities; absent: they were not measured")
+    lamp_deg: NotNegative | None = Field(None, description="angle of a whole lamp, where it was measured")
+    residual_px: NotNegative = Field(0.0, description="root mean square of highlights against the fit")
+    balls: int = Field(0, description="balls, or places of a ball")
+
+    @model_validator(mode="after")
+    def _one_a_light(self) -> LightsTable:
+        if (self.directions is None) == (self.positions_mm is None):
+            msg = "needs exactly one of directions, positions_mm"
+            raise ValueError(msg)
+        count = len(self.directions or self.positions_mm or ())
+        for name in ("intensities", "u_deg", "u_own_deg", "u_common_deg", "u_positions_mm", "u_intensities"):
+            values = getattr(self, name)
+            if values is not None and len(values) != count:
+                msg = f"{name}: must have one entry for each of the {count} lights, got {len(values)}"
+                raise ValueError(msg)
+        return self
+
+
+class FlatTable(Strict):
+    """The ``[flat]`` table."""
+
+    file: str = Field(description="coefficients of the gain maps, .npz, relative to station.toml")
+    sha256: str = Field(description="checksum of that file")
+    degree: Annotated[int, Field(ge=0, le=20)] = Field(description="of the polynomials")
+    size_px: tuple[int, int] = Field(description="height and width of the images")
+    residual: NotNegative = Field(0.0, description="what is left of the board's levels, a ratio")
+
+
+class ResponseTable(Strict):
+    """The ``[response]`` table."""
+
+    levels: list[NotNegative] = Field(description="grey levels, 0 to 1 = full scale")
+    radiances: list[NotNegative] = Field(description="the light that they stand for, 1 at full scale")
+    u_radiance: NotNegative = Field(0.0, description="standard uncertainty, of full scale")
+    source: str = Field("", description="how it was found")
+
+    @model_validator(mode="after")
+    def _grows(self) -> ResponseTable:
+        least = 2
+        if len(self.levels) != len(self.radiances) or len(self.levels) < least:
+            msg = (
+                f"levels and radiances: must be equally many, 2 or more, got {len(self.levels)} and "
+                f"{len(self.radiances)}"
+            )
+            raise ValueError(msg)
+        if min(np.diff(self.levels)) <= 0 or min(np.diff(self.radiances)) <= 0:
+            msg = "levels and radiances: must grow from entry to entry"
+            raise ValueError(msg)
+        return self
+
+
+class ScaleTable(Strict):
+    """The ``[scale]`` table."""
+
+    pixel_pitch_um: Positive = Field(description="size of a pixel on the board")
+    pixel_pitch_u_um: Positive = Field(description="its standard uncertainty")
+    tilt_deg: Number | None = Field(None, description="of the grid against the image plane, where it shows")
+    rotation_deg: Number = Field(0.0, description="of the grid in the image")
+    distortion: Number = Field(0.0, description="radial displacement at the corner, of its distance from the centre")
+    residual_px: NotNegative = Field(0.0, description="of the points of the grid")
+    points: int = Field(0, description="of the grid")
+    camera_distance_mm: Positive | None = Field(None, description="where it is known")
+
+
+class FindingTable(Strict):
+    """An entry of ``[[findings]]``."""
+
+    severity: Literal["note", "doubt", "fail"]
+    message: str
+    code: str = ""
+
+
+class StationFile(Strict):
+    """The whole file."""
+
+    format: Literal["bgars-station"] = Field(description='"bgars-station"')
+    version: Literal[1] = Field(description="1")
+    name: str = Field("station", description="of the station")
+    calibrated_utc: str = Field("", description="when, ISO 8601")
+    bgars: str = Field("", description="version that wrote it")
+    lights: LightsTable | None = None
+    flat: FlatTable | None = None
+    response: ResponseTable | None = None
+    scale: ScaleTable | None = None
+    findings: list[FindingTable] = Field(default_factory=list, description="what the calibrations noticed")
+
+
+def is_station_file(path: str | PathLike[str]) -> bool:
+    """True where a file says that it is a station, whatever its name."""
+    try:
+        return read_values(Path(path)).get("format") == STATION_FORMAT
+    except FileFormatError:
+        return False
+
+
+def station_keys() -> list[tuple[str, str]]:
+    """Return every key of the file and what it means, for the documentation."""
+    tables: dict[str, type[Strict]] = {
+        "lights": LightsTable,
+        "flat": FlatTable,
+        "response": ResponseTable,
+        "scale": ScaleTable,
+    }
+    keys = [(name, str(entry.description)) for name, entry in StationFile.model_fields.items() if name not in tables]
+    for table, model in tables.items():
+        keys += [(f"{table}.{name}", str(entry.description)) for name, entry in model.model_fields.items()]
+    return keys
+
+
+def read_station(path: str | PathLike[str]) -> Station:
+    """Read and check a station file.
+
+    Raises
+    ------
+    FileFormatError
+        The file is missing, no TOML, not a station, or its flat field is missing or not the one it was written with.
+    InputError
+        An unknown key (the nearest known one is named), a wrong type or a value out of range.
+
+    Examples
+    --------
+    >>> import bgars, tempfile, pathlib
+    >>> place = pathlib.Path(tempfile.mkdtemp()) / "station.toml"
+    >>> bgars.write_station(bgars.Station("line 3", scale=bgars.Scale(3.4, 0.002)), place)
+    >>> bgars.read_station(place).scale.pixel_pitch_um
+    3.4
+    """
+    path = Path(path)
+    values = read_values(path)
+    if values.get("format") != STATION_FORMAT:
+        msg = f'{path}: is not a station file: format must be "{STATION_FORMAT}", got {values.get("format")!r}'
+        raise FileFormatError(msg)
+    table = checked(StationFile, values, path)
+    try:
+        lights = None if table.lights is None else _lights(table.lights)
+    except InputError as error:
+        msg = f"{path}: lights: {error}"
+        raise InputError(msg) from None
+    scale = table.scale
+    response = table.response
+    return Station(
+        name=table.name,
+        lights=lights,
+        flat=None if table.flat is None else _flat(path, table.flat),
+        response=None
+        if response is None
+        else ResponseCurve(
+            np.array(response.levels), np.array(response.radiances), response.u_radiance, response.source
+        ),
+        scale=None
+        if scale is None
+        else Scale(**{**scale.model_dump(), "tilt_deg": math.nan if scale.tilt_deg is None else scale.tilt_deg}),
+        calibrated_utc=table.calibrated_utc,
+        findings=tuple(Finding(one.severity, one.message, one.code) for one in table.findings),
+    )
+
+
+def _lights(table: LightsTable) -> LightCalibration:
+    if table.positions_mm is not None:
+        rig = LightRig.from_positions(
+            np.array(table.positions_mm) * MM, intensities=table.intensities, u_deg=table.u_deg
+        )
+    else:
+        rig = LightRig.from_directions(np.array(table.directions), intensities=table.intensities, u_deg=table.u_deg)
+    u_mm = table.u_positions_mm
+    return LightCalibration(
+        rig=rig,
+        u_deg=np.array(table.u_deg),
+        u_own_deg=np.array(table.u_own_deg),
+        u_common_deg=np.array(table.u_common_deg),
+        sphere=table.sphere,
+        balls=(),
+        residual_px=table.residual_px,
+        u_positions_um=None if u_mm is None else np.array(u_mm) * MM,
+        u_intensities=None if table.u_intensities is None else np.array(table.u_intensities),
+        lamp_deg=math.nan if table.lamp_deg is None else table.lamp_deg,
+    )
+
+
+def _flat(path: Path, table: FlatTable) -> FlatField:
+    file = path.parent / table.file
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        msg = f"{path}: flat.file: {file} cannot be read ({error.strerror})"
+        raise FileFormatError(msg) from error
+    if hashlib.sha256(content).hexdigest() != table.sha256:
+        msg = f"{path}: flat.file: {file} is not the one that was calibrated (its checksum differs)"
+        raise FileFormatError(msg)
+    with np.load(file, allow_pickle=False) as archive:
+        return FlatField(archive["coefficients"], table.degree, table.size_px, table.residual)
+
+
+def write_station(station: Station, path: str | PathLike[str]) -> None:
+    """Write a station file, and its flat field beside it as ``NAME.flat.npz``.
+
+    Raises
+    ------
+    FileFormatError
+        The folder is missing or not writable.
+    """
+    path = Path(path)
+    lines = [f'format = "{STATION_FORMAT}"', f"version = {STATION_VERSION}", f"name = {json.dumps(station.name)}"]
+    lines += [f"calibrated_utc = {json.dumps(station.calibrated_utc)}", f"bgars = {json.dumps(version('bgars'))}"]
+    if station.lights is not None:
+        lines += _table("lights", _lights_values(station.lights))
+    if station.flat is not None:
+        file = path.with_name(f"{path.stem}.flat.npz")
+        with atomic_file(file) as place, place.open("wb") as stream:
+            np.savez(stream, coefficients=station.flat.coefficients)
+        digest = hashlib.sha256(file.read_bytes()).hexdigest()
+        flat = station.flat
+        values = {"file": file.name, "sha256": digest, "degree": flat.degree, "size_px": list(flat.size_px)}
+        lines += _table("flat", {**values, "residual": flat.residual})
+    if station.response is not None:
+        curve = station.response
+        values = {"levels": curve.levels.round(6).tolist(), "radiances": curve.radiances.tolist()}
+        lines += _table("response", {**values, "u_radiance": curve.u_radiance, "source": curve.source})
+    if station.scale is not None:
+        lines += _table("scale", dict(vars(station.scale)))
+    for finding in station.findings:
+        lines += ["", "[[findings]]", f"severity = {json.dumps(finding.severity)}"]
+        lines += [f"code = {json.dumps(finding.code)}", f"message = {json.dumps(finding.message)}"]
+    with atomic_file(path) as place:
+        place.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _lights_values(lights: LightCalibration) -> dict[str, Any]:
+    rig = lights.rig
+    places = {"directions": rig.directions.tolist()}
+    if rig.positions_um is not None:
+        places = {"positions_mm": (rig.positions_um / MM).round(6).tolist()}
+    return {
+        "sphere": lights.sphere,
+        **places,
+        "intensities": rig.intensities.tolist(),
+        "u_deg": lights.u_deg.tolist(),
+        "u_own_deg": lights.u_own_deg.tolist(),
+        "u_common_deg": lights.u_common_deg.tolist(),
+        "u_positions_mm": None if lights.u_positions_um is None else (lights.u_positions_um / MM).tolist(),
+        "u_intensities": None if lights.u_intensities is None else lights.u_intensities.tolist(),
+        "lamp_deg": lights.lamp_deg,
+        "residual_px": lights.residual_px,
+        "balls": len(lights.balls),
+    }
+
+
+def _table(name: str, values: dict[str, Any]) -> list[str]:
+    """A table of TOML; JSON's numbers, texts and arrays are TOML's, too. None and NaN are left out."""
+    kept = {key: value for key, value in values.items() if value is not None and value == value}  # noqa: PLR0124 - NaN
+    return ["", f"[{name}]", *(f"{key} = {json.dumps(value)}" for key, value in kept.items())]

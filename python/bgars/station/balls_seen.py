@@ -1,0 +1,176 @@
+"""Reference balls of a capture: where their outlines are, and what is wrong with them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bgars.errors import CalibrationError, InputError
+from bgars.station.matt_lights import shading_misfit
+from bgars.station.outline import Outline, as_outline, find_outline, refine_outline
+from bgars.station_record import Finding
+
+if TYPE_CHECKING:
+    from bgars.records import Capture
+    from bgars.station.levels import Levels
+
+__all__ = ["given_outlines", "outlines_of"]
+
+Array = NDArray[np.float64]
+
+WRONG_SIGMAS, WRONG_SHARE = 4.0, 0.01
+"""A stated radius that differs by more from what the images show is doubted."""
+SOFT_PX = 2.5
+"""Width of an edge from which on a ball is out of focus."""
+SOFT_SHARE = 0.03
+MATT_FLOOR_PX = 0.25
+"""Shading of a matt ball runs into its edge."""
+NOT_SEEN_U_PX = 0.5
+"""Uncertainty of a stated outline that the images do not show."""
+NOT_A_DISC = 0.1
+LEAST_RADIUS_PX = 12.0
+
+
+def given_outlines(outline: ArrayLike | None) -> Array | None:
+    """Return (N, 3) circles as a caller gives them, one or several.
+
+    Raises
+    ------
+    InputError
+        Another shape, or a radius that is not above 0.
+    """
+    if outline is None:
+        return None
+    circles = np.atleast_2d(np.asarray(outline, dtype=np.float64))
+    if circles.ndim != 2 or circles.shape[1] != 3:  # noqa: PLR2004 - x, y, radius
+        msg = f"outline: must be (x, y, radius) or have shape (N, 3), got {circles.shape}"
+        raise InputError(msg)
+    if not (np.isfinite(circles).all() and (circles[:, 2] > 0).all()):
+        msg = f"outline: must be finite with a radius above 0, got {circles.tolist()}"
+        raise InputError(msg)
+    return circles
+
+
+def outlines_of(
+    capture: Capture, levels: Levels, given: Array | None, *, matt: bool
+) -> tuple[list[Outline], list[Finding]]:
+    """Return the outlines of the balls in view, measured where the images show them.
+
+    Raises
+    ------
+    CalibrationError
+        No ball is found, or it is cut off by the edge of the image.
+    """
+    pictures = _pictures(levels)
+    height, width = pictures[0].shape
+    findings: list[Finding] = []
+    outlines: list[Outline] = []
+    if given is None:
+        start = _disc_of_mask(capture)
+        found = (
+            find_outline(pictures, partial(shading_misfit, levels) if matt else None)
+            if start is None
+            else (refine_outline(pictures, start) or as_outline(start))
+        )
+        if found is None:
+            msg = (
+                f"{capture.name}: no ball found: no sharp circle in the images (out of focus, or of the level of its "
+                "background); photograph it again, or give its outline"
+            )
+            raise CalibrationError(msg)
+        outlines.append(found)
+    for index, circle in enumerate(() if given is None else given):
+        seen = refine_outline(pictures, circle)
+        name = "outline" if given is None or len(given) == 1 else f"outline {index}"
+        if seen is None or seen.arc < 0.5:  # noqa: PLR2004 - half of it
+            outlines.append(as_outline(circle, NOT_SEEN_U_PX))
+            findings.append(
+                Finding("note", f"{capture.name}: {name}: not seen in the images, taken as stated", "outline-unseen")
+            )
+            continue
+        off = np.abs(seen.circle_px - circle)
+        allowed = max(WRONG_SHARE * circle[2], WRONG_SIGMAS * math.hypot(seen.u_radius_px, NOT_SEEN_U_PX))
+        if off.max() > allowed:
+            findings.append(
+                Finding(
+                    "doubt",
+                    f"{capture.name}: {name}: stated radius {circle[2]:.2f} px at ({circle[0]:.1f}, {circle[1]:.1f}), "
+                    f"the images show {seen.radius_px:.2f} px at ({seen.x_px:.1f}, {seen.y_px:.1f})",
+                    "wrong-outline",
+                    float(off.max()),
+                    allowed,
+                    "px",
+                )
+            )
+            u_px = np.maximum(off, NOT_SEEN_U_PX)
+            outlines.append(replace(as_outline(circle), u_centre_px=float(u_px[:2].max()), u_radius_px=float(u_px[2])))
+        else:
+            outlines.append(seen)
+    for index, outline in enumerate(outlines):
+        findings += _judge(capture, outline, height, width)
+        if matt and not outline.given:
+            u_radius = math.hypot(outline.u_radius_px, MATT_FLOOR_PX)
+            outlines[index] = Outline(
+                outline.x_px,
+                outline.y_px,
+                outline.radius_px,
+                outline.u_centre_px,
+                u_radius,
+                outline.edge_px,
+                outline.arc,
+            )
+    return outlines, findings
+
+
+def _judge(capture: Capture, outline: Outline, height: int, width: int) -> list[Finding]:
+    if not outline.inside(height, width):
+        msg = (
+            f"{capture.name}: the ball is cut off: radius {outline.radius_px:.1f} px at ({outline.x_px:.1f}, "
+            f"{outline.y_px:.1f}) from the middle of an image of {width} x {height} pixels"
+        )
+        raise CalibrationError(msg)
+    if outline.radius_px < LEAST_RADIUS_PX:
+        msg = (
+            f"{capture.name}: the ball is too small: its radius must be {LEAST_RADIUS_PX:g} px or more, got "
+            f"{outline.radius_px:.1f}"
+        )
+        raise CalibrationError(msg)
+    limit = max(SOFT_PX, SOFT_SHARE * outline.radius_px)
+    if outline.edge_px > limit:
+        return [
+            Finding(
+                "doubt",
+                f"{capture.name}: the ball is out of focus: its edge is {outline.edge_px:.1f} px wide "
+                f"(standard deviation), at most {limit:.1f} is sharp",
+                "out-of-focus",
+                outline.edge_px,
+                limit,
+                "px",
+            )
+        ]
+    return []
+
+
+def _pictures(levels: Levels) -> list[Array]:
+    mean = levels.images.mean(axis=0)
+    return [mean, levels.images.max(axis=0), np.log(np.maximum(mean, 0.0) + 2.0 * levels.noise)]
+
+
+def _disc_of_mask(capture: Capture) -> Array | None:
+    """Circle of a mask that is a disc; None for any other mask, or one of all pixels."""
+    mask = capture.mask
+    if mask.all():
+        return None
+    height, width = mask.shape
+    rows, cols = np.nonzero(mask)
+    radius = math.sqrt(len(rows) / math.pi)
+    row, col = rows.mean(), cols.mean()
+    inside = np.hypot(rows - row, cols - col) <= radius
+    if 1.0 - inside.mean() > NOT_A_DISC / 2.0:
+        return None
+    return np.array([col + 0.5 - width / 2.0, height / 2.0 - row - 0.5, radius])

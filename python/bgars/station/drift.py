@@ -1,0 +1,143 @@
+"""What moved since a station was calibrated: the same reference, photographed again."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bgars.errors import InputError
+from bgars.light_names import light_name
+from bgars.station.flat import calibrate_flat
+from bgars.station.lights import calibrate_lights
+from bgars.station_apply import flat_maps
+from bgars.station_record import Finding, Severity
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from bgars.records import Capture
+    from bgars.station_record import Station
+
+__all__ = ["drift"]
+
+COVERAGE = 2.0
+"""Standard uncertainties, of both calibrations together, that a difference may have."""
+LIMIT_DEG, LIMIT_INTENSITY, LIMIT_EVENNESS = 0.5, 0.05, 0.03
+"""What may change beside that: directions in degrees, intensities and evenness as shares."""
+
+
+def drift(
+    station: Station,
+    capture: Capture,
+    *,
+    reference: str | None = None,
+    outline: ArrayLike | None = None,
+    limit_deg: float = LIMIT_DEG,
+    limit_intensity: float = LIMIT_INTENSITY,
+) -> tuple[Finding, ...]:
+    """Compare a station with a new capture of its reference.
+
+    Parameters
+    ----------
+    station : Station
+        As calibrated.
+    capture : Capture
+        The reference now, read without the station's corrections.
+    reference : {"mirror", "matt", "flat"}, optional
+        What is in view; by default the ball that the station's lights were calibrated with, else a flat board.
+    outline : (3,) array_like, optional
+        Of the ball; see :func:`bgars.calibrate_lights`.
+    limit_deg, limit_intensity : float
+        What a light may move, and change in strength (a share), beside twice its uncertainty.
+
+    Returns
+    -------
+    tuple of Finding
+        One for each light and quantity: "fail" beyond the limit, "note" within; `value` is in `unit`.
+
+    Raises
+    ------
+    InputError
+        The station has no such calibration, or another number of lights.
+    CalibrationError
+        See :func:`bgars.calibrate_lights` and :func:`bgars.calibrate_flat`.
+    """
+    kind = reference or (station.lights.sphere if station.lights is not None else "flat")
+    if kind == "flat":
+        return _even(station, capture, limit_intensity)
+    if station.lights is None:
+        msg = f"station: {station.name} has no calibrated lights to compare with"
+        raise InputError(msg)
+    before = station.lights
+    if len(capture.images) != len(before.rig):
+        msg = f"{capture.name}: {len(capture.images)} images, but {station.name} has {len(before.rig)} lights"
+        raise InputError(msg)
+    now = calibrate_lights(capture, kind, outline, near=False)  # type: ignore[arg-type]
+    found = [*now.findings]
+    seen_from = _origins(station, now.balls[0].outline_px, capture)
+    turn_deg = np.degrees(
+        2.0 * np.arcsin(np.clip(np.linalg.norm(now.rig.directions - seen_from, axis=1) / 2.0, 0.0, 1.0))
+    )
+    u_deg = np.hypot(before.u_deg, now.u_deg) * math.sqrt(2.0)
+    measured = before.u_intensities is not None and now.u_intensities is not None
+    change = (
+        now.rig.intensities / now.rig.intensities.mean() / (before.rig.intensities / before.rig.intensities.mean())
+        - 1.0
+    )
+    for index in range(len(before.rig)):
+        name = light_name(index, capture.files)
+        limit = limit_deg + COVERAGE * float(u_deg[index])
+        moved = float(turn_deg[index])
+        words = f"{name}: moved by {moved:.2f} deg since calibration (limit {limit:.2f} deg)"
+        found.append(Finding("fail" if moved > limit else "note", words, "light-moved", moved, limit, "deg", index))
+        if measured and before.u_intensities is not None and now.u_intensities is not None:
+            limit = limit_intensity + COVERAGE * math.hypot(before.u_intensities[index], now.u_intensities[index])
+            words = (
+                f"{name}: {100 * change[index]:+.1f} % in strength against the other lights (limit {100 * limit:.1f} %)"
+            )
+            severity: Severity = "fail" if abs(change[index]) > limit else "note"
+            found.append(Finding(severity, words, "light-strength", float(change[index]), limit, "", index))
+    return tuple(found)
+
+
+def _origins(station: Station, outline_px: np.ndarray, capture: Capture) -> np.ndarray:
+    """(L, 3) directions of the station's lights as the ball sees them."""
+    rig = station.lights.rig if station.lights is not None else capture.rig
+    pitch_um = capture.pixel_pitch_um or (station.scale.pixel_pitch_um if station.scale else None)
+    if rig.positions_um is None or pitch_um is None:
+        return rig.directions
+    x, y, radius = outline_px * pitch_um
+    way = rig.positions_um - np.array([x, y, radius])
+    # A light is seen from its highlight, half way between the top of the ball and the light's side of it.
+    way = way - 0.5 * radius * (way / np.linalg.norm(way, axis=1, keepdims=True) + [0.0, 0.0, 1.0])
+    directions: np.ndarray = way / np.linalg.norm(way, axis=1, keepdims=True)
+    return directions
+
+
+def _even(station: Station, capture: Capture, limit_intensity: float) -> tuple[Finding, ...]:
+    """Compare the flat board: strength of each light against the others, and its evenness."""
+    if station.flat is None:
+        msg = f"station: {station.name} has no flat field to compare with"
+        raise InputError(msg)
+    if len(capture.images) != len(station.flat.coefficients) or capture.mask.shape != tuple(station.flat.size_px):
+        msg = f"{capture.name}: other images than the flat field of {station.name}"
+        raise InputError(msg)
+    now, said = calibrate_flat(capture)
+    found = [*said]
+    old, new = station.flat.coefficients[:, 0], now.coefficients[:, 0]
+    change = new / new.mean() / (old / old.mean()) - 1.0
+    for index in range(len(new)):
+        name = light_name(index, capture.files)
+        words = (
+            f"{name}: {100 * change[index]:+.1f} % in strength against the other lights (limit "
+            f"{100 * limit_intensity:.1f} %)"
+        )
+        severity: Severity = "fail" if abs(change[index]) > limit_intensity else "note"
+        found.append(Finding(severity, words, "light-strength", float(change[index]), limit_intensity, "", index))
+        uneven = float(np.abs(flat_maps(now, index) / flat_maps(station.flat, index) - 1.0).max())
+        words = f"{name}: its evenness changed by {100 * uneven:.1f} % (limit {100 * LIMIT_EVENNESS:.1f} %)"
+        severity = "fail" if uneven > LIMIT_EVENNESS else "note"
+        found.append(Finding(severity, words, "evenness", uneven, LIMIT_EVENNESS, "", index))
+    return tuple(found)

@@ -1,0 +1,191 @@
+"""How even the lights are: a flat white or grey board under each of them, as smooth maps."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bgars.errors import CalibrationError
+from bgars.light_names import light_name
+from bgars.station.levels import linear_levels
+from bgars.station_apply import flat_maps
+from bgars.station_record import Finding, FlatField
+
+if TYPE_CHECKING:
+    from bgars.records import Capture
+    from bgars.station_record import LightCalibration
+
+__all__ = ["calibrate_flat", "falloff_findings"]
+
+Array = NDArray[np.float64]
+
+BLOCKS = 48
+"""Blocks along the longer side whose means are fitted: dust and noise go, what lights and lenses do stays."""
+DEGREES = (2, 3, 4, 5, 6, 8, 10)
+BETTER = 0.98
+"""A higher degree must lower the error on blocks left out by 2 %."""
+LEAST_LEVEL, CLIPPED_SHARE = 10.0, 0.001
+ROUNDING = 5e-4
+"""Share of the level that rounded grey levels leave in the mean of a block."""
+STRUCTURE = 0.01
+"""Residual of the maps from which on the board, or dust, is in the light."""
+FALLOFF = 0.05
+"""How far the shape of a map may be from that of the near-light model."""
+
+
+def calibrate_flat(capture: Capture) -> tuple[FlatField, tuple[Finding, ...]]:
+    """Fit the levels of a flat board under each light by smooth maps.
+
+    Parameters
+    ----------
+    capture : Capture
+        A flat, matt, evenly coloured board that fills the mask, one image a light; a dark frame helps.
+
+    Returns
+    -------
+    flat : FlatField
+        Polynomials whose degree is chosen on blocks of pixels that were left out.
+    findings : tuple of Finding
+        What is left in the board, and how far the corners fall off.
+
+    Raises
+    ------
+    CalibrationError
+        An image too dark or clipped.
+
+    Examples
+    --------
+    >>> import bgars
+    >>> board, _ = bgars.simulate(bgars.Scene.plane(), bgars.LightRig.ring(8), bgars.Material(i_s=0.0), bgars.Camera())
+    >>> flat, findings = bgars.calibrate_flat(board)
+    >>> flat.degree, flat.residual < 0.01
+    (2, True)
+    """
+    levels = linear_levels(capture)
+    height, width = capture.mask.shape
+    step = max(1, math.ceil(max(height, width) / BLOCKS))
+    means, weights, x, y = _blocks(levels.images, capture.mask, step)
+    for index, image in enumerate(levels.images):
+        name = light_name(index, capture.files)
+        inside = image[capture.mask]
+        clipped = float((inside >= levels.clip).mean())
+        if clipped > CLIPPED_SHARE:
+            msg = f"{capture.name}: {name}: {100 * clipped:.1f} % of the board is clipped; expose shorter"
+            raise CalibrationError(msg)
+        if float(np.median(inside)) < LEAST_LEVEL:
+            msg = (
+                f"{capture.name}: {name}: the board is too dark ({np.median(inside):.1f} of 255, "
+                f"{LEAST_LEVEL:g} is least)"
+            )
+            raise CalibrationError(msg)
+    noise = levels.noise / np.sqrt(np.maximum(weights, 1.0))
+    degree = _degree(means, weights, x, y, noise)
+    rows = _rows(x, y, degree)
+    root = np.sqrt(weights)
+    coefficients, *_ = np.linalg.lstsq(rows * root[:, None], (means * root).T, rcond=None)
+    fitted = (rows @ coefficients).T
+    off = np.sqrt(np.average((means - fitted) ** 2, axis=1, weights=weights))
+    left = np.sqrt(np.maximum(off**2 - float(np.average(noise**2, weights=weights)), 0.0)) / fitted.mean(axis=1)
+    flat = FlatField(np.array(coefficients.T, dtype=np.float64), degree, (height, width), float(left.max()))
+    return flat, tuple(_findings(capture, flat, left))
+
+
+def falloff_findings(flat: FlatField, lights: LightCalibration, pitch_um: float) -> list[Finding]:
+    """Say which light falls off otherwise than a point at its place would."""
+    rig = lights.rig
+    if rig.positions_um is None:
+        return []
+    height, width = flat.size_px
+    x = (np.arange(width) + 0.5 - width / 2.0) * pitch_um
+    y = (height / 2.0 - np.arange(height) - 0.5) * pitch_um
+    ratios = []
+    for light, (px, py, pz) in enumerate(rig.positions_um):
+        distance = np.sqrt((px - x[None, :]) ** 2 + (py - y[:, None]) ** 2 + pz**2)
+        ratios.append(np.log(flat_maps(flat, light) * distance**3 / np.linalg.norm(rig.positions_um[light]) ** 3))
+    shared = np.mean(ratios, axis=0)
+    off = [float(np.std(ratio - shared)) for ratio in ratios]
+    return [
+        Finding(
+            "note",
+            f"{light_name(light)}: falls off {100 * size:.1f} % otherwise than a point at its place; the flat "
+            "field corrects it",
+            "falloff",
+            size,
+            FALLOFF,
+            "",
+            light,
+        )
+        for light, size in enumerate(off)
+        if size > FALLOFF
+    ]
+
+
+def _blocks(images: Array, mask: NDArray[np.bool_], step: int) -> tuple[Array, Array, Array, Array]:
+    """(L, B) means of blocks, (B,) pixels in them, (B,) x and y from -1 to 1."""
+    height, width = mask.shape
+    rows, cols = np.arange(0, height, step), np.arange(0, width, step)
+
+    def total(values: Array) -> Array:
+        sums: Array = np.add.reduceat(np.add.reduceat(values, rows, axis=0), cols, axis=1)
+        return sums
+
+    count = total(mask.astype(np.float64))
+    sums = np.array([total(np.where(mask, image, 0.0)) for image in images])
+    row, col = np.mgrid[:height, :width].astype(np.float64)
+    x = total(np.where(mask, (col + 0.5) / width * 2.0 - 1.0, 0.0))
+    y = total(np.where(mask, 1.0 - (row + 0.5) / height * 2.0, 0.0))
+    use = count > 0.5 * step**2
+    n = count[use]
+    return sums[:, use] / n, n, x[use] / n, y[use] / n
+
+
+def _rows(x: Array, y: Array, degree: int) -> Array:
+    powers = np.eye(degree + 1)
+    of_x = [np.polynomial.legendre.legval(x, row) for row in powers]
+    of_y = [np.polynomial.legendre.legval(y, row) for row in powers]
+    return np.column_stack([of_x[i] * of_y[j] for i in range(degree + 1) for j in range(degree + 1 - i)])
+
+
+def _degree(means: Array, weights: Array, x: Array, y: Array, noise: Array) -> int:
+    """Degree with the least error on every other block (in a chequered order), no higher than pays."""
+    half = (np.arange(len(x)) * 7 // 3) % 2 == 0
+    best, chosen = math.inf, DEGREES[0]
+    # What noise and rounding leave of the blocks is no reason for another term.
+    floor = 4.0 * float(np.mean(noise**2)) + (ROUNDING * float(means.mean())) ** 2
+    for degree in DEGREES:
+        terms = (degree + 1) * (degree + 2) // 2
+        if terms * 3 > min(int(half.sum()), int((~half).sum())):
+            break
+        error = floor
+        for kept in (half, ~half):
+            rows = _rows(x[kept], y[kept], degree) * np.sqrt(weights[kept])[:, None]
+            law, *_ = np.linalg.lstsq(rows, (means[:, kept] * np.sqrt(weights[kept])).T, rcond=None)
+            error += float(np.mean((means[:, ~kept] - (_rows(x[~kept], y[~kept], degree) @ law).T) ** 2))
+        if error < BETTER**2 * best:
+            best, chosen = error, degree
+    return chosen
+
+
+def _findings(capture: Capture, flat: FlatField, left: Array) -> list[Finding]:
+    found = []
+    for light in np.flatnonzero(left > STRUCTURE):
+        name = light_name(int(light), capture.files)
+        message = (
+            f"{capture.name}: {name}: {100 * left[light]:.1f} % of structure is left in the board: texture, "
+            "dust, shine or a shadow"
+        )
+        found.append(Finding("doubt", message, "flat-structure", float(left[light]), STRUCTURE, "", int(light)))
+    corners = [flat_maps(flat, light) for light in range(len(flat.coefficients))]
+    least = min(float(one.min()) for one in corners)
+    found.append(
+        Finding(
+            "note",
+            f"{capture.name}: the darkest place of a map has {100 * least:.0f} % of the level at the centre",
+            "evenness",
+            least,
+        )
+    )
+    return found

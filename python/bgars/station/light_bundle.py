@@ -1,0 +1,199 @@
+"""All highlights of all balls at once: directions or positions of the lights, and the outlines between their errors."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from bgars.errors import CalibrationError
+from bgars.station.mirror import image_of, reflected, sphere_of_outline
+
+__all__ = ["LightSolution", "solve_lights"]
+
+Array = NDArray[np.float64]
+
+NEAR_SIGMAS = 4.0
+"""Lights are near where one over their distance is, for half of them, so many standard deviations from 0."""
+LEAST_U_RAD = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class LightSolution:
+    """Lights with covariance.
+
+    Attributes
+    ----------
+    directions : (L, 3)
+        Unit vectors from the origin.
+    nearness : (L,)
+        One over distance, 1 / px; 0 for distant lights.
+    covariance : (L, 3, 3)
+        Of two turns (radians, across the direction) and nearness.
+    own : (L, 3, 3)
+        The part that is left with perfect outlines.
+    tangents : (L, 2, 3)
+        The axes of the two turns.
+    residuals_px : (B, L, 2)
+        NaN where not seen.
+    outlines_px : (B, 3)
+        Outlines after the fit.
+    reduced_chi_square : float
+        1 is as stated; NaN where nothing is to spare.
+    """
+
+    directions: Array
+    nearness: Array
+    covariance: Array
+    own: Array
+    tangents: Array
+    residuals_px: Array
+    outlines_px: Array
+    reduced_chi_square: float
+
+    @property
+    def u_deg(self) -> Array:
+        """(L,) standard uncertainty on either axis."""
+        return _u_deg(self.covariance)
+
+    @property
+    def u_own_deg(self) -> Array:
+        """(L,) the part of each light alone."""
+        return np.minimum(_u_deg(self.own), self.u_deg)
+
+
+def solve_lights(
+    places_px: Array,
+    covariances_px2: Array,
+    outlines_px: Array,
+    u_outlines_px: Array,
+    camera_px: float,
+    near: bool | None,
+) -> LightSolution:
+    """Fit the lights to highlights.
+
+    Parameters
+    ----------
+    places_px, covariances_px2 : (B, L, 2), (B, L, 2, 2)
+        Highlights of L lights on B balls; NaN where not seen. Each light is seen on a ball.
+    outlines_px, u_outlines_px : (B, 3)
+        Circles and their standard uncertainties.
+    camera_px : float
+        Distance of the camera.
+    near : bool or None
+        Positions or directions; None: positions where the highlights ask for them.
+
+    Raises
+    ------
+    CalibrationError
+        Positions are asked for, but a light is seen on one ball only.
+    """
+    seen: NDArray[np.bool_] = np.asarray(np.isfinite(places_px).all(axis=2))
+    if near and int(seen.sum(axis=0).min()) < 2:  # noqa: PLR2004 - rays that cross
+        index = int(seen.sum(axis=0).argmin())
+        msg = (
+            f"light {index} (counted from 0): its position needs its highlight on two balls or more, got "
+            f"{int(seen[:, index].sum())}"
+        )
+        raise CalibrationError(msg)
+    distant = _solve(places_px, covariances_px2, outlines_px, u_outlines_px, camera_px, near=False)
+    if near is False or int(seen.sum(axis=0).min()) < 2:  # noqa: PLR2004
+        return distant
+    placed = _solve(places_px, covariances_px2, outlines_px, u_outlines_px, camera_px, near=True)
+    if near:
+        return placed
+    sure = placed.nearness / np.sqrt(placed.covariance[:, 2, 2])
+    return placed if float(np.median(sure)) > NEAR_SIGMAS else distant
+
+
+def _solve(
+    places: Array, covariances: Array, outlines: Array, u_outlines: Array, camera_px: float, near: bool
+) -> LightSolution:
+    balls, lights = places.shape[:2]
+    seen: NDArray[np.bool_] = np.asarray(np.isfinite(places).all(axis=2))
+    first = np.array([_first(places[:, light], outlines, camera_px) for light in range(lights)])
+    across = _tangents(first)
+    whiten = np.zeros((balls, lights, 2, 2))
+    whiten[seen] = np.linalg.inv(np.linalg.cholesky(covariances[seen]))
+    size = 3 if near else 2
+    scale_px = float(np.max(np.abs(outlines)))
+
+    def unpack(values: Array) -> tuple[Array, Array, Array]:
+        turns = values[: lights * size].reshape(lights, size)
+        directions = first + np.einsum("lk,lkc->lc", turns[:, :2], across)
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        nearness = turns[:, 2] / scale_px if near else np.zeros(lights)
+        circles = outlines + u_outlines * values[lights * size :].reshape(balls, 3)
+        return directions, nearness, circles
+
+    def off(values: Array) -> Array:
+        directions, nearness, circles = unpack(values)
+        fitted = np.array([image_of(directions, nearness, sphere_of_outline(c, camera_px), camera_px) for c in circles])
+        rest: Array = places - fitted
+        return rest
+
+    def residuals(values: Array) -> Array:
+        scaled = np.einsum("blij,blj->bli", whiten, np.where(seen[..., None], off(values), 0.0))
+        rows: Array = np.concatenate([scaled[seen].ravel(), values[lights * size :]])
+        return rows
+
+    start = np.zeros(lights * size + 3 * balls)
+    fit = least_squares(
+        residuals, start, x_scale=np.concatenate([np.full(lights * size, 0.01), np.ones(3 * balls)]), max_nfev=60
+    )
+    directions, nearness, circles = unpack(fit.x)
+    spare = 2 * int(seen.sum()) - lights * size
+    chi = float(np.square(fit.fun).sum() / spare) if spare > 0 else math.nan
+    raised = max(1.0, chi) if spare > 0 else 1.0
+    jacobian = np.asarray(fit.jac, dtype=np.float64)
+    normal = jacobian.T @ jacobian
+    covariance: Array = np.asarray(np.linalg.pinv(normal) * raised, dtype=np.float64)
+    part = lights * size
+    alone: Array = np.asarray(np.linalg.pinv(normal[:part, :part]) * raised, dtype=np.float64)
+    return LightSolution(
+        directions,
+        nearness,
+        _blocks(covariance, lights, size, scale_px),
+        _blocks(alone, lights, size, scale_px),
+        across,
+        np.where(seen[..., None], off(fit.x), np.nan),
+        circles,
+        chi,
+    )
+
+
+def _first(places: Array, outlines: Array, camera_px: float) -> Array:
+    """Mean of what the balls show of one light."""
+    total = np.zeros(3)
+    for place, outline in zip(places, outlines, strict=True):
+        if np.isfinite(place).all():
+            total += reflected(place, sphere_of_outline(outline, camera_px), camera_px)[1]
+    return total / np.linalg.norm(total)
+
+
+def _tangents(directions: Array) -> Array:
+    """(L, 2, 3) unit vectors across: one level, one upward."""
+    level = np.cross(np.array([0.0, 0.0, 1.0]), directions)
+    flat = np.linalg.norm(level, axis=1) < 1e-9  # noqa: PLR2004 - straight above
+    level[flat] = [1.0, 0.0, 0.0]
+    level /= np.linalg.norm(level, axis=1, keepdims=True)
+    return np.stack([level, np.cross(directions, level)], axis=1)
+
+
+def _blocks(covariance: Array, lights: int, size: int, scale_px: float) -> Array:
+    blocks = np.zeros((lights, 3, 3))
+    for light in range(lights):
+        part = slice(light * size, (light + 1) * size)
+        blocks[light, :size, :size] = covariance[part, part]
+    blocks[:, 2, :] /= scale_px
+    blocks[:, :, 2] /= scale_px
+    return blocks
+
+
+def _u_deg(covariance: Array) -> Array:
+    variance = 0.5 * (covariance[:, 0, 0] + covariance[:, 1, 1])
+    u: Array = np.degrees(np.sqrt(np.maximum(variance, LEAST_U_RAD**2)))
+    return u

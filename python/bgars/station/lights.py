@@ -1,0 +1,279 @@
+"""Lights calibrated on reference balls: one ball, several, or one that is moved from capture to capture."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bgars.errors import InputError
+from bgars.light_names import light_name
+from bgars.records import Capture
+from bgars.rig import LightRig
+from bgars.scalar_checks import check_pitch
+from bgars.station.light_bundle import solve_lights
+from bgars.station.observe import observe, outlines_a_capture
+from bgars.station_record import BallView, Finding, LightCalibration
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from bgars.station.light_bundle import LightSolution
+    from bgars.station.observe import Observed, SeenBall
+
+__all__ = ["Sphere", "calibrate_lights"]
+
+Array = NDArray[np.float64]
+Sphere = Literal["mirror", "matt"]
+
+MISFIT = 3.0
+"""Reduced chi square from which on balls contradict each other."""
+OFF_SIGMAS = 5.0
+UNSURE_DEG = 2.0
+"""Standard uncertainty of a direction that is worth a word."""
+FAR_DEG = 15.0
+"""Turn of a light against the rig that the capture brings, from which on the order of the images is doubted."""
+
+
+def calibrate_lights(
+    capture: Capture | Sequence[Capture],
+    sphere: Sphere = "mirror",
+    outline: ArrayLike | Sequence[ArrayLike | None] | None = None,
+    *,
+    near: bool | None = None,
+    diameter_um: float | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> LightCalibration:
+    """Find where the lights are, from a mirror or a matt ball in view.
+
+    Parameters
+    ----------
+    capture : Capture or sequence of Capture
+        The ball under each light; or several captures, with the ball moved in between. Their rig is a starting guess
+        only: what comes out does not depend on it.
+    sphere : {"mirror", "matt"}
+        A bearing ball, a chrome or a glossy black one; or a matt one.
+    outline : (3,) or (N, 3) array_like, or a sequence of these, optional
+        x, y (from the image centre, x right, y up) and radius of the ball, or of several balls, in pixels; with several
+        captures, one entry a capture. By default the circle is looked for, or taken from a mask that is a disc.
+    near : bool, optional
+        True: positions in space, which takes two balls or one ball moved. False: directions. By default positions where
+        the balls show that directions differ from place to place.
+    diameter_um : float, optional
+        Diameter of the ball: gives the pixel pitch where the captures state none.
+    progress : callable, optional
+        Called with the fraction done.
+
+    Returns
+    -------
+    LightCalibration
+        The rig with standard uncertainties (`u_deg`), intensities where they can be measured, residuals, findings.
+
+    Raises
+    ------
+    CalibrationError
+        No ball, a ball cut off or burnt out, a light whose highlight is on no ball.
+    InputError
+        Captures with different numbers of images, or an outline of a wrong shape.
+
+    Notes
+    -----
+    A mirror ball turns a step of the highlight into twice the angle: of a ball of 200 pixels radius one pixel is half a
+    degree, and a radius that is wrong by 1 pixel tilts a light at 45 degrees by 0.2 degrees, all lights alike
+    (`u_common_deg`).
+
+    References
+    ----------
+    Zhou, W. & Kambhamettu, C. (2002). Estimation of illuminant direction and intensity of multiple light sources.
+    Powell, M. W., Sarkar, S. & Goldgof, D. (2001). A simple strategy for calibrating the geometry of light sources.
+
+    Examples
+    --------
+    >>> import bgars
+    >>> scene, matt = bgars.Scene.hemisphere(300.0), bgars.Material(i_s=0.0)
+    >>> ball, _ = bgars.simulate(scene, bgars.LightRig.ring(8), matt, bgars.Camera())
+    >>> found = bgars.calibrate_lights(ball, sphere="matt")
+    >>> float(abs(found.rig.elevations_deg - 45.0).max()) < 1.0
+    True
+    """
+    captures = [capture] if isinstance(capture, Capture) else list(capture)
+    if sphere not in {"mirror", "matt"}:
+        msg = f"sphere: must be 'mirror' or 'matt', got {sphere!r}"
+        raise InputError(msg)
+    if sphere == "matt":
+        if near:
+            msg = "near: positions of lights need a mirror ball: shading does not say from which point a light is seen"
+            raise InputError(msg)
+        near = False
+    check_pitch(diameter_um, "diameter_um")
+    seen = observe(captures, sphere, outlines_a_capture(captures, outline), diameter_um, progress)
+    balls, findings = seen.balls, seen.findings
+    solution, pitch_um = _solve(captures, seen, diameter_um, near, findings)
+    intensities, u_intensities = _intensities(sphere, captures, seen, solution, findings)
+    rig = _rig(solution, pitch_um, intensities)
+    findings += _judge(solution, balls, captures, rig)
+    own = solution.u_own_deg
+    alone = [ball.own_deg for ball in balls if ball.own_deg is not None]
+    if alone:
+        own = np.minimum(np.sqrt(np.mean(np.square(alone), axis=0) / len(alone)), solution.u_deg)
+    return LightCalibration(
+        rig=rig,
+        u_deg=solution.u_deg,
+        u_own_deg=own,
+        u_common_deg=np.sqrt(np.maximum(solution.u_deg**2 - own**2, 0.0)),
+        sphere=sphere,
+        balls=tuple(_views(balls, solution)),
+        residual_px=_rms(solution.residuals_px),
+        u_positions_um=_u_positions(solution, pitch_um),
+        u_intensities=u_intensities,
+        lamp_deg=seen.lamp_deg,
+        findings=tuple(findings),
+    )
+
+
+def _solve(
+    captures: list[Capture], seen: Observed, diameter_um: float | None, near: bool | None, findings: list[Finding]
+) -> tuple[LightSolution, float | None]:
+    """Lights of all balls, and the pixel pitch that puts them in micrometres."""
+    balls = seen.balls
+    places = np.array([ball.places for ball in balls])
+    covariances = np.array([ball.covariances for ball in balls])
+    circles = np.array([ball.outline.circle_px for ball in balls])
+    u_circles = np.array([ball.outline.u_px for ball in balls])
+    solution = solve_lights(places, covariances, circles, u_circles, seen.camera_px, near)
+    pitch_um = captures[0].pixel_pitch_um
+    if diameter_um is not None:
+        pitch_um = float(np.mean([diameter_um / (2.0 * circle[2]) for circle in solution.outlines_px]))
+    if solution.nearness.any() and pitch_um is None:
+        if near:
+            msg = (
+                f"{captures[0].name}: positions of lights need a scale: pixel_pitch_um in capture.toml, or "
+                "diameter_um of the ball"
+            )
+            raise InputError(msg)
+        message = (
+            "the balls show that the lights are near, but no scale is known: state the diameter of the ball to get "
+            "positions"
+        )
+        findings.append(Finding("doubt", message, "near-without-scale"))
+        solution = solve_lights(places, covariances, circles, u_circles, seen.camera_px, near=False)
+    return solution, pitch_um
+
+
+def _rig(solution: LightSolution, pitch_um: float | None, intensities: Array) -> LightRig:
+    if solution.nearness.any() and pitch_um is not None and (solution.nearness > 0).all():
+        positions = solution.directions / solution.nearness[:, None] * pitch_um
+        return LightRig.from_positions(positions, intensities=intensities, u_deg=solution.u_deg)
+    return LightRig.from_directions(solution.directions, intensities=intensities, u_deg=solution.u_deg)
+
+
+def _u_positions(solution: LightSolution, pitch_um: float | None) -> Array | None:
+    if not solution.nearness.any() or pitch_um is None:
+        return None
+    found = np.zeros((len(solution.directions), 3))
+    for index, (direction, w) in enumerate(zip(solution.directions, solution.nearness, strict=True)):
+        columns = np.column_stack([*(solution.tangents[index] / w), -direction / w**2])
+        found[index] = np.sqrt(np.diag(columns @ solution.covariance[index] @ columns.T))
+    return found * pitch_um
+
+
+def _intensities(
+    sphere: str,
+    captures: list[Capture],
+    seen: Observed,
+    solution: LightSolution,
+    findings: list[Finding],
+) -> tuple[Array, Array | None]:
+    """Relative intensities, mean 1, and their scatter from ball to ball."""
+    usable = [row / row.mean() for row in seen.strengths if np.isfinite(row).all() and (row > 0).all()]
+    if usable:
+        mean = np.mean(usable, axis=0)
+        spread = np.std(usable, axis=0) if len(usable) > 1 else np.full(len(mean), 0.01 if sphere == "matt" else 0.03)
+        return mean / mean.mean(), np.maximum(spread, 0.002)
+    board = [np.median(one.images.reshape(len(one.images), -1), axis=1) for one in seen.levels]
+    level = np.mean(board, axis=0) / np.maximum(solution.directions[:, 2], 0.05)
+    least = 10.0
+    if np.min(board) > least:
+        findings.append(
+            Finding(
+                "note",
+                "intensities by the median level of the images (a matt board in view); the highlights are clipped",
+                "board-intensities",
+            )
+        )
+        return level / level.mean(), np.full(len(level), 0.03)
+    findings.append(
+        Finding(
+            "note",
+            f"{captures[0].name}: intensities not measured (clipped highlights, dark board): taken as equal; "
+            "calibrate flat gives them",
+            "no-intensities",
+        )
+    )
+    return np.ones(len(solution.directions)), None
+
+
+def _judge(solution: LightSolution, balls: list[SeenBall], captures: list[Capture], rig: LightRig) -> list[Finding]:
+    """What the result says about itself, and about the rig that was declared."""
+    found: list[Finding] = []
+    files = captures[0].files
+    if len(balls) > 1 and solution.reduced_chi_square > MISFIT:
+        found.append(
+            Finding(
+                "doubt",
+                f"the balls contradict each other: residuals of {_rms(solution.residuals_px):.2f} px are "
+                f"{math.sqrt(solution.reduced_chi_square):.1f} times what was expected; uncertainties are raised "
+                "by that",
+                "balls-contradict",
+                solution.reduced_chi_square,
+                MISFIT,
+            )
+        )
+        size = np.nanmax(np.linalg.norm(solution.residuals_px, axis=2), axis=0)
+        usual = float(np.median(size))
+        for index in np.flatnonzero(size > OFF_SIGMAS * usual):
+            message = (
+                f"{light_name(int(index), files)}: off by {size[index]:.2f} px between balls, others {usual:.2f} px"
+            )
+            found.append(
+                Finding("doubt", message, "light-off", float(size[index]), OFF_SIGMAS * usual, "px", int(index))
+            )
+    for index in np.flatnonzero(solution.u_deg > UNSURE_DEG):
+        message = f"{light_name(int(index), files)}: its direction is known to {solution.u_deg[index]:.1f} deg only"
+        found.append(Finding("doubt", message, "unsure", float(solution.u_deg[index]), UNSURE_DEG, "deg", int(index)))
+    declared = captures[0].rig
+    if len(declared) == len(rig) and captures[0].folder is not None and declared.u_deg is None:
+        turn = np.degrees(np.arccos(np.clip(declared.directions @ rig.directions.T, -1.0, 1.0)))
+        off = np.diag(turn)
+        nearest = turn.argmin(axis=1)
+        if (
+            (off > FAR_DEG).any()
+            and len(set(nearest.tolist())) == len(rig)
+            and turn.min(axis=1).max() < off.max() / 2.0
+        ):
+            first = int(np.flatnonzero(nearest != np.arange(len(rig)))[0])
+            message = (
+                f"images in another order than the lights of the capture: {light_name(first, files)} is declared where "
+                f"light {int(nearest[first])} is"
+            )
+            found.append(Finding("note", message, "order", light=first))
+    return found
+
+
+def _views(balls: list[SeenBall], solution: LightSolution) -> list[BallView]:
+    return [
+        BallView(
+            ball.capture.name,
+            circle,
+            ball.outline.u_px if ball.u_outline_px is None else ball.u_outline_px,
+            ball.places,
+            residuals,
+        )
+        for ball, circle, residuals in zip(balls, solution.outlines_px, solution.residuals_px, strict=True)
+    ]
+
+
+def _rms(residuals: Array) -> float:
+    return float(np.sqrt(np.nanmean(np.square(residuals).sum(axis=2))))

@@ -1,0 +1,211 @@
+"""Lights from the shading of a matt ball: Lambert's law with attached shadow, light of the room and of the board."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares, minimize
+
+from bgars.errors import CalibrationError
+from bgars.light_names import light_name
+from bgars.station_record import Finding
+
+if TYPE_CHECKING:
+    from bgars.records import Capture
+    from bgars.station.levels import Levels
+    from bgars.station.outline import Outline
+
+__all__ = ["SeenShading", "shading_misfit", "shading_on"]
+
+Array = NDArray[np.float64]
+
+INNER = 0.97
+"""Share of the radius that is used: the rim is blurred, and steep."""
+PIXELS = 6000
+"""Pixels of a ball that are fitted."""
+SECTORS = 8
+"""Parts of a ball that are left out in turn (jackknife): what the model misses is alike within each."""
+NOT_LAMBERT = 0.06
+"""Root mean square residual, of the brightest level, from which on a general monotone law is fitted, too."""
+SATURATED_SHARE = 0.2
+"""Share of the lit pixels that are clipped from which on an image is burnt out."""
+LEAST_LEVEL = 12.0
+"""Grey levels of 255 of the brightest point from which on there is shading."""
+BOARD_SHARE = 0.5
+"""Spread of what the board reflects, of the ball's level, before it is measured in the attached shadow."""
+POLYNOMIAL = 4
+STEP_RAD = 1e-4
+
+
+class SeenShading(NamedTuple):
+    """Lights on one ball: unit vectors, covariances of two turns by the outline's errors and by the rest, strengths."""
+
+    directions: Array
+    own_covariances: Array
+    outline_jacobians: Array
+    strengths: Array
+    u_strengths: Array
+    findings: list[Finding]
+
+
+def shading_on(capture: Capture, levels: Levels, outline: Outline) -> SeenShading:
+    """Fit each light on one ball.
+
+    Raises
+    ------
+    CalibrationError
+        An image that is too dark or burnt out on the ball.
+    """
+    findings: list[Finding] = []
+    count = len(levels.images)
+    directions, strengths, u_strengths = np.zeros((count, 3)), np.zeros(count), np.zeros(count)
+    own, jacobians = np.zeros((count, 2, 2)), np.zeros((count, 3, 3))
+    points, index = _pixels(levels.images.shape[1:], outline)
+    for light, image in enumerate(levels.images):
+        name = light_name(light, capture.files)
+        values = image.ravel()[index]
+        used = values < levels.clip
+        peak = float(np.percentile(values, 99.0))
+        if peak < LEAST_LEVEL:
+            msg = (
+                f"{capture.name}: {name}: too dark on the ball ({peak:.1f} of 255 at its brightest, "
+                f"{LEAST_LEVEL:g} is least)"
+            )
+            raise CalibrationError(msg)
+        if 1.0 - used.mean() > SATURATED_SHARE:
+            msg = (
+                f"{capture.name}: {name}: burnt out: {100 * (1 - used.mean()):.0f} % of the ball is clipped; "
+                "expose shorter"
+            )
+            raise CalibrationError(msg)
+        vector, residual = _fit(_normals(points, outline.circle_px), values, used, levels.noise)
+        strength = float(np.linalg.norm(vector))
+        if vector[2] <= 0:
+            msg = (
+                f"{capture.name}: {name}: no light from above: the fit points to "
+                f"({', '.join(f'{v:.2f}' for v in vector / strength)})"
+            )
+            raise CalibrationError(msg)
+        direction = vector / strength
+        if residual > NOT_LAMBERT * peak:
+            general, left = _monotone(_normals(points, outline.circle_px), values, used, direction)
+            findings.append(
+                Finding(
+                    "note",
+                    f"{capture.name}: {name}: the ball does not follow Lambert's law ({100 * residual / peak:.1f} "
+                    "% off): "
+                    f"a general monotone law is taken ({100 * left / peak:.1f} % off)",
+                    "not-lambert",
+                    residual / peak,
+                    NOT_LAMBERT,
+                    "",
+                    light,
+                )
+            )
+            direction = general
+        directions[light], strengths[light] = direction, strength
+        u_strengths[light] = residual / math.sqrt(max(int(used.sum()) / 50.0, 1.0))
+        own[light], jacobians[light] = _spread(points, values, used, outline, levels.noise, direction)
+    return SeenShading(directions, own, jacobians, strengths, u_strengths, findings)
+
+
+def shading_misfit(levels: Levels, outline: Outline) -> float:
+    """Root mean square residual of the first lights on a circle, of its levels: small where it is the ball."""
+    points, index = _pixels(levels.images.shape[1:], outline)
+    if len(index) < 100:  # noqa: PLR2004 - too few to say
+        return math.inf
+    left = 0.0
+    for image in levels.images[:3]:
+        values = image.ravel()[index]
+        _, residual = _fit(_normals(points, outline.circle_px), values, values < levels.clip, levels.noise)
+        left = max(left, residual / max(float(np.percentile(values, 99.0)), 1.0))
+    return left
+
+
+def _pixels(shape: tuple[int, ...], outline: Outline) -> tuple[Array, NDArray[np.intp]]:
+    """(N, 2) places on the ball and their index in the image."""
+    height, width = shape
+    rows, cols = np.mgrid[:height, :width]
+    x, y = cols + 0.5 - width / 2.0, height / 2.0 - rows - 0.5
+    use = np.flatnonzero(np.hypot(x - outline.x_px, y - outline.y_px).ravel() < INNER * outline.radius_px - 1.0)
+    use = use[:: max(1, len(use) // PIXELS)]
+    return np.column_stack([x.ravel()[use], y.ravel()[use]]), use
+
+
+def _normals(points: Array, circle: Array) -> Array:
+    flat = (points - circle[:2]) / circle[2]
+    return np.column_stack([flat, np.sqrt(np.maximum(1.0 - np.square(flat).sum(axis=1), 0.0))])
+
+
+def _fit(normals: Array, values: Array, used: NDArray[np.bool_], noise: float) -> tuple[Array, float]:
+    """Strength times direction, and the root mean square residual.
+
+    The board reflects onto a ball what an endless plane does: (1 - n_z) / 2 of its level.
+    """
+    normals, values = normals[used], values[used]
+    scale = max(float(values.max()), 1.0)
+    below = 0.5 * (1.0 - normals[:, 2])
+    spread = math.hypot(noise, 0.01 * scale)
+
+    def residuals(p: Array) -> Array:
+        shade = np.maximum(normals @ p[:3], 0.0)
+        return np.append((values - shade - p[3] - p[4] * below) / spread, p[4] / (BOARD_SHARE * scale))
+
+    lit = values > np.percentile(values, 40.0)
+    first, *_ = np.linalg.lstsq(normals[lit], values[lit], rcond=None)
+    start = np.array([*first, 0.0, 0.0])
+    fit = least_squares(residuals, start, loss="soft_l1", max_nfev=60)
+    off = np.abs(fit.fun[:-1]) * spread
+    return fit.x[:3], float(np.sqrt(np.mean(np.minimum(off, 4.0 * np.median(off) + noise) ** 2)))
+
+
+def _monotone(normals: Array, values: Array, used: NDArray[np.bool_], start: Array) -> tuple[Array, float]:
+    """Direction under which the level is most nearly a function of n . l alone (a polynomial over the lit side)."""
+    normals, values = normals[used], values[used]
+    level = np.array([0.0, 0.0, 1.0]) if abs(start[2]) < 0.9 else np.array([1.0, 0.0, 0.0])  # noqa: PLR2004
+    one = np.cross(level, start)
+    one /= np.linalg.norm(one)
+    two = np.cross(start, one)
+
+    def direction(p: Array) -> Array:
+        vector: Array = start + p[0] * one + p[1] * two
+        return vector / np.linalg.norm(vector)
+
+    def left(p: Array) -> float:
+        cosine = normals @ direction(p)
+        lit = cosine > 0.15  # noqa: PLR2004 - away from the attached shadow
+        rows = np.vander(cosine[lit], POLYNOMIAL + 1)
+        law, *_ = np.linalg.lstsq(rows, values[lit], rcond=None)
+        off = np.abs(values[lit] - rows @ law)
+        return float(np.mean(np.minimum(off, 4.0 * np.median(off)) ** 2))
+
+    best = minimize(left, np.zeros(2), method="Nelder-Mead", options={"maxiter": 120, "xatol": 1e-4})
+    return direction(best.x), math.sqrt(float(best.fun))
+
+
+def _spread(
+    points: Array, values: Array, used: NDArray[np.bool_], outline: Outline, noise: float, direction: Array
+) -> tuple[Array, Array]:
+    """Covariance (2, 2) of two turns by leaving out sectors; change (3, 3) of the direction by the outline, per px."""
+    circle = outline.circle_px
+    normals = _normals(points, circle)
+    sector = ((np.arctan2(*(points - circle[:2]).T[::-1]) / (2 * math.pi) + 0.5) * SECTORS).astype(int) % SECTORS
+    tries = []
+    for part in range(SECTORS):
+        vector, _ = _fit(normals, values, used & (sector != part), noise)
+        tries.append(vector / np.linalg.norm(vector))
+    off = np.array(tries) - np.mean(tries, axis=0)
+    covariance = (SECTORS - 1) / SECTORS * off.T @ off
+    level = np.cross([0.0, 0.0, 1.0], direction)
+    level = np.array([1.0, 0.0, 0.0]) if np.linalg.norm(level) < 1e-9 else level / np.linalg.norm(level)  # noqa: PLR2004
+    across = np.stack([level, np.cross(direction, level)])
+    columns = []
+    step = 0.5
+    for axis in np.eye(3):
+        ahead, _ = _fit(_normals(points, circle + step * axis), values, used, noise)
+        behind, _ = _fit(_normals(points, circle - step * axis), values, used, noise)
+        columns.append((ahead / np.linalg.norm(ahead) - behind / np.linalg.norm(behind)) / (2 * step))
+    return across @ covariance @ across.T + STEP_RAD**2 * np.eye(2), np.column_stack(columns)

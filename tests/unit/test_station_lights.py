@@ -1,0 +1,151 @@
+"""Lights from reference balls, rendered by a ray tracer that shares no code with the package."""
+
+from __future__ import annotations
+
+import bgars
+import numpy as np
+import pytest
+from bgars.station.mirror import image_of, reflected, sphere_of_outline
+from numpy.typing import NDArray
+from rendered_spheres import render, ring
+
+Array = NDArray[np.float64]
+BALL = (7.3, -4.6, 100.0)
+LENS = {"blur_px": 0.6, "lamp_level": 3.0, "samples": 3}
+
+
+def capture_of(images: NDArray[np.uint8], **more: object) -> bgars.Capture:
+    shape = images.shape[1:]
+    return bgars.Capture(
+        images=images, rig=bgars.LightRig.ring(len(images)), mask=np.ones(shape, np.bool_), saturation=255.0, **more
+    )
+
+
+def off_deg(found: Array, true: Array) -> Array:
+    return np.degrees(2 * np.arcsin(np.linalg.norm(found - true, axis=1) / 2))
+
+
+@pytest.fixture(scope="module")
+def lights() -> Array:
+    return ring(6, 48.0)
+
+
+@pytest.fixture(scope="module")
+def mirror(lights: Array) -> NDArray[np.uint8]:
+    return render(lights, ball=BALL, size=(260, 260), **LENS)
+
+
+@pytest.fixture(scope="module")
+def matt(lights: Array) -> NDArray[np.uint8]:
+    return render(lights, ball=BALL, size=(260, 260), kind="matt", board=0.05, samples=3)
+
+
+def test_a_mirror_ball_of_200_pixels_gives_directions_to_a_tenth_of_a_degree(
+    lights: Array, mirror: NDArray[np.uint8]
+) -> None:
+    found = bgars.calibrate_lights(capture_of(mirror))
+    off = off_deg(found.rig.directions, lights)
+    assert off.mean() < 0.12
+    assert off.max() < 0.25
+    assert (off < 3 * np.sqrt(2) * found.u_deg).all()
+    np.testing.assert_allclose(found.balls[0].outline_px, BALL, atol=0.3)
+    np.testing.assert_allclose(np.hypot(found.u_own_deg, found.u_common_deg), found.u_deg, rtol=1e-6)
+    assert found.rig.u_deg is not None
+    assert not found.doubts
+
+
+def test_a_matt_ball_gives_directions_and_intensities(lights: Array) -> None:
+    power = np.array([1.0, 0.9, 1.1, 1.0, 0.8, 1.0])
+    images = render(lights, ball=BALL, size=(260, 260), kind="matt", board=0.05, samples=3, intensities=power)
+    found = bgars.calibrate_lights(capture_of(images), sphere="matt")
+    off = off_deg(found.rig.directions, lights)
+    assert off.max() < 0.25
+    assert (off < 3 * np.sqrt(2) * found.u_deg).all()
+    np.testing.assert_allclose(found.rig.intensities, power / power.mean(), rtol=0.01)
+
+
+def test_the_rig_of_the_capture_is_a_starting_guess_only(mirror: NDArray[np.uint8]) -> None:
+    one = bgars.calibrate_lights(capture_of(mirror))
+    other = capture_of(mirror)
+    other = bgars.Capture(
+        images=mirror, rig=bgars.LightRig.ring(6, elevation_deg=20.0), mask=other.mask, saturation=255.0
+    )
+    np.testing.assert_array_equal(one.rig.directions, bgars.calibrate_lights(other).rig.directions)
+
+
+def test_a_wrong_radius_moves_all_lights_together_and_is_doubted(lights: Array, mirror: NDArray[np.uint8]) -> None:
+    found = bgars.calibrate_lights(capture_of(mirror), outline=(BALL[0], BALL[1], 104.0))
+    assert found.doubts[0].code == "wrong-outline"
+    assert "stated radius 104.00 px" in found.doubts[0].message
+    assert float(np.median(found.u_common_deg)) > 2 * float(np.median(found.u_own_deg))
+    assert (off_deg(found.rig.directions, lights) < 3 * np.sqrt(2) * found.u_deg).all()
+
+
+def test_near_lamps_come_out_in_space_from_three_places_of_a_ball() -> None:
+    lamps_px = ring(6, 45.0) * np.array([500.0, 700.0, 600.0, 550.0, 800.0, 650.0])[:, None]
+    places = [(-70.0, -45.0), (75.0, -40.0), (5.0, 75.0)]
+    captures = [
+        capture_of(
+            render(lamps_px, ball=(x, y, 60.0), size=(290, 290), near=True, seed=seed, **{**LENS, "samples": 2}),
+            pixel_pitch_um=20.0,
+        )
+        for seed, (x, y) in enumerate(places)
+    ]
+    found = bgars.calibrate_lights(captures)
+    assert found.rig.positions_um is not None
+    assert found.u_positions_um is not None
+    off_px = found.rig.positions_um / 20.0 - lamps_px
+    share = np.linalg.norm(off_px, axis=1) / np.linalg.norm(lamps_px, axis=1)
+    assert float(np.median(share)) < 0.01
+    assert (np.abs(off_px) < 4 * found.u_positions_um / 20.0).all()
+
+
+def test_a_second_lamp_is_named(mirror: NDArray[np.uint8]) -> None:
+    images = mirror.copy()
+    images[2] = np.maximum(mirror[2], mirror[5])
+    doubts = bgars.calibrate_lights(capture_of(images)).doubts
+    assert any("light 2" in doubt.message and "two highlights" in doubt.message for doubt in doubts)
+
+
+def test_a_light_that_does_not_show_is_named(mirror: NDArray[np.uint8]) -> None:
+    images = mirror.copy()
+    images[3] = np.median(mirror, axis=0).astype(np.uint8)
+    with pytest.raises(bgars.CalibrationError, match=r"light 3 \(counted from 0\): no highlight on the ball"):
+        bgars.calibrate_lights(capture_of(images))
+
+
+def test_a_ball_that_is_cut_off_is_refused(mirror: NDArray[np.uint8]) -> None:
+    with pytest.raises(bgars.CalibrationError, match="the ball is cut off"):
+        bgars.calibrate_lights(capture_of(mirror[:, :, :200].copy()), outline=(37.3, -4.6, 100.0))
+
+
+def test_a_burnt_out_ball_is_refused(matt: NDArray[np.uint8]) -> None:
+    burnt = np.clip(matt.astype(np.int32) * 4, 0, 255).astype(np.uint8)
+    with pytest.raises(bgars.CalibrationError, match=r"burnt out: .* % of the ball is clipped; expose shorter"):
+        bgars.calibrate_lights(capture_of(burnt), sphere="matt", outline=BALL)
+    as_mirror = bgars.calibrate_lights(capture_of(burnt), outline=BALL)
+    assert {"wide-highlight"} <= {doubt.code for doubt in as_mirror.doubts}
+
+
+def test_a_ball_out_of_focus_is_refused(lights: Array) -> None:
+    soft = render(lights, ball=BALL, size=(260, 260), kind="matt", board=0.05, samples=2, blur_px=5.0)
+    with pytest.raises(bgars.CalibrationError, match=r"no sharp circle in the images .out of focus"):
+        bgars.calibrate_lights(capture_of(soft), sphere="matt")
+
+
+def test_images_without_a_ball_are_refused() -> None:
+    noise = np.random.default_rng(0).integers(20, 24, (4, 120, 120)).astype(np.uint8)
+    with pytest.raises(bgars.CalibrationError, match=r"no ball found|no highlight|too small"):
+        bgars.calibrate_lights(capture_of(noise))
+
+
+@pytest.mark.parametrize("camera_px", [np.inf, 3000.0])
+def test_highlights_and_directions_are_inverse(camera_px: float) -> None:
+    sphere = sphere_of_outline(np.array([40.0, -25.0, 80.0]), camera_px)
+    towards = ring(5, 40.0)
+    places = image_of(towards, np.zeros(5), sphere, camera_px)
+    np.testing.assert_allclose(reflected(places, sphere, camera_px)[1], towards, atol=1e-9)
+    lamps = towards * 900.0
+    places = image_of(towards, np.full(5, 1 / 900.0), sphere, camera_px)
+    hits, directions = reflected(places, sphere, camera_px)
+    np.testing.assert_allclose(directions, (lamps - hits) / np.linalg.norm(lamps - hits, axis=1)[:, None], atol=1e-6)
