@@ -98,7 +98,8 @@ def batch_table(folder: Path, parts: int, large_cpu_s: float) -> list[str]:
     lines += [
         "",
         f"Efficiency (CPU) is what one process needs for a part over what two need: what running side by side costs by "
-        f"itself. Beyond two it is calculated, not measured: the one process that writes the store needs "
+        f"itself. The CPU seconds include the start of the command and of its processes, which so few parts do not "
+        f"make small. Beyond two it is calculated, not measured: the one process that writes the store needs "
         f"{1e3 * append_s:.0f} ms a "
         "part, which is the limit of any number of workers; images that are sent pass a network of 1 "
         "Gbit/s (32 MB for a part "

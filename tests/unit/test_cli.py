@@ -138,6 +138,7 @@ def test_evaluate_on_the_sample() -> None:
     [
         *("", "demo", "reconstruct", "normals", "mesh", "info", "evaluate", "inspect", "calibrate material"),
         *("simulate", "experiment", "grr", "report", "spc"),
+        *("batch", "watch", "query", "capture", "send", "store add", "store compact", "store export"),
     ],
 )
 def test_every_command_has_help(command: str) -> None:

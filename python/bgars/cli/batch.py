@@ -36,7 +36,7 @@ SerialFrom = Annotated[
         metavar="PATTERN",
         help="Where serial numbers come from: a pattern of the folder's name with {serial}, {lot}, {substrate}, "
         "{position}, {station}, {operator}, such as '{lot}/{serial}_{position}'; or 'code', the DataMatrix in the "
-        "images. A [part] table in capture.toml goes first.",
+        r"images. A \[part] table in capture.toml goes first.",
     ),
 ]
 

@@ -39,7 +39,7 @@ def report(
     serial: Annotated[
         str | None,
         typer.Argument(
-            metavar="[SERIAL]",
+            metavar="SERIAL",
             help="Serial number of a part of the store; without one the overview of its parts.",
             show_default=False,
         ),
