@@ -11,14 +11,23 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from bgars.rig import LightRig
 
-__all__ = ["BallView", "Finding", "FlatField", "LightCalibration", "ResponseCurve", "Scale", "Severity", "Station"]
+__all__ = [
+    "BallView",
+    "CalibrationFinding",
+    "FlatField",
+    "LightCalibration",
+    "ResponseCurve",
+    "Scale",
+    "Severity",
+    "Station",
+]
 
 Array = NDArray[np.float64]
 Severity = Literal["note", "doubt", "fail"]
 
 
 @dataclass(frozen=True)
-class Finding:
+class CalibrationFinding:
     """Something that a calibration or a check of a station noticed.
 
     Attributes
@@ -99,7 +108,7 @@ class LightCalibration:
         One a ball and capture.
     residual_px : float
         Root mean square of the residuals; 0 where there is nothing to spare.
-    findings : tuple of Finding
+    findings : tuple of CalibrationFinding
         What was noticed.
     """
 
@@ -113,10 +122,10 @@ class LightCalibration:
     u_positions_um: Array | None = None
     u_intensities: Array | None = None
     lamp_deg: float = float("nan")
-    findings: tuple[Finding, ...] = field(default=())
+    findings: tuple[CalibrationFinding, ...] = field(default=())
 
     @property
-    def doubts(self) -> tuple[Finding, ...]:
+    def doubts(self) -> tuple[CalibrationFinding, ...]:
         """The findings that are more than notes."""
         return tuple(finding for finding in self.findings if finding.severity != "note")
 
@@ -224,7 +233,7 @@ class Station:
     scale : Scale or None
     calibrated_utc : str
         When, ISO 8601.
-    findings : tuple of Finding
+    findings : tuple of CalibrationFinding
         What the calibrations noticed.
     """
 
@@ -234,4 +243,4 @@ class Station:
     response: ResponseCurve | None = None
     scale: Scale | None = None
     calibrated_utc: str = ""
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[CalibrationFinding, ...] = ()

@@ -15,7 +15,7 @@ from bgars.rig import LightRig
 from bgars.scalar_checks import check_pitch
 from bgars.station.light_bundle import solve_lights
 from bgars.station.observe import observe, outlines_a_capture
-from bgars.station_record import BallView, Finding, LightCalibration
+from bgars.station_record import BallView, CalibrationFinding, LightCalibration
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -134,7 +134,11 @@ def calibrate_lights(
 
 
 def _solve(
-    captures: list[Capture], seen: Observed, diameter_um: float | None, near: bool | None, findings: list[Finding]
+    captures: list[Capture],
+    seen: Observed,
+    diameter_um: float | None,
+    near: bool | None,
+    findings: list[CalibrationFinding],
 ) -> tuple[LightSolution, float | None]:
     """Lights of all balls, and the pixel pitch that puts them in micrometres."""
     balls = seen.balls
@@ -157,7 +161,7 @@ def _solve(
             "the balls show that the lights are near, but no scale is known: state the diameter of the ball to get "
             "positions"
         )
-        findings.append(Finding("doubt", message, "near-without-scale"))
+        findings.append(CalibrationFinding("doubt", message, "near-without-scale"))
         solution = solve_lights(places, covariances, circles, u_circles, seen.camera_px, near=False)
     return solution, pitch_um
 
@@ -184,7 +188,7 @@ def _intensities(
     captures: list[Capture],
     seen: Observed,
     solution: LightSolution,
-    findings: list[Finding],
+    findings: list[CalibrationFinding],
 ) -> tuple[Array, Array | None]:
     """Relative intensities, mean 1, and their scatter from ball to ball."""
     usable = [row / row.mean() for row in seen.strengths if np.isfinite(row).all() and (row > 0).all()]
@@ -197,7 +201,7 @@ def _intensities(
     least = 10.0
     if np.min(board) > least:
         findings.append(
-            Finding(
+            CalibrationFinding(
                 "note",
                 "intensities by the median level of the images (a matt board in view); the highlights are clipped",
                 "board-intensities",
@@ -205,7 +209,7 @@ def _intensities(
         )
         return level / level.mean(), np.full(len(level), 0.03)
     findings.append(
-        Finding(
+        CalibrationFinding(
             "note",
             f"{captures[0].name}: intensities not measured (clipped highlights, dark board): taken as equal; "
             "calibrate flat gives them",
@@ -215,13 +219,15 @@ def _intensities(
     return np.ones(len(solution.directions)), None
 
 
-def _judge(solution: LightSolution, balls: list[SeenBall], captures: list[Capture], rig: LightRig) -> list[Finding]:
+def _judge(
+    solution: LightSolution, balls: list[SeenBall], captures: list[Capture], rig: LightRig
+) -> list[CalibrationFinding]:
     """What the result says about itself, and about the rig that was declared."""
-    found: list[Finding] = []
+    found: list[CalibrationFinding] = []
     files = captures[0].files
     if len(balls) > 1 and solution.reduced_chi_square > MISFIT:
         found.append(
-            Finding(
+            CalibrationFinding(
                 "doubt",
                 f"the balls contradict each other: residuals of {_rms(solution.residuals_px):.2f} px are "
                 f"{math.sqrt(solution.reduced_chi_square):.1f} times what was expected; uncertainties are raised "
@@ -238,11 +244,15 @@ def _judge(solution: LightSolution, balls: list[SeenBall], captures: list[Captur
                 f"{light_name(int(index), files)}: off by {size[index]:.2f} px between balls, others {usual:.2f} px"
             )
             found.append(
-                Finding("doubt", message, "light-off", float(size[index]), OFF_SIGMAS * usual, "px", int(index))
+                CalibrationFinding(
+                    "doubt", message, "light-off", float(size[index]), OFF_SIGMAS * usual, "px", int(index)
+                )
             )
     for index in np.flatnonzero(solution.u_deg > UNSURE_DEG):
         message = f"{light_name(int(index), files)}: its direction is known to {solution.u_deg[index]:.1f} deg only"
-        found.append(Finding("doubt", message, "unsure", float(solution.u_deg[index]), UNSURE_DEG, "deg", int(index)))
+        found.append(
+            CalibrationFinding("doubt", message, "unsure", float(solution.u_deg[index]), UNSURE_DEG, "deg", int(index))
+        )
     declared = captures[0].rig
     if len(declared) == len(rig) and captures[0].folder is not None and declared.u_deg is None:
         turn = np.degrees(np.arccos(np.clip(declared.directions @ rig.directions.T, -1.0, 1.0)))
@@ -258,7 +268,7 @@ def _judge(solution: LightSolution, balls: list[SeenBall], captures: list[Captur
                 f"images in another order than the lights of the capture: {light_name(first, files)} is declared where "
                 f"light {int(nearest[first])} is"
             )
-            found.append(Finding("note", message, "order", light=first))
+            found.append(CalibrationFinding("note", message, "order", light=first))
     return found
 
 
