@@ -89,9 +89,9 @@ from .station import calibrate_flat as calibrate_flat
 from .station import calibrate_lights as calibrate_lights
 from .station import calibrate_scale as calibrate_scale
 from .station_apply import with_station as with_station
-from .station_record import CalibrationFinding as CalibrationFinding
 from .station_record import FlatField as FlatField
 from .station_record import LightCalibration as LightCalibration
+from .station_record import Remark as Remark
 from .station_record import ResponseCurve as ResponseCurve
 from .station_record import Scale as Scale
 from .station_record import Station as Station

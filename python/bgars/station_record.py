@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BallView",
-    "CalibrationFinding",
     "FlatField",
     "LightCalibration",
+    "Remark",
     "ResponseCurve",
     "Scale",
     "Severity",
@@ -27,7 +27,7 @@ Severity = Literal["note", "doubt", "fail"]
 
 
 @dataclass(frozen=True)
-class CalibrationFinding:
+class Remark:
     """Something that a calibration or a check of a station noticed.
 
     Attributes
@@ -108,7 +108,7 @@ class LightCalibration:
         One a ball and capture.
     residual_px : float
         Root mean square of the residuals; 0 where there is nothing to spare.
-    findings : tuple of CalibrationFinding
+    findings : tuple of Remark
         What was noticed.
     """
 
@@ -122,10 +122,10 @@ class LightCalibration:
     u_positions_um: Array | None = None
     u_intensities: Array | None = None
     lamp_deg: float = float("nan")
-    findings: tuple[CalibrationFinding, ...] = field(default=())
+    findings: tuple[Remark, ...] = field(default=())
 
     @property
-    def doubts(self) -> tuple[CalibrationFinding, ...]:
+    def doubts(self) -> tuple[Remark, ...]:
         """The findings that are more than notes."""
         return tuple(finding for finding in self.findings if finding.severity != "note")
 
@@ -233,7 +233,7 @@ class Station:
     scale : Scale or None
     calibrated_utc : str
         When, ISO 8601.
-    findings : tuple of CalibrationFinding
+    findings : tuple of Remark
         What the calibrations noticed.
     """
 
@@ -243,4 +243,4 @@ class Station:
     response: ResponseCurve | None = None
     scale: Scale | None = None
     calibrated_utc: str = ""
-    findings: tuple[CalibrationFinding, ...] = ()
+    findings: tuple[Remark, ...] = ()

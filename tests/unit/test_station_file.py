@@ -33,7 +33,7 @@ def test_a_station_comes_back_as_it_was(tmp_path: Path) -> None:
         flat=FlatField(np.random.default_rng(0).uniform(50, 100, (6, 6)), 2, (40, 60), 0.001),
         response=bgars.ResponseCurve(levels, levels**2, 0.001, "sums"),
         scale=bgars.Scale(3.4, 0.002, distortion=0.004, points=80),
-        findings=(bgars.CalibrationFinding("doubt", "a 'quoted' \"thing\"", "code"),),
+        findings=(bgars.Remark("doubt", "a 'quoted' \"thing\"", "code"),),
     )
     path = tmp_path / "any name.toml"
     bgars.write_station(known, path)

@@ -14,7 +14,7 @@ from bgars.cli.console import print_json, say
 from bgars.errors import InputError
 from bgars.io.capture import read_unlit
 from bgars.station import response_from_bracket, response_from_sums, srgb_response
-from bgars.station_record import CalibrationFinding
+from bgars.station_record import Remark
 
 __all__ = ["register"]
 
@@ -49,7 +49,7 @@ def response(
     if [exposures is not None, sums, srgb].count(True) != 1:
         msg = "--exposures, --sums, --srgb: give one of them"
         raise InputError(msg)
-    findings: tuple[CalibrationFinding, ...] = ()
+    findings: tuple[Remark, ...] = ()
     if srgb:
         curve = srgb_response()
     elif folder is None:

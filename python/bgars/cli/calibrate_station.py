@@ -19,7 +19,7 @@ from bgars.station.page import write_station_page
 
 if TYPE_CHECKING:
     from bgars.records import Capture
-    from bgars.station_record import CalibrationFinding, LightCalibration, Station
+    from bgars.station_record import LightCalibration, Remark, Station
 
 __all__ = ["FolderArgument", "JsonOption", "OutputOption", "keep_part", "register", "said_values", "tell_findings"]
 
@@ -145,7 +145,7 @@ def station(
         msg = "--grid and --grid-pitch-mm: give both or none"
         raise InputError(msg)
     parts: dict[str, Any] = {}
-    findings: list[CalibrationFinding] = []
+    findings: list[Remark] = []
     with stage_progress() as report:
         if grid is not None and grid_pitch_mm is not None:
             parts["scale"], said = bgars.calibrate_scale(read_unlit(grid), 1000.0 * grid_pitch_mm, target=target)
@@ -265,9 +265,7 @@ def _raw(folder: Path, known: Station) -> Capture:
     return bgars.with_station(capture, bgars.Station(known.name, response=known.response))
 
 
-def keep_part(
-    output: Path, parts: dict[str, Any], findings: tuple[CalibrationFinding, ...], name: str | None = None
-) -> None:
+def keep_part(output: Path, parts: dict[str, Any], findings: tuple[Remark, ...], name: str | None = None) -> None:
     """Write the station with its new parts, and its page."""
     known = _existing(output)
     codes = {finding.code for finding in findings}
@@ -293,7 +291,7 @@ def _lights_values(found: LightCalibration) -> dict[str, Any]:
     }
 
 
-def said_values(findings: tuple[CalibrationFinding, ...]) -> dict[str, Any]:
+def said_values(findings: tuple[Remark, ...]) -> dict[str, Any]:
     """Findings as plain values."""
     return {"findings": [finding.to_dict() for finding in findings]}
 
@@ -315,7 +313,7 @@ def _tell_lights(found: LightCalibration) -> None:
         )
 
 
-def tell_findings(findings: tuple[CalibrationFinding, ...], output: Path) -> None:
+def tell_findings(findings: tuple[Remark, ...], output: Path) -> None:
     """Say what was noticed, and where the result is."""
     for finding in findings:
         say(f"{finding.severity}: {finding.message}")

@@ -16,7 +16,7 @@ from bgars.errors import FileFormatError, InputError
 from bgars.io.atomic import atomic_file
 from bgars.io.strict_toml import Strict, checked, read_values
 from bgars.rig import LightRig
-from bgars.station_record import CalibrationFinding, FlatField, LightCalibration, ResponseCurve, Scale, Station
+from bgars.station_record import FlatField, LightCalibration, Remark, ResponseCurve, Scale, Station
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -200,7 +200,7 @@ def read_station(path: str | PathLike[str]) -> Station:
         if scale is None
         else Scale(**{**scale.model_dump(), "tilt_deg": math.nan if scale.tilt_deg is None else scale.tilt_deg}),
         calibrated_utc=table.calibrated_utc,
-        findings=tuple(CalibrationFinding(one.severity, one.message, one.code) for one in table.findings),
+        findings=tuple(Remark(one.severity, one.message, one.code) for one in table.findings),
     )
 
 

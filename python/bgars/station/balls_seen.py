@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from bgars.errors import CalibrationError, InputError
 from bgars.station.matt_lights import shading_misfit
 from bgars.station.outline import Outline, as_outline, find_outline, refine_outline
-from bgars.station_record import CalibrationFinding
+from bgars.station_record import Remark
 
 if TYPE_CHECKING:
     from bgars.records import Capture
@@ -58,7 +58,7 @@ def given_outlines(outline: ArrayLike | None) -> Array | None:
 
 def outlines_of(
     capture: Capture, levels: Levels, given: Array | None, *, matt: bool
-) -> tuple[list[Outline], list[CalibrationFinding]]:
+) -> tuple[list[Outline], list[Remark]]:
     """Return the outlines of the balls in view, measured where the images show them.
 
     Raises
@@ -68,7 +68,7 @@ def outlines_of(
     """
     pictures = _pictures(levels)
     height, width = pictures[0].shape
-    findings: list[CalibrationFinding] = []
+    findings: list[Remark] = []
     outlines: list[Outline] = []
     if given is None:
         start = _disc_of_mask(capture)
@@ -90,16 +90,14 @@ def outlines_of(
         if seen is None or seen.arc < 0.5:  # noqa: PLR2004 - half of it
             outlines.append(as_outline(circle, NOT_SEEN_U_PX))
             findings.append(
-                CalibrationFinding(
-                    "note", f"{capture.name}: {name}: not seen in the images, taken as stated", "outline-unseen"
-                )
+                Remark("note", f"{capture.name}: {name}: not seen in the images, taken as stated", "outline-unseen")
             )
             continue
         off = np.abs(seen.circle_px - circle)
         allowed = max(WRONG_SHARE * circle[2], WRONG_SIGMAS * math.hypot(seen.u_radius_px, NOT_SEEN_U_PX))
         if off.max() > allowed:
             findings.append(
-                CalibrationFinding(
+                Remark(
                     "doubt",
                     f"{capture.name}: {name}: stated radius {circle[2]:.2f} px at ({circle[0]:.1f}, {circle[1]:.1f}), "
                     f"the images show {seen.radius_px:.2f} px at ({seen.x_px:.1f}, {seen.y_px:.1f})",
@@ -129,7 +127,7 @@ def outlines_of(
     return outlines, findings
 
 
-def _judge(capture: Capture, outline: Outline, height: int, width: int) -> list[CalibrationFinding]:
+def _judge(capture: Capture, outline: Outline, height: int, width: int) -> list[Remark]:
     if not outline.inside(height, width):
         msg = (
             f"{capture.name}: the ball is cut off: radius {outline.radius_px:.1f} px at ({outline.x_px:.1f}, "
@@ -145,7 +143,7 @@ def _judge(capture: Capture, outline: Outline, height: int, width: int) -> list[
     limit = max(SOFT_PX, SOFT_SHARE * outline.radius_px)
     if outline.edge_px > limit:
         return [
-            CalibrationFinding(
+            Remark(
                 "doubt",
                 f"{capture.name}: the ball is out of focus: its edge is {outline.edge_px:.1f} px wide "
                 f"(standard deviation), at most {limit:.1f} is sharp",

@@ -12,7 +12,7 @@ from bgars.light_names import light_name
 from bgars.station.flat import calibrate_flat
 from bgars.station.lights import calibrate_lights
 from bgars.station_apply import flat_maps
-from bgars.station_record import CalibrationFinding, Severity
+from bgars.station_record import Remark, Severity
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -36,7 +36,7 @@ def drift(
     outline: ArrayLike | None = None,
     limit_deg: float = LIMIT_DEG,
     limit_intensity: float = LIMIT_INTENSITY,
-) -> tuple[CalibrationFinding, ...]:
+) -> tuple[Remark, ...]:
     """Compare a station with a new capture of its reference.
 
     Parameters
@@ -54,7 +54,7 @@ def drift(
 
     Returns
     -------
-    tuple of CalibrationFinding
+    tuple of Remark
         One for each light and quantity: "fail" beyond the limit, "note" within; `value` is in `unit`.
 
     Raises
@@ -91,16 +91,14 @@ def drift(
         limit = limit_deg + COVERAGE * float(u_deg[index])
         moved = float(turn_deg[index])
         words = f"{name}: moved by {moved:.2f} deg since calibration (limit {limit:.2f} deg)"
-        found.append(
-            CalibrationFinding("fail" if moved > limit else "note", words, "light-moved", moved, limit, "deg", index)
-        )
+        found.append(Remark("fail" if moved > limit else "note", words, "light-moved", moved, limit, "deg", index))
         if measured and before.u_intensities is not None and now.u_intensities is not None:
             limit = limit_intensity + COVERAGE * math.hypot(before.u_intensities[index], now.u_intensities[index])
             words = (
                 f"{name}: {100 * change[index]:+.1f} % in strength against the other lights (limit {100 * limit:.1f} %)"
             )
             severity: Severity = "fail" if abs(change[index]) > limit else "note"
-            found.append(CalibrationFinding(severity, words, "light-strength", float(change[index]), limit, "", index))
+            found.append(Remark(severity, words, "light-strength", float(change[index]), limit, "", index))
     return tuple(found)
 
 
@@ -118,7 +116,7 @@ def _origins(station: Station, outline_px: np.ndarray, capture: Capture) -> np.n
     return directions
 
 
-def _even(station: Station, capture: Capture, limit_intensity: float) -> tuple[CalibrationFinding, ...]:
+def _even(station: Station, capture: Capture, limit_intensity: float) -> tuple[Remark, ...]:
     """Compare the flat board: strength of each light against the others, and its evenness."""
     if station.flat is None:
         msg = f"station: {station.name} has no flat field to compare with"
@@ -137,11 +135,9 @@ def _even(station: Station, capture: Capture, limit_intensity: float) -> tuple[C
             f"{100 * limit_intensity:.1f} %)"
         )
         severity: Severity = "fail" if abs(change[index]) > limit_intensity else "note"
-        found.append(
-            CalibrationFinding(severity, words, "light-strength", float(change[index]), limit_intensity, "", index)
-        )
+        found.append(Remark(severity, words, "light-strength", float(change[index]), limit_intensity, "", index))
         uneven = float(np.abs(flat_maps(now, index) / flat_maps(station.flat, index) - 1.0).max())
         words = f"{name}: its evenness changed by {100 * uneven:.1f} % (limit {100 * LIMIT_EVENNESS:.1f} %)"
         severity = "fail" if uneven > LIMIT_EVENNESS else "note"
-        found.append(CalibrationFinding(severity, words, "evenness", uneven, LIMIT_EVENNESS, "", index))
+        found.append(Remark(severity, words, "evenness", uneven, LIMIT_EVENNESS, "", index))
     return tuple(found)

@@ -12,7 +12,7 @@ from bgars.errors import CalibrationError
 from bgars.light_names import light_name
 from bgars.station.levels import linear_levels
 from bgars.station_apply import flat_maps
-from bgars.station_record import CalibrationFinding, FlatField
+from bgars.station_record import FlatField, Remark
 
 if TYPE_CHECKING:
     from bgars.records import Capture
@@ -36,7 +36,7 @@ FALLOFF = 0.05
 """How far the shape of a map may be from that of the near-light model."""
 
 
-def calibrate_flat(capture: Capture) -> tuple[FlatField, tuple[CalibrationFinding, ...]]:
+def calibrate_flat(capture: Capture) -> tuple[FlatField, tuple[Remark, ...]]:
     """Fit the levels of a flat board under each light by smooth maps.
 
     Parameters
@@ -48,7 +48,7 @@ def calibrate_flat(capture: Capture) -> tuple[FlatField, tuple[CalibrationFindin
     -------
     flat : FlatField
         Polynomials whose degree is chosen on blocks of pixels that were left out.
-    findings : tuple of CalibrationFinding
+    findings : tuple of Remark
         What is left in the board, and how far the corners fall off.
 
     Raises
@@ -93,7 +93,7 @@ def calibrate_flat(capture: Capture) -> tuple[FlatField, tuple[CalibrationFindin
     return flat, tuple(_findings(capture, flat, left))
 
 
-def falloff_findings(flat: FlatField, lights: LightCalibration, pitch_um: float) -> list[CalibrationFinding]:
+def falloff_findings(flat: FlatField, lights: LightCalibration, pitch_um: float) -> list[Remark]:
     """Say which light falls off otherwise than a point at its place would."""
     rig = lights.rig
     if rig.positions_um is None:
@@ -108,7 +108,7 @@ def falloff_findings(flat: FlatField, lights: LightCalibration, pitch_um: float)
     shared = np.mean(ratios, axis=0)
     off = [float(np.std(ratio - shared)) for ratio in ratios]
     return [
-        CalibrationFinding(
+        Remark(
             "note",
             f"{light_name(light)}: falls off {100 * size:.1f} % otherwise than a point at its place; the flat "
             "field corrects it",
@@ -169,7 +169,7 @@ def _degree(means: Array, weights: Array, x: Array, y: Array, noise: Array) -> i
     return chosen
 
 
-def _findings(capture: Capture, flat: FlatField, left: Array) -> list[CalibrationFinding]:
+def _findings(capture: Capture, flat: FlatField, left: Array) -> list[Remark]:
     found = []
     for light in np.flatnonzero(left > STRUCTURE):
         name = light_name(int(light), capture.files)
@@ -177,13 +177,11 @@ def _findings(capture: Capture, flat: FlatField, left: Array) -> list[Calibratio
             f"{capture.name}: {name}: {100 * left[light]:.1f} % of structure is left in the board: texture, "
             "dust, shine or a shadow"
         )
-        found.append(
-            CalibrationFinding("doubt", message, "flat-structure", float(left[light]), STRUCTURE, "", int(light))
-        )
+        found.append(Remark("doubt", message, "flat-structure", float(left[light]), STRUCTURE, "", int(light)))
     corners = [flat_maps(flat, light) for light in range(len(flat.coefficients))]
     least = min(float(one.min()) for one in corners)
     found.append(
-        CalibrationFinding(
+        Remark(
             "note",
             f"{capture.name}: the darkest place of a map has {100 * least:.0f} % of the level at the centre",
             "evenness",

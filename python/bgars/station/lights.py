@@ -15,7 +15,7 @@ from bgars.rig import LightRig
 from bgars.scalar_checks import check_pitch
 from bgars.station.light_bundle import solve_lights
 from bgars.station.observe import observe, outlines_a_capture
-from bgars.station_record import BallView, CalibrationFinding, LightCalibration
+from bgars.station_record import BallView, LightCalibration, Remark
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -138,7 +138,7 @@ def _solve(
     seen: Observed,
     diameter_um: float | None,
     near: bool | None,
-    findings: list[CalibrationFinding],
+    findings: list[Remark],
 ) -> tuple[LightSolution, float | None]:
     """Lights of all balls, and the pixel pitch that puts them in micrometres."""
     balls = seen.balls
@@ -161,7 +161,7 @@ def _solve(
             "the balls show that the lights are near, but no scale is known: state the diameter of the ball to get "
             "positions"
         )
-        findings.append(CalibrationFinding("doubt", message, "near-without-scale"))
+        findings.append(Remark("doubt", message, "near-without-scale"))
         solution = solve_lights(places, covariances, circles, u_circles, seen.camera_px, near=False)
     return solution, pitch_um
 
@@ -188,7 +188,7 @@ def _intensities(
     captures: list[Capture],
     seen: Observed,
     solution: LightSolution,
-    findings: list[CalibrationFinding],
+    findings: list[Remark],
 ) -> tuple[Array, Array | None]:
     """Relative intensities, mean 1, and their scatter from ball to ball."""
     usable = [row / row.mean() for row in seen.strengths if np.isfinite(row).all() and (row > 0).all()]
@@ -201,7 +201,7 @@ def _intensities(
     least = 10.0
     if np.min(board) > least:
         findings.append(
-            CalibrationFinding(
+            Remark(
                 "note",
                 "intensities by the median level of the images (a matt board in view); the highlights are clipped",
                 "board-intensities",
@@ -209,7 +209,7 @@ def _intensities(
         )
         return level / level.mean(), np.full(len(level), 0.03)
     findings.append(
-        CalibrationFinding(
+        Remark(
             "note",
             f"{captures[0].name}: intensities not measured (clipped highlights, dark board): taken as equal; "
             "calibrate flat gives them",
@@ -219,15 +219,13 @@ def _intensities(
     return np.ones(len(solution.directions)), None
 
 
-def _judge(
-    solution: LightSolution, balls: list[SeenBall], captures: list[Capture], rig: LightRig
-) -> list[CalibrationFinding]:
+def _judge(solution: LightSolution, balls: list[SeenBall], captures: list[Capture], rig: LightRig) -> list[Remark]:
     """What the result says about itself, and about the rig that was declared."""
-    found: list[CalibrationFinding] = []
+    found: list[Remark] = []
     files = captures[0].files
     if len(balls) > 1 and solution.reduced_chi_square > MISFIT:
         found.append(
-            CalibrationFinding(
+            Remark(
                 "doubt",
                 f"the balls contradict each other: residuals of {_rms(solution.residuals_px):.2f} px are "
                 f"{math.sqrt(solution.reduced_chi_square):.1f} times what was expected; uncertainties are raised "
@@ -244,15 +242,11 @@ def _judge(
                 f"{light_name(int(index), files)}: off by {size[index]:.2f} px between balls, others {usual:.2f} px"
             )
             found.append(
-                CalibrationFinding(
-                    "doubt", message, "light-off", float(size[index]), OFF_SIGMAS * usual, "px", int(index)
-                )
+                Remark("doubt", message, "light-off", float(size[index]), OFF_SIGMAS * usual, "px", int(index))
             )
     for index in np.flatnonzero(solution.u_deg > UNSURE_DEG):
         message = f"{light_name(int(index), files)}: its direction is known to {solution.u_deg[index]:.1f} deg only"
-        found.append(
-            CalibrationFinding("doubt", message, "unsure", float(solution.u_deg[index]), UNSURE_DEG, "deg", int(index))
-        )
+        found.append(Remark("doubt", message, "unsure", float(solution.u_deg[index]), UNSURE_DEG, "deg", int(index)))
     declared = captures[0].rig
     if len(declared) == len(rig) and captures[0].folder is not None and declared.u_deg is None:
         turn = np.degrees(np.arccos(np.clip(declared.directions @ rig.directions.T, -1.0, 1.0)))
@@ -268,7 +262,7 @@ def _judge(
                 f"images in another order than the lights of the capture: {light_name(first, files)} is declared where "
                 f"light {int(nearest[first])} is"
             )
-            found.append(CalibrationFinding("note", message, "order", light=first))
+            found.append(Remark("note", message, "order", light=first))
     return found
 
 

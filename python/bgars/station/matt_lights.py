@@ -11,7 +11,7 @@ from scipy.optimize import least_squares, minimize
 
 from bgars.errors import CalibrationError
 from bgars.light_names import light_name
-from bgars.station_record import CalibrationFinding
+from bgars.station_record import Remark
 
 if TYPE_CHECKING:
     from bgars.records import Capture
@@ -48,7 +48,7 @@ class SeenShading(NamedTuple):
     outline_jacobians: Array
     strengths: Array
     u_strengths: Array
-    findings: list[CalibrationFinding]
+    findings: list[Remark]
 
 
 def shading_on(capture: Capture, levels: Levels, outline: Outline) -> SeenShading:
@@ -59,7 +59,7 @@ def shading_on(capture: Capture, levels: Levels, outline: Outline) -> SeenShadin
     CalibrationError
         An image that is too dark or burnt out on the ball.
     """
-    findings: list[CalibrationFinding] = []
+    findings: list[Remark] = []
     count = len(levels.images)
     directions, strengths, u_strengths = np.zeros((count, 3)), np.zeros(count), np.zeros(count)
     own, jacobians = np.zeros((count, 2, 2)), np.zeros((count, 3, 3))
@@ -93,7 +93,7 @@ def shading_on(capture: Capture, levels: Levels, outline: Outline) -> SeenShadin
         if residual > NOT_LAMBERT * peak:
             general, left = _monotone(_normals(points, outline.circle_px), values, used, direction)
             findings.append(
-                CalibrationFinding(
+                Remark(
                     "note",
                     f"{capture.name}: {name}: the ball does not follow Lambert's law ({100 * residual / peak:.1f} "
                     "% off): "

@@ -13,7 +13,7 @@ from bgars.light_names import light_name
 from bgars.station.highlights import REACH, find_spot, fit_highlight, glare, middle_of
 from bgars.station.mirror import sphere_of_outline
 from bgars.station.small_spots import SMALL_PX, place_small_spots
-from bgars.station_record import CalibrationFinding
+from bgars.station_record import Remark
 
 if TYPE_CHECKING:
     from bgars.records import Capture
@@ -42,7 +42,7 @@ class SeenHighlights(NamedTuple):
     covariances_px2: Array
     lamp_deg: Array
     flux: Array
-    findings: list[CalibrationFinding]
+    findings: list[Remark]
 
 
 def highlights_on(capture: Capture, levels: Levels, outline: Outline, camera_px: float) -> SeenHighlights:
@@ -59,14 +59,14 @@ def highlights_on(capture: Capture, levels: Levels, outline: Outline, camera_px:
     places = np.full((count, 2), np.nan)
     covariances = np.full((count, 2, 2), np.nan)
     lamp_deg, flux = np.full(count, np.nan), np.full(count, np.nan)
-    findings: list[CalibrationFinding] = []
+    findings: list[Remark] = []
     spots: dict[int, Spot] = {}
     for index, image in enumerate(levels.images):
         name = light_name(index, capture.files)
         spot = find_spot(image, still, usable, levels.clip, levels.noise)
         if spot is None:
             message = f"{capture.name}: {name}: its highlight is not on the ball (within {REACH:g} of the radius)"
-            findings.append(CalibrationFinding("doubt", message, "no-highlight", light=index))
+            findings.append(Remark("doubt", message, "no-highlight", light=index))
             continue
         wide_deg = math.degrees(4.0 * math.sqrt(spot.area_px / math.pi) / outline.radius_px)
         if wide_deg > TOO_WIDE_DEG:
@@ -80,16 +80,14 @@ def highlights_on(capture: Capture, levels: Levels, outline: Outline, camera_px:
                 f"{capture.name}: {name}: its highlight is {wide_deg:.0f} deg wide: a broad lamp, a rough "
                 "ball, or burnt out"
             )
-            findings.append(CalibrationFinding("doubt", message, "wide-highlight", wide_deg, WIDE_DEG, "deg", index))
+            findings.append(Remark("doubt", message, "wide-highlight", wide_deg, WIDE_DEG, "deg", index))
         if spot.second_share > SECOND_SHARE:
             message = (
                 f"{capture.name}: {name}: two highlights on the ball (the second has "
                 f"{100 * spot.second_share:.0f} % of "
                 "the first one's area); the larger is taken"
             )
-            findings.append(
-                CalibrationFinding("doubt", message, "two-highlights", spot.second_share, SECOND_SHARE, "", index)
-            )
+            findings.append(Remark("doubt", message, "two-highlights", spot.second_share, SECOND_SHARE, "", index))
         spots[index] = spot
     small = [index for index, spot in spots.items() if spot.extent_px <= SMALL_PX and _saturated(levels, index, spot)]
     if small:
@@ -116,7 +114,7 @@ def highlights_on(capture: Capture, levels: Levels, outline: Outline, camera_px:
             places[index] = middle
             covariances[index] = (ROUGH_SHARE * radius) ** 2 * np.eye(2)
             message = f"{capture.name}: {name}: its highlight is no disc; the middle of its bright pixels is taken"
-            findings.append(CalibrationFinding("note", message, "no-disc", light=index))
+            findings.append(Remark("note", message, "no-disc", light=index))
             continue
         places[index], covariances[index] = (fit.x_px, fit.y_px), fit.covariance_px2
         lamp_deg[index], flux[index] = fit.lamp_deg, fit.flux

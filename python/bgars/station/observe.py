@@ -14,7 +14,7 @@ from bgars.station.balls_seen import given_outlines, outlines_of
 from bgars.station.levels import linear_levels
 from bgars.station.matt_lights import shading_on
 from bgars.station.mirror_lights import highlights_on
-from bgars.station_record import CalibrationFinding
+from bgars.station_record import Remark
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -51,7 +51,7 @@ class Observed(NamedTuple):
     strengths: list[Array]
     lamp_deg: float
     camera_px: float
-    findings: list[CalibrationFinding]
+    findings: list[Remark]
 
 
 def observe(
@@ -69,7 +69,7 @@ def observe(
         No ball, or a light that shows on none.
     """
     balls: list[SeenBall] = []
-    findings: list[CalibrationFinding] = []
+    findings: list[Remark] = []
     levels_of: list[Levels] = []
     strengths: list[Array] = []
     lamps: list[Array] = []
@@ -172,7 +172,7 @@ def _need_all(balls: list[SeenBall], captures: list[Capture]) -> None:
         raise CalibrationError(msg)
 
 
-def _lens_note(balls: list[SeenBall]) -> list[CalibrationFinding]:
+def _lens_note(balls: list[SeenBall]) -> list[Remark]:
     """Say what an ordinary lens would do, where none is stated."""
     notes = []
     for ball in balls:
@@ -181,7 +181,7 @@ def _lens_note(balls: list[SeenBall]) -> list[CalibrationFinding]:
         aside = math.hypot(ball.outline.x_px, ball.outline.y_px) / side
         if stated is None and aside > ASIDE_SHARE:
             notes.append(
-                CalibrationFinding(
+                Remark(
                     "note",
                     f"{ball.capture.name}: the ball is {100 * aside:.0f} % of the image aside and no camera is "
                     "stated: taken as "

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares, nnls
 
 from bgars.errors import CalibrationError, InputError
-from bgars.station_record import CalibrationFinding, ResponseCurve
+from bgars.station_record import Remark, ResponseCurve
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,7 +35,7 @@ LEAST_PIXELS = 200
 
 def response_from_bracket(
     images: Sequence[NDArray[np.generic]], exposures: ArrayLike, full_scale: float
-) -> tuple[ResponseCurve, tuple[CalibrationFinding, ...]]:
+) -> tuple[ResponseCurve, tuple[Remark, ...]]:
     """Find the inverse response from one scene at several exposure times.
 
     The logarithm of light grows by that of the exposure: the equations of Debevec & Malik (1997), over a curve that
@@ -101,7 +101,7 @@ def response_from_bracket(
 
 def response_from_sums(
     first: NDArray[np.generic], second: NDArray[np.generic], both: NDArray[np.generic], full_scale: float
-) -> tuple[ResponseCurve, tuple[CalibrationFinding, ...]]:
+) -> tuple[ResponseCurve, tuple[Remark, ...]]:
     """Find the inverse response from light a, light b, and both together: their light adds up.
 
     Parameters
@@ -175,7 +175,7 @@ def _spread_sample(levels: Array) -> Array:
     return rows
 
 
-def _curve(slopes: Array, u: float, source: str) -> tuple[ResponseCurve, tuple[CalibrationFinding, ...]]:
+def _curve(slopes: Array, u: float, source: str) -> tuple[ResponseCurve, tuple[Remark, ...]]:
     knots = np.linspace(0.0, 1.0, KNOTS) ** 2
     curve = np.append(0.0, np.exp(_ramps(knots[1:]) @ slopes))
     curve = np.maximum.accumulate(curve + 1e-9 * np.arange(KNOTS))
@@ -185,9 +185,9 @@ def _curve(slopes: Array, u: float, source: str) -> tuple[ResponseCurve, tuple[C
             f"the camera is not linear: up to {100 * found.nonlinearity:.1f} % of full scale off a straight "
             f"line, about gamma {found.gamma:.2f}"
         )
-        return found, (CalibrationFinding("doubt", message, "not-linear", found.nonlinearity, LINEAR),)
+        return found, (Remark("doubt", message, "not-linear", found.nonlinearity, LINEAR),)
     return found, (
-        CalibrationFinding(
+        Remark(
             "note",
             f"the camera is linear within {100 * max(found.nonlinearity, u):.1f} % of full scale",
             "linear",

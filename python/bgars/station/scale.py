@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from bgars.errors import CalibrationError, InputError
 from bgars.station.levels import linear_levels
-from bgars.station_record import CalibrationFinding, Scale
+from bgars.station_record import Remark, Scale
 
 if TYPE_CHECKING:
     from bgars.records import Capture
@@ -39,7 +39,7 @@ UNKNOWN_PITCH_U = 1e-4
 
 def calibrate_scale(
     capture: Capture, pitch_um: float, *, target: Target = "dots", u_pitch_um: float | None = None
-) -> tuple[Scale, tuple[CalibrationFinding, ...]]:
+) -> tuple[Scale, tuple[Remark, ...]]:
     """Measure a pixel on a grid of known pitch that lies where parts lie.
 
     Parameters
@@ -56,7 +56,7 @@ def calibrate_scale(
     Returns
     -------
     scale : Scale
-    findings : tuple of CalibrationFinding
+    findings : tuple of Remark
 
     Raises
     ------
@@ -80,7 +80,7 @@ def calibrate_scale(
 
 def fit_grid(
     places_px: Array, pitch_um: float, u_pitch_um: float | None, *, size_px: tuple[int, int], name: str = "grid"
-) -> tuple[Scale, tuple[CalibrationFinding, ...]]:
+) -> tuple[Scale, tuple[Remark, ...]]:
     """Fit a square grid, seen by a lens with radial distortion at a tilt, to points (N, 2) from the image centre.
 
     Examples
@@ -115,7 +115,7 @@ def fit_grid(
     tilted = math.hypot(px, py) > SEEN_SIGMAS * math.sqrt(float(covariance[4, 4] + covariance[5, 5]))
     bent = abs(k) > SEEN_SIGMAS * math.sqrt(float(covariance[6, 6]))
     findings = [
-        CalibrationFinding(
+        Remark(
             "note",
             f"{name}: {count} of {len(places_px)} points on the grid, residual {rms:.3f} px",
             "grid",
@@ -126,7 +126,7 @@ def fit_grid(
     ]
     if bent:
         findings.append(
-            CalibrationFinding(
+            Remark(
                 "note",
                 f"{name}: the lens distorts by {100 * k:+.2f} % at the corners; places of balls there are off by "
                 f"{abs(k) * half:.1f} px",
@@ -136,7 +136,7 @@ def fit_grid(
         )
     if tilted:
         findings.append(
-            CalibrationFinding(
+            Remark(
                 "note",
                 f"{name}: the scale changes by {200 * math.hypot(px, py):.2f} % across the image: the grid is "
                 "tilted against the camera",
