@@ -30,8 +30,7 @@ fn the_bits_are_the_same_for_one_and_two_threads() {
 }
 
 #[test]
-fn an_image_over_the_size_that_is_streamed_equals_its_two_halves() {
-    // Over a megapixel results are written past the caches; half of it is not.
+fn an_image_of_several_bands_equals_its_two_halves() {
     let (count, half) = (4, 1 << 19);
     let images: Vec<u8> = (0..count * 2 * half).map(|index| ((index * 2_654_435_761) >> 13) as u8).collect();
     let lights = Lights::directional(&tilted_ring(count, 40.0)).unwrap();
@@ -51,7 +50,6 @@ fn an_image_over_the_size_that_is_streamed_equals_its_two_halves() {
 
 #[test]
 fn images_a_power_of_two_apart_give_the_same_bits() {
-    // By the filter, those that crowd are brought together, and the others are worked on where they lie.
     apart_gives_the_same_bits(|value| value as u8);
     apart_gives_the_same_bits(|value| value as u16);
     apart_gives_the_same_bits(|value| value as f32);

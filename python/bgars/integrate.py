@@ -19,7 +19,6 @@ from bgars.integration_inputs import (
     plain,
     used_pixels,
 )
-from bgars.large_arrays import any_content
 from bgars.records import Component, DepthMap, HeightMap, NormalField
 from bgars.scalar_checks import check_pitch, number
 from bgars.surface_records import BilateralFit
@@ -213,7 +212,7 @@ def integrate_normals(
     arrays = (plain(vectors, np.float32), use, trust, regions)
     common: dict[str, Any] = {"max_iters": iters, "threads": threads, "progress": progress}
     if method == "least-squares":
-        height_px, labels = any_content(use.shape, np.float32), any_content(use.shape, np.int32)
+        height_px, labels = np.zeros(use.shape, np.float32), np.zeros(use.shape, np.int32)
         parts, iterations, residual = _bgars.integrate_normals(
             *arrays,
             height_px=height_px,

@@ -9,7 +9,6 @@ import numpy as np
 
 from bgars import _bgars
 from bgars.errors import InputError
-from bgars.large_arrays import any_content
 from bgars.records import NormalField
 from bgars.surface_records import Anchors, Pinhole
 
@@ -105,7 +104,7 @@ def normal_array(normals: ArrayLike, mask: ArrayLike | None, threads: int | None
 
 def used_pixels(valid: BoolArray, mask: ArrayLike | None) -> BoolArray:
     """Return the pixels of both masks, in an array of its own."""
-    use = any_content(valid.shape, np.bool_)
+    use = np.zeros(valid.shape, np.bool_)
     np.logical_and(valid, valid if mask is None else _bool_mask(mask, valid.shape), out=use)
     return use
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from bgars.errors import InputError
-from bgars.large_arrays import any_content
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -40,13 +39,13 @@ def fresh_outputs(shape: tuple[int, int], set_lights: int, *, fills: bool) -> Ke
         Whether normals may be filled in that are not measured.
     """
     return KernelOutputs(
-        normals=any_content((*shape, 3), np.float32),
-        albedo=any_content(shape, np.float32),
-        mask=any_content(shape, np.bool_),
-        confidence=any_content(shape, np.float32),
-        measured=any_content(shape, np.bool_) if fills else None,
-        lights_kept=any_content(shape, np.uint16),
-        kept_sets=any_content((*shape, set_lights), np.bool_) if set_lights else None,
+        normals=np.zeros((*shape, 3), np.float32),
+        albedo=np.zeros(shape, np.float32),
+        mask=np.zeros(shape, np.bool_),
+        confidence=np.zeros(shape, np.float32),
+        measured=np.zeros(shape, np.bool_) if fills else None,
+        lights_kept=np.zeros(shape, np.uint16),
+        kept_sets=np.zeros((*shape, set_lights), np.bool_) if set_lights else None,
     )
 
 
@@ -63,7 +62,7 @@ def outputs_of(field: NormalField, shape: tuple[int, int], set_lights: int, *, f
         raise InputError(msg)
     measured: BoolArray | None = field.measured
     if _shows(field.measured, field.mask):
-        measured = any_content(shape, np.bool_) if fills else None
+        measured = np.zeros(shape, np.bool_) if fills else None
     outputs = KernelOutputs(
         field.normals, field.albedo, field.mask, field.confidence, measured, field.lights_kept, field.kept_sets
     )

@@ -1,8 +1,7 @@
-"""Memory of an integration: at most 60 bytes a pixel beyond its input and output, kept for the next call."""
+"""Memory of an integration: at most 60 bytes a pixel beyond its input and output."""
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -59,34 +58,6 @@ elif shape == "serpentine":
 print(integrate(mask))
 """
 
-FAULTS_PROGRAM = """
-import resource
-import time
-
-import numpy as np
-
-import bgars
-
-
-def faults():
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
-    bgars.integrate_normals(normals, mask=mask, threads=1)
-    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
-
-
-y, x = np.indices((512, 512), dtype=np.float32) / 25
-normals = np.stack([0.3 * np.sin(x) * np.cos(y), 0.3 * np.cos(x + y), np.zeros_like(x)], axis=-1)
-normals[..., 2] = np.sqrt(1 - np.square(normals).sum(axis=-1))
-mask = np.random.default_rng(0).random(normals.shape[:2]) > 0.001
-first, *_ = (faults() for _ in range(4))
-later = 0
-for _ in range(3):
-    time.sleep(1.2)
-    later += faults()
-print(first, later)
-"""
-"""Small arrays are the allocator's, which of itself gives their pages back after a second: 70 faults a call."""
-
 
 def _can_measure() -> bool:
     try:
@@ -109,14 +80,3 @@ def test_an_integration_needs_at_most_sixty_bytes_a_pixel(shape: str, side_px: i
     done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=120)
     # The solution alone takes eight: less would mean that nothing was measured.
     assert 8.0 < float(done.stdout) <= LIMIT_BYTES
-
-
-@pytest.mark.alone
-@pytest.mark.skipif(sys.platform != "linux", reason="page faults are counted on Linux alone")
-def test_pages_wait_for_the_next_part() -> None:
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("MIMALLOC_")}
-    command = [sys.executable, "-c", FAULTS_PROGRAM]
-    done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=120, env=environment)
-    first, later = map(int, done.stdout.split())
-    assert first > 50
-    assert later < 30

@@ -30,7 +30,7 @@ RECORDS = {
     "normals_choice": 3.6,
 }
 BASE = {
-    **{"errors": 0, "version": 0, "extras": 0, "shown": 0.5, "normal_methods": 0, "large_arrays": 0},
+    **{"errors": 0, "version": 0, "extras": 0, "shown": 0.5, "normal_methods": 0},
     **{"bit_depth": 0, "safe_files": 0.5, "mat_files": 0, "same_images": 3.2, "noise_floor": 3.5, "flatten": 3.5},
     **{"light_names": 1, "light_formats": 1.2, "light_files": 1.5, "rig": 2, "scalar_checks": 1},
     **RECORDS,

@@ -6,10 +6,14 @@ import json
 import subprocess
 import sys
 import threading
+from typing import TYPE_CHECKING
 
 import bgars
 import numpy as np
 import pytest
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="counts the threads of a process as Linux shows them")
 
@@ -48,7 +52,7 @@ print(json.dumps([len(first), len(same - first), len(tasks() - before)]))
     assert counts == [3, 0, 5]
 
 
-def test_no_more_threads_are_kept_than_256() -> None:
+def test_the_pools_of_four_numbers_of_threads_are_kept() -> None:
     counts = run("""
 def kept(expected):
     end = time.monotonic() + 30  # threads that are not kept end by themselves
@@ -56,12 +60,13 @@ def kept(expected):
         time.sleep(0.05)
     return len(tasks() - before)
 
-work(100), work(101)
-both = kept(201)
-work(99)
-print(json.dumps([both, kept(200), (work(300), kept(0))[1]]))
+for threads in (10, 11, 12, 13):
+    work(threads)
+four = kept(46)
+work(14)
+print(json.dumps([four, kept(50)]))
 """)
-    assert counts == [201, 200, 0], "what was not used for longest goes first, and 300 are too many by themselves"
+    assert counts == [46, 50], "the one that was not used for longest goes first"
 
 
 def test_threads_do_nothing_while_nobody_calls() -> None:
@@ -79,15 +84,35 @@ print(json.dumps(time.process_time() - start))
 def test_a_fork_starts_threads_of_its_own() -> None:
     found = run("""
 import signal
-work(2), work(3)
+work(2), work(3), work(None)
 child = os.fork()
 if child == 0:
     signal.alarm(60)
-    results = [work(2), work(2), work(200), work(200), work(3)]
+    results = [work(2), work(None), work(2), work(200), work(3)]
     os._exit(0 if results == [0.0] * 5 else 1)
 print(json.dumps([os.waitpid(child, 0)[1], work(2)]))
 """)
     assert found == [0, 0.0]
+
+
+@pytest.mark.parametrize("method", ["fork", "spawn"])
+def test_processes_of_multiprocessing_work_after_the_first_call(tmp_path: Path, method: str) -> None:
+    program = tmp_path / "program.py"
+    program.write_text(
+        START
+        + f"""
+import multiprocessing
+
+if __name__ == "__main__":
+    work(None), work(2)
+    with multiprocessing.get_context("{method}").Pool(2) as pool:
+        results = pool.map_async(work, [None, 2, None, 3]).get(timeout=60)
+    print(json.dumps([results, work(None)]))
+""",
+        encoding="utf-8",
+    )
+    done = subprocess.run([sys.executable, program], capture_output=True, text=True, check=True, timeout=120)
+    assert json.loads(done.stdout) == [[0.0] * 4, 0.0]
 
 
 @pytest.mark.parametrize("threads", [2, None])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import subprocess
 import sys
@@ -132,85 +131,6 @@ def test_reading_and_triangulating_take_a_number_of_threads() -> None:
     surface = bgars.HeightMap.from_array(np.random.default_rng(3).normal(size=(90, 70)))
     one, two = (bgars.mesh_from_height(surface, threads=threads).faces for threads in (1, 2))
     np.testing.assert_array_equal(one, two)
-
-
-PLACES = """
-import json, os, subprocess, sys, time
-import numpy as np, bgars
-
-def places():
-    return {int(task): os.sched_getaffinity(int(task)) for task in os.listdir("/proc/self/task")}
-
-def placed_by(call, seen):
-    call()
-    return [sorted(place) for task, place in places().items() if task not in seen]
-
-def facing(size):
-    return np.broadcast_to(np.float32([0, 0, 1]), (size, size, 3))
-
-def others_run():
-    with open("/proc/loadavg") as load:  # "0.20 0.18 0.12 1/80 11206"
-        return int(load.read().split()[3].split("/")[0]) > 1
-
-def placed_quietly(seen):
-    quiet = 0
-    while True:  # another process may want the processors just now
-        quiet += not others_run()
-        placed = placed_by(lambda: bgars.integrate_normals(facing(16)), seen)
-        if len(set(map(tuple, placed))) > 1 or quiet == 20:
-            return placed
-        if time.monotonic() > start + 30:
-            print("null")
-            sys.exit()
-        time.sleep(0.1)
-
-start = time.monotonic()
-
-allowed, seen = sorted(os.sched_getaffinity(0)), places()
-quiet = placed_quietly(seen)
-for task in places():  # as taskset -a does
-    os.sched_setaffinity(task, quiet[0])
-placed = placed_by(lambda: bgars.integrate_normals(facing(1500)), seen)
-for task in places():
-    os.sched_setaffinity(task, allowed)
-busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2 * len(allowed))]
-try:
-    crowded = placed_by(lambda: bgars.integrate_normals(facing(1500)), seen)
-    for process in busy[1:]:
-        process.kill()
-    time.sleep(1.5)  # however long it has been busy
-    short = placed_by(lambda: bgars.integrate_normals(facing(16)), seen)
-finally:
-    for process in busy:
-        process.kill()
-        process.wait()
-print(json.dumps([quiet, placed, crowded, short, placed_quietly(seen), allowed]))
-"""
-
-
-@pytest.mark.alone
-@pytest.mark.skipif(
-    sys.platform != "linux" or len(os.sched_getaffinity(0)) < 2, reason="needs Linux and two processors"
-)
-def test_threads_keep_to_processors_of_their_own_until_others_want_them() -> None:
-    run = subprocess.run(
-        [sys.executable, "-c", PLACES],
-        capture_output=True,
-        text=True,
-        check=True,
-        env={name: value for name, value in os.environ.items() if name != "RAYON_NUM_THREADS"},
-    )
-    found = json.loads(run.stdout)
-    if found is None:
-        pytest.skip("other processes keep the processors busy")
-    quiet, placed, crowded, short, quiet_again, allowed = found
-    assert sorted(place for places in quiet for place in places) == allowed, (
-        "each processor is one thread's, where nothing else runs"
-    )
-    assert placed == [quiet[0]] * len(quiet), "where somebody else has put them, they stay"
-    assert crowded == [allowed] * len(quiet)
-    assert short == [allowed] * len(quiet), "not even for a short call, which nobody would look at"
-    assert quiet_again == quiet
 
 
 @pytest.mark.parametrize("threads", [0, -1, 1 << 40])

@@ -10,7 +10,6 @@ from bgars import _bgars
 from bgars.errors import FileFormatError, InputError, UnsupportedImageError
 from bgars.io.image_formats import format_of, read_pixels
 from bgars.io.image_stacks import read_stack
-from bgars.large_arrays import any_content
 from bgars.records import integer_full_scale
 
 if TYPE_CHECKING:
@@ -98,7 +97,7 @@ def decode_stack(
             gains=gains,
             max_megapixels=max_megapixels,
             threads=threads,
-            allocate=any_content,
+            allocate=np.zeros,
         )
     except UnsupportedImageError:
         return _decode_arrays(paths, channel, response, gains, max_megapixels)

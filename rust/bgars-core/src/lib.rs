@@ -6,6 +6,8 @@
 //! Conventions: image arrays are row-major and indexed `[row, col]`; world axes are x right (+col), **y up (-row)**,
 //! z toward the camera; light directions point from the surface to the light; lengths are pixels unless a name says `_um`.
 
+#![forbid(unsafe_code)]
+
 pub mod blind;
 pub mod error;
 pub mod integrate;
@@ -22,13 +24,11 @@ pub mod reflectance;
 pub mod rims;
 pub mod shadows;
 pub mod stack;
-mod stream;
 mod vector;
 pub mod vertex_normals;
 
 pub use error::{Error, Result};
 pub use lights::Lights;
-pub use memory::give_back_by;
 pub use pixel::Pixel;
 pub use radiometry::Radiometry;
 pub use stack::ImageStack;

@@ -2,7 +2,6 @@
 
 use rayon::prelude::*;
 
-use crate::memory::zeros;
 use crate::{Error, Result};
 
 /// Vertices and faces of a height map.
@@ -141,9 +140,9 @@ impl<'a> HeightMesh<'a> {
 pub fn triangulate(height_px: &[f32], mask: &[bool], width: usize, pitch: f64) -> Result<TriangleMesh> {
     let source = HeightMesh::new(height_px, mask, width, pitch)?;
     let mut mesh = TriangleMesh {
-        vertices: zeros(source.vertex_count()),
-        faces: zeros(source.face_count()),
-        pixels: zeros(source.vertex_count()),
+        vertices: vec![[0.0; 3]; source.vertex_count()],
+        faces: vec![[0; 3]; source.face_count()],
+        pixels: vec![0; source.vertex_count()],
     };
     (
         split(&mut mesh.vertices, &source.vertex_starts),

@@ -1,7 +1,6 @@
 //! The compiled half of the Python package `bgars`: a list of functions. Every one of them releases the GIL once, around
 //! the whole of its work; `python/bgars/_bgars.pyi` documents them.
 
-mod allocator;
 mod bilateral;
 mod capture;
 mod convert;
@@ -10,8 +9,6 @@ mod files;
 mod integrate;
 mod mesh;
 mod normals;
-#[cfg_attr(not(target_os = "linux"), path = "places_elsewhere.rs")]
-mod places;
 mod pool;
 mod progress;
 mod reflectance;
@@ -71,12 +68,4 @@ mod _bgars {
     const BLIND_MIN_LIGHTS: usize = bgars_core::blind::MIN_LIGHTS;
     #[pymodule_export]
     const DEBUG_BUILD: bool = cfg!(debug_assertions);
-
-    #[pymodule_init]
-    #[allow(clippy::unnecessary_wraps)]
-    fn set_up(_module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
-        crate::allocator::keep_free_pages();
-        bgars_core::give_back_by(crate::allocator::give_free_pages_back);
-        Ok(())
-    }
 }

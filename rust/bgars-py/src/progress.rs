@@ -9,18 +9,11 @@ use std::time::Duration;
 use pyo3::call::PyCallArgs;
 use pyo3::prelude::*;
 
-use crate::allocator::give_free_pages_back;
 use crate::errors::to_python;
-use crate::pool::Pool;
+use crate::pool::pool;
 
 /// Time between two looks at Python.
 const INTERVAL: Duration = Duration::from_millis(100);
-
-/// Looks at Python after which a long call gives free pages back: five times a second.
-const LOOKS_TO_GIVE_BACK: usize = 2;
-
-/// Time to the first look at where the threads run; each of the next ones comes after twice as long.
-const FIRST_WAIT: Duration = Duration::from_millis(2);
 
 /// Runs `work` without the GIL, on at most `threads` threads (`None`: as many as `RAYON_NUM_THREADS` says, else one a core).
 ///
@@ -32,7 +25,7 @@ where
     A: for<'py> PyCallArgs<'py> + Send,
     W: FnOnce(&mut dyn FnMut(A) -> ControlFlow<()>) -> bgars_core::Result<T> + Send,
 {
-    let pool = Pool::new(threads)?;
+    let pool = pool(threads)?;
     let cancelled = AtomicBool::new(false);
     let state = Mutex::new(None);
     let mut report = |arguments: A| {
@@ -41,7 +34,7 @@ where
     };
     let (mut raised, mut outcome) = (None, None);
     py.detach(|| {
-        pool.in_scope(|scope| {
+        pool.in_place_scope(|scope| {
             let (sender, receiver) = channel();
             let outcome = &mut outcome;
             // On a thread of the pool: from outside, each parallel loop would wake it up anew.
@@ -50,18 +43,7 @@ where
                 // The receiver waits until the sender is gone, whatever it sent.
                 drop(sender);
             });
-            let (mut wait, mut looks) = (FIRST_WAIT, 0);
-            while receiver.recv_timeout(wait) == Err::<(), _>(RecvTimeoutError::Timeout) {
-                if wait < INTERVAL {
-                    pool.look();
-                    wait = (2 * wait).min(INTERVAL);
-                    continue;
-                }
-                pool.free();
-                looks += 1;
-                if looks % LOOKS_TO_GIVE_BACK == 0 {
-                    give_free_pages_back();
-                }
+            while receiver.recv_timeout(INTERVAL) == Err::<(), _>(RecvTimeoutError::Timeout) {
                 let arguments = state.lock().unwrap_or_else(PoisonError::into_inner).take();
                 // After an exception the work only has to end: nobody is told of its progress any more.
                 if raised.is_none()

@@ -26,7 +26,7 @@ use crate::{ImageStack, Lights, Pixel, Radiometry, Result};
 pub use judge::{MIN_LIGHTS, Predictions};
 pub use lobe::Material;
 use material::Specimen;
-use observation::Reader;
+use observation::{Reader, start};
 use passes::Passes;
 
 /// Pixels that the material is fitted to.
@@ -37,6 +37,9 @@ const COMPARED_PIXELS: usize = 600;
 
 /// Pixels among them on which the methods predict left-out lights.
 const JUDGED_PIXELS: usize = 500;
+
+/// Lights beyond which samples hold fewer pixels, so that the work of a fit is bounded.
+const MANY_LIGHTS: usize = 32;
 
 /// Up to this many times the cost of the better simpler method a material is used. More than 1: the prediction is made from one
 /// light fewer and without neighbours, which costs the method that leans on these more than it costs the others.
@@ -172,9 +175,10 @@ pub fn estimate_into<P: Pixel>(
     })?;
     let mut reader = Reader::new(stack, lights, radiometry);
     let pixels: Vec<usize> = (0..stack.pixels()).filter(|&pixel| mask.is_none_or(|mask| mask[pixel])).collect();
-    let sample = specimens(&mut reader, &spread(&pixels, SAMPLE_PIXELS), &lambertian, out.normals);
+    let count = |pixels| bounded(pixels, stack.lights());
+    let sample = specimens(&mut reader, &spread(&pixels, count(SAMPLE_PIXELS)), &lambertian, out.normals);
     let fitted = material::fit(&sample);
-    let predictions = judge::predictions(&spread(&sample, JUDGED_PIXELS), &fitted);
+    let predictions = judge::predictions(&spread(&sample, count(JUDGED_PIXELS)), &fitted);
     if progress(AFTER_MATERIAL).is_break() {
         return Err(crate::Error::Cancelled);
     }
@@ -221,9 +225,10 @@ pub fn predict<P: Pixel>(
     let (lambertian, filtered) = (lambertian?, filtered?);
     let mut reader = Reader::new(stack, lights, radiometry);
     let pixels: Vec<usize> = (0..stack.pixels()).filter(|&pixel| mask.is_none_or(|mask| mask[pixel])).collect();
-    let sample = specimens(&mut reader, &spread(&pixels, COMPARED_PIXELS), &lambertian, &filtered.normals);
+    let count = |pixels| bounded(pixels, stack.lights());
+    let sample = specimens(&mut reader, &spread(&pixels, count(COMPARED_PIXELS)), &lambertian, &filtered.normals);
     let fitted = material::fit(&sample);
-    let predictions = judge::predictions(&spread(&sample, JUDGED_PIXELS), &fitted);
+    let predictions = judge::predictions(&spread(&sample, count(JUDGED_PIXELS)), &fitted);
     Ok(Some((predictions, 255.0 * reader.albedo_scale * reader.noise)))
 }
 
@@ -239,7 +244,7 @@ fn specimens<P: Pixel>(
     let one = |&pixel: &usize| {
         let mut observation = reader.room();
         reader.read(pixel, &mut observation);
-        let starts = [&lambertian.normals[..], filtered].map(|normals| pixel::start(normals, pixel));
+        let starts = [&lambertian.normals[..], filtered].map(|normals| start(normals, pixel));
         Specimen { observation, starts }
     };
     places.par_iter().map(one).collect()
@@ -255,6 +260,11 @@ fn choose(predictions: &Predictions) -> Choice {
     } else {
         Choice::RobustFilter
     }
+}
+
+/// So many pixels of a sample, fewer where there are very many lights: a pixel then tells as much as several of few.
+fn bounded(pixels: usize, lights: usize) -> usize {
+    (pixels * MANY_LIGHTS / lights.max(MANY_LIGHTS)).max(1)
 }
 
 /// At most `count` items, evenly spread.

@@ -3,7 +3,6 @@
 use nalgebra::Vector3;
 
 use super::lobe::Light;
-use super::pixel::start;
 use crate::median::median;
 use crate::normals::NormalMap;
 use crate::{ImageStack, Lights, Pixel, Radiometry};
@@ -174,4 +173,11 @@ impl<P: Pixel> Reader<'_, P> {
         self.sigma = median(&mut differences, f64::total_cmp) / spread;
         self.noise = f64::max(NOISE, NOISE_FACTOR * self.sigma);
     }
+}
+
+/// The estimated normal of a pixel to start from; (0, 0, 1) where there is none.
+pub(super) fn start(normals: &[f32], pixel: usize) -> Vector3<f64> {
+    let at = &normals[3 * pixel..3 * pixel + 3];
+    let normal = Vector3::new(f64::from(at[0]), f64::from(at[1]), f64::from(at[2]));
+    if normal.x.is_nan() { Vector3::z() } else { normal.normalize() }
 }

@@ -7,8 +7,8 @@ use rayon::prelude::*;
 use super::facet::{Facet, Pull};
 use super::lobe::Material;
 use super::neighbours::median_normal;
-use super::observation::Reader;
-use super::pixel::{self, Source, best_facet, filter_knows_better, trust};
+use super::observation::{Reader, start};
+use super::pixel::{Source, best_facet, filter_knows_better, trust};
 use crate::normals::NormalMapMut;
 use crate::{Error, Pixel, Result};
 
@@ -62,7 +62,7 @@ impl<P: Pixel> Passes<'_, P> {
         let mut found = self.banded(&mut |done| part(0, done), &|_, pixel| {
             let mut observation = self.reader.room();
             self.reader.read(pixel, &mut observation);
-            let starts = [(pixel::start(self.lambertian, pixel), None), (pixel::start(filtered, pixel), None)];
+            let starts = [(start(self.lambertian, pixel), None), (start(filtered, pixel), None)];
             let (facet, source) = best_facet(&observation, &self.material, &starts, None, MAX_ITERS[0]);
             Found { facet, source }
         })?;
@@ -124,7 +124,7 @@ impl<P: Pixel> Passes<'_, P> {
             let mut observation = self.reader.room();
             self.reader.read(pixel, &mut observation);
             let material = if source == Source::Matte { Material::MATTE } else { self.material };
-            let scaled = pixel::start(filtered, pixel) * (f64::from(albedo[pixel]) / self.reader.albedo_scale);
+            let scaled = start(filtered, pixel) * (f64::from(albedo[pixel]) / self.reader.albedo_scale);
             if valid[pixel] && filter_knows_better(&observation, &scaled, &facet, &material) {
                 return None;
             }

@@ -39,13 +39,6 @@ pub(super) enum Source {
     RobustFilter,
 }
 
-/// The estimated normal of a pixel to start from; (0, 0, 1) where there is none.
-pub(super) fn start(normals: &[f32], pixel: usize) -> Vector3<f64> {
-    let at = &normals[3 * pixel..3 * pixel + 3];
-    let normal = Vector3::new(f64::from(at[0]), f64::from(at[1]), f64::from(at[2]));
-    if normal.x.is_nan() { Vector3::z() } else { normal.normalize() }
-}
-
 /// The facet of least cost over the starts, under both materials or only under the one that stands beside the start.
 pub(super) fn best_facet(
     observation: &Observation,

@@ -10,14 +10,11 @@ use super::residual::Residual;
 use super::settle::{Right, settle};
 use super::steps::Steps;
 use super::{OnProgress, Params, Progress};
-use crate::memory::{self, Aligned};
+use crate::memory::Aligned;
 use crate::{Error, Result};
 
 /// A graph of more than one node for so many reds needs much of the memory, and much more time than to make the right side again.
 const LARGE_GRAPH: usize = 16;
-
-/// A graph of more nodes takes so long that the next call may find its pages anew.
-const LONG_GRAPH: usize = 1 << 18;
 
 /// What [`conjugate_gradients`] found.
 pub(super) struct Solution {
@@ -67,17 +64,13 @@ pub(super) fn conjugate_gradients(
             had_large_graph: false,
         });
     }
-    let (mut is_large, mut takes_long) = (false, false);
+    let mut is_large = false;
     let preconditioner = Multigrid::new(weights, bits, |unknowns| {
         is_large = unknowns > size / LARGE_GRAPH;
-        takes_long = unknowns > LONG_GRAPH;
         if is_large {
             right.release();
         }
     });
-    if takes_long {
-        memory::give_back_free_pages();
-    }
     let mut vectors = preconditioner.vectors();
     // A direction may be any; what x and r take along it agrees in `f64`.
     let [mut p, mut previous] = [Aligned::<f32>::any(size), Aligned::any(size)];
@@ -97,7 +90,6 @@ pub(super) fn conjugate_gradients(
             // Both are positive but for rounding; what is lost in it cannot be found again.
             solved = r_z > 0.0 && p_q > 0.0;
             if !solved {
-                memory::forget();
                 // What waits is a step along the direction before.
                 std::mem::swap(&mut p, &mut previous);
                 break;

@@ -42,8 +42,8 @@ macro_rules! real {
         }
     };
 }
-real!(f32, Avx512, Avx2, Portable);
-real!(f64, Avx512Double, Avx2Double, PortableDouble);
+real!(f32, Portable, Portable, Portable);
+real!(f64, PortableDouble, PortableDouble, PortableDouble);
 
 /// The greater of two numbers that are none of them NaN: one instruction, where `max` takes three.
 #[inline(always)]

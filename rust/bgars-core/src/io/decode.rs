@@ -7,8 +7,7 @@ use std::path::{Path, PathBuf};
 use image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use rayon::prelude::*;
 
-use super::tiff_gray::read_gray_tiff;
-use crate::memory::zeros;
+use super::tiff_gray::{max_alloc_bytes, read_gray_tiff};
 use crate::{Error, Result};
 
 /// How a colour pixel becomes one value; always on linear values, never with a hidden gamma.
@@ -224,17 +223,17 @@ pub fn decode_stack(paths: &[PathBuf], color: &Color<'_>, max_megapixels: f64) -
     let plan = StackPlan::new(paths, color, max_megapixels)?;
     let data = match plan.kind {
         StackType::U8 => {
-            let mut data = zeros(plan.values());
+            let mut data = vec![Default::default(); plan.values()];
             plan.decode_into(StackMut::U8(&mut data))?;
             StackData::U8(data)
         }
         StackType::U16 => {
-            let mut data = zeros(plan.values());
+            let mut data = vec![Default::default(); plan.values()];
             plan.decode_into(StackMut::U16(&mut data))?;
             StackData::U16(data)
         }
         StackType::F32 => {
-            let mut data = zeros(plan.values());
+            let mut data = vec![Default::default(); plan.values()];
             plan.decode_into(StackMut::F32(&mut data))?;
             StackData::F32(data)
         }
@@ -257,11 +256,6 @@ pub(super) fn open(path: &Path, max_megapixels: f64) -> Result<impl ImageDecoder
     limits.max_alloc = Some(max_alloc_bytes(max_megapixels) as u64);
     reader.limits(limits);
     reader.into_decoder().map_err(|error| translate(path, error))
-}
-
-/// 16 bytes a pixel (RGBA f32) is the most a decoder of this crate asks for; the claim itself is checked in `read_header`.
-pub(super) fn max_alloc_bytes(max_megapixels: f64) -> usize {
-    (max_megapixels * 16e6) as usize
 }
 
 /// True when an end-of-image marker follows the last start of scan: the decoder fills what a truncated JPEG lacks with grey

@@ -8,8 +8,12 @@ use tiff::decoder::{Decoder, Limits};
 use tiff::tags::{SampleFormat, Tag};
 use tiff::{ColorType, TiffError};
 
-use super::decode::max_alloc_bytes;
 use crate::{Error, Result};
+
+/// 16 bytes a pixel (RGBA f32) is the most a decoder of this crate asks for; the claim itself is checked in `decode`.
+pub(super) fn max_alloc_bytes(max_megapixels: f64) -> usize {
+    (max_megapixels * 16e6) as usize
+}
 
 /// Reads the grey pixels of a TIFF into `out`, `bits` each; false, and nothing read, when the file is anything else.
 ///

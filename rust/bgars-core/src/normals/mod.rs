@@ -4,37 +4,28 @@
 //! all lights ([`Method::Lambertian`]), the sorted-gap filter ([`Method::SpecularFilter`]), or the best window of sorted
 //! values ([`Method::RobustFilter`]).
 
-mod ahead;
+mod blocks;
 mod checks;
 mod confidence;
 mod cutoff;
-mod finish;
-mod finite;
-mod fused;
-mod gather;
-mod kept;
-mod kernel;
-mod lane_solve;
+mod estimate;
+mod fit;
 mod lanes;
-mod networks;
-mod out;
-mod overview;
-mod own_scale;
 mod ranked;
 mod robust;
-mod robust_lanes;
 mod solve;
+mod source;
 mod specular;
-mod stretches;
-mod sums;
 mod symmetric;
+mod windows;
 
-use crate::memory::zeros;
+use std::ops::Range;
+
 use crate::{Error, Result};
 
 pub(crate) use checks::check_finite;
 pub(crate) use confidence::{confidence_of, misfit_freedom};
-pub use kernel::{estimate, estimate_into};
+pub use estimate::{estimate, estimate_into};
 pub use robust::{RobustParams, robust_filter};
 pub use specular::specular_filter;
 
@@ -91,17 +82,17 @@ pub struct NormalMapMut<'a> {
 }
 
 impl NormalMap {
-    /// Zeros for so many pixels, on large pages; `set_lights` is the number of lights of the kept sets, 0 without these.
+    /// Zeros for so many pixels; `set_lights` is the number of lights of the kept sets, 0 without these.
     #[must_use]
     pub fn zeros(pixels: usize, set_lights: usize) -> Self {
         Self {
-            normals: zeros(pixels * 3),
-            albedo: zeros(pixels),
-            mask: zeros(pixels),
-            confidence: zeros(pixels),
-            measured: zeros(pixels),
-            lights_kept: zeros(pixels),
-            kept_sets: zeros(pixels * set_lights),
+            normals: vec![0.0; pixels * 3],
+            albedo: vec![0.0; pixels],
+            mask: vec![false; pixels],
+            confidence: vec![0.0; pixels],
+            measured: vec![false; pixels],
+            lights_kept: vec![0; pixels],
+            kept_sets: vec![false; pixels * set_lights],
         }
     }
 
@@ -119,7 +110,7 @@ impl NormalMap {
     }
 }
 
-impl NormalMapMut<'_> {
+impl<'a> NormalMapMut<'a> {
     /// The same arrays, borrowed for less long.
     pub fn reborrow(&mut self) -> NormalMapMut<'_> {
         NormalMapMut {
@@ -130,6 +121,58 @@ impl NormalMapMut<'_> {
             measured: self.measured,
             lights_kept: self.lights_kept,
             kept_sets: self.kept_sets,
+        }
+    }
+
+    /// Lights of the kept sets, 0 without these.
+    fn set_lights(&self) -> usize {
+        self.kept_sets.len() / self.albedo.len().max(1)
+    }
+
+    /// The first pixels, so many of them; the others stay.
+    #[inline]
+    fn take(&mut self, pixels: usize, set_lights: usize) -> NormalMapMut<'a> {
+        NormalMapMut {
+            normals: take(&mut self.normals, pixels * 3),
+            albedo: take(&mut self.albedo, pixels),
+            mask: take(&mut self.mask, pixels),
+            confidence: take(&mut self.confidence, pixels),
+            measured: take(&mut self.measured, pixels),
+            lights_kept: take(&mut self.lights_kept, pixels),
+            kept_sets: take(&mut self.kept_sets, pixels * set_lights),
+        }
+    }
+
+    /// Takes over as much as there is room for.
+    fn copy_from(&mut self, from: &NormalMap) {
+        fn copy<T: Copy>(to: &mut [T], from: &[T]) {
+            to.copy_from_slice(&from[..to.len()]);
+        }
+        copy(self.normals, &from.normals);
+        copy(self.albedo, &from.albedo);
+        copy(self.mask, &from.mask);
+        copy(self.confidence, &from.confidence);
+        copy(self.measured, &from.measured);
+        copy(self.lights_kept, &from.lights_kept);
+        copy(self.kept_sets, &from.kept_sets);
+    }
+
+    /// Marks pixels as not asked for.
+    fn clear(&mut self, pixels: Range<usize>) {
+        let set_lights = self.set_lights();
+        self.lights_kept[pixels.clone()].fill(0);
+        self.kept_sets[pixels.start * set_lights..pixels.end * set_lights].fill(false);
+        self.reject(pixels);
+    }
+
+    /// Marks pixels as without solution.
+    fn reject(&mut self, pixels: Range<usize>) {
+        self.normals[pixels.start * 3..pixels.end * 3].fill(f32::NAN);
+        self.albedo[pixels.clone()].fill(f32::NAN);
+        self.confidence[pixels.clone()].fill(0.0);
+        self.mask[pixels.clone()].fill(false);
+        if let Some(measured) = self.measured.get_mut(pixels) {
+            measured.fill(false);
         }
     }
 
@@ -162,4 +205,13 @@ impl NormalMapMut<'_> {
             Err(Error::LengthMismatch { argument: "measured", expected: pixels, actual })
         }
     }
+}
+
+/// The first elements of a slice, or all where it has fewer; the others stay.
+#[inline]
+fn take<'a, T>(slice: &mut &'a mut [T], count: usize) -> &'a mut [T] {
+    let count = count.min(slice.len());
+    let (first, rest) = std::mem::take(slice).split_at_mut(count);
+    *slice = rest;
+    first
 }

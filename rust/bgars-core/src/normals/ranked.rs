@@ -1,111 +1,137 @@
 //! Lights in the order of their values, for some pixels at once.
 
-use super::lane_solve::BYTE_LIGHTS;
-use super::networks::sort_eight;
+use super::lanes::{Lanes, Vector, dot};
 
 /// Pixels worked on at once: their sums over all windows fit into the nearest cache.
 pub(super) const WIDTH: usize = 16;
 
 /// One quantity of these.
-pub(super) type Row<T> = [T; WIDTH];
+pub(super) type Row<T> = Vector<T, WIDTH>;
 
-/// Flag of a clipped light beside its number.
-pub(super) const CLIPPED: u32 = 1 << 8;
+/// What lifts a clipped value over all that are not: a power of two, which rounds nothing.
+const LIFT: f32 = (1u128 << 64) as f32;
 
 /// The lights of some pixels by their rank: the clipped last, else the darker first, of equal values the lower number.
-///
-/// Aligned, and with it the stack that it lives on, for vectors that go there for want of registers (as in `lanes::Task`).
-#[repr(align(64))]
+pub(super) struct Ranks {
+    /// The rank of each light.
+    pub ranks: Vec<Row<u32>>,
+    /// The lights in that order.
+    pub ranked: Vec<Ranked>,
+    /// Medians of the values, clipped or not; of an even number the mean of the two in the middle.
+    pub medians: Row<f32>,
+    /// True where every value is zero.
+    pub black: Row<bool>,
+    /// True where a clipped value cannot be lifted over the others.
+    pub unsure: Row<bool>,
+    /// What is compared.
+    keys: Vec<Row<f32>>,
+}
+
+/// A light in its rank.
+#[derive(Clone, Copy)]
 pub(super) struct Ranked {
-    pub lights: usize,
-    pub values: [Row<f32>; BYTE_LIGHTS],
-    pub directions: [[Row<f32>; 3]; BYTE_LIGHTS],
-    /// Number of the light, and whether it is clipped.
-    pub codes: [Row<u32>; BYTE_LIGHTS],
+    pub value: Row<f32>,
+    pub direction: [Row<f32>; 3],
+    /// 1 where it is clipped, else 0.
+    pub clipped: Row<u32>,
 }
 
 impl Ranked {
-    pub fn new() -> Self {
+    const ZERO: Self = Self { value: Row::of(0.0), direction: [Row::of(0.0); 3], clipped: Row::of(0) };
+
+    /// What a facet would show under it.
+    #[inline(always)]
+    pub fn predicted<const FMA: bool>(&self, facets: &[Row<f32>; 3], lane: usize) -> f32 {
+        let direction = [self.direction[0][lane], self.direction[1][lane], self.direction[2][lane]];
+        dot::<FMA>(direction, [facets[0][lane], facets[1][lane], facets[2][lane]])
+    }
+}
+
+impl Ranks {
+    pub fn new(lights: usize) -> Self {
         Self {
-            lights: 0,
-            values: [[0.0; WIDTH]; BYTE_LIGHTS],
-            directions: [[[0.0; WIDTH]; 3]; BYTE_LIGHTS],
-            codes: [[0; WIDTH]; BYTE_LIGHTS],
+            ranks: vec![Row::of(0); lights],
+            ranked: vec![Ranked::ZERO; lights],
+            medians: Row::of(0.0),
+            black: Row::of(false),
+            unsure: Row::of(false),
+            keys: vec![Row::of(0.0); lights],
         }
     }
 
-    /// Takes the lights of some pixels; returns the medians of their values.
+    /// Takes the lights of the pixels from `first` on.
     #[inline(always)]
-    pub fn fill(
-        &mut self,
-        directions: &[[f32; 3]],
-        value_of: impl Fn(usize, usize) -> f32,
-        clipped: impl Fn(usize) -> u8,
-    ) -> Row<f32> {
-        self.lights = directions.len();
-        for light in 0..BYTE_LIGHTS {
-            // Places without a light rank last.
-            let there = light < self.lights;
-            let direction = if there { directions[light] } else { [0.0; 3] };
+    pub fn fill(&mut self, directions: &[[f32; 3]], values: &[Lanes<f32>], clipped: &[Lanes<bool>], first: usize) {
+        let (mut sizes, mut unsure, mut clips) = (Row::of(0.0), Row::of(0), false);
+        for ((key, value), clipped) in self.keys.iter_mut().zip(values).zip(clipped) {
             for lane in 0..WIDTH {
-                self.values[light][lane] = if there { value_of(light, lane) } else { f32::INFINITY };
-                let flag = if !there || clipped(lane) >> light & 1 == 1 { CLIPPED } else { 0 };
-                self.codes[light][lane] = light as u32 | flag;
+                let (value, clipped) = (value[first + lane], clipped[first + lane]);
+                key[lane] = value;
+                sizes[lane] += value.abs();
+                unsure[lane] |= u32::from(clipped & (value <= 0.0));
+                clips |= clipped;
             }
-            self.directions[light] = direction.map(|component| [component; WIDTH]);
         }
-        let medians = self.medians();
-        macro_rules! exchange {
-            ($($one:literal $other:literal),*) => {$( self.exchange::<$one, $other>(); )*};
-        }
-        sort_eight!(exchange);
-        medians
-    }
-
-    /// True where every value is zero.
-    #[inline(always)]
-    pub fn is_black(&self) -> Row<bool> {
-        let sizes = self.values[..self.lights].iter();
-        let sums = sizes
-            .fold([0.0; WIDTH], |sums: Row<f32>, values| std::array::from_fn(|lane| sums[lane] + values[lane].abs()));
-        sums.map(|sum| sum == 0.0)
-    }
-
-    /// The medians of the values, clipped or not; of an even number the mean of the two in the middle.
-    #[inline(always)]
-    fn medians(&self) -> Row<f32> {
-        let mut sorted = self.values;
-        macro_rules! exchange {
-            ($($one:literal $other:literal),*) => {$(
-                for lane in 0..WIDTH {
-                    let (a, b) = (sorted[$one][lane], sorted[$other][lane]);
-                    (sorted[$one][lane], sorted[$other][lane]) = if b < a { (b, a) } else { (a, b) };
-                }
-            )*};
-        }
-        sort_eight!(exchange);
-        let (lower, upper) = (sorted[(self.lights - 1) / 2], sorted[self.lights / 2]);
-        std::array::from_fn(|lane| 0.5 * (lower[lane] + upper[lane]))
-    }
-
-    /// Puts two ranks into their order.
-    #[inline(always)]
-    fn exchange<const ONE: usize, const OTHER: usize>(&mut self) {
         for lane in 0..WIDTH {
-            let (a, b) = (self.values[ONE][lane], self.values[OTHER][lane]);
-            let (code, next) = (self.codes[ONE][lane], self.codes[OTHER][lane]);
-            let (clipped, next_clipped) = (code & CLIPPED, next & CLIPPED);
-            // Numbers, since a lazy `&&` would be a branch.
-            let by_value = u32::from(b < a) | u32::from(b <= a) & u32::from(next < code);
-            let swap = u32::from(clipped > next_clipped) | (u32::from(clipped == next_clipped) & by_value);
-            let swap = swap != 0;
-            (self.values[ONE][lane], self.values[OTHER][lane]) = if swap { (b, a) } else { (a, b) };
-            (self.codes[ONE][lane], self.codes[OTHER][lane]) = if swap { (next, code) } else { (code, next) };
-            for axis in 0..3 {
-                let (a, b) = (self.directions[ONE][axis][lane], self.directions[OTHER][axis][lane]);
-                (self.directions[ONE][axis][lane], self.directions[OTHER][axis][lane]) =
-                    if swap { (b, a) } else { (a, b) };
+            self.black[lane] = sizes[lane] == 0.0;
+            self.unsure[lane] = unsure[lane] != 0;
+        }
+        self.rank();
+        self.find_medians();
+        if clips {
+            for (key, clipped) in self.keys.iter_mut().zip(clipped) {
+                for lane in 0..WIDTH {
+                    key[lane] = if clipped[first + lane] { key[lane] * LIFT } else { key[lane] };
+                }
             }
+            self.rank();
+        }
+        for (light, direction) in directions.iter().enumerate() {
+            let (ranks, value, clipped) = (&self.ranks[light], &values[light], &clipped[light]);
+            for lane in 0..WIDTH {
+                let ranked = &mut self.ranked[ranks[lane] as usize];
+                ranked.value[lane] = value[first + lane];
+                for axis in 0..3 {
+                    ranked.direction[axis][lane] = direction[axis];
+                }
+                ranked.clipped[lane] = u32::from(clipped[first + lane]);
+            }
+        }
+    }
+
+    /// Ranks by the keys: every pair is compared once.
+    #[inline(always)]
+    fn rank(&mut self) {
+        for light in 0..self.keys.len() {
+            let key = self.keys[light];
+            let mut rank = Row::of(0u32);
+            for before in 0..light {
+                // Copies, or the compiler has to ask what overlaps.
+                let (other, mut other_rank) = (self.keys[before], self.ranks[before]);
+                for lane in 0..WIDTH {
+                    let is_behind = other[lane] <= key[lane];
+                    rank[lane] = if is_behind { rank[lane] + 1 } else { rank[lane] };
+                    other_rank[lane] = if is_behind { other_rank[lane] } else { other_rank[lane] + 1 };
+                }
+                self.ranks[before] = other_rank;
+            }
+            self.ranks[light] = rank;
+        }
+    }
+
+    #[inline(always)]
+    fn find_medians(&mut self) {
+        let lights = self.keys.len();
+        let (below, above) = (((lights - 1) / 2) as u32, (lights / 2) as u32);
+        let [mut lower, mut upper] = [Row::of(0.0); 2];
+        for (key, rank) in self.keys.iter().zip(&self.ranks) {
+            for lane in 0..WIDTH {
+                lower[lane] = if rank[lane] == below { key[lane] } else { lower[lane] };
+                upper[lane] = if rank[lane] == above { key[lane] } else { upper[lane] };
+            }
+        }
+        for lane in 0..WIDTH {
+            self.medians[lane] = 0.5 * (lower[lane] + upper[lane]);
         }
     }
 }

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix2, Vector3};
 
 use super::anchor::{Circle, pixel_centre};
+use super::ball_normal::BallPixel;
 use super::cells::CellTable;
 use super::disc::{from_disc, metric, to_disc};
 use super::flat_top::FlatTop;
@@ -71,27 +72,6 @@ impl Ball {
             }
         })
     }
-}
-
-/// A normal of a ball.
-#[derive(Clone, Copy, Debug)]
-pub struct BallPixel {
-    /// Index into the image.
-    pub pixel: usize,
-    /// Unit normal.
-    pub normal: [f32; 3],
-    /// Its place on the disc.
-    pub point: [f32; 2],
-    /// The place of its circle's normal.
-    pub circle_point: [f32; 2],
-    /// Standard error of the direction, in radian: data, expectation and circle together.
-    pub error_rad: f32,
-    /// The same by the data alone.
-    pub data_error_rad: f32,
-    /// Angle to the normal of the circle, in radian.
-    pub off_circle_rad: f32,
-    /// Mean loss of a light.
-    pub cost: f32,
 }
 
 /// Which minimum of a pixel is wanted.

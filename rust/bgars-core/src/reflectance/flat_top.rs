@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::ball::BallPixel;
+use super::ball_normal::BallPixel;
 use super::disc::{from_disc, to_disc};
 use crate::median::median;
 

@@ -2,6 +2,7 @@
 
 mod anchor;
 mod ball;
+mod ball_normal;
 mod ball_pixels;
 mod cells;
 mod choose;

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::ball::BallPixel;
+use super::ball_normal::BallPixel;
 use super::cells::{CellSums, CellTable, Population, SIDE};
 
 /// A place is odd where the ball differs from the others by this angle in radian (1.5 degrees) ...

@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::ball::{Ball, BallPixel, BallWork, Scratch};
+use super::ball::{Ball, BallWork, Scratch};
+use super::ball_normal::BallPixel;
 use super::flat_top::flat_top;
 use super::observe::Reader;
 use super::odd::odd_places;

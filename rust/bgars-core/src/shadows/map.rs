@@ -3,7 +3,6 @@
 use rayon::prelude::*;
 
 use super::model::{Ball, Board, Lamp, Shadow, norm};
-use crate::memory::zeros;
 
 /// Points of an outline that say which window of the map a shadow needs.
 const OUTLINE_POINTS: usize = 24;
@@ -93,7 +92,7 @@ pub fn draw_shadows(
         rows,
         cols,
     };
-    let mut hidden = zeros::<bool>(rows * cols);
+    let mut hidden = vec![false; rows * cols];
     for ball in balls {
         let reach = ball.radius + margins.silhouette_px;
         let (in_rows, in_cols) = grid.window([ball.x - reach, ball.x + reach], [ball.y - reach, ball.y + reach]);
@@ -105,7 +104,7 @@ pub fn draw_shadows(
             }
         }
     }
-    let mut count = zeros::<u8>(lamps.len() * rows * cols);
+    let mut count = vec![0u8; lamps.len() * rows * cols];
     count.par_chunks_mut((rows * cols).max(1)).zip(lamps).for_each(|(count, &lamp)| {
         for &ball in balls {
             draw(count, &grid, ball, lamp, board, margins.shadow_px);

@@ -11,7 +11,7 @@ use super::normal_equations::NormalEquations;
 use super::pixels::Pixels;
 use super::reweigh::Shares;
 use super::solve::{OnReweigh, Progressed};
-use crate::memory::{self, Aligned};
+use crate::memory::Aligned;
 use crate::{Error, Result};
 
 /// Largest relative residual of an inner solve.
@@ -84,7 +84,6 @@ impl<'a> Published<'a> {
         }
         fit.inner_iterations += iterations;
         if !left.is_finite() {
-            memory::forget();
             let (iterations, tolerance) = (fit.inner_iterations, TOLERANCE);
             return Err(Error::NoConvergence { iterations, residual: left / scale, tolerance });
         }

@@ -1,23 +1,26 @@
 //! The loop over pixels: radiometry, choice of lights, least squares.
 
-use std::ops::{ControlFlow, Range};
+use std::ops::ControlFlow;
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
+use super::blocks::{self, BlockSolver, Choice, Left, value_scale};
 use super::checks::{check, check_finite};
 use super::confidence::confidence;
-use super::cutoff::LANES;
-use super::lane_solve::{Choice, LaneSolver};
-use super::lanes::{self, Input, Left};
-use super::out::{Out, task_pixels};
-use super::overview::Brought;
 use super::robust::{self, RobustFilter, RobustScratch};
-use super::robust_lanes::RobustLanes;
 use super::solve::{Solution, SubsetSolver};
+use super::source::Images;
 use super::specular::specular_filter;
-use super::{Method, NormalMap, NormalMapMut, own_scale};
+use super::windows::WindowFilter;
+use super::{Method, NormalMap, NormalMapMut};
 use crate::{Error, ImageStack, Lights, Pixel, Radiometry, Result};
+
+/// Pixels of one task. What comes out is the same for any number.
+const TASK_PIXELS: usize = 1 << 13;
+
+/// Pixels between two calls of the progress callback.
+const BAND_PIXELS: usize = 1 << 19;
 
 /// Estimates the normal of every pixel that `mask` allows.
 ///
@@ -64,11 +67,7 @@ pub fn estimate<P: Pixel>(
     Ok(map)
 }
 
-/// [`estimate`] into memory that is there already: on a line that measures one part after the other, this saves the operating
-/// system's handing out of fresh pages, which takes as long as the estimate. After an error the content means nothing.
-///
-/// From a megapixel on, AVX-512 writes past the caches what begins on a cache line (64 bytes), which takes two thirds of the time
-/// or less; most allocators do not lay a `Vec` so.
+/// [`estimate`] into memory that is there already. After an error the content means nothing.
 ///
 /// # Errors
 /// Those of [`estimate`], and arrays of another length than the image needs.
@@ -79,66 +78,59 @@ pub fn estimate_into<P: Pixel>(
     mask: Option<&[bool]>,
     method: Method,
     progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
-    out: NormalMapMut<'_>,
+    mut out: NormalMapMut<'_>,
 ) -> Result<()> {
     check(stack, lights, radiometry, mask, method)?;
     out.check(stack.pixels(), stack.lights())?;
-    let out = Out::of(out);
-    if own_scale::serves(stack, radiometry, mask, method) {
-        let draft = Kernel::new(stack, lights, radiometry, own_scale::sampled(stack), mask, method);
-        if draft.lanes.is_some() {
-            return own_scale::estimate(draft, out, progress);
-        }
-    }
-    let kernel = Kernel::new(stack, lights, radiometry, radiometry.full_scale_of(stack), mask, method);
+    let kernel = Kernel::new(stack, lights, radiometry, mask, method);
     let mut checked = P::CODES.is_some();
-    let work = |(first, out): &mut (usize, Out<'_>), scratch: &mut Scratch<P>| {
-        let left = kernel.lanes(*first, out, scratch);
-        kernel.rest(*first, &left, out, scratch);
-        left.finite
-    };
-    kernel.in_bands(&mut kernel.tasks(out), &work, &mut |finite, done| {
-        if !checked && finite.contains(&false) {
+    let set_lights = out.set_lights();
+    for first in (0..stack.pixels()).step_by(BAND_PIXELS) {
+        let end = stack.pixels().min(first + BAND_PIXELS);
+        let tasks: Vec<_> = (first..end)
+            .step_by(TASK_PIXELS)
+            .map(|first| (first, out.take(TASK_PIXELS.min(end - first), set_lights)))
+            .collect();
+        let finite = tasks
+            .into_par_iter()
+            .map_init(|| Scratch::new(lights), |scratch, (first, mut out)| kernel.task(first, &mut out, scratch))
+            .reduce(|| true, |a, b| a & b);
+        if !finite && !checked {
             // Perhaps nothing is wrong inside the mask.
             check_finite(stack, mask)?;
             checked = true;
         }
-        if progress(done).is_break() { Err(Error::Cancelled) } else { Ok(()) }
-    })
+        if progress(end as f64 / stack.pixels() as f64).is_break() {
+            return Err(Error::Cancelled);
+        }
+    }
+    Ok(())
 }
 
 /// A gap in the grey levels of the images from one in grey levels of 255.
-pub(super) fn gap(threshold: f32, full_scale: f32) -> f32 {
+fn gap(threshold: f32, full_scale: f32) -> f32 {
     threshold * full_scale / 255.0
 }
 
 /// Everything a pixel's work reads.
-pub(super) struct Kernel<'a, P> {
-    pub stack: &'a ImageStack<'a, P>,
-    pub lights: &'a Lights,
-    pub radiometry: &'a Radiometry<'a, P>,
+struct Kernel<'a, P> {
+    stack: &'a ImageStack<'a, P>,
+    lights: &'a Lights,
+    images: Images<'a, P>,
     /// In grey levels.
-    pub full_scale: f32,
+    full_scale: f32,
     mask: Option<&'a [bool]>,
-    pub method: Method,
-    /// Whether `full_scale` is not known yet, only that it is not less: the albedo stays in grey levels.
-    pub is_draft: bool,
+    method: Method,
     robust: Option<RobustFilter>,
     solver: SubsetSolver,
     /// The fast kernel, where it can serve.
-    lanes: Option<LaneSolver>,
-    /// The images.
-    planes: Vec<&'a [P]>,
-    /// 1 / intensity of each light.
-    scales: Vec<f32>,
+    blocks: Option<BlockSolver>,
     /// Full scale in the unit of the scaled values: its mean over the lights.
     scaled_full_scale: f64,
 }
 
 /// Memory of one thread, reused from pixel to pixel.
-pub(super) struct Scratch<P> {
-    /// Images that are brought together.
-    memory: Vec<Brought<P>>,
+struct Scratch {
     values: Vec<f32>,
     clipped: Vec<bool>,
     kept: Vec<bool>,
@@ -147,11 +139,10 @@ pub(super) struct Scratch<P> {
     robust: RobustScratch,
 }
 
-impl<P> Scratch<P> {
+impl Scratch {
     fn new(lights: &Lights) -> Self {
         let count = lights.len();
         Self {
-            memory: Vec::new(),
             values: vec![0.0; count],
             clipped: vec![false; count],
             kept: vec![false; count],
@@ -163,11 +154,10 @@ impl<P> Scratch<P> {
 }
 
 impl<'a, P: Pixel> Kernel<'a, P> {
-    pub fn new(
+    fn new(
         stack: &'a ImageStack<'a, P>,
         lights: &'a Lights,
         radiometry: &'a Radiometry<'a, P>,
-        full_scale: f32,
         mask: Option<&'a [bool]>,
         method: Method,
     ) -> Self {
@@ -179,113 +169,44 @@ impl<'a, P: Pixel> Kernel<'a, P> {
             Method::RobustFilter(params) => Some(RobustFilter::new(params, lights.len())),
             _ => None,
         };
+        let full_scale = radiometry.full_scale_of(stack);
         let scales: Vec<f32> = radiometry.intensities.iter().map(|intensity| (1.0 / intensity) as f32).collect();
         let mean_scale = scales.iter().map(|&scale| f64::from(scale)).sum::<f64>() / scales.len() as f64;
         let scaled_full_scale = f64::from(full_scale) * mean_scale;
-        let choice = match method {
-            Method::Lambertian => Some(Choice::All),
-            Method::SpecularFilter { threshold } => Some(Choice::UpToGap(gap(threshold, full_scale))),
-            Method::RobustFilter(_) => robust
-                .as_ref()
-                .and_then(|robust| RobustLanes::new(robust, lights.len(), scaled_full_scale))
-                .map(Choice::Window),
-        };
-        let lanes = choice.and_then(|choice| LaneSolver::new(lights, choice));
-        let planes = (0..stack.lights()).map(|light| stack.plane(light)).collect();
-        Self {
-            stack,
-            lights,
-            radiometry,
-            full_scale,
-            mask,
-            method,
-            is_draft: false,
-            robust,
-            solver,
-            lanes,
-            planes,
-            scales,
-            scaled_full_scale,
-        }
-    }
-
-    /// The result as tasks, by their first pixel.
-    pub fn tasks<'o>(&self, out: Out<'o>) -> Vec<(usize, Out<'o>)> {
-        let task_pixels = task_pixels(self.stack.pixels().min(self.band_pixels()), self.stack.lights());
-        (0..).step_by(task_pixels).zip(out.split(task_pixels)).collect()
-    }
-
-    /// Works on tasks in parallel, band by band; `done` gets what a band gave and the fraction done, and can end it all.
-    pub fn in_bands<T: Send, R: Send>(
-        &self,
-        tasks: &mut [T],
-        work: &(impl Fn(&mut T, &mut Scratch<P>) -> R + Sync),
-        done: &mut dyn FnMut(Vec<R>, f64) -> Result<()>,
-    ) -> Result<()> {
-        let bands = self.stack.pixels().div_ceil(self.band_pixels());
-        let (count, mut begun) = (tasks.len(), 0);
-        for tasks in tasks.chunks_mut(count.div_ceil(bands)) {
-            begun += tasks.len();
-            let tasks = tasks.par_iter_mut();
-            let given = tasks.map_init(|| Scratch::new(self.lights), |scratch, task| work(task, scratch)).collect();
-            done(given, begun as f64 / count as f64)?;
-        }
-        Ok(())
-    }
-
-    /// Pixels between two calls of the progress callback.
-    fn band_pixels(&self) -> usize {
-        /// Of the careful kernel.
-        const CAREFUL: usize = 1 << 19;
-        /// Of the fast one.
-        const LANES: usize = 1 << 22;
-        if self.lanes.is_some() { LANES } else { CAREFUL }
-    }
-
-    /// The fast kernel on the pixels of `out`, of which `first` is the first one's number.
-    pub fn lanes(&self, first: usize, out: &mut Out<'_>, scratch: &mut Scratch<P>) -> Left {
-        let pixels = first..first + out.albedo.len();
-        let mut left = Left::nothing();
-        if let Some(solver) = &self.lanes {
-            let input = Input {
-                planes: &self.planes,
-                radiometry: self.radiometry,
-                scales: &self.scales,
-                mask: self.mask,
-                per_full_scale: if self.is_draft { 1.0 } else { 1.0 / self.full_scale },
-                is_draft: self.is_draft,
-            };
-            left = lanes::run(solver, &input, pixels.clone(), out, &mut scratch.memory);
-        }
-        if P::CODES.is_none() {
-            for pixel in self.behind_the_lanes(pixels).filter(|&pixel| self.uses(pixel)) {
-                for value in self.planes.iter().map(|plane| plane[pixel].to_f32()) {
-                    left.finite &= value.is_finite();
-                    left.largest = left.largest.max(value);
-                }
+        let choice = match (method, &robust) {
+            (Method::SpecularFilter { threshold }, _) => Choice::UpToGap(gap(threshold, full_scale)),
+            (_, Some(robust)) => {
+                let full_scale = scaled_full_scale * f64::from(value_scale(full_scale));
+                Choice::Window(WindowFilter::new(robust, lights.len(), full_scale))
             }
-        }
-        left
+            _ => Choice::All,
+        };
+        let blocks = BlockSolver::new(lights, full_scale, choice);
+        let planes = (0..stack.lights()).map(|light| stack.plane(light)).collect();
+        let images = Images { planes, radiometry, scales };
+        Self { stack, lights, images, full_scale, mask, method, robust, solver, blocks, scaled_full_scale }
     }
 
-    /// What the fast kernel has left, by the careful one.
-    pub fn rest(&self, first: usize, left: &Left, out: &mut Out<'_>, scratch: &mut Scratch<P>) {
-        for pixel in left.careful_pixels().filter(|&pixel| self.uses(pixel)) {
-            self.pixel(pixel, pixel - first, out, scratch);
+    /// The pixels of `out`, of which `first` is the first one's number; false where something that was read is not finite.
+    fn task(&self, first: usize, out: &mut NormalMapMut<'_>, scratch: &mut Scratch) -> bool {
+        let pixels = first..first + out.albedo.len();
+        if let Some(solver) = &self.blocks {
+            let Left { finite, careful } = blocks::run(solver, &self.images, self.mask, pixels, out);
+            for pixel in careful {
+                self.pixel(pixel, pixel - first, out, scratch);
+            }
+            return finite;
         }
-        for pixel in self.behind_the_lanes(first..first + out.albedo.len()) {
+        let mut finite = true;
+        for pixel in pixels {
             if self.uses(pixel) {
                 self.pixel(pixel, pixel - first, out, scratch);
+                finite &= scratch.values.iter().all(|value| value.is_finite());
             } else {
                 out.clear(pixel - first..pixel - first + 1);
             }
         }
-    }
-
-    /// The pixels behind the last whole block; all of them where the fast kernel does not serve.
-    fn behind_the_lanes(&self, pixels: Range<usize>) -> Range<usize> {
-        let count = if self.lanes.is_some() { pixels.len() % LANES } else { pixels.len() };
-        pixels.end - count..pixels.end
+        finite
     }
 
     fn uses(&self, pixel: usize) -> bool {
@@ -293,7 +214,7 @@ impl<'a, P: Pixel> Kernel<'a, P> {
     }
 
     /// The careful kernel: one pixel in `f64`, written to place `at`.
-    fn pixel(&self, pixel: usize, at: usize, out: &mut Out<'_>, scratch: &mut Scratch<P>) {
+    fn pixel(&self, pixel: usize, at: usize, out: &mut NormalMapMut<'_>, scratch: &mut Scratch) {
         let lights = self.stack.lights();
         self.load(pixel, scratch);
         self.choose(scratch);
@@ -328,12 +249,12 @@ impl<'a, P: Pixel> Kernel<'a, P> {
     }
 
     /// The pixel's values in linear grey levels at unit light intensity, its clipped lights, and near lights' directions.
-    fn load(&self, pixel: usize, scratch: &mut Scratch<P>) {
-        let offset = self.radiometry.offset(pixel);
+    fn load(&self, pixel: usize, scratch: &mut Scratch) {
+        let offset = self.images.radiometry.offset(pixel);
         for light in 0..self.stack.lights() {
-            let code = self.planes[light][pixel];
-            scratch.clipped[light] = code.to_f32() >= self.radiometry.saturation;
-            scratch.values[light] = (self.radiometry.linearise(code) - offset) * self.scales[light];
+            let code = self.images.planes[light][pixel];
+            scratch.clipped[light] = code.to_f32() >= self.images.radiometry.saturation;
+            scratch.values[light] = (self.images.radiometry.linearise(code) - offset) * self.images.scales[light];
         }
         if let Lights::Near { .. } = self.lights {
             let (row, col) = (pixel / self.stack.width(), pixel % self.stack.width());
@@ -347,7 +268,7 @@ impl<'a, P: Pixel> Kernel<'a, P> {
         }
     }
 
-    fn choose(&self, scratch: &mut Scratch<P>) {
+    fn choose(&self, scratch: &mut Scratch) {
         match (self.method, &self.robust) {
             (Method::SpecularFilter { threshold }, _) => {
                 let gap = gap(threshold, self.full_scale);
