@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 GROUP = "bilateral"
 MAPS = ("diligent/bear", "diligent/cat", "diligent/goblet", "diligent/harvest", "diligent/pot1", "Fig5_plant")
-SETTINGS = (("compatible", "auto", 1e-3), ("compatible", "double", 1e-3), ("converged", "auto", 1e-6))
+SETTINGS = (("compatible", 1e-3), ("converged", 1e-6))
 MIN_N_Z = 1e-3
 PAIRS = 3
 """The peer takes up to a minute a run."""
@@ -45,7 +45,7 @@ FIRST_ROUNDS = {"harvest": 10, "Fig5_plant": 3}
 PUBLIC_ROUNDS = {"Fig5_plant": 3}
 """The same of the published code."""
 SPARSE_LIMITS = {"Fig5_plant": 5.0}
-"""How many times as fast as plain sparse matrices a map has to be in the default precision."""
+"""How many times as fast as plain sparse matrices a map has to be."""
 PUBLIC_LIMITS = {1: 8.0, 2: 12.0}
 """How many times as fast as the published code the compatible setting has to be, on DiLiGenT, by threads."""
 
@@ -65,11 +65,6 @@ def shown_name(map_name: str, first_rounds: dict[str, int]) -> str:
     return f"{map_name}, first {first_rounds[map_name]} re-weightings" if map_name in first_rounds else map_name
 
 
-def shown_setting(solver: str, precision: str) -> str:
-    """The name of a setting, with its precision where that is not the default."""
-    return solver if precision == "auto" else f"{solver}, {precision} precision"
-
-
 def compare(name: str, folder: Path) -> None:
     """Both sides on one map, every setting; and how far the last energies are apart."""
     from slow_bilateral import integrate as plain  # noqa: PLC0415 - needs SciPy
@@ -79,8 +74,8 @@ def compare(name: str, folder: Path) -> None:
     size = f"{mask.sum()} pixels"
     map_name = Path(name).name
     rounds = FIRST_ROUNDS.get(map_name, MAX_ROUNDS)
-    for solver, precision, tolerance in SETTINGS:
-        options: dict[str, Any] = {"camera": camera, "solver": solver, "precision": precision, "max_iters": rounds}
+    for solver, tolerance in SETTINGS:
+        options: dict[str, Any] = {"camera": camera, "solver": solver, "max_iters": rounds}
         last: dict[str, float] = {}
 
         def ours(options: dict[str, Any] = options, last: dict[str, float] = last) -> None:
@@ -93,9 +88,9 @@ def compare(name: str, folder: Path) -> None:
             run = plain(normals, mask, matrix, inner_tolerance=tolerance, rounds=rounds, published=published)
             last["theirs"] = run[1][-1]
 
-        what = f"{shown_name(map_name, FIRST_ROUNDS)}, {shown_setting(solver, precision)}"
+        what = f"{shown_name(map_name, FIRST_ROUNDS)}, {solver}"
         timed = alternate(ours, theirs, 1 if map_name in FIRST_ROUNDS else PAIRS)
-        limit = SPARSE_LIMITS.get(map_name) if precision == "auto" else None
+        limit = SPARSE_LIMITS.get(map_name)
         emit_ratio(GROUP, what, size, own_threads(), f"scipy cg to {tolerance:g}, Jacobi", timed, limit=limit)
         apart = abs(last["ours"] / last["theirs"] - 1.0)
         emit_check(GROUP, f"{what}: last energies apart", size, own_threads(), apart, "relative")
@@ -120,19 +115,18 @@ def against_public(name: str, folder: Path) -> None:
         def published() -> str:
             return subprocess.run(line, check=True, capture_output=True, text=True).stdout
 
-        for precision in ("auto", "double"):
-            options: dict[str, Any] = {"camera": camera, "solver": "compatible", "precision": precision}
+        def ours() -> None:
+            bgars.integrate_normals(
+                vectors, mask=mask, method="bilateral", camera=camera, solver="compatible", max_iters=rounds
+            )
 
-            def ours(options: dict[str, Any] = options) -> None:
-                bgars.integrate_normals(vectors, mask=mask, method="bilateral", max_iters=rounds, **options)
-
-            pairs = 1 if map_name in PUBLIC_ROUNDS else PAIRS
-            timed = alternate(ours, published, pairs, peer_seconds=lambda run: printed_seconds(str(run())))
-            what = f"{shown_name(map_name, PUBLIC_ROUNDS)}, {shown_setting('compatible', precision)}"
-            is_limited = precision == "auto" and name.startswith("diligent/")
-            limit = PUBLIC_LIMITS.get(own_threads()) if is_limited else None
-            size = f"{mask.sum()} pixels"
-            emit_ratio(GROUP, what, size, own_threads(), "published code (one thread)", timed, limit=limit)
+        pairs = 1 if map_name in PUBLIC_ROUNDS else PAIRS
+        timed = alternate(ours, published, pairs, peer_seconds=lambda run: printed_seconds(str(run())))
+        what = f"{shown_name(map_name, PUBLIC_ROUNDS)}, compatible"
+        limit = PUBLIC_LIMITS.get(own_threads()) if name.startswith("diligent/") else None
+        emit_ratio(
+            GROUP, what, f"{mask.sum()} pixels", own_threads(), "published code (one thread)", timed, limit=limit
+        )
 
 
 def printed_seconds(output: str) -> float:

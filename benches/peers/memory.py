@@ -13,7 +13,7 @@ from normal_fields import make_field
 from process import own_threads
 from rows import Skipped, emit, emit_check
 
-LIMIT_BYTES = 60.0
+LIMIT_BYTES = 100.0
 STATUS, RESET = Path("/proc/self/status"), Path("/proc/self/clear_refs")
 KIBIBYTE = 1024
 

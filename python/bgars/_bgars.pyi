@@ -113,7 +113,6 @@ def integrate_bilateral(
     max_iters: int,
     tolerance: float,
     setting: str,
-    precision: str,
     threads: int | None,
     progress: Callable[[int, float], object] | None,
 ) -> dict[str, Any]: ...

@@ -37,7 +37,6 @@ Difference = Literal["trapezoid", "forward"]
 DIFFERENCES: tuple[Difference, ...] = get_args(Difference)
 IntegrationMethod = Literal["least-squares", "bilateral"]
 Solver = Literal["converged", "compatible"]
-Precision = Literal["auto", "double", "single"]
 LEAST_SQUARES_ITERS, BILATERAL_ITERS = 2_000, 150
 
 if TYPE_CHECKING:
@@ -55,7 +54,6 @@ if TYPE_CHECKING:
         k: float
         tol: float
         solver: Solver
-        precision: Precision
         anchors: Anchors | None
         pixel_pitch_um: float | None
         threads: int | None
@@ -83,7 +81,6 @@ def integrate_normals(
     k: float = 2.0,
     tol: float = 1e-4,
     solver: Solver = "converged",
-    precision: Precision = "auto",
     camera: Pinhole | None = None,
     anchors: Anchors | None = None,
     pixel_pitch_um: float | None = None,
@@ -133,10 +130,6 @@ def integrate_normals(
         Bilateral: every system solved by multigrid to 1e-6, or the published iteration, Jacobi-preconditioned conjugate
         gradient to 1e-3. Stopped that early, jumps depend on how far the solver happened to come. Under a camera whose
         two focal lengths differ, "compatible" also takes the published approximation for it.
-    precision : {"auto", "double", "single"}
-        Bilateral: numbers inside a solve; surface and weights are always double. "single", which only "compatible" has,
-        takes half the time. "auto" is single for "compatible", whose tolerance is far above rounding, and double for
-        "converged".
     camera : Pinhole, optional
         Bilateral: perspective; the result is then a :class:`DepthMap`.
     anchors : Anchors, optional
@@ -183,7 +176,6 @@ def integrate_normals(
         ("method", method, get_args(IntegrationMethod)),
         ("difference", difference, DIFFERENCES),
         ("solver", solver, get_args(Solver)),
-        ("precision", precision, get_args(Precision)),
     ):
         if value not in allowed:
             msg = f"{name}: must be one of {', '.join(allowed)}; got {value!r}"
@@ -193,11 +185,9 @@ def integrate_normals(
         "relative_tolerance": number("relative_tolerance", relative_tolerance),
         "absolute_tolerance": number("absolute_tolerance", absolute_tolerance),
     }
-    bilateral = {"k": number("k", k), "tol": number("tol", tol), "solver": solver, "precision": precision}
+    bilateral = {"k": number("k", k), "tol": number("tol", tol), "solver": solver}
     own, others = (bilateral, least_squares) if method == "bilateral" else (least_squares, bilateral)
     check_others(method, others, own)
-    if precision == "auto":
-        precision = "single" if solver == "compatible" else "double"
     iters = count("max_iters", max_iters, BILATERAL_ITERS if method == "bilateral" else LEAST_SQUARES_ITERS)
     check_camera(camera, method, anchors)
     if isinstance(normals, NormalField):
@@ -232,7 +222,6 @@ def integrate_normals(
             k=k,
             tolerance=tol,
             setting=solver,
-            precision=precision,
             **common,
         )
         height_px, labels = surface["height"], surface["labels"]
@@ -249,7 +238,6 @@ def integrate_normals(
                 converged=surface["converged"],
                 k=k,
                 solver=solver,
-                precision=precision,
             ),
         }
     if camera is not None:

@@ -39,7 +39,6 @@ DEFAULTS = {
     "k": 2.0,
     "tol": 1e-4,
     "solver": "converged",
-    "precision": "auto",
 }
 """Of the arguments that only one method has."""
 
@@ -66,9 +65,6 @@ def check_others(method: str, others: Mapping[str, object], own: Mapping[str, ob
         if value != DEFAULTS[name]:
             msg = f"{name}: method {method!r} has no such argument (it has {', '.join(own)}); got {value!r}"
             raise InputError(msg)
-    if own.get("precision") == "single" and own["solver"] != "compatible":
-        msg = f"precision: only solver 'compatible' has 'single', got solver {own['solver']!r}"
-        raise InputError(msg)
 
 
 def check_camera(camera: object, method: str, anchors: Anchors | None) -> None:

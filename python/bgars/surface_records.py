@@ -85,8 +85,6 @@ class BilateralFit:
     k : float
         Sharpness of the sigmoid.
     solver : {"converged", "compatible"}
-    precision : {"double", "single"}
-        Of the numbers inside its solves.
     """
 
     rightward: NDArray[np.float32]
@@ -95,7 +93,6 @@ class BilateralFit:
     converged: bool
     k: float
     solver: str
-    precision: str
 
     def jumps(self, least: float = 0.9) -> NDArray[np.bool_]:
         """(H, W) True where one side of a pixel has at least this share: the pixels along a jump."""

@@ -59,7 +59,7 @@ def test_compatible_is_the_published_iteration_to_the_last_digits(camera: np.nda
     first = bilateral(normals, mask=mask)
     mask = first.labels == np.argmax([part.pixels for part in first.components])
     expected, energies, inner = slow(normals.astype(np.float64), mask, camera, inner_tolerance=1e-3, published=True)
-    options = {"mask": mask, "solver": "compatible", "precision": "double"}
+    options = {"mask": mask, "solver": "compatible"}
     found = bilateral(normals, **options) if camera is None else perspective(normals, camera, **options)
     fit = fit_of(found)
     assert found.iterations == inner
@@ -123,16 +123,13 @@ def test_a_sphere_under_perspective_is_first_order() -> None:
     assert errors[1] < 0.75 * errors[0]
 
 
-def test_single_precision_and_compatible_agree_with_double_and_converged() -> None:
+def test_compatible_agrees_with_converged() -> None:
     _, normals = terrace()
-    double = bilateral(normals, solver="compatible", precision="double")
-    single = bilateral(normals, solver="compatible")
+    compatible = bilateral(normals, solver="compatible")
     exact = bilateral(normals, solver="converged")
-    assert [fit_of(found).precision for found in (double, single, exact)] == ["double", "single", "double"]
-    assert np.abs(single.height_px - double.height_px).max() < 1e-3
-    assert np.abs(exact.height_px - double.height_px).max() < 0.05
+    assert np.abs(exact.height_px - compatible.height_px).max() < 0.05
     assert exact.residual <= 1e-6
-    assert double.residual <= 1e-3
+    assert compatible.residual <= 1e-3
 
 
 @pytest.mark.parametrize("solver", ["converged", "compatible"])
@@ -193,7 +190,6 @@ BAD: list[tuple[dict[str, object], str]] = [
     ({"tol": 0.0}, r"tol: must be finite and above 0, got 0"),
     ({"max_iters": 0}, r"max_iters: must be at least 1, got 0"),
     ({"solver": "best"}, r"solver: must be one of converged, compatible; got 'best'"),
-    ({"precision": "half"}, r"precision: must be one of auto, double, single; got 'half'"),
     ({"camera": np.eye(3)}, r"camera: must be a bgars.Pinhole, got ndarray"),
     ({"mask": np.zeros((60, 60), bool)}, r"mask: no pixel"),
 ]

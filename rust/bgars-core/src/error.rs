@@ -145,6 +145,12 @@ pub enum Error {
         /// Relative residual asked for.
         tolerance: f64,
     },
+    /// Work memory that the system does not give.
+    #[error("out of memory: {bytes} bytes of work memory are not available; integrate a smaller part of the image")]
+    OutOfMemory {
+        /// Bytes asked for.
+        bytes: usize,
+    },
     /// The progress callback asked to stop.
     #[error("cancelled")]
     Cancelled,

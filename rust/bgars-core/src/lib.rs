@@ -15,7 +15,6 @@ pub mod io;
 mod key;
 pub mod lights;
 mod median;
-mod memory;
 pub mod mesh;
 pub mod normals;
 pub mod pixel;
@@ -24,7 +23,6 @@ pub mod reflectance;
 pub mod rims;
 pub mod shadows;
 pub mod stack;
-mod vector;
 pub mod vertex_normals;
 
 pub use error::{Error, Result};

@@ -1,7 +1,7 @@
 //! `integrate_bilateral`.
 
 use bgars_core::integrate::{
-    BilateralParams, BilateralSurface, Field, Pinhole, Precision, Setting, integrate_bilateral as integrate,
+    BilateralParams, BilateralSurface, Field, Pinhole, Setting, integrate_bilateral as integrate,
 };
 use numpy::{PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -12,7 +12,7 @@ use crate::errors::InputError;
 use crate::progress::watched;
 
 #[pyfunction]
-#[pyo3(signature = (normals, mask, weights, regions, *, camera, k, max_iters, tolerance, setting, precision, threads, progress))]
+#[pyo3(signature = (normals, mask, weights, regions, *, camera, k, max_iters, tolerance, setting, threads, progress))]
 #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)]
 pub fn integrate_bilateral<'py>(
     py: Python<'py>,
@@ -25,7 +25,6 @@ pub fn integrate_bilateral<'py>(
     max_iters: usize,
     tolerance: f64,
     setting: &str,
-    precision: &str,
     threads: Option<i64>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
@@ -34,12 +33,7 @@ pub fn integrate_bilateral<'py>(
         "converged" => Setting::Converged,
         _ => return Err(InputError::new_err(format!("setting: unknown setting {setting:?}"))),
     };
-    let precision = match precision {
-        "double" => Precision::Double,
-        "single" => Precision::Single,
-        _ => return Err(InputError::new_err(format!("precision: unknown precision {precision:?}"))),
-    };
-    let params = BilateralParams { k, max_iters, tolerance, setting, precision };
+    let params = BilateralParams { k, max_iters, tolerance, setting };
     let camera = camera.map(|(f_x_px, f_y_px, c_x_px, c_y_px)| Pinhole { f_x_px, f_y_px, c_x_px, c_y_px });
     let shape = [mask.shape()[0], mask.shape()[1]];
     let normals = slice3(&normals, "normals")?;

@@ -1,7 +1,7 @@
 //! The core's errors as the package's exceptions.
 
 use bgars_core::Error;
-use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError};
 use pyo3::prelude::*;
 
 mod classes {
@@ -20,6 +20,7 @@ pub fn to_python(error: Error) -> PyErr {
         Error::NoConvergence { iterations, residual, .. } => {
             classes::ConvergenceError::new_err((message, iterations, residual))
         }
+        Error::OutOfMemory { .. } => PyMemoryError::new_err(message),
         Error::Cancelled => PyKeyboardInterrupt::new_err(message),
         Error::UnsupportedImage { .. } => classes::UnsupportedImageError::new_err(message),
         Error::Io { .. } | Error::Decode { .. } | Error::ImageTooLarge { .. } | Error::StackMismatch { .. } => {

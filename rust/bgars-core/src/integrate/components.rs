@@ -5,8 +5,6 @@ use std::ops::Range;
 use memchr::memchr;
 use rayon::prelude::*;
 
-use crate::memory::zeros;
-
 /// One connected component of the mask (4-neighbourhood).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Component {
@@ -113,7 +111,7 @@ impl Runs {
 
     /// Index of each pixel's component, row-major; -1 outside the mask.
     pub fn labels(&self) -> Vec<i32> {
-        let mut labels = zeros((self.row_starts.len() - 1) * self.width);
+        let mut labels = vec![0; (self.row_starts.len() - 1) * self.width];
         self.write_labels(&mut labels);
         labels
     }

@@ -1,115 +1,171 @@
-//! Conjugate gradient on the reduced system (Hestenes and Stiefel 1952), preconditioned by multigrid.
-//!
-//! Written out here for its memory traffic: the sums ride along with the passes that make their vectors, and every pass runs on
-//! all threads. faer's solver, with which the tests compare it, does its vector work on one thread and in passes of its own.
+//! faer's conjugate gradient, watched: it tells its progress, can be stopped, and is held to the true residual.
 
-use super::checkerboard::Weights;
-use super::edge_bits::EdgeBits;
-use super::multigrid::Multigrid;
-use super::residual::Residual;
-use super::settle::{Right, settle};
-use super::steps::Steps;
-use super::{OnProgress, Params, Progress};
-use crate::memory::Aligned;
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::matrix_free::conjugate_gradient::{CgParams, conjugate_gradient as solve, conjugate_gradient_scratch};
+use faer::matrix_free::{InitialGuessStatus, LinOp, Precond};
+use faer::{MatMut, MatRef, Par};
+
+use super::norm::norm;
+use super::vectors::{slice, slice_mut};
 use crate::{Error, Result};
 
-/// A graph of more than one node for so many reds needs much of the memory, and much more time than to make the right side again.
-const LARGE_GRAPH: usize = 16;
+/// What the true residual may lie above the target by, relative to it.
+const ROUNDING: f64 = 1e-6;
 
-/// What [`conjugate_gradients`] found.
-pub(super) struct Solution {
-    pub reds: Aligned<f64>,
-    pub blacks: Aligned<f64>,
-    pub iterations: usize,
-    /// Norm of the true residual, relative to `scale`.
-    pub residual: f64,
-    /// False where the iterations did not suffice, or rounding left nothing of one; the rest is then what they came to.
-    pub solved: bool,
-    /// True where a large graph was needed, whose memory the allocator may keep for a while.
-    pub had_large_graph: bool,
+/// When to stop.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    /// Largest norm of the residual.
+    pub target: f64,
+    pub max_iters: usize,
 }
 
-/// Solves for the reds of `weights`, which have the edges of `bits`, from `start` or from zero, until the norm of what the
-/// system leaves is at most the tolerance times `scale`; the blacks follow from them.
+/// How far the iterations came.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Outcome {
+    pub iterations: usize,
+    /// Norm of the true residual.
+    pub norm: f64,
+    /// Whether it is as small as asked for.
+    pub solved: bool,
+}
+
+/// Called with the iterations done and the norm of the residual.
+pub(super) type Report<'a> = &'a mut dyn FnMut(usize, f64) -> ControlFlow<()>;
+
+/// Brings `x` to the solution of `operator x = right`, preconditioned; nothing is set up where it is there already.
 ///
 /// The residual that the iteration carries along drifts from the true one by rounding: when it says done, the true one is
-/// computed, and if it does not agree the iteration starts again from there. It is kept in two floats, not in one: what rounding adds
-/// to the sum of a component's residuals no step can take away, and the preconditioner makes the most of it.
-pub(super) fn conjugate_gradients(
-    weights: &Weights,
-    bits: EdgeBits,
-    mut right: Right<'_>,
-    start: Option<Aligned<f64>>,
-    scale: f64,
-    params: &Params,
-    on_progress: OnProgress<'_>,
-) -> Result<Solution> {
-    let size = weights.grid.half_pixels();
-    let target = (params.relative_tolerance * scale).max(params.absolute_tolerance * (2.0 * size as f64).sqrt());
-    // After the steps the blacks lie in q.
-    let mut q = Aligned::<f64>::any(size);
-    let mut r = Residual::any(size);
-    let mut norm = settle(weights, &right, start.as_deref(), None, Some(&mut r)).sqrt();
-    let mut x = Steps::from(start, size);
-    let (mut iterations, mut solved) = (0, true);
-    if norm <= target {
-        let residual = if norm > 0.0 { norm / scale } else { 0.0 };
-        settle(weights, &right, Some(x.end(weights, [&[], &[]])), Some(&mut q), None);
-        return Ok(Solution {
-            reds: x.into_solution(),
-            blacks: q,
-            iterations,
-            residual,
-            solved,
-            had_large_graph: false,
-        });
+/// computed, and if it does not agree the iteration starts again from there, as long as that helps.
+pub(super) fn conjugate_gradient<P: Precond<f64>>(
+    operator: &impl LinOp<f64>,
+    preconditioner: impl FnOnce() -> P,
+    right: &[f64],
+    x: &mut [f64],
+    limits: Limits,
+    report: Report<'_>,
+) -> Result<Outcome> {
+    let mut outcome = Outcome { iterations: 0, norm: true_norm(operator, right, x), solved: true };
+    if outcome.norm <= limits.target {
+        return Ok(outcome);
     }
-    let mut is_large = false;
-    let preconditioner = Multigrid::new(weights, bits, |unknowns| {
-        is_large = unknowns > size / LARGE_GRAPH;
-        if is_large {
-            right.release();
-        }
-    });
-    let mut vectors = preconditioner.vectors();
-    // A direction may be any; what x and r take along it agrees in `f64`.
-    let [mut p, mut previous] = [Aligned::<f32>::any(size), Aligned::any(size)];
+    let preconditioner = preconditioner();
+    let watch = Watch { stopped: AtomicBool::new(false), norm: AtomicU64::new(0) };
+    let (watched, preconditioner) = (Stoppable(operator, &watch), Noting(&preconditioner, &watch));
+    let request = conjugate_gradient_scratch(&preconditioner, &watched, 1, Par::Seq);
+    let mut memory =
+        MemBuffer::try_new(request).map_err(|_| Error::OutOfMemory { bytes: request.unaligned_bytes_required() })?;
     loop {
-        let mut r_z_before = None;
-        // Written so that NaN goes on, to be found below.
-        while !(norm <= target) {
-            solved = iterations < params.max_iters;
-            if !solved {
-                break;
+        let (before, start) = (outcome.norm, outcome.iterations);
+        let params = CgParams {
+            // faer 0.24 leaves its residual unset for a guess of zero.
+            initial_guess: InitialGuessStatus::MaybeNonZero,
+            abs_tolerance: limits.target,
+            rel_tolerance: 0.0,
+            max_iters: limits.max_iters - start,
+            ..CgParams::default()
+        };
+        let done = &mut outcome.iterations;
+        let each = |_: MatRef<'_, f64>| {
+            // The residual of this iteration is known in the next one.
+            if *done > start && report(*done, f64::from_bits(watch.norm.load(Ordering::Relaxed))).is_break() {
+                watch.stopped.store(true, Ordering::Relaxed);
             }
-            let r_z = preconditioner.descend(r.rounded(), &mut vectors);
-            // What was there before the first direction is finite, and counts nothing.
-            let beta = r_z_before.replace(r_z).map_or(0.0, |before| (r_z / before) as f32);
-            std::mem::swap(&mut p, &mut previous);
-            let p_q = preconditioner.advance(r.rounded(), x.due(), &vectors, (beta, &previous), &mut p, &mut q);
-            // Both are positive but for rounding; what is lost in it cannot be found again.
-            solved = r_z > 0.0 && p_q > 0.0;
-            if !solved {
-                // What waits is a step along the direction before.
-                std::mem::swap(&mut p, &mut previous);
-                break;
-            }
-            let alpha = r_z / p_q;
-            x.add(alpha);
-            norm = r.subtract(weights, alpha, &q).sqrt();
-            iterations += 1;
-            if on_progress(Progress { iteration: iterations, residual: norm / scale }).is_break() {
-                return Err(Error::Cancelled);
-            }
+            *done += 1;
+        };
+        let (solution, right) = (MatMut::from_column_major_slice_mut(x, right.len(), 1), column(right));
+        // It ends converged, out of iterations, or where rounding leaves nothing of a product: the true residual tells.
+        let _ = solve(solution, &preconditioner, &watched, right, params, each, Par::Seq, MemStack::new(&mut memory));
+        if watch.stopped.load(Ordering::Relaxed) {
+            return Err(Error::Cancelled);
         }
-        norm = settle(weights, &right, Some(x.end(weights, [&previous, &p])), Some(&mut q), None).sqrt();
-        if !solved || norm <= target {
-            if is_large {
-                [p, previous].into_iter().for_each(Aligned::release);
-            }
-            let (reds, blacks, residual) = (x.into_solution(), q, norm / scale);
-            return Ok(Solution { reds, blacks, iterations, residual, solved, had_large_graph: is_large });
+        outcome.norm = true_norm(operator, slice(right), x);
+        outcome.solved = outcome.norm <= limits.target * (1.0 + ROUNDING);
+        if outcome.iterations > start && report(outcome.iterations, outcome.norm).is_break() {
+            return Err(Error::Cancelled);
         }
-        settle(weights, &right, Some(x.end(weights, [&[], &[]])), None, Some(&mut r));
+        if outcome.solved || outcome.iterations >= limits.max_iters || !(outcome.norm < before) {
+            return Ok(outcome);
+        }
     }
 }
+
+fn column(values: &[f64]) -> MatRef<'_, f64> {
+    MatRef::from_column_major_slice(values, values.len(), 1)
+}
+
+/// Norm of `right - operator x`.
+fn true_norm(operator: &impl LinOp<f64>, right: &[f64], x: &[f64]) -> f64 {
+    let mut left = vec![0.0; right.len()];
+    let product = MatMut::from_column_major_slice_mut(&mut left, right.len(), 1);
+    operator.apply(product, column(x), Par::Seq, MemStack::new(&mut []));
+    left.iter_mut().zip(right).for_each(|(left, right)| *left = right - *left);
+    norm(&left)
+}
+
+/// What the solver's parts know of each other.
+#[derive(Debug)]
+struct Watch {
+    stopped: AtomicBool,
+    /// Bits of the norm of the last residual.
+    norm: AtomicU64,
+}
+
+/// An operator that ends the solver where it was stopped, by numbers that are none.
+#[derive(Debug)]
+struct Stoppable<'a, A>(&'a A, &'a Watch);
+
+/// A preconditioner that notes the norm of the residual.
+#[derive(Debug)]
+struct Noting<'a, P>(&'a P, &'a Watch);
+
+/// What is the same for both.
+macro_rules! forward_to_inner {
+    () => {
+        fn apply_scratch(&self, rhs_ncols: usize, par: Par) -> StackReq {
+            self.0.apply_scratch(rhs_ncols, par)
+        }
+
+        fn nrows(&self) -> usize {
+            self.0.nrows()
+        }
+
+        fn ncols(&self) -> usize {
+            self.0.ncols()
+        }
+
+        fn conj_apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, par: Par, stack: &mut MemStack) {
+            self.apply(out, rhs, par, stack);
+        }
+    };
+}
+
+impl<A: LinOp<f64>> LinOp<f64> for Stoppable<'_, A> {
+    forward_to_inner!();
+
+    fn apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, par: Par, stack: &mut MemStack) {
+        if self.1.stopped.load(Ordering::Relaxed) {
+            slice_mut(out).fill(f64::NAN);
+        } else {
+            self.0.apply(out, rhs, par, stack);
+        }
+    }
+}
+
+impl<P: Precond<f64>> LinOp<f64> for Noting<'_, P> {
+    forward_to_inner!();
+
+    fn apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, par: Par, stack: &mut MemStack) {
+        if self.1.stopped.load(Ordering::Relaxed) {
+            slice_mut(out).fill(0.0);
+        } else {
+            self.1.norm.store(norm(slice(rhs)).to_bits(), Ordering::Relaxed);
+            self.0.apply(out, rhs, par, stack);
+        }
+    }
+}
+
+impl<P: Precond<f64>> Precond<f64> for Noting<'_, P> {}

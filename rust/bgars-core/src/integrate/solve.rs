@@ -1,26 +1,16 @@
-//! The least-squares integrator: checks, the solver, constants.
-
-use std::ops::Range;
+//! The least-squares integrator: the solver between its checks and the constants of components.
 
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::checkerboard::{by_column, join_whole_row};
+use super::checkerboard::{Crop, by_column, join_row};
+use super::checks::{CHECK_PIXELS, check, check_length, check_memory};
 use super::components::Runs;
-use super::conjugate_gradient::{Solution, conjugate_gradients};
-use super::fill::fill_corners;
-use super::operator::{Field, FieldEdges};
-use super::reduction::sum;
-use super::settle::Right;
-use super::{Fit, OnProgress, Params, Surface};
-use crate::memory::zeros;
+use super::conjugate_gradient::{Limits, conjugate_gradient};
+use super::field::assemble;
+use super::norm::sum;
+use super::settings::{Field, Fit, OnProgress, Params, Progress, Surface};
 use crate::{Error, Result};
-
-/// Shortest and longest normal that is taken for one of length 1: interpolation and 8 bits shorten them, garbage is far off.
-const LENGTHS: [f32; 2] = [0.5, 2.0];
-
-/// Pixels that are checked at a time.
-const CHECK_PIXELS: usize = 1 << 14;
 
 /// Integrates `normals` over `mask` to a height map in pixels.
 ///
@@ -81,7 +71,7 @@ pub fn integrate(
 /// # Ok::<(), bgars_core::Error>(())
 /// ```
 pub fn integrate_field(field: Field<'_>, params: &Params, on_progress: OnProgress<'_>) -> Result<Surface> {
-    let (mut height_px, mut labels) = (zeros(field.mask.len()), zeros(field.mask.len()));
+    let (mut height_px, mut labels) = (vec![0.0; field.mask.len()], vec![0; field.mask.len()]);
     let fit = integrate_into(field, params, on_progress, &mut height_px, &mut labels)?;
     let Fit { components, iterations, residual } = fit;
     Ok(Surface { height_px, labels, components, iterations, residual })
@@ -105,37 +95,50 @@ pub fn integrate_into(
     let (field, width) = (Field { mask, ..field }, field.width);
     check_length("height_px", mask.len(), height_px.len())?;
     check_length("labels", mask.len(), labels.len())?;
-    let edges = FieldEdges::new(field, params.difference);
-    let (mut weights, right) = edges.assemble();
-    let bits = fill_corners(&mut weights);
-    let again = |rows: Range<usize>, colours: [&mut [f64]; 2]| edges.right_side(rows, colours);
-    let scale = right.norm;
-    let half = weights.grid.half();
-    let Solution { reds, blacks, iterations, residual, solved, had_large_graph } =
-        conjugate_gradients(&weights, bits, Right::Kept(right, Some(&again)), None, scale, params, on_progress)?;
-    if !solved {
+    let crop = Crop::around(mask, width);
+    check_memory(crop.grid.height * crop.grid.width)?;
+    let system = assemble(field, crop, params.difference);
+    let (half, scale) = (crop.grid.half(), system.scale);
+    let limits = Limits {
+        target: (params.relative_tolerance * scale).max(params.absolute_tolerance * (mask.len() as f64).sqrt()),
+        max_iters: params.max_iters,
+    };
+    let mut reds = vec![0.0; crop.grid.half_pixels()];
+    let solution = {
+        let mut report = |iteration, norm: f64| {
+            on_progress(Progress { iteration, residual: if norm > 0.0 { norm / scale } else { 0.0 } })
+        };
+        conjugate_gradient(
+            &system.operator(),
+            || system.preconditioner(),
+            system.right_side(),
+            &mut reds,
+            limits,
+            &mut report,
+        )?
+    };
+    let (iterations, residual) = (solution.iterations, if solution.norm > 0.0 { solution.norm / scale } else { 0.0 });
+    if !solution.solved {
         return Err(Error::NoConvergence { iterations, residual, tolerance: params.relative_tolerance });
     }
-    if had_large_graph {
-        // What is written now would come on top of it.
-        weights.release();
-    }
+    let blacks = system.blacks_of(&reds);
     let runs = Runs::new(mask, field.regions, width);
-    let fill = |row: usize, values: &mut [f64]| {
-        let span = row * half..(row + 1) * half;
-        join_whole_row(row, &reds[span.clone()], &blacks[span], values);
-    };
+    // Rows and columns of the box.
+    let of_row = |row: usize| [&reds, &blacks].map(|colour| &colour[row * half..(row + 1) * half]);
     let means = runs.means(|row, cols| {
-        let span = row * half..(row + 1) * half;
-        let [first, second] = by_column(row, [&reds[span.clone()], &blacks[span]]);
+        let (row, cols) = (row - crop.row, cols.start - crop.col..cols.end - crop.col);
+        let [first, second] = by_column(row, of_row(row));
         sum(&first[cols.start.div_ceil(2)..cols.end.div_ceil(2)]) + sum(&second[cols.start / 2..cols.end / 2])
     });
     height_px.par_chunks_mut(width).enumerate().for_each_init(
-        || vec![0.0; width],
+        || vec![0.0; crop.grid.width],
         |values, (row, height_px)| {
-            fill(row, values);
+            if (crop.row..crop.row + crop.grid.height).contains(&row) {
+                join_row(row - crop.row, of_row(row - crop.row), values);
+            }
             for (cols, component) in runs.row(row) {
-                center(&values[cols.clone()], means[component], &mut height_px[cols]);
+                let values = &values[cols.start - crop.col..cols.end - crop.col];
+                center(values, means[component], &mut height_px[cols]);
             }
             for cols in runs.gaps(row) {
                 height_px[cols].fill(f32::NAN);
@@ -171,7 +174,7 @@ fn without_weightless(field: Field<'_>) -> Option<Vec<bool>> {
 /// ```
 #[must_use]
 pub fn usable(normals: &[f32]) -> Vec<bool> {
-    let mut usable = zeros(normals.len() / 3);
+    let mut usable = vec![false; normals.len() / 3];
     usable.par_chunks_mut(CHECK_PIXELS).zip(normals.par_chunks(3 * CHECK_PIXELS)).for_each(|(usable, normals)| {
         for (usable, normal) in usable.iter_mut().zip(normals.chunks_exact(3)) {
             // NaN and infinity spread into the sum of their products with zero.
@@ -179,128 +182,4 @@ pub fn usable(normals: &[f32]) -> Vec<bool> {
         }
     });
     usable
-}
-
-/// Refuses what the solver cannot work on.
-pub(super) fn check(field: Field<'_>, params: &Params) -> Result<()> {
-    check_lengths(field)?;
-    check_pixels(field, Facing::Camera)?;
-    for (argument, value) in
-        [("relative_tolerance", params.relative_tolerance), ("absolute_tolerance", params.absolute_tolerance)]
-    {
-        if !(value.is_finite() && value > 0.0) {
-            return Err(Error::OutOfRange { argument, rule: "finite and above 0", value });
-        }
-    }
-    if params.max_iters == 0 {
-        return Err(Error::OutOfRange { argument: "max_iters", rule: "at least 1", value: 0.0 });
-    }
-    Ok(())
-}
-
-/// Refuses arrays that do not fit each other, and a mask without a pixel.
-pub(super) fn check_lengths(field: Field<'_>) -> Result<()> {
-    let Field { normals, mask, weights, regions, width } = field;
-    check_length("normals", mask.len() * 3, normals.len())?;
-    if let Some(weights) = weights {
-        check_length("weights", mask.len(), weights.len())?;
-    }
-    if let Some(regions) = regions {
-        check_length("regions", mask.len(), regions.len())?;
-    }
-    if width == 0 || !mask.contains(&true) {
-        return Err(Error::EmptyMask);
-    }
-    check_length("mask", mask.len().div_ceil(width) * width, mask.len())?;
-    Ok(())
-}
-
-fn check_length(argument: &'static str, expected: usize, actual: usize) -> Result<()> {
-    if expected == actual { Ok(()) } else { Err(Error::LengthMismatch { argument, expected, actual }) }
-}
-
-/// Where normals may point.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Facing {
-    /// `n_z >= 0`.
-    Camera,
-    /// In perspective the camera may see a normal with `n_z < 0`.
-    Anywhere,
-}
-
-/// Refuses normals and weights inside the mask that mean nothing.
-pub(super) fn check_pixels(field: Field<'_>, facing: Facing) -> Result<()> {
-    // Nearly always all is well, and that shows quickly; only otherwise the first offender is looked for.
-    let pixels = field.mask.len();
-    let chunks = (0..pixels.div_ceil(CHECK_PIXELS)).into_par_iter();
-    let sound = |chunk: usize| are_sound(field, facing, chunk * CHECK_PIXELS..((chunk + 1) * CHECK_PIXELS).min(pixels));
-    if !chunks.map(sound).all(|sound| sound) {
-        (0..pixels).try_for_each(|pixel| check_pixel(field, facing, pixel))?;
-    }
-    let weighs = |(&weight, &used): (&f32, &bool)| used && weight > 0.0;
-    if field.weights.is_some_and(|weights| !weights.iter().zip(field.mask).any(weighs)) {
-        let rule = "above 0 in at least one pixel of the mask";
-        return Err(Error::OutOfRange { argument: "weights", rule, value: 0.0 });
-    }
-    Ok(())
-}
-
-/// True when [`check_pixel`] refuses none of some pixels; without branches.
-#[allow(clippy::needless_bitwise_bool)]
-fn are_sound(field: Field<'_>, facing: Facing, pixels: Range<usize>) -> bool {
-    let mask = &field.mask[pixels.clone()];
-    let normals = field.normals[3 * pixels.start..3 * pixels.end].as_chunks::<3>().0;
-    let mut sound = are_unit(normals, mask, facing == Facing::Anywhere);
-    // NaN and infinity spread into products with zero.
-    let is_finite = |value: f32| value * 0.0 == 0.0;
-    for (&weight, &used) in field.weights.map_or(&[][..], |weights| &weights[pixels]).iter().zip(mask) {
-        sound &= !used | (is_finite(weight) & (weight >= 0.0));
-    }
-    sound
-}
-
-/// True when the normals in the mask have about length 1 and, unless they may point `away`, face the camera.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-#[allow(clippy::needless_bitwise_bool)]
-fn are_unit(normals: &[[f32; 3]], mask: &[bool], away: bool) -> bool {
-    let [least, most] = [LENGTHS[0] * LENGTHS[0], LENGTHS[1] * LENGTHS[1]];
-    let n = mask.len();
-    let normals = &normals[..n];
-    let mut sound = true;
-    for k in 0..n {
-        let [x, y, z] = normals[k];
-        let square = x * x + y * y + z * z;
-        // Comparisons with NaN are false.
-        sound &= !mask[k] | ((square >= least) & (square <= most) & (away | (z >= 0.0)));
-    }
-    sound
-}
-
-/// Refuses a normal or a weight inside the mask that means nothing.
-fn check_pixel(field: Field<'_>, facing: Facing, pixel: usize) -> Result<()> {
-    let Field { normals, mask, weights, width, .. } = field;
-    if !mask[pixel] {
-        return Ok(());
-    }
-    let (row, col) = (pixel / width, pixel % width);
-    let normal: [f32; 3] = std::array::from_fn(|axis| normals[3 * pixel + axis]);
-    let length = normal.iter().map(|component| component * component).sum::<f32>().sqrt();
-    let rule = if !normal.iter().all(|component| component.is_finite()) {
-        Some("finite")
-    } else if facing == Facing::Camera && normal[2] < 0.0 {
-        Some("toward the camera, n_z >= 0")
-    } else if !(LENGTHS[0]..=LENGTHS[1]).contains(&length) {
-        Some("of length 1 (0.5 to 2 is let through)")
-    } else {
-        None
-    };
-    if let Some(rule) = rule {
-        return Err(Error::BadNormal { row, col, rule, normal });
-    }
-    if let Some(weights) = weights
-        && !(weights[pixel].is_finite() && weights[pixel] >= 0.0)
-    {
-        return Err(Error::BadWeight { row, col, value: f64::from(weights[pixel]) });
-    }
-    Ok(())
 }

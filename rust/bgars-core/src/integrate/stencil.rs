@@ -1,92 +1,263 @@
-//! A row of the checkerboard, vector by vector.
+//! A graph Laplacian on all pixels of a grid: the 5-point stencil, never stored as a matrix.
 
-use super::checkerboard::{DOWN, LEFT, PaddedRow, RIGHT, UP};
-use super::spans::Span;
-use crate::vector::Packed;
+use std::borrow::Cow;
 
-/// The weights of the edges of a row's pixels of one colour: left, right, up, down.
-pub(super) struct Sides<'a, V: Packed>(pub [&'a [V::Floats]; 4]);
+use multiversion::multiversion;
+use rayon::prelude::*;
 
-impl<V: Packed> Sides<'_, V> {
-    /// How many vectors there are.
-    #[inline(always)]
-    pub fn len(&self) -> usize {
-        self.0[0].len()
+use super::checkerboard::{BAND_ROWS, Colour, Grid, split_row};
+use super::real::Real;
+
+pub(super) const LEFT: usize = 0;
+pub(super) const RIGHT: usize = 1;
+pub(super) const UP: usize = 2;
+pub(super) const DOWN: usize = 3;
+
+/// Edges from a row of pixels to the right or down: their weights, and how much each moves of the right side from its first pixel
+/// to its second.
+#[derive(Debug)]
+pub(super) struct EdgeRow<W> {
+    pub weight: Vec<W>,
+    pub push: Vec<f64>,
+}
+
+impl<W: Real> EdgeRow<W> {
+    fn zeros(width: usize) -> Self {
+        Self { weight: vec![W::default(); width], push: vec![0.0; width] }
     }
 
-    /// The weights of vector `k`; 0 for virtual edges, which are no part of the system.
-    #[inline(always)]
-    fn at(&self, side: usize, k: usize) -> V {
-        V::widen_positive(&self.0[side][k])
-    }
-
-    /// Sums of the weights.
-    #[inline(always)]
-    pub fn diagonal(&self, k: usize) -> V {
-        (self.at(LEFT, k) + self.at(RIGHT, k)) + (self.at(UP, k) + self.at(DOWN, k))
+    pub fn clear(&mut self) {
+        self.weight.fill(W::default());
+        self.push.fill(0.0);
     }
 }
 
-/// A row's pixels of one colour, with what is at the far ends of their edges.
-pub(super) struct Stencil<'a, V: Packed> {
-    sides: Sides<'a, V>,
-    near: [&'a [V::Chunk]; 4],
+/// The weights of the edges between neighbouring pixels, kept at the red end of each: in `f32` 8 bytes a pixel.
+#[derive(Debug)]
+pub(super) struct Stencil<W = f32> {
+    pub grid: Grid,
+    /// From each red to the left, right, up and down; a zero before each row and after the last.
+    sides: [Vec<W>; 4],
+    /// The weights of a row that is not there.
+    pub(super) no_weights: Vec<W>,
 }
 
-impl<'a, V: Packed> Stencil<'a, V> {
-    /// `shift` is 0 where the left neighbour of pixel k is pixel k - 1 of the other colour, 1 where it is pixel k.
-    #[inline(always)]
-    pub fn new(
-        sides: Sides<'a, V>,
-        [above, here, below]: [PaddedRow<'a, V::Number>; 3],
-        span: Span,
-        shift: usize,
-    ) -> Self {
-        let (first, n) = (1 + span.start, sides.len());
-        let near = [
-            V::chunks(&here[first - 1 + shift..], n),
-            V::chunks(&here[first + shift..], n),
-            V::chunks(&above[first..], n),
-            V::chunks(&below[first..], n),
-        ];
-        Self { sides, near }
+impl<W: Real> Stencil<W> {
+    /// From the edges to the right of and below each row of pixels: `rows_of()` gives a function that sets them, asked for row by
+    /// row within a band and for the row above it. What leads out of the grid must be zero. Where a right side is asked for, it
+    /// becomes what edges push onto the pixels of either colour, less what they take.
+    pub fn from_edges<Rows>(grid: Grid, rows_of: impl Fn() -> Rows + Sync, right: Option<&mut [Vec<f64>; 2]>) -> Self
+    where
+        Rows: FnMut(usize, &mut EdgeRow<W>, &mut EdgeRow<W>),
+    {
+        let (half, stride) = (grid.half(), grid.half() + 1);
+        let mut sides: [Vec<W>; 4] = std::array::from_fn(|_| vec![W::default(); grid.height * stride + 1]);
+        let [left, right_side, up, down] = sides.each_mut().map(|side| side[1..].par_chunks_mut(BAND_ROWS * stride));
+        let bands = grid.height.div_ceil(BAND_ROWS);
+        let pushed: Vec<Option<[&mut [f64]; 2]>> = match right {
+            None => (0..bands).map(|_| None).collect(),
+            Some([reds, blacks]) => {
+                let chunk = BAND_ROWS * half;
+                reds.chunks_mut(chunk)
+                    .zip(blacks.chunks_mut(chunk))
+                    .map(|(reds, blacks)| Some([reds, blacks]))
+                    .collect()
+            }
+        };
+        let bands = (left, right_side, up, down, pushed).into_par_iter().enumerate();
+        bands.for_each(|(band, (left, right, up, down, mut pushed))| {
+            let first = band * BAND_ROWS;
+            let mut set = rows_of();
+            let [mut along, mut above, mut below] = std::array::from_fn(|_| EdgeRow::zeros(grid.width));
+            let (mut unused, mut divergence) = (vec![W::default(); half], vec![0.0; grid.width]);
+            if first > 0 {
+                set(first - 1, &mut along, &mut above);
+            }
+            for (k, row) in (first..grid.height.min(first + BAND_ROWS)).enumerate() {
+                set(row, &mut along, &mut below);
+                let span = k * stride..k * stride + half;
+                // An edge to the right is its red left end's; with a black one it is to the left of red k, or in even rows k + 1.
+                let before = k * stride + 1 - row % 2;
+                split_row(row, &along.weight, [&mut right[span.clone()], &mut left[before..before + half]]);
+                split_row(row, &below.weight, [&mut down[span.clone()], &mut unused]);
+                split_row(row, &above.weight, [&mut up[span], &mut unused]);
+                if let Some(pushed) = &mut pushed {
+                    diverge([&above.push, &along.push, &below.push], &mut divergence);
+                    let span = k * half..(k + 1) * half;
+                    split_row(row, &divergence, pushed.each_mut().map(|colour| &mut colour[span.clone()]));
+                }
+                std::mem::swap(&mut above, &mut below);
+            }
+        });
+        Self { grid, sides, no_weights: vec![W::default(); half] }
     }
 
-    /// How many vectors there are.
+    /// Where the weights of a row begin.
     #[inline(always)]
-    pub fn len(&self) -> usize {
-        self.sides.len()
+    fn start(&self, row: usize) -> usize {
+        row * (self.grid.half() + 1) + 1
     }
 
-    /// The weights, those of virtual edges too.
+    /// Weights from the pixels of one colour of a row to the left, right, up and down.
     #[inline(always)]
-    pub fn sides(&self) -> [&'a [V::Floats]; 4] {
-        self.sides.0
-    }
-
-    /// Sums of the weights.
-    #[inline(always)]
-    pub fn diagonal(&self, k: usize) -> V {
-        self.sides.diagonal(k)
-    }
-
-    /// Sums of the weights times the neighbours.
-    #[inline(always)]
-    pub fn sum(&self, k: usize) -> V {
-        let mut sum = self.sides.at(LEFT, k) * V::read(&self.near[LEFT][k]);
-        for side in [RIGHT, UP, DOWN] {
-            sum = self.sides.at(side, k).times_plus(V::read(&self.near[side][k]), sum);
+    pub fn weights(&self, colour: Colour, row: usize) -> [&[W]; 4] {
+        let (half, start, stride) = (self.grid.half(), self.start(row), self.grid.half() + 1);
+        let side = |side: usize, first: usize| &self.sides[side][first..first + half];
+        // Nothing leads up from the first row, nor down from the last.
+        let (is_first, is_last) = (row == 0, row + 1 == self.grid.height);
+        match colour {
+            Colour::Red => [side(LEFT, start), side(RIGHT, start), side(UP, start), side(DOWN, start)],
+            Colour::Black => [
+                side(RIGHT, start - row % 2),
+                side(LEFT, start + 1 - row % 2),
+                if is_first { side(UP, start) } else { side(DOWN, start - stride) },
+                if is_last { side(DOWN, start) } else { side(UP, start + stride) },
+            ],
         }
-        sum
     }
 
-    /// `term`, and the sums of the weights of all edges, virtual ones too, times the neighbours.
+    /// Sets the values of one colour: `set(&mut value, sum, diagonal, input)` gets the weighted sum of the neighbours' values,
+    /// the sum of the weights, and the number of `input` at the place.
+    pub fn update<T: Real + From<W>>(
+        &self,
+        colour: Colour,
+        neighbours: &[T],
+        input: &[T],
+        values: &mut [T],
+        set: impl Fn(&mut T, T, T, T) + Sync,
+    ) {
+        let half = self.grid.half();
+        values.par_chunks_mut(BAND_ROWS * half).enumerate().for_each(|(band, values)| {
+            for (row, values) in (band * BAND_ROWS..).zip(values.chunks_mut(half)) {
+                let of_row = |row: usize| &neighbours[row * half..(row + 1) * half];
+                let vertical = [of_row(row.saturating_sub(1)), of_row((row + 1).min(self.grid.height - 1))];
+                let beside = self.beside(colour, row, neighbours);
+                let input = &input[row * half..(row + 1) * half];
+                update_row(self.weights(colour, row), &beside, vertical, input, values, &set);
+            }
+        });
+    }
+
+    /// The neighbours to the left and right of a row's pixels of one colour: those of pixel k are k and k + 1.
     #[inline(always)]
-    pub fn plus_magnitudes(&self, term: V, k: usize) -> V {
-        let mut sum = term;
-        for side in [LEFT, RIGHT, UP, DOWN] {
-            sum = V::widen(&self.sides.0[side][k]).magnitude().times_plus(V::read(&self.near[side][k]), sum);
+    fn beside<'a, T: Real>(&self, colour: Colour, row: usize, neighbours: &'a [T]) -> Cow<'a, [T]> {
+        let half = self.grid.half();
+        let (start, is_first) = (row * half, colour.first_col(row) == 0);
+        let first = (start + usize::from(!is_first)).checked_sub(1);
+        // Beside the row lies any number, which no weight leads to; at the ends of the vector there is none.
+        match first.and_then(|first| neighbours.get(first..=first + half)) {
+            Some(beside) => Cow::Borrowed(beside),
+            None => {
+                let row = &neighbours[start..start + half];
+                let ends = [&[T::default()][..], &[]];
+                let [before, after] = if is_first { ends } else { [ends[1], ends[0]] };
+                Cow::Owned([before, row, after].concat())
+            }
         }
-        sum
+    }
+}
+
+/// What the edges above, along and below a row push onto its pixels, less what they take.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn diverge([above, along, below]: [&[f64]; 3], divergence: &mut [f64]) {
+    let n = divergence.len();
+    let (above, along, below) = (&above[..n], &along[..n], &below[..n]);
+    for k in 0..n {
+        divergence[k] = (above[k] - below[k]) - along[k];
+    }
+    for (divergence, left) in divergence[1..].iter_mut().zip(along) {
+        *divergence += left;
+    }
+}
+
+/// [`Stencil::update`] of a row.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn update_row<W: Copy, T: Real + From<W>, F: Fn(&mut T, T, T, T)>(
+    weights: [&[W]; 4],
+    beside: &[T],
+    vertical: [&[T]; 2],
+    input: &[T],
+    values: &mut [T],
+    set: &F,
+) {
+    let n = values.len();
+    let [w_left, w_right, w_up, w_down] = weights.map(|side| &side[..n]);
+    let (left, right, [up, down], input) = (&beside[..n], &beside[1..=n], vertical.map(|row| &row[..n]), &input[..n]);
+    for k in 0..n {
+        let [l, r, u, d] = [w_left[k], w_right[k], w_up[k], w_down[k]].map(<T as From<W>>::from);
+        let sum = (l * left[k] + r * right[k]) + (u * up[k] + d * down[k]);
+        set(&mut values[k], sum, (l + r) + (u + d), input[k]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Weight and push of the edge from pixel (row, col) to the right (0) or down (1).
+    fn edge(grid: Grid, row: usize, col: usize, axis: usize) -> (f64, f64) {
+        let inside = if axis == 0 { col + 1 < grid.width } else { row + 1 < grid.height };
+        let number = (((row * 991 + col * 4 + axis) * 2_654_435_761) >> 9) % 7;
+        if inside { (number as f64, (number * number) as f64 - 3.0) } else { (0.0, 0.0) }
+    }
+
+    fn stencil(grid: Grid, right: &mut [Vec<f64>; 2]) -> Stencil {
+        let rows_of = || {
+            |row: usize, along: &mut EdgeRow<f32>, below: &mut EdgeRow<f32>| {
+                for (axis, edges) in [along, below].into_iter().enumerate() {
+                    for col in 0..grid.width {
+                        let (weight, push) = edge(grid, row, col, axis);
+                        (edges.weight[col], edges.push[col]) = (weight as f32, push);
+                    }
+                }
+            }
+        };
+        Stencil::from_edges(grid, rows_of, Some(right))
+    }
+
+    /// Sums over edges and pushes, against one edge at a time.
+    #[test]
+    fn sums_and_right_sides_are_those_of_the_edges() {
+        for (height, width) in [(1, 1), (1, 2), (2, 1), (3, 7), (33, 16), (34, 31), (65, 33)] {
+            let grid = Grid { height, width };
+            let mut right = [(); 2].map(|()| vec![0.0; grid.half_pixels()]);
+            let stencil = stencil(grid, &mut right);
+            let place = |row: usize, col: usize| row * grid.half() + col / 2;
+            let value = |row: usize, col: usize| (row * 17 + col * 5) as f64 % 11.0;
+            let mut values = [(); 2].map(|()| vec![100.0; grid.half_pixels()]);
+            for (row, col) in (0..height * width).map(|at| (at / width, at % width)) {
+                values[Colour::at(row, col) as usize][place(row, col)] = value(row, col);
+            }
+            let mut sums = values.clone();
+            let mut diagonals = values.clone();
+            for colour in [Colour::Red, Colour::Black] {
+                let (own, other) = (&values[colour as usize], &values[colour.other() as usize]);
+                stencil.update(colour, other, own, &mut sums[colour as usize], |out, sum, _, x| *out = sum + x);
+                stencil.update(colour, other, own, &mut diagonals[colour as usize], |out, _, d, _| *out = d);
+            }
+            for (row, col) in (0..height * width).map(|at| (at / width, at % width)) {
+                let mut expected = [value(row, col), 0.0, 0.0];
+                for (axis, ahead) in [(0, [row, col + 1]), (1, [row + 1, col])] {
+                    let (weight, push) = edge(grid, row, col, axis);
+                    expected[0] += weight * value(ahead[0], ahead[1]);
+                    expected[1] += weight;
+                    expected[2] -= push;
+                    let behind = if axis == 0 {
+                        col.checked_sub(1).map(|col| [row, col])
+                    } else {
+                        row.checked_sub(1).map(|row| [row, col])
+                    };
+                    if let Some([row, col]) = behind {
+                        let (weight, push) = edge(grid, row, col, axis);
+                        expected[0] += weight * value(row, col);
+                        expected[1] += weight;
+                        expected[2] += push;
+                    }
+                }
+                let colour = Colour::at(row, col) as usize;
+                let found = [&sums, &diagonals, &right].map(|vector| vector[colour][place(row, col)]);
+                assert_eq!(found, expected, "{height} x {width}: {row}, {col}");
+            }
+        }
     }
 }

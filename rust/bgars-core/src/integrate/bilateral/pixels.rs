@@ -1,58 +1,32 @@
 //! What stays the same from one re-weighting to the next: normals and trust, cropped to the mask.
 
-use std::ops::Range;
-
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::super::checkerboard::Grid;
-use super::super::operator::{Field, to_unit};
-use super::Setting;
+use super::super::checkerboard::{Crop, Grid};
+use super::super::field::to_unit;
+use super::super::real::Real;
+use super::super::settings::Field;
+use super::super::stencil::{EdgeRow, Stencil};
 use super::camera::Pinhole;
-use super::frame::Frame;
-use crate::memory::{Aligned, zeros};
-
-/// The bounding box of the mask, its first row and column in the image.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Crop {
-    pub row: usize,
-    pub col: usize,
-    pub grid: Grid,
-}
-
-impl Crop {
-    /// The smallest box around a mask that has at least one pixel.
-    fn around(mask: &[bool], width: usize) -> Self {
-        let used = |row: &[bool]| row.contains(&true);
-        let rows: Vec<&[bool]> = mask.chunks(width).collect();
-        let top = rows.iter().position(|row| used(row)).unwrap_or(0);
-        let bottom = rows.iter().rposition(|row| used(row)).unwrap_or(0);
-        let (mut left, mut right) = (width, 0);
-        for row in &rows[top..=bottom] {
-            left = left.min(row.iter().position(|&used| used).unwrap_or(width));
-            right = right.max(row.iter().rposition(|&used| used).map_or(0, |col| col + 1));
-        }
-        Self { row: top, col: left, grid: Grid { height: bottom + 1 - top, width: right - left } }
-    }
-}
+use super::reweigh::Shares;
+use super::settings::Setting;
 
 /// The pixels of the box, row-major; numbers of pixels outside the mask are zero.
 #[derive(Debug)]
 pub(super) struct Pixels {
     pub crop: Crop,
     /// Components of the normals along x and y.
-    pub n: [Aligned<f64>; 2],
+    pub n: [Vec<f64>; 2],
     /// Factors of the differences along x and y.
-    pub g: [Aligned<f64>; 2],
+    pub g: [Vec<f64>; 2],
     /// How much each pixel is trusted, times `unit`.
-    pub trust: Aligned<f64>,
+    pub trust: Vec<f64>,
     /// Brings the weights of edges, trust times factor squared, to the size of 1.
     pub unit: f64,
     /// 1 where a pixel is joined to its right neighbour, or to the one below, else 0.
-    pub ties: [Aligned<f64>; 2],
+    pub ties: [Vec<f64>; 2],
     mask: Vec<bool>,
-    /// Of the box.
-    pub frame: Frame,
 }
 
 impl Pixels {
@@ -60,8 +34,8 @@ impl Pixels {
         let crop = Crop::around(field.mask, field.width);
         let Grid { height, width } = crop.grid;
         let pixels = height * width;
-        let [mut n_x, mut n_y, mut g_x, mut g_y, mut trust] = std::array::from_fn(|_| Aligned::zeros(pixels));
-        let [mut tied_right, mut tied_below] = std::array::from_fn(|_| Aligned::zeros(pixels));
+        let [mut n_x, mut n_y, mut g_x, mut g_y, mut trust] = std::array::from_fn(|_| vec![0.0; pixels]);
+        let [mut tied_right, mut tied_below] = std::array::from_fn(|_| vec![0.0; pixels]);
         let mut mask = vec![false; pixels];
         let number = |at: usize| field.regions.map_or(0, |regions| regions[at]);
         let rows = (
@@ -94,23 +68,15 @@ impl Pixels {
                 mask[k] = true;
             }
         });
-        let frame = Frame::new(&mask, width);
-        let weights =
-            (&*trust, &*g_x, &*g_y).into_par_iter().map(|(trust, g_x, g_y)| trust * (g_x * g_x).max(g_y * g_y));
+        let weights = (&trust, &g_x, &g_y).into_par_iter().map(|(trust, g_x, g_y)| trust * (g_x * g_x).max(g_y * g_y));
         let unit = to_unit(weights.reduce(|| 0.0, f64::max));
         trust.par_iter_mut().for_each(|trust| *trust *= unit);
-        Self { crop, n: [n_x, n_y], g: [g_x, g_y], trust, unit, ties: [tied_right, tied_below], mask, frame }
+        Self { crop, n: [n_x, n_y], g: [g_x, g_y], trust, unit, ties: [tied_right, tied_below], mask }
     }
 
     /// Pixels of the box.
     pub fn len(&self) -> usize {
         self.mask.len()
-    }
-
-    /// The columns of the mask in a row, in parts from left to right.
-    pub fn spans(&self, row: usize) -> impl Iterator<Item = Range<usize>> {
-        let width = self.crop.grid.width;
-        self.frame.columns(row).map(move |span| span.start..span.end.min(width))
     }
 
     /// True for a pixel of the mask.
@@ -120,10 +86,9 @@ impl Pixels {
 
     /// A map of the box as one of the image, of `pixels` pixels in rows of `width`; NaN outside the mask.
     pub fn whole(&self, pixels: usize, width: usize, value: impl Fn(usize) -> f64 + Sync) -> Vec<f32> {
-        let mut whole: Vec<f32> = zeros(pixels);
+        let mut whole = vec![f32::NAN; pixels];
         let (crop, box_width) = (self.crop, self.crop.grid.width);
         whole.par_chunks_mut(width).enumerate().for_each(|(row, whole)| {
-            whole.fill(f32::NAN);
             let Some(row) = row.checked_sub(crop.row).filter(|row| *row < crop.grid.height) else { return };
             for k in 0..box_width {
                 let pixel = row * box_width + k;
@@ -138,30 +103,46 @@ impl Pixels {
 
 /// The edges along an axis: to the right (0), or to the pixel below (1).
 #[derive(Debug)]
-pub(super) struct Edges<'a> {
-    pub pixels: &'a Pixels,
+struct Edges<'a> {
+    pixels: &'a Pixels,
     /// Weight of each pixel's difference ahead.
-    pub share: &'a [f64],
+    share: &'a [f64],
     /// Least share of a side.
-    pub least: f64,
-    pub axis: usize,
+    least: f64,
+    axis: usize,
 }
 
 impl Edges<'_> {
-    /// Weights of a row's edges, and how much of the right side each pushes from its first pixel to its second; columns
-    /// outside the row's spans, which have none, are left alone.
-    pub fn of_row(&self, row: usize, weight: &mut [f64], push: &mut [f64]) {
-        let Pixels { crop: Crop { grid, .. }, .. } = self.pixels;
+    /// Sets the edges of a row.
+    fn set_row<W: Real>(&self, row: usize, weight: &mut [f64], edges: &mut EdgeRow<W>) {
+        let Grid { height, width } = self.pixels.crop.grid;
+        edges.clear();
         // Nothing ties a pixel to one that is not there: not the last row, nor the last column.
-        if self.axis == 1 && row + 1 == grid.height {
+        let (end, stride) = if self.axis == 0 { (width - 1, 1) } else { (width, width) };
+        if self.axis == 1 && row + 1 == height {
             return;
         }
-        let (end, stride) = if self.axis == 0 { (grid.width - 1, 1) } else { (grid.width, grid.width) };
-        for span in self.pixels.spans(row) {
-            let span = span.start..span.end.min(end);
-            edges_of(self, row * grid.width + span.start, stride, &mut weight[span.clone()], &mut push[span]);
+        edges_of(self, row * width, stride, &mut weight[..end], &mut edges.push[..end]);
+        for (rounded, weight) in edges.weight[..end].iter_mut().zip(weight) {
+            *rounded = W::nearest(*weight);
         }
     }
+}
+
+/// Operator and right side of the normal equations for the shares of a surface, none of them taken below `least`.
+pub(super) fn assemble<W: Real>(pixels: &Pixels, shares: &Shares, least: f64) -> (Stencil<W>, [Vec<f64>; 2]) {
+    let grid = pixels.crop.grid;
+    let rows_of = || {
+        let mut weight = vec![0.0; grid.width];
+        move |row: usize, right: &mut EdgeRow<W>, below: &mut EdgeRow<W>| {
+            for (axis, edges) in [right, below].into_iter().enumerate() {
+                Edges { pixels, share: &shares[axis], least, axis }.set_row(row, &mut weight, edges);
+            }
+        }
+    };
+    let mut right = [(); 2].map(|()| vec![0.0; grid.half_pixels()]);
+    let stencil = Stencil::from_edges(grid, rows_of, Some(&mut right));
+    (stencil, right)
 }
 
 /// Weights and pushes of the edges from the pixels from `first` on, to those `stride` further.

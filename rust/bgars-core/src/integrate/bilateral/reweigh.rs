@@ -5,7 +5,6 @@ use rayon::prelude::*;
 
 use super::super::checkerboard::BAND_ROWS;
 use super::pixels::Pixels;
-use crate::memory::Aligned;
 
 /// Largest argument of the sigmoid, either way: beyond, one side has all but `e^-70`, which is still a normal number in `f32`.
 const MAX_ARGUMENT: f64 = 70.0;
@@ -13,16 +12,11 @@ const MAX_ARGUMENT: f64 = 70.0;
 const LANES: usize = 8;
 
 /// Weights of the differences to the right and upward; the opposite ones have the rest.
-pub(super) type Shares = [Aligned<f64>; 2];
+pub(super) type Shares = [Vec<f64>; 2];
 
 /// Both sides of every pixel alike: where the iteration starts.
 pub(super) fn even(pixels: &Pixels) -> Shares {
-    let halves = || {
-        let mut halves = Aligned::any(pixels.len());
-        halves.fill(0.5);
-        halves
-    };
-    [halves(), halves()]
+    std::array::from_fn(|_| vec![0.5; pixels.len()])
 }
 
 /// Sets the shares by the surface `z` (row-major in the box) and returns the energy with them (Cao et al. 2022, eqs. 11 and 16).
@@ -41,21 +35,17 @@ pub(super) fn reweigh(pixels: &Pixels, z: &[f64], k: f64, shares: &mut Shares) -
             let rows = rightward.chunks_mut(width).zip(upward.chunks_mut(width)).enumerate();
             rows.map(|(row, (rightward, upward))| {
                 let row = band * BAND_ROWS + row;
-                let spans = pixels.spans(row).map(|span| {
-                    let shares = [&mut rightward[span.clone()], &mut upward[span.clone()]];
-                    reweigh_span(pixels, z, row * width + span.start, k, &mut steps, shares)
-                });
-                spans.sum::<f64>()
+                reweigh_row(pixels, z, row * width, k, &mut steps, [rightward, upward])
             })
-            .sum()
+            .sum::<f64>()
         })
         .collect();
     energies.iter().sum::<f64>() / pixels.unit
 }
 
-/// Sets the shares of part of a row, from pixel `first` on, and returns their energy.
+/// Sets the shares of a row, from pixel `first` on, and returns their energy.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn reweigh_span(pixels: &Pixels, z: &[f64], first: usize, k: f64, steps: &mut Steps, shares: [&mut [f64]; 2]) -> f64 {
+fn reweigh_row(pixels: &Pixels, z: &[f64], first: usize, k: f64, steps: &mut Steps, shares: [&mut [f64]; 2]) -> f64 {
     let [rightward, upward] = shares;
     steps.load(pixels, z, first, rightward.len());
     let right = Side { ahead: &steps.right[1..], behind: &steps.right, axis: 0 };
@@ -63,7 +53,7 @@ fn reweigh_span(pixels: &Pixels, z: &[f64], first: usize, k: f64, steps: &mut St
     row_of(pixels, first, &right, k, rightward) + row_of(pixels, first, &up, k, upward)
 }
 
-/// Height differences along the span of a row, zero where nothing is joined.
+/// Height differences along a row, zero where nothing is joined.
 struct Steps {
     /// To the right of each pixel, after one zero for what is left of the first.
     right: Vec<f64>,
@@ -145,56 +135,5 @@ fn term([trust, share, ahead, behind, g, n]: [f64; 6]) -> f64 {
 
 #[inline(always)]
 fn sigmoid(argument: f64) -> f64 {
-    1.0 / (1.0 + exp(-argument.clamp(-MAX_ARGUMENT, MAX_ARGUMENT)))
-}
-
-/// `e^x` for |x| up to 700, within 2 units in the last place, without a branch: it runs in lanes.
-///
-/// `x = n ln 2 + y`, `|y| <= ln 2 / 2` (ln 2 in two parts, Cody and Waite 1980); Taylor's series of y; n goes into the exponent.
-#[inline(always)]
-fn exp(x: f64) -> f64 {
-    /// Added, it leaves the nearest integer in the lowest bits.
-    const ROUND: f64 = 6_755_399_441_055_744.0;
-    /// The first 32 bits of ln 2, and what is left of it.
-    const LN_2: [f64; 2] = [0.693_147_180_369_123_8, 1.908_214_929_270_587_7e-10];
-    /// 1 / 13!, ..., 1 / 0!.
-    const TAYLOR: [f64; 14] = [
-        1.605_904_383_682_161_3e-10,
-        2.087_675_698_786_81e-9,
-        2.505_210_838_544_172e-8,
-        2.755_731_922_398_589_3e-7,
-        2.755_731_922_398_589e-6,
-        2.480_158_730_158_73e-5,
-        1.984_126_984_126_984e-4,
-        1.388_888_888_888_889e-3,
-        8.333_333_333_333_333e-3,
-        4.166_666_666_666_666_4e-2,
-        1.666_666_666_666_666_6e-1,
-        0.5,
-        1.0,
-        1.0,
-    ];
-    let shifted = x * std::f64::consts::LOG2_E + ROUND;
-    let n = shifted - ROUND;
-    let y = (x - n * LN_2[0]) - n * LN_2[1];
-    let mut sum = TAYLOR[0];
-    for coefficient in &TAYLOR[1..] {
-        sum = sum * y + coefficient;
-    }
-    sum * f64::from_bits(shifted.to_bits().wrapping_add(1023) << 52)
-}
-
-#[cfg(test)]
-#[allow(clippy::float_cmp)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_exponential_is_that_of_the_library() {
-        for step in -70_000..=70_000 {
-            let x = f64::from(step) * 1e-3 + 1e-7;
-            assert!((exp(x) / x.exp() - 1.0).abs() < 4e-16 + 1e-16, "{x}: {} for {}", exp(x), x.exp());
-        }
-        assert_eq!(exp(0.0), 1.0);
-    }
+    1.0 / (1.0 + (-argument.clamp(-MAX_ARGUMENT, MAX_ARGUMENT)).exp())
 }

@@ -4,31 +4,27 @@ use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
-use super::super::checkerboard::{Weights, join_row, split_whole_row};
+use super::super::checkerboard::{Grid, join_row, split_row};
+use super::super::checks::{Facing, check_lengths, check_memory, check_pixels};
 use super::super::components::Runs;
-use super::super::conjugate_gradient::conjugate_gradients;
-use super::super::edges::Colours;
-use super::super::fill::fill_corners;
-use super::super::operator::Field;
-use super::super::reduction::sum;
-use super::super::settle::Right;
-use super::super::solve::{Facing, check_lengths, check_pixels};
-use super::super::{Params, Progress};
-use super::assemble::assemble;
-use super::pixels::Pixels;
-use super::published::Published;
-use super::reweigh::{even, reweigh};
-use super::{BilateralParams, BilateralSurface, Pinhole, Setting};
-use crate::memory::Aligned;
+use super::super::conjugate_gradient::{Limits, Outcome, conjugate_gradient};
+use super::super::norm::{norm, sum};
+use super::super::settings::{Field, Progress};
+use super::super::system::System;
+use super::camera::Pinhole;
+use super::jacobi::{Diagonal, Laplacian};
+use super::pixels::{Pixels, assemble};
+use super::reweigh::{Shares, even, reweigh};
+use super::settings::{BilateralParams, BilateralSurface, Setting};
 use crate::{Error, Result};
 
-/// Largest relative residual of an inner solve.
-const CONVERGED_TOLERANCE: f64 = 1e-6;
+/// Largest relative residual of an inner solve as published, and most iterations.
+const PUBLISHED: (f64, usize) = (1e-3, 5_000);
+/// The same by multigrid.
+const CONVERGED: (f64, usize) = (1e-6, 500);
 /// Least share of a side in a system that multigrid solves. Weaker ties than this hold nothing within the tolerance, and the
 /// preconditioner's `f32` could not carry them.
 const CONVERGED_LEAST_SHARE: f64 = 1e-6;
-/// Most iterations of an inner solve.
-const CONVERGED_ITERS: usize = 500;
 
 /// Callback of [`integrate_bilateral`], once a re-weighting, with the relative change of the energy in place of the residual.
 pub type OnReweigh<'a> = &'a mut dyn FnMut(Progress) -> ControlFlow<()>;
@@ -71,21 +67,15 @@ pub fn integrate_bilateral(
 ) -> Result<BilateralSurface> {
     let Field { mask, width, .. } = field;
     check(field, camera, params)?;
+    check_memory(2 * mask.len())?;
     let pixels = Pixels::new(field, camera, params.setting);
-    let mut published =
-        (params.setting == Setting::Compatible).then(|| Published::new(&pixels.frame, params.precision));
-    let mut z = Aligned::zeros(pixels.len());
+    let mut z = vec![0.0; pixels.len()];
     let mut shares = even(&pixels);
-    let mut fit = Progressed::default();
+    let mut fit = Inner::default();
     let mut energies: Vec<f64> = Vec::new();
     let mut at_rest = false;
     while energies.len() < params.max_iters && !at_rest {
-        if let Some(published) = &mut published {
-            published.improve(&pixels, &shares, &mut z, &mut fit, on_progress)?;
-        } else {
-            let (system, right) = assemble(&pixels, &shares, CONVERGED_LEAST_SHARE);
-            improve(system, right, &mut z, &mut fit, on_progress)?;
-        }
+        improve(&pixels, &shares, params.setting, &mut z, &mut fit, on_progress)?;
         let energy = reweigh(&pixels, &z, params.k, &mut shares);
         let before = energies.last().copied().unwrap_or(f64::INFINITY);
         energies.push(energy);
@@ -160,59 +150,79 @@ fn check_facing(field: Field<'_>, camera: Pinhole) -> Result<()> {
 
 /// What the inner solves add up to.
 #[derive(Default)]
-pub(super) struct Progressed {
-    pub rounds: usize,
-    pub change: f64,
-    pub inner_iterations: usize,
-    pub residual: f64,
+struct Inner {
+    rounds: usize,
+    change: f64,
+    inner_iterations: usize,
+    residual: f64,
     /// Whether the last of them needed more iterations than it was given.
-    pub unsolved: bool,
+    unsolved: bool,
 }
 
-/// Brings `z` (row-major in the box) to the solution of a system by multigrid.
+/// Brings `z` (row-major in the box) to the solution of the system for some shares, from where it is.
 fn improve(
-    mut weights: Weights,
-    right: Colours,
+    pixels: &Pixels,
+    shares: &Shares,
+    setting: Setting,
     z: &mut [f64],
-    fit: &mut Progressed,
+    fit: &mut Inner,
     on_progress: OnReweigh<'_>,
 ) -> Result<()> {
-    let grid = weights.grid;
-    let (width, half) = (grid.width, grid.half());
-    let scale = right.norm;
+    let state = Progress { iteration: fit.rounds, residual: fit.change };
+    let mut report = |_: usize, _: f64| on_progress(state);
+    let grid = pixels.crop.grid;
+    let mut x = split(grid, z);
+    let (tolerance, max_iters) = if setting == Setting::Compatible { PUBLISHED } else { CONVERGED };
+    let (outcome, scale) = match setting {
+        Setting::Compatible => {
+            let (stencil, right) = assemble(pixels, shares, 0.0);
+            let (right, scale) = (right.concat(), norm(&right[0]).hypot(norm(&right[1])));
+            let (operator, limits) = (Laplacian(&stencil), Limits { target: tolerance * scale, max_iters });
+            (conjugate_gradient(&operator, || Diagonal(&stencil), &right, &mut x, limits, &mut report)?, scale)
+        }
+        Setting::Converged => {
+            let (stencil, right) = assemble(pixels, shares, CONVERGED_LEAST_SHARE);
+            let system = System::reduce(stencil, right);
+            let (scale, reds) = (system.scale, &mut x[..grid.half_pixels()]);
+            let limits = Limits { target: tolerance * scale, max_iters };
+            let (operator, right) = (system.operator(), system.right_side());
+            let outcome = conjugate_gradient(&operator, || system.preconditioner(), right, reds, limits, &mut report)?;
+            drop(operator);
+            let blacks = system.blacks_of(reds);
+            x[grid.half_pixels()..].copy_from_slice(&blacks);
+            (outcome, scale)
+        }
+    };
     if scale == 0.0 {
         z.fill(0.0);
         return Ok(());
     }
-    let bits = fill_corners(&mut weights);
-    let mut reds = Aligned::any(grid.half_pixels());
-    // Of the blacks only the memory matters: they follow from the reds.
-    reds.par_chunks_mut(half)
-        .zip(z.par_chunks(width))
-        .enumerate()
-        .for_each_init(|| vec![0.0; half], |blacks, (row, (reds, z))| split_whole_row(row, z, reds, blacks));
-    let inner = Params { relative_tolerance: CONVERGED_TOLERANCE, max_iters: CONVERGED_ITERS, ..Params::default() };
-    let state = Progress { iteration: fit.rounds, residual: fit.change };
-    let solution = conjugate_gradients(
-        &weights,
-        bits,
-        Right::Kept(right, None),
-        Some(reds),
-        scale,
-        &inner,
-        &mut |_: Progress| on_progress(state),
-    )?;
-    fit.inner_iterations += solution.iterations;
-    if !solution.residual.is_finite() {
-        let (iterations, tolerance) = (fit.inner_iterations, CONVERGED_TOLERANCE);
-        return Err(Error::NoConvergence { iterations, residual: solution.residual, tolerance });
+    let Outcome { iterations, norm, solved } = outcome;
+    fit.inner_iterations += iterations;
+    let residual = norm / scale;
+    if !residual.is_finite() {
+        return Err(Error::NoConvergence { iterations: fit.inner_iterations, residual, tolerance });
     }
-    fit.unsolved = !solution.solved;
-    fit.residual = fit.residual.max(solution.residual);
-    z.par_chunks_mut(width)
-        .zip(solution.reds.par_chunks(half))
-        .zip(solution.blacks.par_chunks(half))
-        .enumerate()
-        .for_each(|(row, ((z, reds), blacks))| join_row(row, reds, blacks, z));
+    fit.unsolved = setting == Setting::Converged && !solved;
+    fit.residual = fit.residual.max(residual);
+    join(grid, &x, z);
     Ok(())
+}
+
+/// Rows of pixels as a vector of reds and blacks.
+fn split(grid: Grid, z: &[f64]) -> Vec<f64> {
+    let mut x = vec![0.0; 2 * grid.half_pixels()];
+    let (reds, blacks) = x.split_at_mut(grid.half_pixels());
+    let colours = reds.par_chunks_mut(grid.half()).zip(blacks.par_chunks_mut(grid.half()));
+    let rows = colours.zip(z.par_chunks(grid.width)).enumerate();
+    rows.for_each(|(row, ((reds, blacks), z))| split_row(row, z, [reds, blacks]));
+    x
+}
+
+/// The way back.
+fn join(grid: Grid, x: &[f64], z: &mut [f64]) {
+    let (reds, blacks) = x.split_at(grid.half_pixels());
+    let colours = reds.par_chunks(grid.half()).zip(blacks.par_chunks(grid.half()));
+    let rows = z.par_chunks_mut(grid.width).zip(colours).enumerate();
+    rows.for_each(|(row, (z, (reds, blacks)))| join_row(row, [reds, blacks], z));
 }

@@ -1,0 +1,293 @@
+//! Aggregation by connected parts: each block of 2 x 2 pixels becomes one coarse unknown for every connected component of the
+//! unknowns in it, so that no wall of the mask is ever merged across. The blocks form a checkerboard again.
+
+use rayon::prelude::*;
+
+use super::adjacency::Adjacency;
+use super::checkerboard::{COLOURS, Colour};
+use super::graph::{Graph, Part};
+
+impl Members {
+    /// The blacks of a coarse unknown.
+    pub fn of(&self, unknown: usize) -> &[u32] {
+        &self.blacks[self.starts[unknown] as usize..self.starts[unknown + 1] as usize]
+    }
+}
+
+/// Which coarse unknown each black belongs to, both ways; of the reds none needs to know.
+#[derive(Debug)]
+pub(super) struct Aggregates {
+    /// Prolongation: the coarse unknown of each black, `2 index + colour`.
+    pub parents: Vec<u32>,
+    /// Restriction: the blacks of each coarse unknown of either colour.
+    pub members: [Members; 2],
+}
+
+/// Lists of blacks.
+#[derive(Debug, Default)]
+pub(super) struct Members {
+    /// Where each list begins, and the end.
+    pub starts: Vec<u32>,
+    pub blacks: Vec<u32>,
+}
+
+/// An unknown of the fine operator.
+#[derive(Clone, Copy)]
+struct Node {
+    block: u32,
+    colour: Colour,
+    row: u32,
+    unknown: u32,
+}
+
+/// The aggregates of a row of blocks, one after the other.
+struct RowOfBlocks {
+    nodes: Vec<Node>,
+    /// Where the nodes of each aggregate begin, and the end.
+    starts: Vec<usize>,
+}
+
+/// The coarse operator, resistors in a network: edges between the same aggregates in parallel, halved because each leads over
+/// twice the distance; and the aggregates.
+pub(super) fn aggregate(fine: &impl Adjacency) -> (Graph, Aggregates) {
+    let grid = fine.grid().coarse();
+    let rows: Vec<RowOfBlocks> = (0..grid.height).into_par_iter().map(|row| aggregates_of(fine, row)).collect();
+    let (firsts, counts) = number(&rows);
+    let parents = parents(fine, &rows, &firsts);
+    let row_parts: Vec<([Part; 2], [Members; 2])> =
+        (0..grid.height).into_par_iter().map(|row| coarse_row(fine, row, &rows[row], &parents)).collect();
+    let mut parts = COLOURS.map(|colour| Part {
+        rows: firsts.iter().map(|first| first[colour as usize]).chain([counts[colour as usize]]).collect(),
+        starts: vec![0],
+        ..Part::default()
+    });
+    let mut members = COLOURS.map(|_| Members { starts: vec![0], blacks: Vec::new() });
+    for (row_parts, row_members) in row_parts {
+        for (all, of_row) in parts.iter_mut().zip(row_parts) {
+            let first = all.ends.len() as u32;
+            all.starts.extend(of_row.starts.iter().map(|start| first + start));
+            all.ends.extend(of_row.ends);
+            all.weights.extend(of_row.weights);
+            all.cols.extend(of_row.cols);
+        }
+        for (all, of_row) in members.iter_mut().zip(row_members) {
+            let first = all.blacks.len() as u32;
+            all.starts.extend(of_row.starts.iter().map(|start| first + start));
+            all.blacks.extend(of_row.blacks);
+        }
+    }
+    let [_, parents] = parents;
+    (Graph { grid, parts }, Aggregates { parents, members })
+}
+
+/// The connected components of each block of a row.
+fn aggregates_of(fine: &impl Adjacency, row: usize) -> RowOfBlocks {
+    let mut nodes = Vec::new();
+    for row in 2 * row..(2 * row + 2).min(fine.grid().height) {
+        for colour in COLOURS {
+            // A pixel without edges needs no coarse unknown.
+            for unknown in fine.row(colour, row).filter(|&unknown| fine.edges(colour, row, unknown).next().is_some()) {
+                let block = (fine.col(colour, row, unknown) / 2) as u32;
+                nodes.push(Node { block, colour, row: row as u32, unknown: unknown as u32 });
+            }
+        }
+    }
+    nodes.sort_by_key(|node| node.block);
+    let mut starts = Vec::new();
+    let (mut first, mut labels) = (0, Vec::new());
+    for block in nodes.chunk_by_mut(|a, b| a.block == b.block) {
+        label_components(fine, block, &mut labels);
+        let mut order: Vec<(usize, Node)> = labels.iter().copied().zip(block.iter().copied()).collect();
+        order.sort_by_key(|&(label, _)| label);
+        for (place, node) in block.iter_mut().zip(&order) {
+            *place = node.1;
+        }
+        starts.extend((0..order.len()).filter(|&k| k == 0 || order[k].0 != order[k - 1].0).map(|k| first + k));
+        first += block.len();
+    }
+    starts.push(nodes.len());
+    RowOfBlocks { nodes, starts }
+}
+
+/// Labels the nodes of a block: equal where edges within it connect them.
+fn label_components(fine: &impl Adjacency, block: &[Node], labels: &mut Vec<usize>) {
+    labels.clear();
+    labels.extend(0..block.len());
+    for (k, node) in block.iter().enumerate().filter(|(_, node)| node.colour == Colour::Red) {
+        for (end, _) in fine.edges(Colour::Red, node.row as usize, node.unknown as usize) {
+            let same = |other: &Node| other.colour == Colour::Black && other.unknown == end as u32;
+            let Some(other) = block.iter().position(same) else { continue };
+            let [kept, gone] = [labels[k].min(labels[other]), labels[k].max(labels[other])];
+            labels.iter_mut().filter(|label| **label == gone).for_each(|label| *label = kept);
+        }
+    }
+}
+
+impl RowOfBlocks {
+    fn aggregates(&self) -> impl Iterator<Item = &[Node]> {
+        self.starts.windows(2).map(|ends| &self.nodes[ends[0]..ends[1]])
+    }
+}
+
+/// The number of the first aggregate of each row of blocks, for either colour, and how many there are.
+fn number(rows: &[RowOfBlocks]) -> (Vec<[u32; 2]>, [u32; 2]) {
+    let mut counts = [0; 2];
+    let mut firsts = Vec::with_capacity(rows.len());
+    for (row, blocks) in rows.iter().enumerate() {
+        firsts.push(counts);
+        for nodes in blocks.aggregates() {
+            counts[Colour::at(row, nodes[0].block as usize) as usize] += 1;
+        }
+    }
+    (firsts, counts)
+}
+
+/// The coarse unknown of each unknown, `2 index + colour`, for either colour of the fine operator.
+fn parents(fine: &impl Adjacency, rows: &[RowOfBlocks], firsts: &[[u32; 2]]) -> [Vec<u32>; 2] {
+    let mut parents = COLOURS.map(|colour| vec![0; fine.len(colour)]);
+    let starts = COLOURS.map(|colour| {
+        let start = |row: usize| if row < rows.len() { fine.row(colour, 2 * row).start } else { fine.len(colour) };
+        (0..=rows.len()).map(start).collect::<Vec<usize>>()
+    });
+    let [reds, blacks] = &mut parents;
+    let tasks = split(reds, &starts[0]).into_par_iter().zip(split(blacks, &starts[1])).zip(rows).zip(firsts);
+    tasks.enumerate().for_each(|(row, (((reds, blacks), blocks), &firsts))| {
+        let (mut next, slices) = (firsts, [reds, blacks]);
+        for nodes in blocks.aggregates() {
+            let colour = Colour::at(row, nodes[0].block as usize) as usize;
+            for node in nodes {
+                let fine_colour = node.colour as usize;
+                slices[fine_colour][node.unknown as usize - starts[fine_colour][row]] =
+                    2 * next[colour] + colour as u32;
+            }
+            next[colour] += 1;
+        }
+    });
+    parents
+}
+
+/// A slice in parts that begin at `starts`, whose last is the end.
+fn split<'a, T>(mut values: &'a mut [T], starts: &[usize]) -> Vec<&'a mut [T]> {
+    let lengths = starts.windows(2).map(|ends| ends[1] - ends[0]);
+    lengths
+        .map(|length| {
+            let (part, rest) = std::mem::take(&mut values).split_at_mut(length);
+            values = rest;
+            part
+        })
+        .collect()
+}
+
+/// The coarse unknowns of a row of blocks with their edges, and the blacks that belong to them; numbers count from the row's first.
+fn coarse_row(
+    fine: &impl Adjacency,
+    row: usize,
+    blocks: &RowOfBlocks,
+    parents: &[Vec<u32>; 2],
+) -> ([Part; 2], [Members; 2]) {
+    let mut found = <([Part; 2], [Members; 2])>::default();
+    let mut edges: Vec<(u32, f32)> = Vec::new();
+    for nodes in blocks.aggregates() {
+        let colour = Colour::at(row, nodes[0].block as usize);
+        let (part, members) = (&mut found.0[colour as usize], &mut found.1[colour as usize]);
+        edges.clear();
+        for node in nodes {
+            if node.colour == Colour::Black {
+                members.blacks.push(node.unknown);
+            }
+            let own = parents[node.colour as usize][node.unknown as usize];
+            for (end, weight) in fine.edges(node.colour, node.row as usize, node.unknown as usize) {
+                let other = parents[node.colour.other() as usize][end];
+                if other == own {
+                    continue;
+                }
+                match edges.iter_mut().find(|(end, _)| *end == other / 2) {
+                    Some((_, sum)) => *sum += 0.5 * weight,
+                    None => edges.push((other / 2, 0.5 * weight)),
+                }
+            }
+        }
+        part.cols.push(nodes[0].block);
+        part.ends.extend(edges.iter().map(|&(end, _)| end));
+        part.weights.extend(edges.iter().map(|&(_, weight)| weight));
+        part.starts.push(part.ends.len() as u32);
+        members.starts.push(members.blacks.len() as u32);
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::checkerboard::Grid;
+    use super::super::stencil::{EdgeRow, Stencil};
+    use super::*;
+
+    /// The grid of a mask, given as rows of `#` and `.`, all weights one.
+    fn stencil(rows: &[&str]) -> Stencil {
+        let grid = Grid { height: rows.len(), width: rows[0].len() };
+        let used = |row: usize, col: usize| {
+            rows.get(row).and_then(|row| row.as_bytes().get(col)).is_some_and(|&mark| mark == b'#')
+        };
+        let rows_of = || {
+            |row: usize, along: &mut EdgeRow<f32>, below: &mut EdgeRow<f32>| {
+                for col in 0..grid.width {
+                    along.weight[col] = f32::from(u8::from(used(row, col) && used(row, col + 1)));
+                    below.weight[col] = f32::from(u8::from(used(row, col) && used(row + 1, col)));
+                }
+            }
+        };
+        Stencil::from_edges(grid, rows_of, None)
+    }
+
+    /// Sums of weights of all unknowns.
+    fn diagonals(of: &impl Adjacency) -> Vec<(usize, usize, f32)> {
+        let mut found = Vec::new();
+        for row in 0..of.grid().height {
+            for colour in COLOURS {
+                for unknown in of.row(colour, row) {
+                    let weight: f32 = of.edges(colour, row, unknown).map(|(_, weight)| weight).sum();
+                    if weight > 0.0 {
+                        found.push((row, of.col(colour, row, unknown), weight));
+                    }
+                }
+            }
+        }
+        found.sort_by_key(|&(row, col, _)| (row, col));
+        found
+    }
+
+    #[test]
+    fn a_grid_that_does_not_fall_apart_is_coarsened_alike_either_way() {
+        for rows in [
+            &["#######", "#######", "###.###", "#######", "#######"][..],
+            &["######", "##..##", "##..##", "######"],
+            &["##", "##"],
+        ] {
+            let fine = stencil(rows);
+            let (graph, _) = aggregate(&fine);
+            assert_eq!(diagonals(&fine.coarse().unwrap()), diagonals(&graph), "{rows:?}");
+        }
+    }
+
+    #[test]
+    fn blocks_fall_apart_along_walls() {
+        // A wall from corner to corner, joined far away.
+        let fine = stencil(&[".#####", "#.####", "##.###", "###.##", "######", "######"]);
+        assert!(fine.coarse().is_none());
+        let (graph, aggregates) = aggregate(&fine);
+        // The upper left block has two pixels that do not touch, the one beside the wall's end is whole.
+        let sizes = graph.parts.each_ref().map(Part::len);
+        assert_eq!(sizes.iter().sum::<usize>(), 9 + 2);
+        let blacks: usize = aggregates.members.iter().map(|members| members.blacks.len()).sum();
+        assert_eq!(blacks, 18, "every pixel with row + col odd");
+        for (colour, part) in COLOURS.into_iter().zip(&graph.parts) {
+            for unknown in 0..part.len() {
+                for edge in part.edges(unknown) {
+                    let other = &graph.parts[colour.other() as usize];
+                    let back = other.edges(part.ends[edge] as usize).find(|&back| other.ends[back] as usize == unknown);
+                    assert_eq!(back.map(|back| other.weights[back]), Some(part.weights[edge]));
+                }
+            }
+        }
+    }
+}

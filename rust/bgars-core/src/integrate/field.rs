@@ -1,0 +1,186 @@
+//! The normal equations of a field of normals: its edges and the system that they make.
+
+use multiversion::multiversion;
+use rayon::prelude::*;
+
+use super::checkerboard::Crop;
+use super::checks::check;
+use super::settings::{Difference, Field, Params};
+use super::stencil::{EdgeRow, Stencil};
+use super::system::System;
+use crate::Result;
+
+/// Smallest n_z of an edge: a normal seen edge-on has no finite slope.
+const MIN_N_Z: f64 = 1e-3;
+
+/// One row of the field with its components apart; pixels outside the mask face the camera and are not trusted.
+#[derive(Debug, Default, Clone)]
+struct FieldRow {
+    along: [Vec<f32>; 2],
+    n_z: Vec<f32>,
+    /// Square root of the pixel's weight, 0 outside the mask.
+    trust: Vec<f64>,
+}
+
+impl FieldRow {
+    /// `unit` brings the weights to the size of 1.
+    fn load(&mut self, field: Field<'_>, crop: Crop, unit: f64, row: usize) {
+        let first = (crop.row + row) * field.width + crop.col;
+        let span = first..first + crop.grid.width;
+        let mask = &field.mask[span.clone()];
+        let [n_x, n_y] = &mut self.along;
+        for component in [&mut *n_x, n_y, &mut self.n_z] {
+            component.resize(mask.len(), 0.0);
+        }
+        self.trust.resize(mask.len(), 0.0);
+        let normals = &field.normals[span.start * 3..span.end * 3];
+        split_normals(normals, mask, [n_x, n_y, &mut self.n_z], &mut self.trust);
+        if let Some(weights) = field.weights {
+            for ((trust, &weight), &used) in self.trust.iter_mut().zip(&weights[span]).zip(mask) {
+                *trust = if used { (f64::from(weight) * unit).sqrt() } else { 0.0 };
+            }
+        }
+    }
+}
+
+/// The components of a row of normals, and 1 in the mask.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn split_normals(normals: &[f32], mask: &[bool], [n_x, n_y, n_z]: [&mut [f32]; 3], inside: &mut [f64]) {
+    let (normals, n) = (normals.as_chunks::<3>().0, mask.len());
+    let (normals, n_x, n_y, n_z) = (&normals[..n], &mut n_x[..n], &mut n_y[..n], &mut n_z[..n]);
+    for k in 0..n {
+        let [x, y, z] = normals[k];
+        (n_x[k], n_y[k], n_z[k]) = if mask[k] { (x, y, z) } else { (0.0, 0.0, 1.0) };
+    }
+    for (inside, &used) in inside.iter_mut().zip(mask) {
+        *inside = f64::from(u8::from(used));
+    }
+}
+
+/// A row of the field as an edge sees it: the component along its axis, n_z, trust.
+type Ends<'a> = (&'a [f32], &'a [f32], &'a [f64]);
+
+/// Edges from pixel k of `a` to pixel k of `b`; `sign` is +1 where the axis grows from `a` to `b`; `lead_is_a` says whose
+/// normal the forward difference takes.
+///
+/// `n_z^2` is the weight that the paper's rows `n_z dz = -n_x` imply.
+fn join(edges: &mut EdgeRow<f32>, [a, b]: [Ends<'_>; 2], sign: f64, difference: Difference, lead_is_a: bool) {
+    let normals = match (difference, lead_is_a) {
+        (Difference::Trapezoid, _) => [a, b],
+        // The mean of a normal with itself.
+        (Difference::Forward, true) => [a, a],
+        (Difference::Forward, false) => [b, b],
+    };
+    weigh(normals, [a.2, b.2], sign, &mut edges.weight, &mut edges.push);
+}
+
+/// Takes away the edges between regions: from pixel k of the image to pixel k + `stride`, k counted from `first`.
+fn cut(edges: &mut EdgeRow<f32>, field: Field<'_>, first: usize, stride: usize) {
+    let Some(regions) = field.regions else { return };
+    for (k, (weight, push)) in edges.weight.iter_mut().zip(&mut edges.push).enumerate() {
+        let (a, b) = (first + k, first + k + stride);
+        if b < regions.len() && regions[a] != regions[b] {
+            (*weight, *push) = (0.0, 0.0);
+        }
+    }
+}
+
+/// Weight and push of the edges between the pixels of two rows, from the mean of two rows of normals.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn weigh([c, d]: [Ends<'_>; 2], trust: [&[f64]; 2], sign: f64, weight: &mut [f32], push: &mut [f64]) {
+    let edges = trust[0].len().min(trust[1].len());
+    let [c_along, c_z, d_along, d_z] = [c.0, c.1, d.0, d.1].map(|values| &values[..edges]);
+    let [a_trust, b_trust] = trust.map(|values| &values[..edges]);
+    let (weight, push) = (&mut weight[..edges], &mut push[..edges]);
+    for k in 0..edges {
+        // Twice the means; halves of them change no digit.
+        let along = f64::from(c_along[k]) + f64::from(d_along[k]);
+        let n_z = (f64::from(c_z[k]) + f64::from(d_z[k])).max(2.0 * MIN_N_Z);
+        let trusted = a_trust[k] * b_trust[k] * n_z;
+        weight[k] = (0.25 * (trusted * n_z)) as f32;
+        push[k] = (-0.25 * sign) * (trusted * along);
+    }
+}
+
+/// The last two rows of a field that were asked for.
+#[derive(Default)]
+struct FieldRows {
+    rows: [FieldRow; 2],
+    loaded: [Option<usize>; 2],
+}
+
+impl FieldRows {
+    fn load(&mut self, field: Field<'_>, crop: Crop, unit: f64, row: usize) {
+        if self.loaded[row % 2] != Some(row) {
+            self.rows[row % 2].load(field, crop, unit, row);
+            self.loaded[row % 2] = Some(row);
+        }
+    }
+}
+
+/// The largest weight in the mask.
+fn largest(weights: &[f32], mask: &[bool]) -> f64 {
+    let inside = weights.par_iter().zip(mask).map(|(&weight, &used)| if used { weight } else { 0.0 });
+    f64::from(inside.reduce(|| 0.0, f32::max))
+}
+
+/// The power of four that brings a weight near 1. Tolerances and the range of `f32` then mean the same for weights of any size,
+/// and no digit of them or of their roots changes.
+pub(super) fn to_unit(weight: f64) -> f64 {
+    if weight > 0.0 { 4f64.powf(-(weight.log2() / 2.0).floor()) } else { 1.0 }
+}
+
+/// Weights and right side `M^T v` of a field within the bounding box of its mask.
+pub(super) fn assemble(field: Field<'_>, crop: Crop, difference: Difference) -> System {
+    let unit = field.weights.map_or(1.0, |weights| to_unit(largest(weights, field.mask)));
+    let rows_of = || {
+        let mut rows = FieldRows::default();
+        move |row: usize, right: &mut EdgeRow<f32>, below: &mut EdgeRow<f32>| {
+            let first = (crop.row + row) * field.width + crop.col;
+            rows.load(field, crop, unit, row);
+            let FieldRow { along, n_z, trust } = &rows.rows[row % 2];
+            let ends = [(&along[0][..], &n_z[..], &trust[..]), (&along[0][1..], &n_z[1..], &trust[1..])];
+            join(right, ends, 1.0, difference, true);
+            cut(right, field, first, 1);
+            if row + 1 == crop.grid.height {
+                below.clear();
+                return;
+            }
+            rows.load(field, crop, unit, row + 1);
+            let [upper, lower] = [&rows.rows[row % 2], &rows.rows[(row + 1) % 2]];
+            let ends = [upper, lower].map(|row| (&row.along[1][..], &row.n_z[..], &row.trust[..]));
+            // y grows upward: the forward difference starts at the lower pixel.
+            join(below, ends, -1.0, difference, false);
+            cut(below, field, first, field.width);
+        }
+    };
+    let mut right = [(); 2].map(|()| vec![0.0; crop.grid.half_pixels()]);
+    let stencil = Stencil::from_edges(crop.grid, rows_of, Some(&mut right));
+    System::reduce(stencil, right)
+}
+
+impl System {
+    /// The system of a field; see [`super::integrate`] for the arguments.
+    ///
+    /// # Errors
+    /// Those of [`super::integrate`] that concern the input.
+    ///
+    /// # Examples
+    /// ```
+    /// use bgars_core::integrate::{Difference, System};
+    /// let system = System::new(&[0.0, 0.0, 1.0].repeat(12), &[true; 12], 4, None, Difference::Trapezoid)?;
+    /// assert_eq!(system.right_side().len(), 6); // every other pixel
+    /// # Ok::<(), bgars_core::Error>(())
+    /// ```
+    pub fn new(
+        normals: &[f32],
+        mask: &[bool],
+        width: usize,
+        weights: Option<&[f32]>,
+        difference: Difference,
+    ) -> Result<Self> {
+        let field = Field { normals, mask, weights, regions: None, width };
+        check(field, &Params { difference, ..Params::default() })?;
+        Ok(assemble(field, field.whole(), difference))
+    }
+}
