@@ -16,7 +16,6 @@ from bgars.integration_inputs import (
     count,
     edge_trust,
     normal_array,
-    plain,
     used_pixels,
 )
 from bgars.large_arrays import any_content
@@ -210,7 +209,7 @@ def integrate_normals(
     use = used_pixels(valid, mask)
     trust = edge_trust(normals, weights, use)
     regions = anchor_regions(anchors, use.shape)
-    arrays = (plain(vectors, np.float32), use, trust, regions)
+    arrays = (vectors, use, trust, regions)
     common: dict[str, Any] = {"max_iters": iters, "threads": threads, "progress": progress}
     if method == "least-squares":
         height_px, labels = any_content(use.shape, np.float32), any_content(use.shape, np.int32)

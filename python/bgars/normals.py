@@ -19,6 +19,7 @@ from bgars.pixelwise import (
     combined_mask,
     pixelwise_normals,
 )
+from bgars.plain_arrays import plain, plain_bool
 from bgars.reflectance import add_reflectance
 
 if TYPE_CHECKING:
@@ -238,8 +239,9 @@ def _circles(anchors: FoundBalls | ArrayLike, shape: tuple[int, ...]) -> NDArray
     if isinstance(anchors, FoundBalls):
         circles = [(ball.x_px, ball.y_px, ball.radius_px, ball.u_radius_px) for ball in anchors.balls]
         return np.array(circles, np.float64).reshape(-1, CIRCLE_VALUES + 1)
-    given = np.asarray(anchors)
+    given = plain("anchors", anchors)
     if given.dtype == np.bool_:
+        given = plain_bool("anchors", given)
         if given.shape != shape or not given.any():
             msg = (
                 f"anchors: a mask of one ball must have shape {shape} and pixels, got {given.shape}, {given.sum()} True"

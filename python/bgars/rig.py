@@ -12,6 +12,7 @@ from bgars import _bgars
 from bgars.errors import InputError
 from bgars.light_files import read_lp
 from bgars.light_names import light_name
+from bgars.plain_arrays import plain
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -273,7 +274,7 @@ def directions_from_angles(angles_deg: ArrayLike) -> NDArray[np.float64]:
 
 def _rows(values: ArrayLike, name: str) -> NDArray[np.float64]:
     """A row a light."""
-    vectors = np.ascontiguousarray(values, dtype=np.float64)
+    vectors = plain(name, values, np.float64)
     if vectors.ndim != 2 or vectors.shape[1] != 3:  # noqa: PLR2004 - x, y, z
         msg = f"{name}: must have shape (L, 3), got {vectors.shape}"
         raise InputError(msg)
@@ -296,7 +297,7 @@ def _vectors(values: ArrayLike, name: str) -> NDArray[np.float64]:
 def _intensities(values: ArrayLike | None, count: int) -> NDArray[np.float64]:
     if values is None:
         return np.array([1.0] * count)
-    intensities = np.ascontiguousarray(values, dtype=np.float64)
+    intensities = plain("light_intensities", values, np.float64)
     if intensities.shape != (count,):
         msg = f"light_intensities: must have shape ({count},), one a light, got {intensities.shape}"
         raise InputError(msg)

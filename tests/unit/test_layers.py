@@ -12,6 +12,8 @@ PACKAGE = Path(bgars.__file__).parent
 RECORDS = {
     "ball_names": 0.5,
     "circle_pixels": 0,
+    "plain_arrays": 0.5,
+    "truth_record": 1,
     "ball_records": 1,
     "material_records": 1,
     "part_material": 2,

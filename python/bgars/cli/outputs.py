@@ -56,7 +56,12 @@ def write_reconstruction(
         bgars.write_normal_map(result.field, folder / "normals.png", directx=directx)
         bgars.write_height(result.height, folder / "height.tif")
         bgars.write_height(result.height, folder / "height.npy")
-        summary = {"bgars": bgars.__version__, **result.summary(), "files": list(files)}
+        summary = {
+            "format": "bgars-reconstruction",
+            "bgars": bgars.__version__,
+            **result.summary(),
+            "files": list(files),
+        }
         (folder / MARK).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     return summary, files
 
