@@ -20,7 +20,7 @@ from bgars.integration_inputs import (
 )
 from bgars.large_arrays import any_content
 from bgars.records import Component, DepthMap, HeightMap, NormalField
-from bgars.scalar_checks import check_pitch, number
+from bgars.scalar_checks import check_pitch, number, thread_count
 from bgars.surface_records import BilateralFit
 
 if TYPE_CHECKING:
@@ -179,6 +179,7 @@ def integrate_normals(
     >>> np.diff(bgars.integrate_normals(normals, method="bilateral").height_px[0]).round(2).tolist()
     [0.75, 0.75]
     """
+    threads = thread_count(threads)
     for name, value, allowed in (
         ("method", method, get_args(IntegrationMethod)),
         ("difference", difference, DIFFERENCES),

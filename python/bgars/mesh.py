@@ -9,6 +9,7 @@ import trimesh
 
 from bgars import _bgars
 from bgars.errors import InputError
+from bgars.scalar_checks import thread_count
 
 if TYPE_CHECKING:
     from bgars.records import HeightMap, NormalField
@@ -49,6 +50,7 @@ def mesh_from_height(
     >>> mesh.vertices[0].tolist(), len(mesh.faces), mesh.metadata["unit"]
     ([-5.0, 5.0, 0.0], 2, 'um')
     """
+    threads = thread_count(threads)
     height.check_field(field)
     pitch = 1.0 if height.pixel_pitch_um is None else height.pixel_pitch_um
     vertices, faces, pixels = _bgars.triangulate(height.height_px, height.mask, pitch, threads=threads)

@@ -21,6 +21,7 @@ from bgars.pixelwise import (
 )
 from bgars.plain_arrays import plain, plain_bool
 from bgars.reflectance import add_reflectance
+from bgars.scalar_checks import number, thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -132,6 +133,7 @@ def estimate_normals(
     >>> float(bgars.estimate_normals(images, rig.directions).normals[0, 0, 2])
     1.0
     """
+    threads = thread_count(threads)
     if method not in ALL_METHODS:
         msg = f"method: must be one of {', '.join(ALL_METHODS)}; got {method!r}"
         raise InputError(msg)
@@ -143,6 +145,8 @@ def estimate_normals(
         if value is not None and method != user:
             msg = f"{name}: only the method {user} uses it, got method {method!r}"
             raise InputError(msg)
+    threshold = None if threshold is None else number("threshold", threshold)
+    saturation = None if saturation is None else number("saturation", saturation)
     capture = capture_of(
         images, light_directions, light_intensities, saturation, threads, needs_full_scale=method == "reflectance"
     )

@@ -10,6 +10,7 @@ import numpy as np
 from bgars.integrate import Difference, integrate_normals
 from bgars.mesh import mesh_from_height
 from bgars.normals import DEFAULT_METHOD, Method, estimate_normals
+from bgars.scalar_checks import thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -120,6 +121,7 @@ def reconstruct(
     >>> result.height.unit, len(result.height.components)
     ('um', 1)
     """
+    threads = thread_count(threads)
 
     def report(stage: Stage, fraction: float) -> None:
         if progress is not None:

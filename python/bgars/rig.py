@@ -13,6 +13,7 @@ from bgars.errors import InputError
 from bgars.light_files import read_lp
 from bgars.light_names import light_name
 from bgars.plain_arrays import plain
+from bgars.scalar_checks import number
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["LightRig", "directions_from_angles"]
 
 MIN_LIGHTS = 3
+MAX_LIGHTS = 65_535
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,9 +109,16 @@ class LightRig:
         >>> LightRig.ring(8, elevation_deg=45.0).directions[2].round(3).tolist()
         [0.0, 0.707, 0.707]
         """
+        if isinstance(count, bool) or not isinstance(count, int | np.integer):
+            msg = f"count: must be a whole number, got {count!r}"
+            raise InputError(msg)
+        if count > MAX_LIGHTS:
+            msg = f"count: must be {MAX_LIGHTS} lights or fewer, got a larger number"
+            raise InputError(msg)
         if count < MIN_LIGHTS:
             msg = f"count: a ring needs at least {MIN_LIGHTS} lights, got {count}"
             raise InputError(msg)
+        azimuth0_deg, elevation_deg = number("azimuth0_deg", azimuth0_deg), number("elevation_deg", elevation_deg)
         azimuths_deg = azimuth0_deg + 360.0 / count * np.arange(count)
         angles_deg = np.column_stack([azimuths_deg, np.full(count, elevation_deg)])
         return cls.from_angles(angles_deg, intensities=intensities, u_deg=u_deg)

@@ -28,7 +28,16 @@ RECORDS = {
     "integration_inputs": 3.5,
     "normals_choice": 3.6,
 }
-BASE = {"errors": 0, "large_arrays": 0, "light_files": 1, "light_names": 1, "rig": 2, "scalar_checks": 1, **RECORDS}
+BASE = {
+    "errors": 0,
+    "csv_cells": 0,
+    "large_arrays": 0,
+    "light_files": 1,
+    "light_names": 1,
+    "rig": 2,
+    "scalar_checks": 1,
+    **RECORDS,
+}
 STAGES = dict.fromkeys(("io", "pixelwise", "reflectance", "integrate", "mesh", "balls", "inspection"), 4)
 PIPELINES = ("calibrate", "pipeline", "evaluate", "part_anchors", "recipes", "cfx")
 JOINED = {"normals": 4.5, **dict.fromkeys(PIPELINES, 5), "part_surface": 5.2, "inspection_pipeline": 5.4}

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 import bgars
+from bgars.cli.arguments import CarefulGroup
 from bgars.cli.calibrate import register as register_calibrate
 from bgars.cli.console import EXIT_BAD_INPUT, activation, fail, print_json, say, shown_path, stage_progress
 from bgars.cli.describe import describe, describe_in_words
@@ -26,8 +27,10 @@ from bgars.cli.report import register as register_report
 from bgars.cli.simulate import register as register_simulate
 from bgars.cli.spc import register as register_spc
 from bgars.errors import BgarsError
+from bgars.io.given_paths import need_folder, need_output
 from bgars.light_files import read_filenames
 from bgars.normals import DEFAULT_METHOD, METHODS, Method
+from bgars.scalar_checks import thread_count
 
 __all__ = ["main"]
 
@@ -35,6 +38,7 @@ ChannelOption = Literal["luminance", "mean", "red", "green", "blue"]
 
 app = typer.Typer(
     name="bgars",
+    cls=CarefulGroup,
     help=(
         "Photometric stereo for shiny parts: one camera, several lights, one image a light. "
         "Start with 'bgars demo'; then 'bgars reconstruct FOLDER -o OUT' on your own photographs."
@@ -90,7 +94,7 @@ def top(
     """Options of the command itself."""
     if threads is not None:
         # The compiled module starts its threads at its first work, so this comes in time for all of it.
-        os.environ["RAYON_NUM_THREADS"] = str(threads)
+        os.environ["RAYON_NUM_THREADS"] = str(thread_count(threads, "--threads"))
     if version:
         say(f"bgars {bgars.__version__}")
         raise typer.Exit
@@ -178,6 +182,8 @@ def normals(
     as_json: JsonOption = False,
 ) -> None:
     """Only the normals: normals.png (16 bit), albedo.tif, confidence.tif, measured.png, lights_kept.png."""
+    need_folder(folder)
+    need_output(output, folder)
     capture = bgars.read_capture(folder, channel=channel)
     surface = _material_from(material, capture)
     with stage_progress() as report:
@@ -277,7 +283,17 @@ def main() -> None:
         app()
     except BgarsError as error:
         fail(str(error))
-        sys.exit(EXIT_BAD_INPUT)
+    except MemoryError as error:
+        fail(str(error) or "there is not enough memory for this; use fewer or smaller images")
+    except RecursionError:
+        fail("a file is nested too deeply to be read")
+    except OSError as error:
+        # A disk that is full, a name that is too long: no defect, and nothing that a trace explains.
+        name = "" if error.filename is None else f"{error.filename}: "
+        fail(f"{name}{error.strerror or error}")
+    else:
+        return
+    sys.exit(EXIT_BAD_INPUT)
 
 
 def _reconstruct_to(
@@ -289,6 +305,8 @@ def _reconstruct_to(
     directx: bool,
     channel: ChannelOption | None = None,
 ) -> tuple[dict[str, Any], dict[str, str]]:
+    need_folder(folder)
+    need_output(output, folder)
     with stage_progress() as report:
         return write_reconstruction(
             lambda: run(bgars.read_capture(folder, channel=channel), progress=report),

@@ -80,7 +80,7 @@ def utc_now() -> str:
 def fail(message: str) -> None:
     """Print an error for people."""
     error_console.print("error:", style="bold red", end=" ")
-    error_console.print(message, markup=False)
+    error_console.print(" ".join(message.splitlines()), markup=False)
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from bgars.cli.console import print_json, say, say_files, stage_progress, utc_no
 from bgars.cli.options import MethodOption
 from bgars.errors import InputError
 from bgars.io.atomic import FolderNames, atomic_folder
-from bgars.io.given_paths import need_file, need_folder
+from bgars.io.given_paths import need_file, need_folder, need_output
 from bgars.io.parquet import need_pyarrow
 from bgars.normals import DEFAULT_METHOD
 from bgars.report.page import REPORT_FILES
@@ -35,7 +35,6 @@ FILES = {
 }
 PARQUET = "balls.parquet"
 CFX = "cfx.json"
-# balls.csv and the pictures mark no run: captures have files of these names, too.
 NAMES = FolderNames(
     frozenset({*FILES, *PICTURES, *REPORT_FILES, PARQUET, CFX}), frozenset({"result.json", PARQUET, CFX})
 )
@@ -92,6 +91,7 @@ def inspect(
 
     Writes report.html, which is the page to look at first, result.json, balls.csv and four pictures. Files that an
     earlier inspection left in OUT are removed before FOLDER is read: where it cannot be measured, no verdict is left.
+    Files of others are never touched: OUT may not hold a capture, nor files of these names that bgars did not write.
 
     Exit code 0: the part passes. 1: it fails, or is undecided because something is too near its limit, was not
     measured, or has no limit; the output says which. 2: wrong use, a bad recipe, or a capture that cannot be measured.
@@ -103,6 +103,7 @@ def inspect(
         need_pyarrow()
     need_file(recipe)
     need_folder(folder)
+    need_output(output, folder)
     with stage_progress() as report, atomic_folder(output, NAMES) as place:
         part = None if recipe is None else bgars.read_part_recipe(recipe)
         capture = bgars.read_capture(folder)

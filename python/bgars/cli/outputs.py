@@ -31,6 +31,12 @@ RECONSTRUCTION = FolderNames(
     judged=False,
 )
 
+NORMALS = FolderNames(
+    frozenset({"normals.png", "albedo.tif", "confidence.tif", "measured.png", "lights_kept.png"}),
+    frozenset(),
+    judged=False,
+)
+
 
 def write_reconstruction(
     run: Callable[[], Reconstruction], output: Path, *, mesh_format: str, directx: bool
@@ -79,7 +85,7 @@ def write_normals(field: NormalField, output: Path, *, directx: bool) -> tuple[d
         "measured.png": "white: the pixel's own light fixes its normal",
         "lights_kept.png": "number of lights in each fit",
     }
-    with atomic_folder(output) as folder:
+    with atomic_folder(output, NORMALS) as folder:
         bgars.write_normal_map(field, folder / "normals.png", directx=directx)
         write_described(folder / "albedo.tif", field.albedo, "albedo")
         write_described(folder / "confidence.tif", field.confidence, "confidence")

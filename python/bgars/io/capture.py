@@ -14,6 +14,7 @@ from bgars.io.images import MAX_MEGAPIXELS, WEIGHTS, decode_stack, read_mask
 from bgars.io.recipe import RECIPE_NAME, CaptureRecipe, GammaResponse, TableResponse, read_recipe
 from bgars.io.response import Curve, gamma_curve, linearise, read_response_table, tabulate
 from bgars.records import Capture, every_pixel, float_full_scale
+from bgars.scalar_checks import thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -78,6 +79,7 @@ def read_capture(
     >>> capture.images.shape, capture.pixel_pitch_um
     ((8, 240, 256), 3.4)
     """
+    threads = thread_count(threads)
     folder = need_folder(folder)
     recipe_path = folder / RECIPE_NAME
     recipe = read_recipe(recipe_path) if recipe_path.exists() else default_recipe(folder)

@@ -77,11 +77,11 @@ def read_pixels(path: Path) -> Pixels:
             values, bits = _bgars.read_color(path, MAX_MEGAPIXELS)
     except UnsupportedImageError as error:
         if suffix not in {".tif", ".tiff"}:
-            msg = f"{error}; a normal map is an RGB image, R = x, G = y, B = z"
+            msg = f"{' '.join(str(error).split())}; a normal map is an RGB image, R = x, G = y, B = z"
             raise FileFormatError(msg) from None
         return of_array(path, load_tiff(path, WHAT)[0])
     except FileFormatError as error:
-        msg = f"{error}; a normal map is an RGB image, R = x, G = y, B = z"
+        msg = f"{' '.join(str(error).split())}; a normal map is an RGB image, R = x, G = y, B = z"
         raise FileFormatError(msg) from None
     if bits == 2 * 8 and not (values % EIGHT_BIT_STEP).any():
         values, bits = values / np.float32(EIGHT_BIT_STEP), 8

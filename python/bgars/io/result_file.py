@@ -12,7 +12,7 @@ import numpy as np
 from bgars.ball_records import BallLayout
 from bgars.errors import FileFormatError, InputError
 from bgars.io.result_schema import Reading, ResultTable
-from bgars.io.strict_toml import checked
+from bgars.io.strict_toml import bounded_text, checked
 from bgars.part_material import MaterialParameter, PartMaterial
 from bgars.part_recipe import Limits, PartRecipe
 from bgars.part_result import FORMAT, FORMAT_VERSION, BallResult, PartCheck, PartResult, SeatingResult
@@ -74,7 +74,9 @@ def _json(path: Path) -> Any:  # noqa: ANN401 - whatever the file holds
         raise ValueError(msg)
 
     try:
-        return json.loads(path.read_bytes().decode("utf-8"), parse_constant=refuse)
+        return json.loads(bounded_text(path), parse_constant=refuse)
+    except FileFormatError:
+        raise
     except OSError as error:
         msg = f"{path}: cannot be read ({error.strerror})"
         raise FileFormatError(msg) from error

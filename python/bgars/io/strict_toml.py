@@ -22,9 +22,13 @@ if TYPE_CHECKING:
 
     from pydantic_core import ErrorDetails
 
-__all__ = ["Strict", "checked", "read_values"]
+__all__ = ["Strict", "bounded_text", "checked", "read_values"]
 
 Model = TypeVar("Model", bound=BaseModel)
+MAX_BYTES = 64_000_000
+MAX_DOTS = 32
+LONG_KEY = re.compile(r"(?:[\w\"'-]{1,64}[ \t]{0,8}\.[ \t]{0,8}){33}")
+MAX_SHOWN = 200
 SCALARS = {"str", "int", "float", "bool"}
 SCALAR_WANTED = {"string_type", "float_type", "int_type", "bool_type", "literal_error"}
 
@@ -46,11 +50,17 @@ def read_values(path: Path) -> dict[str, Any]:
     is_json = path.suffix.lower() == ".json"
     kind = "JSON" if is_json else "TOML"
     try:
-        content = path.read_bytes().decode("utf-8")
+        content = bounded_text(path)
+        _check_keys(path, content, kind)
         values = json.loads(content) if is_json else tomllib.loads(content)
+    except FileFormatError:
+        raise
     except OSError as error:
         msg = f"{path}: cannot be read ({error.strerror})"
         raise FileFormatError(msg) from error
+    except RecursionError:
+        msg = f"{path}: is nested too deeply to be {kind} of bgars"
+        raise FileFormatError(msg) from None
     except ValueError as error:  # both decoders' errors, and bytes that are no text
         msg = f"{path}: is not valid {kind} ({error})"
         raise FileFormatError(msg) from error
@@ -58,6 +68,35 @@ def read_values(path: Path) -> dict[str, Any]:
         msg = f"{path}: must hold one object, got {type(values).__name__}"
         raise FileFormatError(msg)
     return values
+
+
+def bounded_text(path: Path) -> str:
+    """Return the text of a plain file of bounded size: never of a pipe or a device, which may not end.
+
+    Raises
+    ------
+    FileFormatError
+        It is no plain file, or too long.
+    OSError, ValueError
+        It cannot be read, or is no UTF-8.
+    """
+    if path.exists() and not path.is_file():
+        msg = f"{path}: cannot be read (is a folder or a device, not a file)"
+        raise FileFormatError(msg)
+    with path.open("rb") as file:
+        content = file.read(MAX_BYTES + 1)
+    if len(content) > MAX_BYTES:
+        msg = f"{path}: is longer than {MAX_BYTES} bytes: no recipe or result"
+        raise FileFormatError(msg)
+    return content.decode("utf-8")
+
+
+def _check_keys(path: Path, content: str, kind: str) -> None:
+    """Raise where a key has so many parts that the tables it makes could not be walked any more."""
+    for number, line in enumerate(content.splitlines(), start=1):
+        if kind == "TOML" and line.count(".") > MAX_DOTS and LONG_KEY.search(line):
+            msg = f"{path}: line {number}: a key must have at most {MAX_DOTS} dots"
+            raise FileFormatError(msg)
 
 
 def checked(model: type[Model], values: dict[str, Any], path: Path) -> Model:
@@ -80,14 +119,19 @@ def _explain(model: type[BaseModel], path: Path, error: ValidationError) -> str:
     is_unknown = first["type"] == "extra_forbidden"
     keys, known = _walk(model, first["loc"][:-1] if is_unknown else first["loc"])
     if is_unknown:
-        name = str(first["loc"][-1])
+        name = _short(str(first["loc"][-1]))
         nearest = difflib.get_close_matches(name, known, n=1, cutoff=0.0)
         hint = f"; the nearest known key is '{nearest[0]}'" if nearest else ""
         return f"{path}: unknown key '{'.'.join([*keys, name])}'{hint} (known: {', '.join(known)})"
     reason = first["msg"].removeprefix("Value error, ")
-    value = "" if isinstance(first["input"], dict) else f", got {first['input']!r}"
+    value = "" if isinstance(first["input"], dict) else f", got {_short(repr(first['input']))}"
     # A rule over several keys names them itself.
     return ": ".join([str(path), *([".".join(keys)] if keys else []), f"{reason}{value}"])
+
+
+def _short(text: str) -> str:
+    """A text that still fits a message, and a comparison."""
+    return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}..."
 
 
 def _rank(model: type[BaseModel], detail: ErrorDetails) -> int:
