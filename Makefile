@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral simulator experiments method schema constants studies performance instructions clean
+.PHONY: demo test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral simulator experiments method schema constants studies performance instructions fuzz clean
 
 demo: $(VENV)/.installed ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
@@ -71,6 +71,10 @@ schema: $(VENV)/.installed ## Write docs/result.schema.json, the JSON Schema of 
 
 constants: $(VENV)/.installed ## Write docs/constants.md, the registry of constants, again
 	$(BIN)/python docs/make_constants.py
+
+FUZZ_INPUTS ?= 1000000
+fuzz: $(VENV)/.installed ## Damaged files for every reader: FUZZ_INPUTS of them (hours); findings go to fuzz-findings
+	$(BIN)/python tests/fuzz/fuzzer.py --inputs $(FUZZ_INPUTS)
 
 instructions: ## Instructions a pixel of each kernel against the kept counts (needs valgrind)
 	python3 benches/count_instructions.py

@@ -64,7 +64,6 @@ def make_corpus(folder: Path) -> None:
     lobe = bgars.SurfaceLobe(strength_level=255.0, roughness=0.2, tail=0.0)
     bgars.write_material(bgars.SurfaceMaterial(30.0, 0.0, 0.0, (lobe,), "smith", gains=(1.0,) * 8), folder / "m.toml")
     (folder / "p.csv").write_text("name,x_um,y_um\nA1,0,0\nA2,800,0\n", encoding="utf-8")
-    (folder / "positions.toml").write_text('positions = "p.csv"\n', encoding="utf-8")
     recipes = Path(bgars.__file__).parent / "recipes" / "named"
     for name in ("hemisphere", "defects-5x5"):
         shutil.copy(recipes / f"{name}.toml", folder / f"scene-{name}.toml")
@@ -82,7 +81,7 @@ def _side(path: Path) -> object:
 
 def _positions(path: Path) -> object:
     recipe = path.with_name("of-positions.toml")
-    recipe.write_text(f"positions = {json.dumps(path.name)}\n", encoding="utf-8")
+    recipe.write_text(f"name = 'x'\npositions = {json.dumps(path.name)}\n", encoding="utf-8")
     return bgars.read_part_recipe(recipe)
 
 

@@ -147,6 +147,8 @@ def _check_page(path: Path, page: tifffile.TiffPage, size_bytes: int) -> None:
         (page.dtype is None or page.dtype.kind not in NUMBERS, "holds no plain numbers"),
         (values < 1 or values > MAX_VALUES, f"its header claims shape {shape}"),
         (len(counts) != len(page.dataoffsets) or len(counts) > max(values, 1), "its table of strips is damaged"),
+        # Decoders fill up what is missing, piece by piece, for as long as the header claims.
+        (len(counts) != math.prod(page.chunked), "its table of strips does not fit its size"),
         (math.prod(page.chunks) > MAX_VALUES, f"its header claims pieces of {page.chunks}"),
         (any(count > size_bytes for count in counts), "its strips reach over the end of the file"),
         (any(offset > size_bytes for offset in page.dataoffsets), "its strips reach over the end of the file"),
