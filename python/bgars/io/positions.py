@@ -80,10 +80,13 @@ def _refuse_close(path: Path, places: list[tuple[str, float, float]], least_um: 
     if len(places) < len(("one", "other")):
         return
     found = KDTree(points_um).query(points_um, k=2)
-    distances_um, nearest = (np.asarray(values)[:, 1] for values in found)
+    distances_um, neighbours = (np.asarray(values) for values in found)
+    distances_um = distances_um[:, 1]
     index = int(np.argmin(distances_um))
+    # Of two at one place, either may come first.
+    nearest = next(int(other) for other in neighbours[index] if other != index)
     if distances_um[index] <= least_um:
-        one, other = sorted((index, int(nearest[index])))
+        one, other = sorted((index, nearest))
         rule = f"must be more than {least_um:g} um apart" if least_um else "must be at different places"
         msg = f"{path}: {places[one][0]} and {places[other][0]}: {rule}, got {distances_um[index]:g} um"
         raise InputError(msg)

@@ -65,7 +65,7 @@ def array_balls(
 ) -> list[Ball]:
     """Return the balls of a grid in reading order; see :meth:`bgars.Scene.ball_array`."""
     for name, count in (("scene.rows", rows), ("scene.cols", cols)):
-        whole(name, count, 1, MAX_BALLS)
+        whole(name, count, 1)
     require(rows * cols <= MAX_BALLS, "scene.rows x scene.cols", f"must be {MAX_BALLS} balls or fewer", rows * cols)
     for name, value in (("pitch_um", pitch_um), ("diameter_um", diameter_um), ("height_um", height_um)):
         positive(f"scene.{name}", value)
