@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral simulator experiments method check-faults schema constants studies performance bench instructions clean
+.PHONY: demo test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral simulator experiments method check-faults schema constants studies performance bench instructions fuzz clean
 
 demo: $(VENV)/.run-time ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
@@ -77,6 +77,10 @@ constants: $(VENV)/.installed ## Write docs/constants.md, the registry of consta
 
 bench: $(VENV)/.run-time ## CPU seconds, wall time and memory of whole commands, into docs/performance.md
 	$(BIN)/python benches/commands.py --docs
+
+FUZZ_INPUTS ?= 1000000
+fuzz: $(VENV)/.installed ## Damaged files for every reader: FUZZ_INPUTS of them (hours); findings go to fuzz-findings
+	$(BIN)/python tests/fuzz/fuzzer.py --inputs $(FUZZ_INPUTS)
 
 instructions: ## Instructions a pixel of each kernel against the kept counts (needs valgrind)
 	python3 benches/count_instructions.py

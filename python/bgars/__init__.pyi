@@ -6,9 +6,9 @@ from .ball_records import FoundBalls as FoundBalls
 from .balls import find_balls as find_balls
 from .calibrate import calibrate_material as calibrate_material
 from .cfx import to_cfx as to_cfx
+from .check_pipeline import check as check
 from .checks.records import Finding as Finding
 from .checks.records import Findings as Findings
-from .check_pipeline import check as check
 from .errors import BgarsError as BgarsError
 from .errors import CalibrationError as CalibrationError
 from .errors import CaptureWarning as CaptureWarning

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.ball_records import BallKind
+from bgars.csv_cells import harmless
 from bgars.part_material import PartMaterial
 from bgars.part_recipe import PartRecipe
 from bgars.shown import ShownPart
@@ -288,14 +289,18 @@ class PartResult(ShownPart):
         return json.dumps(self.to_dict(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
     def to_csv(self) -> str:
-        """Return the balls as CSV text, one line a ball; empty cells where something was not measured."""
+        """Return the balls as CSV text, one line a ball; empty cells where something was not measured.
+
+        Text that a spreadsheet would run as a formula begins with an apostrophe.
+        """
         text = io.StringIO()
         names = [entry.name for entry in fields(BallResult) if entry.name != "budget"]
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(names)
         for ball in self.balls:
             cells = [_csv_cell(name, getattr(ball, name)) for name in names]
-            writer.writerow(["; ".join(cell) if isinstance(cell, list) else cell for cell in cells])
+            told = ["; ".join(cell) if isinstance(cell, list) else cell for cell in cells]
+            writer.writerow([harmless(cell) if isinstance(cell, str) else cell for cell in told])
         return text.getvalue()
 
     def to_table(self) -> str:

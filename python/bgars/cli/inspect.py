@@ -17,7 +17,7 @@ from bgars.cli.options import ForceOption, MethodOption
 from bgars.errors import InputError
 from bgars.extras import how_to_install, missing
 from bgars.io.atomic import FolderNames, atomic_folder
-from bgars.io.given_paths import need_file, need_folder
+from bgars.io.given_paths import need_file, need_folder, need_output
 from bgars.normal_methods import DEFAULT_METHOD
 from bgars.report.page import REPORT_FILES
 from bgars.report.page_budget import main_causes
@@ -36,7 +36,6 @@ FILES = {
 }
 PARQUET = "balls.parquet"
 CFX = "cfx.json"
-# balls.csv and the pictures mark no run: captures have files of these names, too.
 NAMES = FolderNames(
     frozenset({*FILES, *PICTURES, *REPORT_FILES, PARQUET, CFX}), frozenset({"result.json", PARQUET, CFX})
 )
@@ -98,6 +97,7 @@ def inspect(
 
     Writes report.html, which is the page to look at first, result.json, balls.csv and four pictures. Files that an
     earlier inspection left in OUT are removed before FOLDER is read: where it cannot be measured, no verdict is left.
+    Files of others are never touched: OUT may not hold a capture, nor files of these names that bgars did not write.
 
     The capture is checked first ('bgars check'): where its lights and images do not fit, there is no verdict.
 
@@ -113,6 +113,7 @@ def inspect(
         need_pyarrow()
     need_file(recipe)
     need_folder(folder)
+    need_output(output, folder)
     pictures = _is_drawn(pictures, "the pictures are left out: drawing them", "matplotlib")
     page = _is_drawn(page, "report.html is left out: it", "plotly")
     with stage_progress() as report, atomic_folder(output, NAMES) as place:

@@ -13,7 +13,7 @@ import bgars
 from bgars.cli.console import print_json, say, say_files, stage_progress
 from bgars.cli.inspect import EXIT_NOT_PASSED
 from bgars.io.atomic import FolderNames, atomic_folder
-from bgars.io.given_paths import need_path
+from bgars.io.given_paths import need_output, need_path
 from bgars.studies.pages import spc_page
 from bgars.studies.trend import DEFAULT_SUBGROUP, TARGET
 
@@ -59,6 +59,7 @@ def spc(
     """
     for path in results:
         need_path(path)
+    need_output(output, *results)
     with stage_progress() as report, atomic_folder(output, NAMES) as place:
         ordered, warnings = bgars.read_results(results, progress=lambda fraction: report("results", fraction))
         found = bgars.process_trend(

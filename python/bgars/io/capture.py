@@ -28,6 +28,7 @@ from bgars.io.light_discovery import default_recipe
 from bgars.io.masks import opaque_everywhere, read_mask
 from bgars.io.recipe import RECIPE_NAME, CaptureRecipe, read_recipe
 from bgars.records import Capture, every_pixel
+from bgars.scalar_checks import thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -96,6 +97,7 @@ def read_capture(
     >>> capture.images.shape, capture.pixel_pitch_um
     ((8, 240, 256), 3.4)
     """
+    threads = thread_count(threads)
     folder = need_folder(folder)
     notes: list[str] = []
     listing = list_folder(folder)

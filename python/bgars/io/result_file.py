@@ -16,6 +16,7 @@ from bgars.io.strict_toml import checked
 from bgars.part_material import MaterialParameter, PartMaterial
 from bgars.part_recipe import Limits, PartRecipe
 from bgars.part_result import FORMAT, FORMAT_VERSION, BallResult, PartCheck, PartResult, SeatingResult
+from bgars.safe_files import read_bounded
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -26,6 +27,7 @@ __all__ = ["RESULT_NAME", "read_result"]
 
 RESULT_NAME = "result.json"
 OLDEST_VERSION = 2
+MAX_BYTES = 64_000_000
 READABLE_VERSIONS = range(OLDEST_VERSION, FORMAT_VERSION + 1)
 
 
@@ -74,10 +76,7 @@ def _json(path: Path) -> Any:  # noqa: ANN401 - whatever the file holds
         raise ValueError(msg)
 
     try:
-        return json.loads(path.read_bytes().decode("utf-8"), parse_constant=refuse)
-    except OSError as error:
-        msg = f"{path}: cannot be read ({error.strerror})"
-        raise FileFormatError(msg) from error
+        return json.loads(read_bounded(path, MAX_BYTES, "result").decode("utf-8"), parse_constant=refuse)
     except (ValueError, RecursionError) as error:
         msg = f"{path}: is not valid JSON: cut off, or not a result ({error})"
         raise FileFormatError(msg) from error
