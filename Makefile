@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral simulator experiments method check-faults kills line schema constants studies performance bench clean
+.PHONY: demo test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral simulator experiments method check-faults kills line schema constants studies performance bench fuzz clean
 
 demo: $(VENV)/.run-time ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
@@ -86,6 +86,10 @@ kills: $(VENV)/.installed ## Kill `bgars watch` at KILLS random times: every par
 	rm -rf kill-test && mkdir kill-test
 	$(BIN)/python tests/unit/killed_watch.py kill-test $(KILLS) 1000
 	rm -rf kill-test
+
+FUZZ_INPUTS ?= 1000000
+fuzz: $(VENV)/.installed ## Damaged files for every reader: FUZZ_INPUTS of them (hours); findings go to fuzz-findings
+	$(BIN)/python tests/fuzz/fuzzer.py --inputs $(FUZZ_INPUTS)
 
 performance: $(VENV)/.installed ## Measure against the peers and rewrite docs/performance.md (long; leave the machine alone)
 	$(BIN)/python -m pip install --quiet --requirement benches/peers/requirements.txt

@@ -29,7 +29,8 @@ JUDGED_N_Z = 0.3
 
 def read_map(folder: Path) -> tuple[NDArray[np.float32], NDArray[np.bool_], bgars.Pinhole]:
     """Normals, mask and camera of a DiLiGenT map."""
-    normals = _bgars.read_rgb16(folder / "normal_map.png", 100.0) / 65535 * 2 - 1
+    codes, bits = _bgars.read_color(folder / "normal_map.png", 100.0)
+    normals = codes[..., :3].astype(np.float64) / (2**bits - 1) * 2 - 1
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     mask = np.asarray(Image.open(folder / "mask.png").convert("L")) > 0
     return normals.astype(np.float32), mask, bgars.Pinhole(np.loadtxt(folder / "K.txt"))

@@ -4,8 +4,9 @@
 use std::path::{Path, PathBuf};
 
 use bgars_core::Error;
+use bgars_core::io::color::read_color;
 use bgars_core::io::decode::{Channel, Color, StackData, decode_stack};
-use bgars_core::io::rgb16::{read_rgb16, write_png16};
+use bgars_core::io::rgb16::write_png16;
 use bgars_core::io::{MeshView, obj::write_obj, ply::write_ply};
 use bgars_core::mesh::triangulate;
 use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage};
@@ -131,9 +132,10 @@ fn sixteen_bit_rgb_survives_a_round_trip_and_grey_is_refused() {
     let path = folder.path().join("n.png");
     let data: Vec<u16> = (0..2 * 3 * 3).map(|index| index * 3001).collect();
     write_png16(&path, &data, 2, 3).unwrap();
-    let image = read_rgb16(&path, LIMIT).unwrap();
-    assert_eq!((image.height, image.width, image.data), (2, 3, data));
-    let error = read_rgb16(&gray(folder.path(), "g.png", 3, 2), LIMIT).unwrap_err();
+    let image = read_color(&path, LIMIT).unwrap();
+    assert_eq!((image.height, image.width, image.channels, image.bits), (2, 3, 3, 16));
+    assert!(image.data.iter().zip(&data).all(|(&found, &code)| found == f32::from(code)));
+    let error = read_color(&gray(folder.path(), "g.png", 3, 2), LIMIT).unwrap_err();
     assert!(error.to_string().contains("RGB"), "{error}");
     assert!(matches!(write_png16(&path, &[0; 5], 2, 3).unwrap_err(), Error::LengthMismatch { .. }));
 }

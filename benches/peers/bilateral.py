@@ -52,7 +52,8 @@ PUBLIC_LIMITS = {1: 8.0, 2: 12.0}
 
 def read_map(folder: Path) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64] | None]:
     """Normals, mask, and the camera matrix of a perspective map."""
-    normals = _bgars.read_rgb16(folder / "normal_map.png", 100.0) / 65535 * 2 - 1
+    codes, bits = _bgars.read_color(folder / "normal_map.png", 100.0)
+    normals = codes[..., :3].astype(np.float64) / (2**bits - 1) * 2 - 1
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     mask = np.asarray(Image.open(folder / "mask.png").convert("L")) > 0
     if (folder / "K.txt").exists():

@@ -30,7 +30,7 @@ __all__ = [
     "integrate_normals",
     "measure_edges",
     "predict_left_out",
-    "read_rgb16",
+    "read_color",
     "rim_bands",
     "rim_profiles",
     "ring_edges",
@@ -145,7 +145,7 @@ def measure_edges(
     mask: NDArray[np.bool_] | None,
     threads: int | None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
-def read_rgb16(path: str | PathLike[str], max_megapixels: float) -> NDArray[np.uint16]: ...
+def read_color(path: str | PathLike[str], max_megapixels: float) -> tuple[NDArray[np.float32], int]: ...
 def rim_bands(
     circles: NDArray[np.float64],
     depths: NDArray[np.float64],

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from bgars import _bgars
 from bgars.errors import CalibrationError
 from bgars.normals import estimate_normals
+from bgars.scalar_checks import thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -57,6 +58,7 @@ def calibrate_material(
     >>> len(fit.circles_px), len(fit.material.gains), fit.loss < 0.1
     (1, 8, True)
     """
+    threads = thread_count(threads)
     if len(capture.rig) < _bgars.REFLECTANCE_MIN_LIGHTS:
         least = _bgars.REFLECTANCE_MIN_LIGHTS
         msg = f"{capture.name}: a material needs {least} lights or more, the capture has {len(capture.rig)}"

@@ -12,9 +12,17 @@ __all__ = [
     "UnsupportedImageError",
 ]
 
+LONGEST = 2000
+"""Characters of a message."""
+
 
 class BgarsError(Exception):
-    """Base of every exception that bgars raises on purpose."""
+    """Base of every exception that bgars raises on purpose; its message is one line of bounded length."""
+
+    def __str__(self) -> str:
+        # Decoders end their words in line breaks; a damaged file may put all of itself into a value that is quoted.
+        text = " ".join(super().__str__().split("\n")).strip()
+        return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 4 :]}"
 
 
 class InputError(BgarsError, ValueError):

@@ -22,6 +22,7 @@ from bgars.normals import DEFAULT_METHOD, Method, estimate_normals
 from bgars.part_material import part_material
 from bgars.part_recipe import PartRecipe
 from bgars.part_surface import part_surface
+from bgars.scalar_checks import thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -83,6 +84,7 @@ def inspect(
     CalibrationError
         Images that do not show what the rig says.
     """
+    threads = thread_count(threads)
     if recipe is not None and not isinstance(recipe, PartRecipe):
         recipe = read_part_recipe(recipe)
 

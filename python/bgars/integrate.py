@@ -16,11 +16,10 @@ from bgars.integration_inputs import (
     count,
     edge_trust,
     normal_array,
-    plain,
     used_pixels,
 )
 from bgars.records import Component, DepthMap, HeightMap, NormalField
-from bgars.scalar_checks import check_pitch, number
+from bgars.scalar_checks import check_pitch, number, thread_count
 from bgars.surface_records import BilateralFit
 
 if TYPE_CHECKING:
@@ -172,6 +171,7 @@ def integrate_normals(
     >>> np.diff(bgars.integrate_normals(normals, method="bilateral").height_px[0]).round(2).tolist()
     [0.75, 0.75]
     """
+    threads = thread_count(threads)
     for name, value, allowed in (
         ("method", method, get_args(IntegrationMethod)),
         ("difference", difference, DIFFERENCES),
@@ -199,7 +199,7 @@ def integrate_normals(
     use = used_pixels(valid, mask)
     trust = edge_trust(normals, weights, use)
     regions = anchor_regions(anchors, use.shape)
-    arrays = (plain(vectors, np.float32), use, trust, regions)
+    arrays = (vectors, use, trust, regions)
     common: dict[str, Any] = {"max_iters": iters, "threads": threads, "progress": progress}
     if method == "least-squares":
         height_px, labels = np.zeros(use.shape, np.float32), np.zeros(use.shape, np.int32)

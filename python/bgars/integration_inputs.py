@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import operator
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from bgars import _bgars
 from bgars.errors import InputError
+from bgars.plain_arrays import plain, plain_bool, without_mask
 from bgars.records import NormalField
 from bgars.surface_records import Anchors, Pinhole
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import ArrayLike, DTypeLike, NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from bgars.records import BoolArray, FloatArray
 
@@ -26,7 +28,6 @@ __all__ = [
     "count",
     "edge_trust",
     "normal_array",
-    "plain",
     "used_pixels",
 ]
 
@@ -82,14 +83,9 @@ def check_camera(camera: object, method: str, anchors: Anchors | None) -> None:
         raise InputError(msg)
 
 
-def plain(values: ArrayLike, dtype: DTypeLike) -> NDArray[Any]:
-    """Return the array as the solver reads it, C-contiguous and aligned; copied only where it is not."""
-    return np.require(values, dtype, ["C", "A"])
-
-
 def normal_array(normals: ArrayLike, mask: ArrayLike | None, threads: int | None) -> tuple[FloatArray, BoolArray]:
     """Return plain normals and where they can be integrated: where the mask says, if there is one."""
-    vectors = _numbers("normals", normals)
+    vectors = plain("normals", without_mask(normals, math.nan), np.float32)
     if vectors.ndim != NORMALS_NDIM or vectors.shape[2] != NORMALS_NDIM:
         msg = f"normals: must have shape (H, W, 3), got {vectors.shape}"
         raise InputError(msg)
@@ -107,9 +103,9 @@ def used_pixels(valid: BoolArray, mask: ArrayLike | None) -> BoolArray:
 
 def _bool_mask(mask: ArrayLike, shape: tuple[int, ...]) -> BoolArray:
     """Return the mask, or raise InputError unless it is one of this shape."""
-    given = np.asarray(mask)
-    if given.dtype != np.bool_ or given.shape != shape:
-        msg = f"mask: must be bool of shape {shape}, got {given.dtype} of shape {given.shape}"
+    given = plain_bool("mask", mask)
+    if given.shape != shape:
+        msg = f"mask: must be bool of shape {shape}, got shape {given.shape}"
         raise InputError(msg)
     return given
 
@@ -124,8 +120,8 @@ def edge_trust(
         if weights != "confidence" or not isinstance(normals, NormalField):
             msg = f"weights: must be an array of shape (H, W), or 'confidence' with a NormalField; got {weights!r}"
             raise InputError(msg)
-        return plain(normals.confidence, np.float32)
-    trust = _numbers("weights", weights)
+        return normals.confidence
+    trust = plain("weights", without_mask(weights, 0.0), np.float32)
     if trust.shape != use.shape:
         msg = f"weights: must have shape {use.shape}, got {trust.shape}"
         raise InputError(msg)
@@ -140,12 +136,4 @@ def anchor_regions(anchors: object, shape: tuple[int, ...]) -> NDArray[np.int32]
         msg = f"anchors: must be bgars.Anchors, got {type(anchors).__name__}"
         raise InputError(msg)
     anchors.check(shape)
-    return None if anchors.regions is None else plain(anchors.regions, np.int32)
-
-
-def _numbers(name: str, values: ArrayLike) -> FloatArray:
-    try:
-        return plain(values, np.float32)
-    except (TypeError, ValueError) as error:
-        msg = f"{name}: must be an array of numbers ({error})"
-        raise InputError(msg) from error
+    return None if anchors.regions is None else plain("anchors.regions", anchors.regions, np.int32)

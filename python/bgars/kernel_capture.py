@@ -6,10 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from bgars.errors import InputError
+from bgars.plain_arrays import plain
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from bgars.records import Capture, FloatArray, PixelArray
@@ -66,7 +68,7 @@ def kernel_capture(capture: Capture) -> KernelCapture:
         reference_px = (rig.intensity_distance_um / capture.pixel_pitch_um).tolist()
     return KernelCapture(
         images=capture.images,
-        lights=lights,
+        lights=plain("light_directions", lights, np.float64),
         lights_are_positions=near,
         reference_px=reference_px,
         intensities=rig.intensities.tolist(),

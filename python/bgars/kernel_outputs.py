@@ -70,6 +70,8 @@ def outputs_of(field: NormalField, shape: tuple[int, int], set_lights: int, *, f
         if array is not None and not array.flags.writeable:
             msg = f"out: its arrays are overwritten, but {name} is read-only"
             raise InputError(msg)
+        if array is not None and array.dtype == np.bool_ and (levels := array.view(np.uint8)).max(initial=0) > 1:
+            np.not_equal(levels, 0, out=array)  # no value of bool, which the kernels would take it for
     return outputs
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from bgars import _bgars
 from bgars.errors import InputError
+from bgars.scalar_checks import thread_count
 
 if TYPE_CHECKING:
     import trimesh
@@ -52,6 +53,7 @@ def mesh_from_height(
     """
     import trimesh  # noqa: PLC0415 - half a second, only for those who want its record
 
+    threads = thread_count(threads)
     height.check_field(field)
     pitch = 1.0 if height.pixel_pitch_um is None else height.pixel_pitch_um
     vertices, faces, pixels = _bgars.triangulate(height.height_px, height.mask, pitch, threads=threads)

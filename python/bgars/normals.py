@@ -20,7 +20,9 @@ from bgars.pixelwise import (
     combined_mask,
     pixelwise_normals,
 )
+from bgars.plain_arrays import plain, plain_bool
 from bgars.reflectance import add_reflectance
+from bgars.scalar_checks import number, thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -126,6 +128,7 @@ def estimate_normals(
     >>> float(bgars.estimate_normals(images, rig.directions).normals[0, 0, 2])
     1.0
     """
+    threads = thread_count(threads)
     if method not in ALL_METHODS:
         msg = f"method: must be one of {', '.join(ALL_METHODS)}; got {method!r}"
         raise InputError(msg)
@@ -137,6 +140,8 @@ def estimate_normals(
         if value is not None and method != user:
             msg = f"{name}: only the method {user} uses it, got method {method!r}"
             raise InputError(msg)
+    threshold = None if threshold is None else number("threshold", threshold)
+    saturation = None if saturation is None else number("saturation", saturation)
     capture = capture_of(
         images, light_directions, light_intensities, saturation, threads, needs_full_scale=method == "reflectance"
     )
@@ -233,8 +238,9 @@ def _circles(anchors: FoundBalls | ArrayLike, shape: tuple[int, ...]) -> NDArray
     if isinstance(anchors, FoundBalls):
         circles = [(ball.x_px, ball.y_px, ball.radius_px, ball.u_radius_px) for ball in anchors.balls]
         return np.array(circles, np.float64).reshape(-1, CIRCLE_VALUES + 1)
-    given = np.asarray(anchors)
+    given = plain("anchors", anchors)
     if given.dtype == np.bool_:
+        given = plain_bool("anchors", given)
         if given.shape != shape or not given.any():
             msg = (
                 f"anchors: a mask of one ball must have shape {shape} and pixels, got {given.shape}, {given.sum()} True"

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.ball_records import BallKind
+from bgars.csv_cells import harmless
 from bgars.part_identity import PartIdentity
 from bgars.part_material import PartMaterial
 from bgars.part_recipe import PartRecipe
@@ -295,6 +296,7 @@ class PartResult(ShownPart):
         """Return the balls as CSV text, one line a ball; empty cells where something was not measured.
 
         The last columns say which part it is: serial number, lot, capture, time.
+        Text that a spreadsheet would run as a formula begins with an apostrophe.
         """
         text = io.StringIO()
         names = [entry.name for entry in fields(BallResult) if entry.name != "budget"]
@@ -303,7 +305,8 @@ class PartResult(ShownPart):
         writer.writerow([*names, *CSV_PART])
         for ball in self.balls:
             cells = [_csv_cell(name, getattr(ball, name)) for name in names]
-            writer.writerow([*("; ".join(cell) if isinstance(cell, list) else cell for cell in cells), *part])
+            told = ["; ".join(cell) if isinstance(cell, list) else cell for cell in cells]
+            writer.writerow([harmless(cell) if isinstance(cell, str) else cell for cell in (*told, *part)])
         return text.getvalue()
 
     def to_table(self) -> str:

@@ -13,6 +13,7 @@ from bgars.integrate import Difference, integrate_normals
 from bgars.mesh import check_faces, mesh_from_height, mesh_size
 from bgars.noise_floor import without_background
 from bgars.normals import DEFAULT_METHOD, Method, estimate_normals
+from bgars.scalar_checks import thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -135,6 +136,7 @@ def reconstruct(
     >>> result.height.unit, len(result.height.components)
     ('um', 1)
     """
+    threads = thread_count(threads)
 
     def report(stage: Stage, fraction: float) -> None:
         if progress is not None:

@@ -11,7 +11,8 @@ from bgars import _bgars
 from bgars.errors import InputError
 from bgars.kernel_capture import kernel_capture
 from bgars.kernel_outputs import fresh_outputs, measured_by, outputs_of
-from bgars.records import Capture, NormalField, every_pixel, float_full_scale, integer_full_scale
+from bgars.plain_arrays import masked_pixels, plain_bool
+from bgars.records import Capture, NormalField, every_pixel, float_full_scale, integer_full_scale, pixel_array
 from bgars.rig import LightRig
 
 if TYPE_CHECKING:
@@ -108,7 +109,7 @@ def capture_of(
     if light_directions is None:
         msg = "light_directions: needed with plain image arrays, shape (L, 3)"
         raise InputError(msg)
-    stack = pixel_stack(images)
+    stack, hidden = pixel_stack(images), masked_pixels(images)
     rig = LightRig.from_directions(light_directions, intensities=light_intensities)
     if len(rig) != len(stack):
         msg = f"images and light_directions: {len(stack)} images but {len(rig)} lights; they must be equal in number"
@@ -123,7 +124,7 @@ def capture_of(
     return Capture(
         images=stack,
         rig=rig,
-        mask=every_pixel(stack.shape[1:]),
+        mask=every_pixel(stack.shape[1:]) if hidden is None else ~hidden,
         saturation=clip,
         full_scale=full_scale,
     )
@@ -131,16 +132,11 @@ def capture_of(
 
 def pixel_stack(images: ArrayLike) -> PixelArray:
     """Return a C-contiguous (L, H, W) stack of a supported dtype, without a copy where possible."""
-    stack = np.asarray(images)
+    stack = pixel_array("images", images)
     if stack.ndim != STACK_NDIM:
         msg = f"images: must have shape (L, H, W), got {stack.shape}"
         raise InputError(msg)
-    if stack.dtype == np.float64:
-        stack = stack.astype(np.float32)
-    if stack.dtype not in (np.uint8, np.uint16, np.float32):
-        msg = f"images: must be uint8, uint16 or float32, got {stack.dtype}"
-        raise InputError(msg)
-    return np.ascontiguousarray(stack)
+    return stack
 
 
 def combined_mask(capture: Capture, mask: ArrayLike | None) -> NDArray[np.bool_] | None:
@@ -149,10 +145,10 @@ def combined_mask(capture: Capture, mask: ArrayLike | None) -> NDArray[np.bool_]
         if capture.mask.strides == (0, 0) and capture.mask.size and capture.mask[0, 0]:
             return None  # one True for all pixels, as captures without a mask have it
         return np.ascontiguousarray(capture.mask)
-    given = np.asarray(mask)
-    if given.dtype != np.bool_ or given.shape != capture.images.shape[1:]:
+    given = plain_bool("mask", mask)
+    if given.shape != capture.images.shape[1:]:
         expected = tuple(capture.images.shape[1:])
-        msg = f"mask: must be bool of shape {expected}, got {given.dtype} of shape {given.shape}"
+        msg = f"mask: must be bool of shape {expected}, got shape {given.shape}"
         raise InputError(msg)
     combined: NDArray[np.bool_] = np.ascontiguousarray(given & capture.mask)
     if not combined.any():

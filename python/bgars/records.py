@@ -15,15 +15,28 @@ from numpy.typing import NDArray
 
 from bgars import _bgars
 from bgars.errors import InputError
+from bgars.plain_arrays import (
+    every_pixel,
+    integer_full_scale,
+    keep,
+    masked_pixels,
+    pixel_array,
+    plain,
+    plain_bool,
+    plain_fields,
+    without_mask,
+)
 from bgars.scalar_checks import check_pitch
 from bgars.shown import ShownCapture, ShownField, ShownHeight
+from bgars.surface_records import Component, DepthMap
+from bgars.truth_record import Truth
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from bgars.material_records import ReflectanceFit
     from bgars.rig import LightRig
-    from bgars.surface_records import BilateralFit, Pinhole
+    from bgars.surface_records import BilateralFit
 
 __all__ = [
     "BoolArray",
@@ -38,6 +51,7 @@ __all__ = [
     "every_pixel",
     "float_full_scale",
     "integer_full_scale",
+    "pixel_array",
 ]
 
 PixelArray = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32]
@@ -45,19 +59,9 @@ FloatArray = NDArray[np.float32]
 BoolArray = NDArray[np.bool_]
 
 
-def every_pixel(shape: tuple[int, ...]) -> BoolArray:
-    """Return a read-only mask (H, W) that uses every pixel: one True in memory."""
-    return np.ndarray(shape, np.bool_, b"\x01", strides=(0, 0))
-
-
-def integer_full_scale(pixels: PixelArray) -> float | None:
-    """Return the largest grey level of an integer dtype (255 or 65535), None for floats."""
-    return float((1 << 8 * pixels.dtype.itemsize) - 1) if pixels.dtype.kind == "u" else None
-
-
 def float_full_scale(pixels: PixelArray, threads: int | None) -> float:
     """Return the largest finite value of float pixels: their full scale, where no saturation level is known."""
-    return _bgars.float_full_scale(pixels.astype(np.float32, copy=False), threads=threads)
+    return _bgars.float_full_scale(plain("images", pixels, np.float32), threads=threads)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -104,6 +108,20 @@ class Capture(ShownCapture):
     pixel_pitch_u_um: float | None = None
     camera_distance_mm: float | None = None
     assumed: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Bring the arrays into the layout of the kernels; what a numpy masked stack hides is not used."""
+        hidden = masked_pixels(self.images)
+        mask = plain_bool("mask", self.mask)
+        arrays: dict[str, Any] = {
+            "images": pixel_array("images", self.images),
+            "mask": mask if hidden is None else mask & ~hidden,
+        }
+        if self.dark is not None:
+            arrays["dark"] = plain("dark", self.dark)
+        if self.response is not None:
+            arrays["response"] = plain("response", self.response, np.float32)
+        keep(self, arrays)
 
     @property
     def name(self) -> str:
@@ -160,6 +178,18 @@ class NormalField(ShownField):
     choice: str = ""
     reflectance: ReflectanceFit | None = field(default=None, repr=False)
 
+    def __post_init__(self) -> None:
+        """Bring the arrays into the layout of the kernels."""
+        shows_mask = isinstance(self.measured, np.ndarray) and self.measured.base is self.mask
+        types = {"normals": np.float32, "albedo": np.float32, "mask": np.bool_, "confidence": np.float32}
+        types |= {"measured": np.bool_, "lights_kept": np.uint16, "kept_sets": np.bool_}
+        mask = self.mask
+        plain_fields(self, types)
+        if shows_mask and self.mask is not mask:
+            measured = self.mask.view()
+            measured.flags.writeable = self.measured.flags.writeable
+            keep(self, {"measured": measured})
+
     @property
     def standard_error_deg(self) -> FloatArray:
         """(H, W) float32 standard error of the direction in degrees, by `confidence`; infinite where invalid."""
@@ -176,29 +206,6 @@ class NormalField(ShownField):
         level = np.minimum(self.albedo * np.float32(255.0 / top), np.float32(255.0))
         grey: NDArray[np.uint8] = np.where(np.isfinite(level), level, np.float32(128.0)).astype(np.uint8)
         return grey
-
-
-@dataclass(frozen=True)
-class Component:
-    """One connected part of a height map; without an anchor its mean is 0, its height against other parts unknown.
-
-    Attributes
-    ----------
-    pixels : int
-        Number of pixels.
-    first_row, first_col : int
-        Its first pixel in reading order.
-    anchor_pixels : int
-        Known heights that hold it; 0: it floats freely.
-    anchor_rms_px : float
-        How far it passes from them, root mean square; NaN without any.
-    """
-
-    pixels: int
-    first_row: int
-    first_col: int
-    anchor_pixels: int = 0
-    anchor_rms_px: float = math.nan
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -234,6 +241,10 @@ class HeightMap(ShownHeight):
     labels: NDArray[np.int32]
     bilateral: BilateralFit | None = field(default=None, repr=False)
 
+    def __post_init__(self) -> None:
+        """Bring the arrays into the layout of the kernels."""
+        plain_fields(self, {"height_px": np.float32, "mask": np.bool_, "labels": np.int32})
+
     def check_field(self, field: NormalField | None) -> None:
         """Raise InputError unless a field, where there is one, has the size of this map."""
         if field is not None and field.mask.shape != self.mask.shape:
@@ -247,16 +258,20 @@ class HeightMap(ShownHeight):
         Parameters
         ----------
         height : (H, W) floating
-            Heights in micrometres when a pixel pitch is given, else in pixels; NaN = invalid.
+            Heights in micrometres when a pixel pitch is given, else in pixels; NaN, or masked = invalid.
         pixel_pitch_um : float, optional
             Size of a pixel.
 
         Raises
         ------
         InputError
-            A pitch that is not a number, finite and above 0.
+            Another shape; a pitch that is not a number, finite and above 0.
         """
         check_pitch(pixel_pitch_um)
+        height = plain("height", without_mask(height, math.nan))
+        if height.ndim != len(("row", "col")) or height.dtype.kind not in "fui":
+            msg = f"height: must be numbers of shape (H, W), got {height.dtype} of shape {height.shape}"
+            raise InputError(msg)
         height_px = (height / (1.0 if pixel_pitch_um is None else pixel_pitch_um)).astype(np.float32)
         mask: BoolArray = np.isfinite(height_px)
         rows, cols = np.nonzero(mask)
@@ -300,53 +315,3 @@ class HeightMap(ShownHeight):
             "iterations": self.iterations,
             "residual": self.residual,
         }
-
-
-@dataclass(frozen=True, eq=False)
-class DepthMap:
-    """Depths under a pinhole camera, up to one factor a connected component.
-
-    Attributes
-    ----------
-    depth : (H, W) float32
-        Distance from the camera's plane, above 0, of geometric mean 1 in each component; NaN outside the mask.
-    mask : (H, W) bool
-        True where there is a depth.
-    camera : Pinhole
-        The camera.
-    iterations, residual, components, labels
-        As in :class:`HeightMap`.
-    bilateral : BilateralFit
-        Jumps and energies.
-    """
-
-    depth: FloatArray
-    mask: BoolArray
-    camera: Pinhole
-    iterations: int
-    residual: float
-    components: tuple[Component, ...]
-    labels: NDArray[np.int32]
-    bilateral: BilateralFit = field(repr=False)
-
-
-@dataclass(frozen=True, eq=False)
-class Truth:
-    """What a capture should give.
-
-    Attributes
-    ----------
-    normals : (H, W, 3) float32
-        True unit normals; NaN where unknown.
-    ball_ids : (H, W) int16 or None
-        0 board, 1.. balls, -1 bridge; None for a photograph of something else.
-    mask : (H, W) bool
-        Pixels to judge: the balls of a scene, the object of a photograph.
-    height_um : (H, W) float32 or None
-        True height.
-    """
-
-    normals: FloatArray
-    ball_ids: NDArray[np.int16] | None
-    mask: BoolArray
-    height_um: FloatArray | None

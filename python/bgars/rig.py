@@ -13,6 +13,8 @@ from bgars.errors import InputError
 from bgars.light_files import read_lp
 from bgars.light_formats import MAX_LIGHTS
 from bgars.light_names import light_name
+from bgars.plain_arrays import plain
+from bgars.scalar_checks import number
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
 __all__ = ["LightRig", "directions_from_angles"]
 
 MIN_LIGHTS = 3
+MOST_SHOWN = 10**20
+"""Numbers from here on have too many digits for a message."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,9 +111,14 @@ class LightRig:
         >>> LightRig.ring(8, elevation_deg=45.0).directions[2].round(3).tolist()
         [0.0, 0.707, 0.707]
         """
-        if not MIN_LIGHTS <= count <= MAX_LIGHTS:
-            msg = f"count: a ring needs at least {MIN_LIGHTS} lights and has at most {MAX_LIGHTS}, got {count}"
+        if isinstance(count, bool) or not isinstance(count, int | np.integer):
+            msg = f"count: must be a whole number, got {count!r}"
             raise InputError(msg)
+        if not MIN_LIGHTS <= count <= MAX_LIGHTS:
+            told = count if abs(count) < MOST_SHOWN else "a number of many digits"
+            msg = f"count: a ring needs at least {MIN_LIGHTS} lights and has at most {MAX_LIGHTS}, got {told}"
+            raise InputError(msg)
+        azimuth0_deg, elevation_deg = number("azimuth0_deg", azimuth0_deg), number("elevation_deg", elevation_deg)
         azimuths_deg = azimuth0_deg + 360.0 / count * np.arange(count)
         angles_deg = np.column_stack([azimuths_deg, np.full(count, elevation_deg)])
         return cls.from_angles(angles_deg, intensities=intensities, u_deg=u_deg)
@@ -276,7 +285,7 @@ def directions_from_angles(angles_deg: ArrayLike) -> NDArray[np.float64]:
 
 def _rows(values: ArrayLike, name: str) -> NDArray[np.float64]:
     """A row a light."""
-    vectors = np.ascontiguousarray(values, dtype=np.float64)
+    vectors = plain(name, values, np.float64)
     if vectors.ndim != 2 or vectors.shape[1] != 3:  # noqa: PLR2004 - x, y, z
         msg = f"{name}: must have shape (L, 3), got {vectors.shape}"
         raise InputError(msg)
@@ -299,7 +308,7 @@ def _vectors(values: ArrayLike, name: str) -> NDArray[np.float64]:
 def _intensities(values: ArrayLike | None, count: int) -> NDArray[np.float64]:
     if values is None:
         return np.array([1.0] * count)
-    intensities = np.ascontiguousarray(values, dtype=np.float64)
+    intensities = plain("light_intensities", values, np.float64)
     if intensities.shape != (count,):
         msg = f"light_intensities: must have shape ({count},), one a light, got {intensities.shape}"
         raise InputError(msg)

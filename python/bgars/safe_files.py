@@ -12,7 +12,16 @@ from bgars.errors import FileFormatError
 if TYPE_CHECKING:
     import os
 
-__all__ = ["MAX_TEXT_BYTES", "Text", "decode_text", "need_regular", "read_bounded", "read_text", "shown"]
+__all__ = [
+    "MAX_TEXT_BYTES",
+    "Text",
+    "decode_text",
+    "need_readable",
+    "need_regular",
+    "read_bounded",
+    "read_text",
+    "shown",
+]
 
 MAX_TEXT_BYTES = 8_000_000
 """Largest text file that is read: 65,536 lines of a response table have 3 MB."""
@@ -77,6 +86,18 @@ def shown(path: str | os.PathLike[str]) -> str:
     return text if len(text) <= longest else f"{text[:longest]}..."
 
 
+def need_readable(path: str | os.PathLike[str], what: str = "file") -> int:
+    """Return the size of a file that is about to be read; as :func:`need_regular`, in the words of a reader."""
+    try:
+        return need_regular(path, what)
+    except FileFormatError as error:
+        reason = str(error).removeprefix(f"{shown(path)}: ")
+        if reason.startswith("cannot be read"):
+            raise
+        msg = f"{shown(path)}: cannot be read ({reason})"
+        raise FileFormatError(msg) from error
+
+
 def read_bounded(path: str | os.PathLike[str], max_bytes: int = MAX_TEXT_BYTES, what: str = "file") -> bytes:
     """Return the bytes of a regular file of at most `max_bytes`.
 
@@ -85,14 +106,7 @@ def read_bounded(path: str | os.PathLike[str], max_bytes: int = MAX_TEXT_BYTES, 
     FileFormatError
         As :func:`need_regular`, or the file is larger or cannot be read.
     """
-    try:
-        size = need_regular(path, what)
-    except FileFormatError as error:
-        reason = str(error).removeprefix(f"{shown(path)}: ")
-        if reason.startswith("cannot be read"):
-            raise
-        msg = f"{shown(path)}: cannot be read ({reason})"
-        raise FileFormatError(msg) from error
+    size = need_readable(path, what)
     if size <= max_bytes:
         try:
             with Path(path).open("rb") as file:

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import math
+import operator
+import os
 
 import numpy as np
 
 from bgars.errors import InputError
 
-__all__ = ["check_pitch", "number"]
+__all__ = ["check_pitch", "number", "thread_count"]
+
+MAX_THREADS = 1024
+MOST_A_CORE = 4
+"""More threads than this only wait for each other; results do not depend on their number."""
 
 
 def number(name: str, value: object) -> float:
@@ -27,3 +33,25 @@ def check_pitch(pixel_pitch_um: object, name: str = "pixel_pitch_um") -> None:
     if not (math.isfinite(pitch) and pitch > 0):
         msg = f"{name}: must be finite and above 0, got {pitch:g}"
         raise InputError(msg)
+
+
+def thread_count(threads: object, name: str = "threads") -> int | None:
+    """Return how many threads to work on: at most a few a core; None for as many as the environment says.
+
+    Raises
+    ------
+    InputError
+        No whole number from 1 to 1024.
+    """
+    if threads is None:
+        return None
+    try:
+        count = operator.index(threads)  # type: ignore[arg-type]  # what has no index raises
+    except TypeError:
+        msg = f"{name}: must be a whole number from 1 to {MAX_THREADS}, got {threads!r}"
+        raise InputError(msg) from None
+    if isinstance(threads, bool) or not 1 <= count <= MAX_THREADS:
+        told = str(threads) if abs(count) < 10**20 else "a number of many digits"
+        msg = f"{name}: must be 1 to {MAX_THREADS}, got {told}"
+        raise InputError(msg)
+    return min(count, MOST_A_CORE * max(os.cpu_count() or 1, MOST_A_CORE))

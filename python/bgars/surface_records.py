@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -10,14 +11,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.errors import InputError
+from bgars.plain_arrays import plain_fields
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["Anchors", "BilateralFit", "Pinhole"]
+__all__ = ["Anchors", "BilateralFit", "Component", "DepthMap", "Pinhole"]
 
 MATRIX_SHAPE = (3, 3)
 MAX_REGION = 2**31 - 1
+
+
+@dataclass(frozen=True)
+class Component:
+    """One connected part of a height map; without an anchor its mean is 0, its height against other parts unknown.
+
+    Attributes
+    ----------
+    pixels : int
+        Number of pixels.
+    first_row, first_col : int
+        Its first pixel in reading order.
+    anchor_pixels : int
+        Known heights that hold it; 0: it floats freely.
+    anchor_rms_px : float
+        How far it passes from them, root mean square; NaN without any.
+    """
+
+    pixels: int
+    first_row: int
+    first_col: int
+    anchor_pixels: int = 0
+    anchor_rms_px: float = math.nan
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -102,6 +127,38 @@ class BilateralFit:
 
 
 @dataclass(frozen=True, eq=False)
+class DepthMap:
+    """Depths under a pinhole camera, up to one factor a connected component.
+
+    Attributes
+    ----------
+    depth : (H, W) float32
+        Distance from the camera's plane, above 0, of geometric mean 1 in each component; NaN outside the mask.
+    mask : (H, W) bool
+        True where there is a depth.
+    camera : Pinhole
+        The camera.
+    iterations, residual, components, labels
+        As in :class:`HeightMap`.
+    bilateral : BilateralFit
+        Jumps and energies.
+    """
+
+    depth: NDArray[np.float32]
+    mask: NDArray[np.bool_]
+    camera: Pinhole
+    iterations: int
+    residual: float
+    components: tuple[Component, ...]
+    labels: NDArray[np.int32]
+    bilateral: BilateralFit = field(repr=False)
+
+    def __post_init__(self) -> None:
+        """Bring the arrays into the layout of the kernels."""
+        plain_fields(self, {"depth": np.float32, "mask": np.bool_, "labels": np.int32})
+
+
+@dataclass(frozen=True, eq=False)
 class Anchors:
     """Heights that are known from elsewhere, for parts of a surface that float freely.
 
@@ -132,6 +189,9 @@ class Anchors:
         for name, values in given.items():
             if values is not None and not isinstance(values, np.ndarray):
                 msg = f"anchors.{name}: must be an array, got {type(values).__name__}"
+                raise InputError(msg)
+            if isinstance(values, np.ma.MaskedArray):
+                msg = f"anchors.{name}: is a numpy masked array; fill it (heights that are not known are NaN)"
                 raise InputError(msg)
             if isinstance(values, np.ndarray) and values.shape != shape:
                 msg = f"anchors.{name}: must have the shape of the normals {shape}, got {values.shape}"

@@ -17,8 +17,8 @@ PUBLISHED_MM = {"bear": 0.334, "cat": 0.074, "goblet": 9.018, "harvest": 1.838, 
 
 
 def read_map(folder: Path) -> tuple[np.ndarray, np.ndarray, bgars.Pinhole]:
-    levels = _bgars.read_rgb16(folder / "normal_map.png", 100.0).astype(np.float64)
-    normals = levels / 65535 * 2 - 1
+    codes, bits = _bgars.read_color(folder / "normal_map.png", 100.0)
+    normals = codes[..., :3].astype(np.float64) / (2**bits - 1) * 2 - 1
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     mask = np.asarray(Image.open(folder / "mask.png").convert("L")) > 0
     return normals.astype(np.float32), mask, bgars.Pinhole(np.loadtxt(folder / "K.txt"))

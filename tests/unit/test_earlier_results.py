@@ -22,10 +22,38 @@ def command(*arguments: object) -> str:
     return str(run.exception) if isinstance(run.exception, bgars.BgarsError) else run.output
 
 
+OWN = {
+    ".json": b'{"format": "bgars-result", "inspected_utc": "2026-01-01T00:00:00Z", "files": ["height.npy","mesh.glb"]}',
+    ".csv": b"name,row,col,present,verdict,reasons,kind\n",
+    ".html": b'<!doctype html><meta charset="utf-8"><meta name="generator" content="bgars">',
+    ".png": b"\x89PNG\r\n\x1a\n....tEXtSoftware\0bgars",
+    ".jpg": b"\xff\xd8\xff\xfe\0\x07bgars",
+    ".parquet": b"PAR1 bgars",
+    ".npz": b"PK ball_height_um.npy",
+    ".tif": b'II*\0 {"content": "bgars height map"}',
+    ".ply": b"ply\ncomment bgars mesh, unit um",
+    ".obj": b"# bgars mesh, unit um",
+    ".stl": b"bgars mesh",
+    ".npy": b"",
+    ".glb": b"",
+    ".txt": b"earlier",
+}
+MESSAGE = b'{"MessageName": "CFX.Production", "TimeStamp": "2026-01-01T00:00:00Z"}'
+
+
 def filled(folder: Path, *names: str) -> Path:
+    """A folder of files as an earlier run left them, known by what is in them."""
     folder.mkdir(exist_ok=True)
     for name in names:
-        (folder / name).write_text("earlier", encoding="utf-8")
+        (folder / name).write_bytes(MESSAGE if name == "cfx.json" else OWN[Path(name).suffix])
+    return folder
+
+
+def foreign(folder: Path, *names: str) -> Path:
+    """A folder of somebody else's files of these names."""
+    folder.mkdir(exist_ok=True)
+    for name in names:
+        (folder / name).write_text('{"mine": true}', encoding="utf-8")
     return folder
 
 
@@ -39,7 +67,7 @@ def test_what_this_run_does_not_write_is_removed(tmp_path: Path) -> None:
         (place / "verdict.json").write_text("new", encoding="utf-8")
     assert names_in(folder) == {"verdict.json", "notes.txt"}
     assert (folder / "verdict.json").read_text(encoding="utf-8") == "new"
-    assert (folder / "notes.txt").read_text(encoding="utf-8") == "earlier"
+    assert (folder / "notes.txt").read_bytes() == OWN[".txt"]
 
 
 def test_a_failing_run_that_judges_leaves_nothing_of_an_earlier_one(tmp_path: Path) -> None:
@@ -49,12 +77,20 @@ def test_a_failing_run_that_judges_leaves_nothing_of_an_earlier_one(tmp_path: Pa
     assert names_in(folder) == {"notes.txt"}
 
 
-def test_without_the_mark_of_a_run_files_of_its_names_are_foreign(tmp_path: Path) -> None:
-    folder = filled(tmp_path / "out", "picture.png")
-    (folder / "more.json").mkdir()
-    with pytest.raises(bgars.CalibrationError), atomic_folder(folder, JUDGED):
-        raise bgars.CalibrationError("lights do not fit")
-    assert names_in(folder) == {"picture.png", "more.json"}
+def test_somebody_elses_files_of_these_names_are_never_touched(tmp_path: Path) -> None:
+    folder = foreign(tmp_path / "out", "picture.png", "verdict.json")
+    refused = pytest.raises(bgars.FileFormatError, match=r"holds picture.png, verdict.json, which bgars did not write")
+    with refused, atomic_folder(folder, JUDGED):
+        pytest.fail("the work must not begin")
+    assert {path.read_text(encoding="utf-8") for path in folder.iterdir()} == {'{"mine": true}'}
+
+
+@pytest.mark.parametrize("name", sorted(inspect.NAMES.written))
+def test_a_failing_inspection_deletes_nothing_of_others(name: str, capture_folder: Path, tmp_path: Path) -> None:
+    out = foreign(tmp_path / "out", name)
+    (capture_folder / "img0.png").unlink()
+    assert "bgars did not write" in command("inspect", capture_folder, "-o", out)
+    assert (out / name).read_text(encoding="utf-8") == '{"mine": true}'
 
 
 def test_a_failing_inspection_leaves_no_verdict_of_another_part(capture_folder: Path, tmp_path: Path) -> None:

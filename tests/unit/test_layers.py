@@ -12,6 +12,8 @@ PACKAGE = Path(bgars.__file__).parent
 RECORDS = {
     "ball_names": 0.5,
     "circle_pixels": 0,
+    "plain_arrays": 0.5,
+    "truth_record": 1,
     "ball_records": 1,
     "material_records": 1,
     "part_identity": 2,
@@ -30,7 +32,7 @@ RECORDS = {
     "normals_choice": 3.6,
 }
 BASE = {
-    **{"errors": 0, "version": 0, "extras": 0, "shown": 0.5, "normal_methods": 0},
+    **{"errors": 0, "version": 0, "extras": 0, "csv_cells": 0, "normal_methods": 0, "shown": 0.5},
     **{"bit_depth": 0, "safe_files": 0.5, "mat_files": 0, "same_images": 3.2, "noise_floor": 3.5, "flatten": 3.5},
     **{"light_names": 1, "light_formats": 1.2, "light_files": 1.5, "rig": 2, "scalar_checks": 1},
     **RECORDS,

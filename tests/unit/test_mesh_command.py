@@ -11,6 +11,7 @@ import pytest
 import tifffile
 import trimesh
 from bgars.cli.app import app
+from bgars.io.normal_map_pixels import NORMAL_MAP_SUFFIXES
 from typer.testing import CliRunner
 
 
@@ -81,18 +82,18 @@ def test_another_tiff_of_bgars_is_no_height_map(capture_folder: Path, content: s
 
 
 def test_a_picture_is_no_normal_map() -> None:
-    picture = np.full((10, 10, 3), 255, np.uint8)
-    picture[:2, :, :2] = 128  # a fifth of it faces the camera
+    picture = np.random.default_rng(1).integers(230, 256, (10, 10, 3), np.uint8)
+    picture[:2] = [128, 128, 255]  # a fifth of it faces the camera
     iio.imwrite("picture.png", picture)
     words = "at least 50% of its pixels must be unit vectors (length 1 within 0.1), but 80.0% are not"
     assert mesh("picture.png") == f"picture.png: is not a normal map: {words}"
-    picture[:8, :, :2] = 128
+    picture[:8] = [128, 128, 255]
     iio.imwrite("picture.png", picture)
     assert "faces" in mesh("picture.png")
 
 
 def test_what_is_no_map_is_told_what_is() -> None:
-    taken = "mesh takes a normal map (.png) or a height map (.tif, .tiff, .npy)"
+    taken = f"mesh takes a normal map ({', '.join(NORMAL_MAP_SUFFIXES)}) or a height map (.tif, .tiff, .npy)"
     Path("notes.txt").touch()
     Path("empty.npy").touch()
     Path("folder").mkdir()

@@ -166,8 +166,8 @@ def test_what_is_known_of_lights_scale_and_camera_travels_along(
     assert read.camera_distance_mm == distance_mm
     np.testing.assert_array_equal(read.rig.u_deg, u_deg)
     np.testing.assert_array_equal(bgars.read_scene(tmp_path / "part" / "scene.json").rig.u_deg, u_deg)
-    bgars.write_simulation(made, truth, tmp_path / "part")
-    plain = bgars.read_capture(tmp_path / "part")
+    bgars.write_simulation(made, truth, tmp_path / "plain")
+    plain = bgars.read_capture(tmp_path / "plain")
     assert plain.pixel_pitch_u_um is None
     assert plain.camera_distance_mm is None, "not stated"
 

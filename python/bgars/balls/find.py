@@ -16,6 +16,7 @@ from bgars.balls.levels import Levels
 from bgars.balls.places import look_again
 from bgars.balls.registration import register
 from bgars.errors import InputError
+from bgars.scalar_checks import thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -99,6 +100,7 @@ def find_balls(
     >>> found.balls[0].name, len(found.balls), len(found.missing)
     ('A1', 1, 0)
     """
+    threads = thread_count(threads)
     if layout is not None and capture.pixel_pitch_um is None:
         msg = "layout: needs capture.pixel_pitch_um, which is None, to lay micrometres over pixels"
         raise InputError(msg)

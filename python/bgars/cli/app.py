@@ -100,7 +100,9 @@ def top(
     """Options of the command itself."""
     if threads is not None:
         # The compiled module starts its threads at its first work, so this comes in time for all of it.
-        os.environ["RAYON_NUM_THREADS"] = str(threads)
+        from bgars.scalar_checks import thread_count  # noqa: PLC0415 - loaded when it is asked
+
+        os.environ["RAYON_NUM_THREADS"] = str(thread_count(threads, "--threads"))
     if version:
         say(f"bgars {bgars.__version__}")
         raise typer.Exit
@@ -130,6 +132,7 @@ def demo(
         demo_line(output, parts=parts, as_json=as_json)
         return
     folder = bgars.sample_capture()
+    _need_places(folder, output)
     summary, files = _reconstruct_to(
         bgars.read_capture(folder), output, bgars.reconstruct, mesh_format="ply", directx=False
     )
@@ -185,6 +188,7 @@ def reconstruct(
             capture, method=method, threshold=threshold, material=surface, flatten=flatten, **options
         )
 
+    _need_places(folder, output)
     capture = bgars.read_capture(folder, channel=channel, station=station)
     findings = check_first(capture, force=force)
     summary, files = _reconstruct_to(
@@ -230,6 +234,7 @@ def normals(
     from bgars.cli.outputs import write_normals  # noqa: PLC0415
     from bgars.noise_floor import without_background  # noqa: PLC0415
 
+    _need_places(folder, output)
     capture = bgars.read_capture(folder, channel=channel, station=station)
     findings = check_first(capture, force=force)
     surface = _material_from(material, capture)
@@ -326,12 +331,29 @@ def main() -> None:
         app()
     except BgarsError as error:
         fail(str(error))
-        sys.exit(EXIT_BAD_INPUT)
     except ModuleNotFoundError as error:
         if error.name not in EXTRA_OF:
             raise
         fail(f"this command {how_to_install(error.name)}")
-        sys.exit(EXIT_BAD_INPUT)
+    except MemoryError as error:
+        fail(str(error) or "there is not enough memory for this; use fewer or smaller images")
+    except RecursionError:
+        fail("a file is nested too deeply to be read")
+    except OSError as error:
+        # A disk that is full, a name that is too long: no defect, and nothing that a trace explains.
+        name = "" if error.filename is None else f"{error.filename}: "
+        fail(f"{name}{error.strerror or error}")
+    else:
+        return
+    sys.exit(EXIT_BAD_INPUT)
+
+
+def _need_places(folder: Path, output: Path) -> None:
+    """Raise unless there is a folder to read, and one for results that holds no inputs."""
+    from bgars.io.given_paths import need_folder, need_output  # noqa: PLC0415 - loaded when it runs
+
+    need_folder(folder)
+    need_output(output, folder)
 
 
 def _reconstruct_to(

@@ -9,8 +9,8 @@ import typer
 
 import bgars
 from bgars.cli.console import print_json, say
-from bgars.io.atomic import atomic_file
-from bgars.io.given_paths import need_folder
+from bgars.io.atomic import FolderNames, atomic_file, atomic_folder
+from bgars.io.given_paths import need_folder, need_output
 from bgars.report.check_page import check_page
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ __all__ = ["EXIT_WRONG", "register"]
 
 EXIT_WRONG = 1
 PAGE_NAME = "check.html"
+NAMES = FolderNames(frozenset({PAGE_NAME}), frozenset(), judged=False)
 PAGE_SUFFIXES = (".html", ".htm")
 
 
@@ -57,13 +58,11 @@ def check(
     wrong. 2: wrong use, or a capture that cannot be read.
     """
     need_folder(folder)
+    if output is not None and not _is_page(output):
+        need_output(output, folder)
     capture = bgars.read_capture(folder)
     findings = bgars.check(capture)
-    page = None if output is None else _page_path(output)
-    if page is not None:
-        page.parent.mkdir(parents=True, exist_ok=True)
-        with atomic_file(page) as temporary:
-            temporary.write_text(check_page(capture, findings), encoding="utf-8")
+    page = None if output is None else _write_page(output, check_page(capture, findings))
     if as_json:
         print_json({"capture": capture.name, **findings.to_dict()})
     else:
@@ -75,8 +74,20 @@ def check(
         raise typer.Exit(EXIT_WRONG)
 
 
-def _page_path(output: Path) -> Path:
-    return output if output.suffix.lower() in PAGE_SUFFIXES else output / PAGE_NAME
+def _is_page(output: Path) -> bool:
+    return output.suffix.lower() in PAGE_SUFFIXES
+
+
+def _write_page(output: Path, page: str) -> Path:
+    """Write the file that is named, or check.html into a folder; return its path."""
+    if not _is_page(output):
+        with atomic_folder(output, NAMES) as place:
+            (place / PAGE_NAME).write_text(page, encoding="utf-8")
+        return output / PAGE_NAME
+    output.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_file(output) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+    return output
 
 
 def _tell(name: str, findings: Findings) -> None:

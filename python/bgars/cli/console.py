@@ -94,7 +94,7 @@ def fail(message: str) -> None:
     """Print an error for people."""
     console = error_console()
     console.print("error:", style="bold red", end=" ")
-    console.print(_encodable(message), markup=False, emoji=False)
+    console.print(_encodable(" ".join(message.splitlines())), markup=False, emoji=False)
 
 
 def warn(message: str) -> None:

@@ -14,7 +14,7 @@ from bgars.cli.inspect import EXIT_NOT_PASSED
 from bgars.cli.options import MethodOption
 from bgars.errors import InputError
 from bgars.io.atomic import FolderNames, atomic_folder
-from bgars.io.given_paths import need_file, need_folder
+from bgars.io.given_paths import need_file, need_folder, need_output
 from bgars.normal_methods import DEFAULT_METHOD
 from bgars.studies.pages import grr_page
 from bgars.studies.readings import readings_csv
@@ -83,6 +83,7 @@ def grr(
     wrong use, a design that is not balanced, runs that do not belong together, or a capture that cannot be measured.
     """
     need_folder(folder)
+    need_output(output, folder)
     for file in (recipe, references):
         need_file(file)
     _check_results(folder, output)

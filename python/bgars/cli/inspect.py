@@ -17,7 +17,7 @@ from bgars.cli.options import ForceOption, LotOption, MethodOption, OperatorOpti
 from bgars.errors import InputError
 from bgars.extras import how_to_install, missing
 from bgars.io.atomic import FolderNames, atomic_folder
-from bgars.io.given_paths import need_file, need_folder
+from bgars.io.given_paths import need_file, need_folder, need_output
 from bgars.line.naming import identity_of
 from bgars.normal_methods import DEFAULT_METHOD
 from bgars.part_identity import PartIdentity
@@ -38,7 +38,6 @@ FILES = {
 }
 PARQUET = "balls.parquet"
 CFX = "cfx.json"
-# balls.csv and the pictures mark no run: captures have files of these names, too.
 NAMES = FolderNames(
     frozenset({*FILES, *PICTURES, *REPORT_FILES, PARQUET, CFX}), frozenset({"result.json", PARQUET, CFX})
 )
@@ -107,6 +106,7 @@ def inspect(
 
     Writes report.html, which is the page to look at first, result.json, balls.csv and four pictures. Files that an
     earlier inspection left in OUT are removed before FOLDER is read: where it cannot be measured, no verdict is left.
+    Files of others are never touched: OUT may not hold a capture, nor files of these names that bgars did not write.
 
     The capture is checked first ('bgars check'): where its lights and images do not fit, there is no verdict.
 
@@ -123,6 +123,7 @@ def inspect(
     need_file(recipe)
     need_file(station)
     need_folder(folder)
+    need_output(output, folder)
     pictures = _is_drawn(pictures, "the pictures are left out: drawing them", "matplotlib")
     page = _is_drawn(page, "report.html is left out: it", "plotly")
     with stage_progress() as report, atomic_folder(output, NAMES) as place:

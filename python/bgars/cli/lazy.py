@@ -6,12 +6,17 @@ from importlib import import_module
 from typing import Any
 
 import typer
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperCommand
+
+from bgars.cli.arguments import CarefulGroup
 
 __all__ = ["LAZY_COMMANDS", "LazyGroup"]
 
 LAZY_COMMANDS = {
-    "check": ("bgars.cli.check", "Say whether images and lights belong together, before any number."),
+    "check": (
+        "bgars.cli.check",
+        "Say whether images and lights belong together, and what else is wrong with a capture",
+    ),
     "mesh": ("bgars.cli.mesh", "Turn a normal map or a height map into a mesh."),
     "inspect": ("bgars.cli.inspect", "Find, measure and judge the solder balls of a part."),
     "capture": ("bgars.cli.capture", "Take an image under each light with a camera, write a capture folder"),
@@ -38,7 +43,7 @@ LAZY_COMMANDS = {
 """Of each command, in the order of the help: the module whose ``register`` adds it, and its line in the list."""
 
 
-class LazyGroup(TyperGroup):
+class LazyGroup(CarefulGroup):
     """The commands of the app itself, then those of LAZY_COMMANDS."""
 
     def __init__(self, **settings: Any) -> None:  # noqa: ANN401 - typer's own

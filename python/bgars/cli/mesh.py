@@ -13,14 +13,17 @@ from bgars.errors import FileFormatError, InputError
 from bgars.integrate import IntegrationMethod, Solver
 from bgars.io.height import HEIGHT_SUFFIXES, read_stored_height
 from bgars.io.mesh_files import MESH_SUFFIXES
+from bgars.io.normal_map import holds_normals, read_stored_normals
+from bgars.io.normal_map_pixels import NORMAL_MAP_SUFFIXES
 from bgars.pipeline import solver_fraction
 from bgars.scalar_checks import check_pitch
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-NORMAL_MAP_SUFFIX = ".png"
-TAKEN = f"mesh takes a normal map ({NORMAL_MAP_SUFFIX}) or a height map ({', '.join(HEIGHT_SUFFIXES)})"
+    from bgars.records import FloatArray
+
+TAKEN = f"mesh takes a normal map ({', '.join(NORMAL_MAP_SUFFIXES)}) or a height map ({', '.join(HEIGHT_SUFFIXES)})"
 
 
 def register(app: typer.Typer) -> None:
@@ -32,7 +35,9 @@ def mesh(
     source: Annotated[
         Path,
         typer.Argument(
-            metavar="FILE", help="normals.png, or a height map (.tif, .npy; NaN = invalid).", show_default=False
+            metavar="FILE",
+            help="A normal map (.png, .jpg, .tif, .exr, .npy, .npz), or a height map (.tif, .npy; NaN = invalid).",
+            show_default=False,
         ),
     ],
     output: Annotated[
@@ -48,7 +53,21 @@ def mesh(
             show_default=False,
         ),
     ] = None,
-    directx: Annotated[bool, typer.Option("--directx", help="The normal map has green = y down.")] = False,
+    directx: Annotated[
+        bool | None,
+        typer.Option(
+            "--directx/--opengl",
+            help="The normal map has green = y down (up). By default the curl of its field says.",
+            show_default=False,
+        ),
+    ] = None,
+    mask: Annotated[
+        Path | None,
+        typer.Option(
+            help="Image, white = use, for a normal map; by default alpha and a background of one colour are left out.",
+            show_default=False,
+        ),
+    ] = None,
     method: Annotated[
         IntegrationMethod | None,
         typer.Option(
@@ -73,42 +92,51 @@ def mesh(
     ] = False,
 ) -> None:
     """Turn a normal map or a height map into a mesh."""
-    options = _integration(source, method, k, solver)
+    has_content = source.is_file() and source.stat().st_size > 0
+    is_normal_map = holds_normals(source) if has_content else source.suffix.lower() not in HEIGHT_SUFFIXES
+    options = _integration(source, is_normal_map, {"--method": method, "--k": k, "--solver": solver})
     _check_source(source)
     check_pitch(pixel_pitch_um, "--pixel-pitch-um")
+    if not is_normal_map and (mask is not None or directx is not None):
+        msg = f"--mask, --directx, --opengl: {source} is a height map; leave them out"
+        raise InputError(msg)
+    notes: tuple[str, ...] = ()
     with stage_progress() as report:
-        height = _height_from(source, pixel_pitch_um, directx, options, report)
+        if is_normal_map:
+            normals = read_stored_normals(source, directx=directx, mask=mask)
+            notes = normals.notes
+            height = _integrated(normals.vectors, pixel_pitch_um, options, report)
+        else:
+            height = _stored_height(source, pixel_pitch_um)
     surface = bgars.mesh_from_height(height)
     bgars.write_mesh(surface, output)
     summary: dict[str, Any] = {"vertices": len(surface.vertices), "faces": len(surface.faces), "unit": height.unit}
-    summary["file"] = str(output)
+    summary |= {"file": str(output), "notes": list(notes)}
     if height.bilateral is not None:
         summary["reweightings"] = len(height.bilateral.energies)
         summary["converged"] = height.bilateral.converged
     if as_json:
         print_json(summary)
         return
+    for note in notes:
+        say(f"note: {note}")
     say(f"{output}: {summary['vertices']} vertices, {summary['faces']} faces, in {height.unit}")
     if height.bilateral is not None and not height.bilateral.converged:
         say(f"The energy still moved after {summary['reweightings']} re-weightings.")
 
 
-def _integration(
-    source: Path, method: IntegrationMethod | None, k: float | None, solver: Solver | None
-) -> dict[str, Any]:
+def _integration(source: Path, is_normal_map: bool, given: dict[str, Any]) -> dict[str, Any]:
     """What was asked of the integrator; refused where nothing would listen."""
-    given = {"--method": method, "--k": k, "--solver": solver}
-    for name, value in given.items():
-        if value is None:
-            continue
-        if source.suffix.lower() != NORMAL_MAP_SUFFIX:
+    given = {name: value for name, value in given.items() if value is not None}
+    for name in given:
+        if not is_normal_map:
             msg = f"{name}: {source} is a height map, which is not integrated; leave {name} out"
             raise InputError(msg)
-        if name != "--method" and method != "bilateral":
-            msg = f"{name}: only --method bilateral has it, got --method {method or get_args(IntegrationMethod)[0]}"
+        if name != "--method" and given.get("--method") != "bilateral":
+            method = given.get("--method", get_args(IntegrationMethod)[0])
+            msg = f"{name}: only --method bilateral has it, got --method {method}"
             raise InputError(msg)
-    named = {"method": method, "k": k, "solver": solver}
-    return {name: value for name, value in named.items() if value is not None}
+    return {name.removeprefix("--"): value for name, value in given.items()}
 
 
 def _check_source(source: Path) -> None:
@@ -117,7 +145,7 @@ def _check_source(source: Path) -> None:
         what = "is a folder"
     elif not source.is_file():
         what = "no such file"
-    elif source.suffix.lower() not in {NORMAL_MAP_SUFFIX, *HEIGHT_SUFFIXES}:
+    elif source.suffix.lower() not in {*NORMAL_MAP_SUFFIXES, *HEIGHT_SUFFIXES}:
         what = f"ends in {source.suffix!r}"
     elif not source.stat().st_size:
         what = "is empty (0 bytes)"
@@ -127,23 +155,17 @@ def _check_source(source: Path) -> None:
     raise FileFormatError(msg)
 
 
-def _height_from(
-    source: Path,
-    pixel_pitch_um: float | None,
-    directx: bool,
-    options: dict[str, Any],
-    report: Callable[[str, float], None],
+def _integrated(
+    normals: FloatArray, pixel_pitch_um: float | None, options: dict[str, Any], report: Callable[[str, float], None]
 ) -> bgars.HeightMap:
-    if source.suffix.lower() == NORMAL_MAP_SUFFIX:
-        tolerance = 1e-4 if options.get("method") == "bilateral" else 1e-8
-        height: bgars.HeightMap = bgars.integrate_normals(
-            bgars.read_normal_map(source, directx=directx),
-            pixel_pitch_um=pixel_pitch_um,
-            progress=lambda _, residual: report("height", solver_fraction(residual, tolerance)),
-            **options,
-        )
-        return height
-    return _stored_height(source, pixel_pitch_um)
+    tolerance = 1e-4 if options.get("method") == "bilateral" else 1e-8
+    height: bgars.HeightMap = bgars.integrate_normals(
+        normals,
+        pixel_pitch_um=pixel_pitch_um,
+        progress=lambda _, residual: report("height", solver_fraction(residual, tolerance)),
+        **options,
+    )
+    return height
 
 
 def _stored_height(source: Path, pixel_pitch_um: float | None) -> bgars.HeightMap:

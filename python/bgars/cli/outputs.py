@@ -33,6 +33,12 @@ RECONSTRUCTION = FolderNames(
     judged=False,
 )
 
+NORMALS = FolderNames(
+    frozenset({"normals.png", "albedo.tif", "confidence.tif", "measured.png", "lights_kept.png"}),
+    frozenset(),
+    judged=False,
+)
+
 
 def write_reconstruction(
     run: Callable[[], Reconstruction],
@@ -67,7 +73,13 @@ def write_reconstruction(
         bgars.write_normal_map(result.field, folder / "normals.png", directx=directx)
         bgars.write_height(result.height, folder / "height.tif")
         bgars.write_height(result.height, folder / "height.npy")
-        summary = {"bgars": bgars.__version__, **result.summary(), **(checked or {}), "files": list(files)}
+        summary = {
+            "format": "bgars-reconstruction",
+            "bgars": bgars.__version__,
+            **result.summary(),
+            **(checked or {}),
+            "files": list(files),
+        }
         (folder / MARK).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     return summary, files
 
@@ -93,7 +105,7 @@ def write_normals(field: NormalField, output: Path, *, directx: bool) -> tuple[d
         "measured.png": "white: the pixel's own light fixes its normal",
         "lights_kept.png": "number of lights in each fit",
     }
-    with atomic_folder(output) as folder:
+    with atomic_folder(output, NORMALS) as folder:
         bgars.write_normal_map(field, folder / "normals.png", directx=directx)
         write_described(folder / "albedo.tif", field.albedo, "albedo")
         write_described(folder / "confidence.tif", field.confidence, "confidence")

@@ -53,7 +53,7 @@ def simulate(
             "--output",
             "-o",
             metavar="OUT",
-            help="Folder of the capture; made if missing, files of the same names replaced.",
+            help="Folder of the capture; made if missing. It must not hold a capture already.",
             show_default=False,
         ),
     ],

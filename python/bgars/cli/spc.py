@@ -14,7 +14,7 @@ from bgars.cli.console import print_json, say, say_files, stage_progress
 from bgars.cli.inspect import EXIT_NOT_PASSED
 from bgars.errors import InputError
 from bgars.io.atomic import FolderNames, atomic_folder
-from bgars.io.given_paths import need_path
+from bgars.io.given_paths import need_output, need_path
 from bgars.store import open_store
 from bgars.studies.nelson import parse_rules
 from bgars.studies.pages import chart_page, spc_page
@@ -93,6 +93,7 @@ def spc(
     for path in results:
         for place in expanded(path):
             need_path(place)
+    need_output(output, *results)
     rules = parse_rules(nelson)
     if query:
         _chart_query(results, query, output, rules, zone_rules=western_electric, as_json=as_json)

@@ -31,6 +31,7 @@ from bgars.io.recipe import RECIPE_NAME, CaptureRecipe, read_recipe
 from bgars.io.station_file import read_station
 from bgars.records import Capture, every_pixel
 from bgars.rig import LightRig
+from bgars.scalar_checks import thread_count
 from bgars.station_apply import with_station
 from bgars.station_record import Station
 
@@ -104,6 +105,7 @@ def read_capture(
     >>> capture.images.shape, capture.pixel_pitch_um
     ((8, 240, 256), 3.4)
     """
+    threads = thread_count(threads)
     folder = need_folder(folder)
     notes: list[str] = []
     listing = list_folder(folder)

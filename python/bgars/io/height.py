@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
-import tifffile
 
 from bgars.errors import FileFormatError, InputError
 from bgars.io.atomic import atomic_file
-from bgars.io.described_tiff import OWN, description_of, write_described
+from bgars.io.described_tiff import OWN, write_described
+from bgars.io.guarded import load_npy, load_tiff
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -23,6 +23,7 @@ __all__ = ["HEIGHT_SUFFIXES", "StoredHeight", "read_height", "read_stored_height
 HEIGHT_SUFFIXES = (".tif", ".tiff", ".npy")
 HEIGHT_NDIM = 2
 CONTENT = "height map"
+WHAT = "a height map"
 
 
 class StoredHeight(NamedTuple):
@@ -102,20 +103,11 @@ def read_stored_height(path: str | PathLike[str]) -> StoredHeight:
     path = Path(path)
     _check_suffix(path)
     fields: dict[str, Any] = {}
-    try:
-        if path.suffix.lower() == ".npy":
-            values = np.load(path, allow_pickle=False)
-        else:
-            with tifffile.TiffFile(path) as tiff:
-                values = tiff.asarray()
-                fields = description_of(tiff)
-    except OSError as error:
-        msg = f"{path}: cannot be read ({error.strerror or error})"
-        raise FileFormatError(msg) from error
-    except (ValueError, EOFError, tifffile.TiffFileError) as error:
-        msg = f"{path}: is not a height map ({error})"
-        raise FileFormatError(msg) from error
-    if values.ndim != HEIGHT_NDIM or values.dtype.kind not in "fui":
+    if path.suffix.lower() == ".npy":
+        values = load_npy(path, WHAT)
+    else:
+        values, fields = load_tiff(path, WHAT)
+    if values.ndim != HEIGHT_NDIM or values.dtype.kind not in "fui" or not values.size:
         msg = f"{path}: must hold one grey image of numbers, got {values.dtype} of shape {values.shape}"
         raise FileFormatError(msg)
     content = str(fields.get("content", ""))

@@ -14,7 +14,7 @@ from bgars.light_formats import LIGHT_FORMATS
 if TYPE_CHECKING:
     from bgars.io.image_listing import Listing
 
-__all__ = ["choose_mask", "default_recipe"]
+__all__ = ["choose_mask", "default_recipe", "is_about_lights"]
 
 DIRECTIONS, INTENSITIES = "light_directions.txt", "light_intensities.txt"
 SUFFIXES = frozenset(suffix for kind in LIGHT_FORMATS for suffix in kind.suffixes)
@@ -68,6 +68,21 @@ def choose_mask(listing: Listing, notes: list[str]) -> str | None:
     return chosen
 
 
+def is_about_lights(name: str) -> bool:
+    """Whether a file describes directions or positions of lights, by its name.
+
+    Examples
+    --------
+    >>> [is_about_lights(name) for name in ("lights.csv", "rti.dome", "light_intensities.txt", "balls.csv")]
+    [True, True, False, False]
+    """
+    path = Path(name)
+    suffix = path.suffix.lower()
+    words = re.sub(r"[\W_\d]+", " ", path.stem.lower()).strip()
+    is_said = suffix in SUFFIXES and ABOUT_LIGHTS.search(words) is not None and not ABOUT_STRENGTH.search(words)
+    return not name.startswith(".") and (is_said or suffix == ".dome")
+
+
 def _rti_files(folder: Path, listing: Listing, notes: list[str]) -> list[str]:
     """The ``.lp`` files of an RTIBuilder project, seen from its top, or of any other folder here."""
     usual = [name for name in listing.folders if name.lower() in RTI_FOLDERS]
@@ -83,15 +98,7 @@ def _rti_files(folder: Path, listing: Listing, notes: list[str]) -> list[str]:
 
 def _other_file(folder: Path, listing: Listing, notes: list[str]) -> str:
     """The file of another format that is about lights by its name."""
-    about = []
-    for name in listing.others:
-        path = Path(name)
-        words = re.sub(r"[\W_\d]+", " ", path.stem.lower()).strip()
-        fits = path.suffix.lower() == ".dome" or (
-            path.suffix.lower() in SUFFIXES and ABOUT_LIGHTS.search(words) and not ABOUT_STRENGTH.search(words)
-        )
-        if fits and not name.startswith("."):
-            about.append(name)
+    about = [name for name in listing.others if is_about_lights(name)]
     positions = [name for name in about if ABOUT_PLACES.search(name.lower())]
     about = [name for name in about if name not in positions]
     for preferred in PREFERRED:

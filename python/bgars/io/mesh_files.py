@@ -11,6 +11,7 @@ from bgars import _bgars
 from bgars.errors import InputError
 from bgars.io.atomic import atomic_file
 from bgars.records import HeightMap
+from bgars.scalar_checks import thread_count
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -70,6 +71,7 @@ def write_mesh(
     ...     [path.name for path in pathlib.Path(folder).iterdir()]
     ['flat.ply']
     """
+    threads = thread_count(threads)
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in MESH_SUFFIXES:

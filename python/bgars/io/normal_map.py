@@ -1,29 +1,37 @@
-"""Normal maps as 16-bit PNG."""
+"""Normal maps: written as 16-bit PNG, read from what people hold."""
 
 from __future__ import annotations
 
+import math
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bgars import _bgars
-from bgars.errors import FileFormatError, InputError
+from bgars.errors import InputError
 from bgars.io.atomic import atomic_file
-from bgars.io.images import MAX_MEGAPIXELS
+from bgars.io.guarded import stored_shape
+from bgars.io.height import HEIGHT_SUFFIXES
+from bgars.io.masks import read_mask
+from bgars.io.normal_map_encoding import Normals, normals_of
+from bgars.io.normal_map_pixels import NORMAL_MAP_SUFFIXES, is_normal_array, read_pixels
+from bgars.io.own_files import is_own, sign
+from bgars.plain_arrays import plain, without_mask
+from bgars.records import NormalField
 
 if TYPE_CHECKING:
     from os import PathLike
 
-    from bgars.records import FloatArray, NormalField
+    from numpy.typing import ArrayLike
 
-__all__ = ["read_normal_map", "write_normal_map"]
+    from bgars.records import FloatArray
+
+__all__ = ["holds_normals", "read_normal_map", "read_stored_normals", "write_normal_map"]
 
 FULL = 65535.0
 NORMALS_NDIM = 3
-UNIT_WITHIN = 0.1
-"""How far a vector of 8 bits that was filtered or resized may be from length 1."""
-MOST_OTHERS = 0.5
 
 
 def write_normal_map(normals: NormalField | FloatArray, path: str | PathLike[str], *, directx: bool = False) -> None:
@@ -48,7 +56,8 @@ def write_normal_map(normals: NormalField | FloatArray, path: str | PathLike[str
         The file cannot be written.
     """
     path = Path(path)
-    vectors = np.asarray(getattr(normals, "normals", normals), dtype=np.float32)
+    given: ArrayLike = normals.normals if isinstance(normals, NormalField) else normals
+    vectors = plain("normals", without_mask(given, math.nan), np.float32)
     if vectors.ndim != NORMALS_NDIM or vectors.shape[2] != NORMALS_NDIM:
         msg = f"normals: must have shape (H, W, 3), got {vectors.shape}"
         raise InputError(msg)
@@ -60,27 +69,40 @@ def write_normal_map(normals: NormalField | FloatArray, path: str | PathLike[str
     rgb = np.where(np.isfinite(codes), np.clip(codes, 0.0, FULL), 0.0).astype(np.uint16)
     with atomic_file(path) as temporary:
         _bgars.write_png16(temporary, rgb)
+        sign(temporary)
 
 
-def read_normal_map(path: str | PathLike[str], *, directx: bool = False) -> FloatArray:
-    """Read a normal map of 8 or 16 bits a channel.
+def read_normal_map(
+    path: str | PathLike[str], *, directx: bool | None = None, mask: str | PathLike[str] | None = None
+) -> FloatArray:
+    """Read a normal map, in whichever dialect it is.
+
+    8 and 16 bits a channel encode ``round((n + 1) / 2 * 255)`` (65535); of 8 bits, 127 and 128 both are 0, which has no
+    code of its own: a plain map of (128, 128, 255) is flat. Alpha is a mask. The one colour around an object is left
+    out where it is no unit vector, or where the object ends steeply at it. Maps of two channels get their z computed.
+    sRGB curves, blue and red exchanged, z away from the camera and green down are recognised, and a warning says so.
 
     Parameters
     ----------
     path : path
-        RGB image, R = x, G = y up (OpenGL), B = z.
-    directx : bool
-        The file has G = y down.
+        PNG, JPEG, BMP, PPM, TIFF (8 and 16 bits, float), EXR (``pip install 'bgars[exr]'``), .npy or .npz (of several
+        arrays the one whose name has "normal"); R = x, G = y up (OpenGL), B = z.
+    directx : bool, optional
+        The file has G = y down; by default the curl of its field says.
+    mask : path, optional
+        Image, white = use; background is then not looked for.
 
     Returns
     -------
     (H, W, 3) float32
-        Unit normals; NaN where the file is black.
+        Unit normals; NaN where the file is black, transparent, masked, or no unit vector.
 
     Raises
     ------
+    InputError
+        An unknown suffix, a mask of another size.
     FileFormatError
-        The file is not an RGB image, or most of its pixels that are not black hold no unit vectors.
+        The file is damaged, most of its pixels hold no unit vectors, or many face away (object or world space).
 
     Examples
     --------
@@ -92,29 +114,28 @@ def read_normal_map(path: str | PathLike[str], *, directx: bool = False) -> Floa
     >>> back.round(3).tolist()
     [[[0.6000000238418579, 0.0, 0.800000011920929], [nan, nan, nan]]]
     """
+    found = read_stored_normals(path, directx=directx, mask=mask)
+    for note in found.notes:
+        warnings.warn(f"{path}: {note}", stacklevel=2)
+    return found.vectors
+
+
+def read_stored_normals(
+    path: str | PathLike[str], *, directx: bool | None = None, mask: str | PathLike[str] | None = None
+) -> Normals:
+    """Read a normal map and what had to be assumed; otherwise as :func:`read_normal_map`."""
     path = Path(path)
-    try:
-        rgb = _bgars.read_rgb16(path, MAX_MEGAPIXELS)
-    except FileFormatError as error:
-        msg = f"{error}; a normal map is an RGB image, R = x, G = y, B = z"
-        raise FileFormatError(msg) from None
-    vectors = rgb.astype(np.float32) / np.float32(FULL) * 2.0 - 1.0
-    if directx:
-        vectors[..., 1] *= -1.0
-    lengths = np.linalg.norm(vectors, axis=2, keepdims=True)
-    black = (rgb == 0).all(axis=2)
-    _check_lengths(path, lengths[~black])
-    vectors /= np.maximum(lengths, 1e-6)
-    vectors[black] = np.nan
-    return vectors
+    pixels = read_pixels(path)
+    shape = pixels.values.shape
+    use = None if mask is None else read_mask(Path(mask), (shape[0], shape[1]))
+    if use is None and path.suffix.lower() == ".png" and is_own(path):
+        use = np.ones(shape[:2], np.bool_)  # black says where there is nothing: a board of one colour is a board
+    return normals_of(path, pixels, use, directx)
 
 
-def _check_lengths(path: Path, lengths: FloatArray) -> None:
-    """Refuse a picture of something else: its colours are no unit vectors."""
-    others = float(np.mean(np.abs(lengths - 1.0) > UNIT_WITHIN)) if lengths.size else 0.0
-    if others > MOST_OTHERS:
-        msg = (
-            f"{path}: is not a normal map: at least {1 - MOST_OTHERS:.0%} of its pixels must be unit vectors (length 1 "
-            f"within {UNIT_WITHIN:g}), but {others:.1%} are not"
-        )
-        raise FileFormatError(msg)
+def holds_normals(path: Path) -> bool:
+    """Whether a file can be a normal map: by its suffix, and where heights have the same one, by its shape."""
+    suffix = path.suffix.lower()
+    if suffix in HEIGHT_SUFFIXES:
+        return is_normal_array(stored_shape(path, "a normal map or a height map"))
+    return suffix in NORMAL_MAP_SUFFIXES

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import csv
 import math
+from collections import Counter
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from bgars.errors import FileFormatError, InputError
 
@@ -61,7 +63,7 @@ def read_positions(path: Path, diameter_um: float | None = None) -> tuple[tuple[
         raise FileFormatError(msg)
     names = [name for name, _, _ in places]
     if len(set(names)) < len(names):
-        twice = next(name for index, name in enumerate(names) if name in names[:index])
+        twice = Counter(names).most_common(1)[0][0]
         msg = f"{path}: name: must be given once, got {twice!r} twice"
         raise InputError(msg)
     _refuse_close(path, places, diameter_um or 0.0)
@@ -92,11 +94,16 @@ def _place_mm(path: Path, number: int, cells: list[str]) -> tuple[str, float, fl
 
 def _refuse_close(path: Path, places: list[tuple[str, float, float]], least_um: float) -> None:
     points_um = np.array([place[1:] for place in places])
-    for index in range(len(points_um) - 1):
-        distances_um = np.hypot(*(points_um[index + 1 :] - points_um[index]).T)
-        nearest = int(distances_um.argmin())
-        if distances_um[nearest] <= least_um:
-            pair = f"{places[index][0]} and {places[index + 1 + nearest][0]}"
-            rule = f"must be more than {least_um:g} um apart" if least_um else "must be at different places"
-            msg = f"{path}: {pair}: {rule}, got {distances_um[nearest]:g} um"
-            raise InputError(msg)
+    if len(places) < len(("one", "other")):
+        return
+    found = KDTree(points_um).query(points_um, k=2)
+    distances_um, neighbours = (np.asarray(values) for values in found)
+    distances_um = distances_um[:, 1]
+    index = int(np.argmin(distances_um))
+    # Of two at one place, either may come first.
+    nearest = next(int(other) for other in neighbours[index] if other != index)
+    if distances_um[index] <= least_um:
+        one, other = sorted((index, nearest))
+        rule = f"must be more than {least_um:g} um apart" if least_um else "must be at different places"
+        msg = f"{path}: {places[one][0]} and {places[other][0]}: {rule}, got {distances_um[index]:g} um"
+        raise InputError(msg)

@@ -27,6 +27,7 @@ __all__ = ["RESULT_NAME", "parse_result", "read_result"]
 
 RESULT_NAME = "result.json"
 OLDEST_VERSION = 2
+MAX_BYTES = 64_000_000
 READABLE_VERSIONS = range(OLDEST_VERSION, FORMAT_VERSION + 1)
 
 
@@ -55,12 +56,7 @@ def read_result(path: str | PathLike[str]) -> PartResult:
         if not path.is_file():
             msg = f"{path.parent}: holds no {RESULT_NAME}: not a folder that bgars inspect wrote"
             raise FileFormatError(msg)
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        msg = f"{path}: cannot be read ({error.strerror})"
-        raise FileFormatError(msg) from error
-    return parse_result(content, path)
+    return parse_result(read_bounded(path, MAX_BYTES, "result"), path)
 
 
 def parse_result(content: bytes, path: Path) -> PartResult:

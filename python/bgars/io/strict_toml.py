@@ -49,7 +49,7 @@ def _explain(model: type[BaseModel], path: Path, error: ValidationError) -> str:
     is_unknown = first["type"] == "extra_forbidden"
     keys, known = _walk(model, first["loc"][:-1] if is_unknown else first["loc"])
     if is_unknown:
-        name = str(first["loc"][-1])
+        name = _short(str(first["loc"][-1]))
         nearest = difflib.get_close_matches(name, known, n=1, cutoff=0.0)
         hint = f"; the nearest known key is '{nearest[0]}'" if nearest else ""
         return f"{path}: unknown key '{_short('.'.join([*keys, name]))}'{hint} (known: {', '.join(known)})"

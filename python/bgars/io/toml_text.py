@@ -22,6 +22,10 @@ __all__ = ["read_values"]
 
 MAX_BYTES = 1_000_000
 """Largest recipe: lists of some thousand lights have a tenth of it."""
+MAX_DOTS = 32
+LONG_KEY = re.compile(r"(?:[\w\"'-]{1,64}[ \t]{0,8}\.[ \t]{0,8}){33}")
+"""Of 34 parts or more, with blanks between, wherever it stands: in tables within a line, too."""
+BETWEEN_WORDS = re.compile(r"[\s,={}\[\]]+")
 MAX_DEPTH = 20
 """Deepest nesting of tables and lists; the recipes need four."""
 BACKSLASH = re.compile(r'"[^"\n]*\\[^"\n]*"')
@@ -65,9 +69,14 @@ def read_values(path: Path) -> dict[str, Any]:
 def _refuse_long_keys(content: str, path: Path) -> None:
     """A key of many parts makes the parser's time grow with their square."""
     for number, line in enumerate(content.splitlines(), start=1):
-        key = line if line.lstrip().startswith("[") else line.partition("=")[0]
-        if key.count(".") > 10 * MAX_DEPTH:
-            msg = f"{path}: line {number}: a key of {key.count('.') + 1} parts; recipes need three at most"
+        if line.count(".") <= MAX_DOTS or line.lstrip().startswith("#"):
+            continue
+        # Not the numbers of a list, which dots are in, too.
+        dots = max(word.count(".") for word in BETWEEN_WORDS.split(line))
+        spaced = LONG_KEY.search(line)
+        dots = max(dots, 0 if spaced is None else spaced[0].count("."))
+        if dots > MAX_DOTS:
+            msg = f"{path}: line {number}: a key of {dots + 1} parts or more; recipes need three at most"
             raise FileFormatError(msg)
 
 

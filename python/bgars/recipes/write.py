@@ -7,20 +7,22 @@ import json
 import math
 from dataclasses import asdict, fields
 from importlib.metadata import version
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import imageio.v3 as iio
 import numpy as np
 
+from bgars.csv_cells import harmless
 from bgars.errors import InputError
 from bgars.io.atomic import atomic_folder
+from bgars.io.given_paths import capture_marks
 from bgars.recipes.dump import ALBEDO_MAP, setup_values
 from bgars.simulate import BallTruth
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from os import PathLike
-    from pathlib import Path
 
     from bgars.records import Capture
     from bgars.simulate import PlaneTruth, SimulatedTruth
@@ -44,7 +46,7 @@ def write_simulation(capture: Capture, truth: SimulatedTruth, folder: str | Path
     capture, truth : Capture, SimulatedTruth
         From :func:`bgars.simulate`.
     folder : path
-        Made if missing; files of the same name are replaced, others stay.
+        Made if missing; must not hold a capture. Other files of it stay.
 
     Returns
     -------
@@ -56,7 +58,7 @@ def write_simulation(capture: Capture, truth: SimulatedTruth, folder: str | Path
     FileFormatError
         The folder cannot be written.
     InputError
-        More than 64 lights.
+        More than 64 lights, or a folder that holds a capture already.
     """
     return write_simulation_of(lambda: (capture, truth), folder)[0]
 
@@ -65,6 +67,13 @@ def write_simulation_of(
     run: Callable[[], tuple[Capture, SimulatedTruth]], folder: str | PathLike[str]
 ) -> tuple[list[str], SimulatedTruth]:
     """Like :func:`write_simulation`, but try the folder before the work of `run`, so that none is lost."""
+    found = capture_marks(Path(folder))
+    if found:
+        msg = (
+            f"{folder}: holds a capture already ({', '.join(found)}): two would be mixed; "
+            "name another folder, or remove that one"
+        )
+        raise InputError(msg)
     with atomic_folder(folder) as place:
         capture, truth = run()
         lights = len(capture.rig)
@@ -148,7 +157,7 @@ def _write_balls(path: Path, balls: tuple[BallTruth, ...]) -> None:
     with path.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.DictWriter(stream, [field.name for field in fields(BallTruth)], lineterminator="\n")
         writer.writeheader()
-        writer.writerows(asdict(ball) for ball in balls)
+        writer.writerows(asdict(ball) | {"name": harmless(ball.name)} for ball in balls)
 
 
 def _truth_values(truth: SimulatedTruth) -> dict[str, Any]:

@@ -121,6 +121,7 @@ def side_files(photograph: Photograph, lamps: tuple[Lamp, ...], surface: PartSur
     content = None if surface is None else surface_bytes(surface)
     place = {name: value for name, value in asdict(photograph).items() if name != "jpeg"}
     values = {
+        "format": "bgars-page",
         "photograph": {"file": PHOTOGRAPH_FILE, **place},
         "lights": [asdict(lamp) for lamp in lamps],
         # By its checksum: the file of an earlier inspection must not be taken for this one's.

@@ -8,12 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from bgars.simulate.balls import Ball, ball_name
-from bgars.simulate.checks import at_least, number, positive, whole
+from bgars.simulate.checks import at_least, number, positive, require, whole
 
 __all__ = ["Jitter", "array_balls", "truncated_normal"]
 
 CUT_OFF = 2.5
 MAX_DRAWS = 64
+
+MAX_BALLS = 32_767
+"""Labels are int16."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +66,7 @@ def array_balls(
     """Return the balls of a grid in reading order; see :meth:`bgars.Scene.ball_array`."""
     for name, count in (("scene.rows", rows), ("scene.cols", cols)):
         whole(name, count, 1)
+    require(rows * cols <= MAX_BALLS, "scene.rows x scene.cols", f"must be {MAX_BALLS} balls or fewer", rows * cols)
     for name, value in (("pitch_um", pitch_um), ("diameter_um", diameter_um), ("height_um", height_um)):
         positive(f"scene.{name}", value)
     number("scene.rotation_deg", rotation_deg)

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 __all__ = ["simulate"]
 
+MOST_THREADS = 64
+
 VARIATION_KEY = 1 << 63
 """Sets the streams of the ball-to-ball variation apart from those of the noise."""
 MAX_SEED = (1 << 63) - 1
@@ -119,6 +121,8 @@ def simulate(
     sensor = Sensor(camera, seed)
     finishes = _finishes(material.variation, world.solids, seed)
     studio = Studio(world, rig, material, camera, sensor, shape, finishes, _floor_um(board, x_um, y_um, camera))
+    # More threads only wait for each other.
+    threads = None if threads is None else min(threads, MOST_THREADS)
     frames = render(studio, threads=threads, tile_rows=tile_rows, progress=progress)
     capture = Capture(
         images=frames.images,

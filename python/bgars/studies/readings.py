@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bgars.csv_cells import harmless
 from bgars.studies.characteristics import CHARACTERISTICS, Characteristic, part_readings
 
 if TYPE_CHECKING:
@@ -103,4 +104,5 @@ def readings_csv(study: Study) -> str:
 
 
 def _cell(text: str) -> str:
+    text = harmless(text)
     return '"' + text.replace('"', '""') + '"' if set(text) & set(',"\r\n') else text

@@ -2,8 +2,8 @@
 
 use numpy::ndarray::Dimension;
 use numpy::{
-    Element, PyArray1, PyArray2, PyArray3, PyArray4, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3,
-    PyReadonlyArray4, PyReadwriteArray, PyUntypedArrayMethods,
+    Element, PyArray1, PyArray2, PyArray3, PyArray4, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray,
+    PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArray4, PyReadwriteArray, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 
@@ -20,27 +20,57 @@ pub enum Stack<'py> {
     F32(PyReadonlyArray3<'py, f32>),
 }
 
-/// The elements of a C-contiguous array; the Python side has made it contiguous.
+/// The elements of an array in C order; the Python side has brought it there.
+///
+/// `as_slice` alone takes Fortran order, too, and would hand the elements over in the order of memory.
+fn elements<'a, T: Element, D: Dimension>(array: &'a PyReadonlyArray<'_, T, D>, name: &str) -> PyResult<&'a [T]> {
+    if !array.is_c_contiguous() {
+        return Err(not_c_order(name));
+    }
+    refuse_other_bools(array, name)?;
+    array.as_slice().map_err(|_| not_c_order(name))
+}
+
+fn not_c_order(name: &str) -> PyErr {
+    InputError::new_err(format!("{name}: must be C-contiguous"))
+}
+
+/// A bool is one of two bytes: what `view(bool)` makes of others must not reach Rust as one.
+fn refuse_other_bools<T: Element, D: Dimension>(array: &PyReadonlyArray<'_, T, D>, name: &str) -> PyResult<()> {
+    let is_bool = array.dtype().is_equiv_to(&numpy::dtype::<bool>(array.py()));
+    if is_bool && array.len() > 0 {
+        let bytes = array.call_method1("view", ("u1",))?;
+        if bytes.call_method0("max")?.extract::<u8>()? > 1 {
+            return Err(InputError::new_err(format!("{name}: a bool must be 0 or 1, got other bytes")));
+        }
+    }
+    Ok(())
+}
+
+/// Elements of two dimensions.
 pub fn slice2<'a, T: Element>(array: &'a PyReadonlyArray2<'_, T>, name: &str) -> PyResult<&'a [T]> {
-    array.as_slice().map_err(|_| InputError::new_err(format!("{name}: must be C-contiguous")))
+    elements(array, name)
 }
 
 /// The same for three dimensions.
 pub fn slice3<'a, T: Element>(array: &'a PyReadonlyArray3<'_, T>, name: &str) -> PyResult<&'a [T]> {
-    array.as_slice().map_err(|_| InputError::new_err(format!("{name}: must be C-contiguous")))
+    elements(array, name)
 }
 
 /// The same for four dimensions.
 pub fn slice4<'a, T: Element>(array: &'a PyReadonlyArray4<'_, T>, name: &str) -> PyResult<&'a [T]> {
-    array.as_slice().map_err(|_| InputError::new_err(format!("{name}: must be C-contiguous")))
+    elements(array, name)
 }
 
-/// The elements of a C-contiguous array, to be written.
+/// The elements of an array in C order, to be written.
 pub fn slice_mut<'a, T: Element, D: Dimension>(
     array: &'a mut PyReadwriteArray<'_, T, D>,
     name: &str,
 ) -> PyResult<&'a mut [T]> {
-    array.as_slice_mut().map_err(|_| InputError::new_err(format!("{name}: must be C-contiguous")))
+    if !array.is_c_contiguous() {
+        return Err(not_c_order(name));
+    }
+    array.as_slice_mut().map_err(|_| not_c_order(name))
 }
 
 /// Rows of `N` values, shape (rows, N).

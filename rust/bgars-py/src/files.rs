@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use bgars_core::io::decode::{Channel, Color, StackMut, StackPlan, StackType};
-use bgars_core::io::{HeightSource, MeshFormat, MeshView, rgb16, write_mesh_file};
+use bgars_core::io::{HeightSource, MeshFormat, MeshView, color, rgb16, write_mesh_file};
 use bgars_core::mesh::HeightMesh;
 use numpy::{PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadwriteArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -71,11 +71,12 @@ pub fn decode_stack<'py>(
     Ok((array, plan.linear, plan.bits))
 }
 
+/// (H, W, 3 or 4) codes as they are stored, and bits a channel.
 #[pyfunction]
 #[allow(clippy::needless_pass_by_value)]
-pub fn read_rgb16(py: Python<'_>, path: PathBuf, max_megapixels: f64) -> PyResult<Bound<'_, PyArray3<u16>>> {
-    let image = py.detach(|| rgb16::read_rgb16(&path, max_megapixels)).map_err(to_python)?;
-    array3(py, image.data, [image.height, image.width, 3])
+pub fn read_color(py: Python<'_>, path: PathBuf, max_megapixels: f64) -> PyResult<(Bound<'_, PyArray3<f32>>, u16)> {
+    let image = py.detach(|| color::read_color(&path, max_megapixels)).map_err(to_python)?;
+    Ok((array3(py, image.data, [image.height, image.width, image.channels])?, image.bits))
 }
 
 #[pyfunction]

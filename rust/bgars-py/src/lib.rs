@@ -26,7 +26,7 @@ mod _bgars {
     #[pymodule_export]
     use crate::files::decode_stack;
     #[pymodule_export]
-    use crate::files::read_rgb16;
+    use crate::files::read_color;
     #[pymodule_export]
     use crate::files::write_height;
     #[pymodule_export]

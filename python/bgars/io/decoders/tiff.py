@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from bgars.io.image_formats import ImageFormat
     from bgars.records import PixelArray
 
-__all__ = ["read_tiff", "read_tiff_pages"]
+__all__ = ["quiet", "read_tiff", "read_tiff_pages"]
 
 PLANAR_SEPARATE = 2
 
@@ -32,7 +32,7 @@ def read_tiff(path: Path, kind: ImageFormat, max_megapixels: float) -> PixelArra
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def quiet() -> Iterator[None]:
     """Keep tifffile from logging what it finds damaged: one message names the file."""
     logger = logging.getLogger("tifffile")
     before, logger.disabled = logger.disabled, True
@@ -52,7 +52,7 @@ def read_tiff_pages(path: Path, count: int, max_megapixels: float) -> NDArray[An
     """
     import tifffile  # noqa: PLC0415 - most captures never need it
 
-    with _quiet(), tifffile.TiffFile(path) as file:
+    with quiet(), tifffile.TiffFile(path) as file:
         pages: list[Any] = [page for page in file.pages if not getattr(page, "is_reduced", False)]
         if len(pages) != count:
             msg = f"{path}: holds {len(pages)} images, but {count} are expected"

@@ -288,7 +288,8 @@ pub(super) fn translate(path: &Path, error: ImageError) -> Error {
     let path = path.to_path_buf();
     match error {
         ImageError::Unsupported(reason) => Error::UnsupportedImage { path, reason: reason.to_string() },
-        other => Error::Decode { path, reason: other.to_string() },
+        // Some end in a line break.
+        other => Error::Decode { path, reason: other.to_string().trim_end().to_owned() },
     }
 }
 

@@ -1,6 +1,7 @@
 //! Files: image stacks in, meshes out.
 
 mod blocks;
+pub mod color;
 pub mod decode;
 mod mesh_file;
 mod mesh_source;

@@ -1,0 +1,72 @@
+"""A short run of the fuzzer in CI, and what longer runs found."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from pathlib import Path
+
+import bgars
+import numpy as np
+import pytest
+import tifffile
+
+sys.path.insert(0, str(Path(__file__).parent))
+import fuzzer
+from readers import READERS, make_corpus
+
+INPUTS = 60
+SEED = 20261128
+
+
+@pytest.fixture(scope="module")
+def corpus(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("fuzz") / "corpus"
+    make_corpus(folder)
+    return folder
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_whole_files_are_read(name: str, corpus: Path) -> None:
+    read, patterns = READERS[name]
+    files = [path for pattern in patterns for path in sorted(corpus.glob(pattern))]
+    assert files
+    for path in files:
+        if path.name == "hp.tif":  # several pages
+            with pytest.raises(bgars.FileFormatError, match="several pages"):
+                read(path)
+        elif path.name != "scene.json":
+            read(path)
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_damaged_files_are_read_or_refused_in_one_line(name: str, corpus: Path, tmp_path: Path) -> None:
+    found = fuzzer.run_batch(corpus, name, SEED, 0, INPUTS, tmp_path)
+    assert found == Counter({"": INPUTS})
+
+
+def test_a_tiff_of_more_rows_than_its_table_of_strips_is_refused_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "h.tif"
+    tifffile.imwrite(path, np.zeros((12, 14), np.float32), compression="zlib", rowsperstrip=3)
+    with tifffile.TiffFile(path, mode="r+b") as tiff:
+        tiff.pages.first.tags["ImageLength"].overwrite(2_097_164)
+    with pytest.raises(bgars.FileFormatError, match="table of strips"):
+        bgars.read_height(path)
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        {"descr": "<f4", "fortran_order": False, "shape": (10**9, 10**9)},
+        {"descr": "<f4", "fortran_order": False, "shape": (-4, 4)},
+        {"descr": "|O", "fortran_order": False, "shape": (4, 4)},
+        {"descr": "<c8", "fortran_order": False, "shape": (4, 4)},
+    ],
+)
+def test_an_npy_header_is_not_believed(header: dict[str, object], tmp_path: Path) -> None:
+    path = tmp_path / "h.npy"
+    with path.open("wb") as file:
+        np.lib.format.write_array_header_1_0(file, header)
+        file.write(bytes(3000))
+    with pytest.raises(bgars.FileFormatError, match=path.name):
+        bgars.read_height(path)
