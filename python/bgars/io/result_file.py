@@ -17,6 +17,7 @@ from bgars.part_identity import PartIdentity
 from bgars.part_material import MaterialParameter, PartMaterial
 from bgars.part_recipe import Limits, PartRecipe
 from bgars.part_result import FORMAT, FORMAT_VERSION, BallResult, PartCheck, PartResult, SeatingResult
+from bgars.safe_files import read_bounded
 
 if TYPE_CHECKING:
     from os import PathLike
