@@ -37,7 +37,9 @@ def plain(name: str, values: ArrayLike, dtype: DTypeLike | None = None) -> NDArr
         raise InputError(msg)
     try:
         array = np.asarray(values)
-        wanted = (array.dtype if dtype is None else np.dtype(dtype)).newbyteorder("=")
+        wanted = array.dtype if dtype is None else np.dtype(dtype)
+        if not wanted.isnative:  # a dtype made anew would make a view, not the same object
+            wanted = wanted.newbyteorder("=")
         if wanted.kind not in "bc" and array.dtype.kind == "c":
             msg = f"{name}: must be real numbers, got {array.dtype}"
             raise InputError(msg)
