@@ -77,7 +77,7 @@ def against_cosines(side: int) -> None:
     timed = alternate(ours, lambda: solver.solve(divergence(field.normals)))
     emit_ratio(GROUP, "rectangle", size, threads, f"{peer}, from normals", timed, "at most", limit)
     timed = alternate(ours, lambda: solver.solve(right))
-    emit_ratio(GROUP, "rectangle", size, threads, f"{peer}, solve alone", timed, "at most", limit)
+    emit_ratio(GROUP, "rectangle", size, threads, f"{peer}, solve alone", timed, "at most", None)
     emit_difference("scipy DCT (other weights), rectangle", side, ours().height_px, solver.solve(right))
 
 
