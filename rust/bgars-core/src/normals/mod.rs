@@ -209,6 +209,7 @@ impl<'a> NormalMapMut<'a> {
 
 /// The first elements of a slice, or all where it has fewer; the others stay.
 #[inline]
+#[allow(clippy::mut_mut)] // what is left is written back
 fn take<'a, T>(slice: &mut &'a mut [T], count: usize) -> &'a mut [T] {
     let count = count.min(slice.len());
     let (first, rest) = std::mem::take(slice).split_at_mut(count);

@@ -14,9 +14,9 @@ const LIFT: f32 = (1u128 << 64) as f32;
 /// The lights of some pixels by their rank: the clipped last, else the darker first, of equal values the lower number.
 pub(super) struct Ranks {
     /// The rank of each light.
-    pub ranks: Vec<Row<u32>>,
+    pub of_lights: Vec<Row<u32>>,
     /// The lights in that order.
-    pub ranked: Vec<Ranked>,
+    pub lights: Vec<Ranked>,
     /// Medians of the values, clipped or not; of an even number the mean of the two in the middle.
     pub medians: Row<f32>,
     /// True where every value is zero.
@@ -50,8 +50,8 @@ impl Ranked {
 impl Ranks {
     pub fn new(lights: usize) -> Self {
         Self {
-            ranks: vec![Row::of(0); lights],
-            ranked: vec![Ranked::ZERO; lights],
+            of_lights: vec![Row::of(0); lights],
+            lights: vec![Ranked::ZERO; lights],
             medians: Row::of(0.0),
             black: Row::of(false),
             unsure: Row::of(false),
@@ -87,9 +87,9 @@ impl Ranks {
             self.rank();
         }
         for (light, direction) in directions.iter().enumerate() {
-            let (ranks, value, clipped) = (&self.ranks[light], &values[light], &clipped[light]);
+            let (ranks, value, clipped) = (&self.of_lights[light], &values[light], &clipped[light]);
             for lane in 0..WIDTH {
-                let ranked = &mut self.ranked[ranks[lane] as usize];
+                let ranked = &mut self.lights[ranks[lane] as usize];
                 ranked.value[lane] = value[first + lane];
                 for axis in 0..3 {
                     ranked.direction[axis][lane] = direction[axis];
@@ -107,15 +107,15 @@ impl Ranks {
             let mut rank = Row::of(0u32);
             for before in 0..light {
                 // Copies, or the compiler has to ask what overlaps.
-                let (other, mut other_rank) = (self.keys[before], self.ranks[before]);
+                let (other, mut other_rank) = (self.keys[before], self.of_lights[before]);
                 for lane in 0..WIDTH {
                     let is_behind = other[lane] <= key[lane];
                     rank[lane] = if is_behind { rank[lane] + 1 } else { rank[lane] };
                     other_rank[lane] = if is_behind { other_rank[lane] } else { other_rank[lane] + 1 };
                 }
-                self.ranks[before] = other_rank;
+                self.of_lights[before] = other_rank;
             }
-            self.ranks[light] = rank;
+            self.of_lights[light] = rank;
         }
     }
 
@@ -124,7 +124,7 @@ impl Ranks {
         let lights = self.keys.len();
         let (below, above) = (((lights - 1) / 2) as u32, (lights / 2) as u32);
         let [mut lower, mut upper] = [Row::of(0.0); 2];
-        for (key, rank) in self.keys.iter().zip(&self.ranks) {
+        for (key, rank) in self.keys.iter().zip(&self.of_lights) {
             for lane in 0..WIDTH {
                 lower[lane] = if rank[lane] == below { key[lane] } else { lower[lane] };
                 upper[lane] = if rank[lane] == above { key[lane] } else { upper[lane] };

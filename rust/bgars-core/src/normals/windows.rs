@@ -102,7 +102,7 @@ impl WindowFilter {
                 self.judge::<FMA>(index as u32, window, sums, ranks, &mut best);
             }
             let (starts, ends) = self.kept(&best, ranks);
-            for (weight, ranks) in weights.iter_mut().zip(&ranks.ranks) {
+            for (weight, ranks) in weights.iter_mut().zip(&ranks.of_lights) {
                 for lane in 0..WIDTH {
                     let is_kept = (ranks[lane] >= starts[lane]) & (ranks[lane] < ends[lane]);
                     weight[first + lane] = if is_kept { 1.0 } else { 0.0 };
@@ -118,7 +118,7 @@ impl WindowFilter {
     /// First and one past last rank that each pixel keeps.
     #[inline(always)]
     fn kept(&self, best: &Best, ranks: &Ranks) -> (Row<u32>, Row<u32>) {
-        let lights = ranks.ranked.len();
+        let lights = ranks.lights.len();
         let [mut starts, mut ends] = [Row::of(0), Row::of(lights as u32)];
         for lane in 0..WIDTH {
             // No window fits nothing: every light is kept.
@@ -139,7 +139,7 @@ impl WindowFilter {
                 Some((shorter, end)) => (sums[shorter], end),
                 None => ([Row::of(0.0); SUMS], window.first),
             };
-            for light in &ranks.ranked[start..window.end] {
+            for light in &ranks.lights[start..window.end] {
                 for lane in 0..WIDTH {
                     let [x, y, z] = [light.direction[0][lane], light.direction[1][lane], light.direction[2][lane]];
                     let value = light.value[lane];
@@ -196,13 +196,13 @@ impl WindowFilter {
     #[inline(always)]
     fn residuals<const FMA: bool>(&self, window: &Window, facets: &[Row<f32>; 3], ranks: &Ranks) -> [Row<f32>; 2] {
         let [mut residuals, mut unexplained] = [Row::of(0.0f32); 2];
-        for light in &ranks.ranked[window.first..window.end] {
+        for light in &ranks.lights[window.first..window.end] {
             for lane in 0..WIDTH {
                 let difference = light.value[lane] - light.predicted::<FMA>(facets, lane);
                 residuals[lane] = add_product::<FMA>(residuals[lane], difference, difference);
             }
         }
-        for (lights, left_as_dark) in [(&ranks.ranked[..window.first], true), (&ranks.ranked[window.end..], false)] {
+        for (lights, left_as_dark) in [(&ranks.lights[..window.first], true), (&ranks.lights[window.end..], false)] {
             for light in lights {
                 for lane in 0..WIDTH {
                     let predicted = light.predicted::<FMA>(facets, lane);

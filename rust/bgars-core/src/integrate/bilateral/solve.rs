@@ -105,7 +105,7 @@ pub fn integrate_bilateral(
         components: runs.components,
         energies,
         converged: at_rest && !fit.unsolved,
-        inner_iterations: fit.inner_iterations,
+        inner_iterations: fit.iterations,
         residual: fit.residual,
     })
 }
@@ -153,7 +153,7 @@ fn check_facing(field: Field<'_>, camera: Pinhole) -> Result<()> {
 struct Inner {
     rounds: usize,
     change: f64,
-    inner_iterations: usize,
+    iterations: usize,
     residual: f64,
     /// Whether the last of them needed more iterations than it was given.
     unsolved: bool,
@@ -198,10 +198,10 @@ fn improve(
         return Ok(());
     }
     let Outcome { iterations, norm, solved } = outcome;
-    fit.inner_iterations += iterations;
+    fit.iterations += iterations;
     let residual = norm / scale;
     if !residual.is_finite() {
-        return Err(Error::NoConvergence { iterations: fit.inner_iterations, residual, tolerance });
+        return Err(Error::NoConvergence { iterations: fit.iterations, residual, tolerance });
     }
     fit.unsolved = setting == Setting::Converged && !solved;
     fit.residual = fit.residual.max(residual);
