@@ -72,7 +72,7 @@ def write_part_pictures(result: PartResult, capture: Capture, folder: str | Path
         }
         line = identity_line(result.to_dict())
         for name, figure in figures.items():
-            figure.text(0.995, 0.003, line, ha="right", va="bottom", fontsize=6, color="0.35", parse_math=False)
+            figure.text(0.995, 0.997, line, ha="right", va="top", fontsize=6, color="0.35", parse_math=False)
             with atomic_file(folder / name) as temporary:
                 save(figure, temporary)
     return dict(PICTURES)
