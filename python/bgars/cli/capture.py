@@ -10,6 +10,7 @@ import typer
 import bgars
 from bgars.cli.console import print_json, say, stage_progress
 from bgars.cli.describe import describe, describe_in_words
+from bgars.cli.first_check import warn
 from bgars.io.given_paths import need_file
 from bgars.line.camera import camera_of, take_capture
 
@@ -45,19 +46,25 @@ def capture(
 ) -> None:
     """Take an image under each light with a camera, write a capture folder, read it again and say what is in it.
 
-    The folder appears when all is in it, so that it may lie in the inbox of bgars watch.
+    The folder appears when all is in it, so that it may lie in the inbox of bgars watch. The capture is then checked as
+    'bgars check' does.
     """
     need_file(rig)
     with stage_progress() as report:
         files = take_capture(
             camera_of(camera), output, lights=lights, rig=rig, progress=lambda fraction: report("lights", fraction)
         )
-    facts = None if rig is None else describe(bgars.read_capture(output))
+    taken = None if rig is None else bgars.read_capture(output)
+    facts = None if taken is None else describe(taken)
+    findings = None if taken is None else bgars.check(taken)
     if as_json:
-        print_json({"output": str(output), "files": files, "capture": facts})
+        found = {} if findings is None else findings.to_dict()
+        print_json({"output": str(output), "files": files, "capture": facts, **found})
         return
     say(f"{output}: {lights} images")
     for line in [] if facts is None else describe_in_words(facts):
         say(line)
     if facts is None:
         say("without --rig nothing says where the lights are: put a capture.toml into it")
+    for finding in () if findings is None else findings.told:
+        warn(finding)

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import bgars
+from bgars.cli.calibrate_station import drift
 from bgars.cli.console import print_json, say
+from bgars.errors import InputError
 from bgars.io.atomic import FolderNames, atomic_file, atomic_folder
 from bgars.io.given_paths import need_folder, need_output
 from bgars.report.check_page import check_page
@@ -44,6 +46,14 @@ def check(
             show_default=False,
         ),
     ] = None,
+    station: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="station.toml",
+            help="Compare with the calibration of this station: FOLDER shows its reference again, as every morning.",
+            show_default=False,
+        ),
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
     ] = False,
@@ -52,12 +62,18 @@ def check(
 
     Order and handedness of the lights, lights below the surface, the same image twice, dead and uneven lamps, exposure,
     frames lit in part, ambient light, vignetting, motion, focus, noise, response, bit depth. What a capture cannot show
-    (a flat part has no shading) is not said.
+    (a flat part has no shading) is not said. With --station: what moved since its calibration (docs/station.md).
 
     Exit code 0: no error was found (there may be warnings). 1: an error was found: numbers from this capture would be
     wrong. 2: wrong use, or a capture that cannot be read.
     """
     need_folder(folder)
+    if station is not None:
+        if output is not None:
+            msg = "--station, --output: give one of them; bgars calibrate writes the page of a station"
+            raise InputError(msg)
+        drift(folder, station, as_json=as_json)
+        return
     if output is not None and not _is_page(output):
         need_output(output, folder)
     capture = bgars.read_capture(folder)
