@@ -93,9 +93,8 @@ def estimate_normals(
     keep_sets : bool
         Also return which lights were kept: `NormalField.kept_sets`, (H, W, L) bool.
     out : NormalField, optional
-        Result of an earlier call on images of the same size, to be overwritten and returned. Without it, the memory of
-        a result that nobody holds any more is used again, too, and lent to the system until then. After an error in
-        the pixels, or an interruption, its content means nothing.
+        Result of an earlier call on images of the same size, to be overwritten and returned. After an error in the
+        pixels, or an interruption, its content means nothing.
     threads : int, optional
         Most threads to work on; by default what the environment variable ``RAYON_NUM_THREADS`` says, else one a core.
         The result does not depend on it.
