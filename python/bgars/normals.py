@@ -61,7 +61,7 @@ def estimate_normals(
     Parameters
     ----------
     images : Capture or (L, H, W) array_like of uint8, uint16 or float32
-        A capture, or one image a light. A C-contiguous array, read-only or not, is used where it lies; strided and
+        A capture, or one image per light. A C-contiguous array, read-only or not, is used where it lies; strided and
         Fortran-ordered ones (a crop, a transposed stack) and float64 are copied once.
     light_directions : (L, 3) array_like
         Unit vectors from the surface to the light; only with plain arrays.
