@@ -86,7 +86,7 @@ def batch_table(folder: Path, parts: int, large_cpu_s: float) -> list[str]:
     append_s = append_time(folder, captures / demo.serial_of(0))
     base = rows[0]
     lines = [
-        f"**Batch:** {parts} parts of nine balls, 290 x 290 pixels, eight lights, one thread a process.\n",
+        f"**Batch:** {parts} parts of nine balls, 290 x 290 pixels, eight lights, one thread per process.\n",
         "| processes | parts a minute | efficiency (wall) | CPU s a part | efficiency (CPU) | processors had |",
         "|---:|---:|---:|---:|---:|---:|",
     ]

@@ -92,7 +92,7 @@ def read_numbers(path: Path, columns: tuple[int, ...], meaning: str) -> NDArray[
 
 
 def _in_rows(path: Path) -> NDArray[np.float64] | None:
-    """Intensities written as one line, or three, of a number a light; None for any other form."""
+    """Intensities written as one line, or three, of a number per light; None for any other form."""
     if path.suffix.lower() == ".npy":
         return None
     lines = data_lines(read_text(path))
@@ -114,7 +114,7 @@ def _fitting(array: NDArray[np.float64], path: Path, columns: tuple[int, ...], m
 
 
 def read_intensities(path: Path) -> NDArray[np.float64]:
-    """Read (L, 1) or (L, 3) light intensities: one number a light, or red, green, blue; also as lines of L numbers."""
+    """Read (L, 1) or (L, 3) light intensities: one number per light, or red, green, blue; or lines of L numbers."""
     in_rows = _in_rows(path)
     if in_rows is not None:
         return in_rows

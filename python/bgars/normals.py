@@ -61,7 +61,7 @@ def estimate_normals(
     Parameters
     ----------
     images : Capture or (L, H, W) array_like of uint8, uint16 or float32
-        A capture, or one image a light. A C-contiguous array, read-only or not, is used where it lies; strided and
+        A capture, or one image per light. A C-contiguous array, read-only or not, is used where it lies; strided and
         Fortran-ordered ones (a crop, a transposed stack) and float64 are copied once.
     light_directions : (L, 3) array_like
         Unit vectors from the surface to the light; only with plain arrays.
@@ -93,9 +93,8 @@ def estimate_normals(
     keep_sets : bool
         Also return which lights were kept: `NormalField.kept_sets`, (H, W, L) bool.
     out : NormalField, optional
-        Result of an earlier call on images of the same size, to be overwritten and returned. Without it, the memory of
-        a result that nobody holds any more is used again, too, and lent to the system until then. After an error in
-        the pixels, or an interruption, its content means nothing.
+        Result of an earlier call on images of the same size, to be overwritten and returned. After an error in the
+        pixels, or an interruption, its content means nothing.
     threads : int, optional
         Most threads to work on; by default what the environment variable ``RAYON_NUM_THREADS`` says, else one a core.
         The result does not depend on it.

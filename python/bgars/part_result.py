@@ -293,7 +293,7 @@ class PartResult(ShownPart):
         return json.dumps(self.to_dict(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
     def to_csv(self) -> str:
-        """Return the balls as CSV text, one line a ball; empty cells where something was not measured.
+        """Return the balls as CSV text, one line per ball; empty cells where something was not measured.
 
         The last columns say which part it is: serial number, lot, capture, time.
         Text that a spreadsheet would run as a formula begins with an apostrophe.

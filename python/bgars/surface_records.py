@@ -172,7 +172,7 @@ class Anchors:
         Trust in each, at least 0; None: all alike.
     regions : (H, W) integer or None
         Pixels of different numbers are not joined, so that each region floats until its anchors hold it: for instance 0
-        for the board and one number a ball, whose silhouettes are jumps.
+        for the board and one number per ball, whose silhouettes are jumps.
     reach_px : mapping of int to float
         Regions (0 where there are no regions) in which anchors bend the surface, and over which distance, the standard
         deviation of a Gaussian: what is longer follows the anchors, what is shorter the normals.

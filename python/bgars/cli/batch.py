@@ -64,7 +64,7 @@ def batch(
     processes: Annotated[
         int | None,
         typer.Option(
-            min=1, help="Parts side by side; with --threads, one thread a core by default.", show_default=False
+            min=1, help="Parts side by side; with --threads, one thread per core by default.", show_default=False
         ),
     ] = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Threads of each process.", show_default=False)] = None,

@@ -68,7 +68,7 @@ def run(how: Run) -> Outcome:
             },
             rows,
         ),
-        about=f"A hemisphere under {listed([float(setting.lights)])} lights, one image a light.",
+        about=f"A hemisphere under {listed([float(setting.lights)])} lights, one image per light.",
         agrees=("each image has one highlight, which walks around the top with the light.",),
         differs=(
             f"each image also leaves {shadow} % of the hemisphere in attached shadow, at grey level 0, and clips "

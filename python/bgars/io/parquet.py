@@ -1,4 +1,4 @@
-"""The balls of a result as a Parquet table, for data lakes: one row a ball, units in the columns' metadata."""
+"""The balls of a result as a Parquet table, for data lakes: one row per ball, units in the columns' metadata."""
 
 from __future__ import annotations
 

@@ -135,7 +135,7 @@ def _vector(value: Any, path: Path, keys: tuple[str, ...] = AXES) -> list[float]
                 return [float(number) for number in numbers]
             except OverflowError:
                 pass
-    msg = f"{path}: must hold three numbers a light, got {repr(value)[:80]}; {EXPECTED}"
+    msg = f"{path}: must hold three numbers per light, got {repr(value)[:80]}; {EXPECTED}"
     raise FileFormatError(msg)
 
 

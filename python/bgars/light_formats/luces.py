@@ -30,7 +30,7 @@ def is_led_parameters(path: Path) -> bool:
 
 
 def read_led_parameters(path: Path) -> LightTable:
-    """Read LED parameters: a header, ``N_img columns rows f x0 y0 mean_distance``, then a line a light.
+    """Read LED parameters: a header, ``N_img columns rows f x0 y0 mean_distance``, then a line per light.
 
     A line holds the position in mm, the principal axis, the red, green and blue intensity and the exponent of the
     emission. Axes as of the camera: x right, y down, z away from it. The emission pattern is not modelled, which is

@@ -42,7 +42,7 @@ def calibrate_flat(capture: Capture) -> tuple[FlatField, tuple[Remark, ...]]:
     Parameters
     ----------
     capture : Capture
-        A flat, matt, evenly coloured board that fills the mask, one image a light; a dark frame helps.
+        A flat, matt, evenly coloured board that fills the mask, one image per light; a dark frame helps.
 
     Returns
     -------

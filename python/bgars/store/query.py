@@ -15,8 +15,8 @@ TRIES = 5
 """A compaction may take files away between the listing and the reading; the next listing has what replaced them."""
 LOST = ("No files found", "Cannot open file", "No such file")
 VIEWS = {
-    "parts": "one row a part; round = 1, 2, ... counts the inspections of a serial number",
-    "balls": "one row a ball, with serial, lot, part and time of its part",
+    "parts": "one row per part; round = 1, 2, ... counts the inspections of a serial number",
+    "balls": "one row per ball, with serial, lot, part and time of its part",
     "checks": "one row a judged quantity of a part",
     "budgets": "standard uncertainty by cause, of each reading",
     "failures": "captures that could not be inspected, and why; gone once they are",

@@ -34,7 +34,7 @@ def read_pillow(path: Path, kind: ImageFormat, max_megapixels: float) -> PixelAr
         check_size(path, image.height, image.width, max_megapixels)
         frames = getattr(image, "n_frames", 1)
         if frames != 1 and image.format != "MPO":
-            msg = f"{path}: holds {frames} frames; one image a light is expected, or a TIFF stack of all of them"
+            msg = f"{path}: holds {frames} frames; one image per light is expected, or a TIFF stack of all of them"
             raise FileFormatError(msg)
         image.load()
         if image.mode == "P":
