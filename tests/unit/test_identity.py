@@ -45,7 +45,7 @@ def test_one_inspection_takes_its_identity_from_side_file_and_options(tmp_path: 
     with (folder / "capture.toml").open("a") as file:
         file.write('\n[part]\nserial = "SN5"\nlot = "L2"\n')
     out = tmp_path / "out"
-    CliRunner().invoke(app, ["inspect", str(folder), "-o", str(out), "--lot", "other", "--station", "S9", "--parquet"])
+    CliRunner().invoke(app, ["inspect", str(folder), "-o", str(out), "--lot", "other", "--station-name", "S9", "--parquet"])
     result = bgars.read_result(out)
     assert (result.serial, result.identity.lot, result.identity.station) == ("SN5", "L2", "S9")
     assert result.identity.captured_utc
@@ -58,12 +58,12 @@ def test_one_inspection_takes_its_identity_from_side_file_and_options(tmp_path: 
 
 
 def test_pictures_say_which_part_they_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from bgars.report import part as pictures  # noqa: PLC0415
+    from bgars.report import part_style  # noqa: PLC0415
 
     capture = bgars.read_capture(bgars.sample_capture())
     result = bgars.inspect(capture)
     said: list[str] = []
-    monkeypatch.setattr(pictures, "save", lambda figure, _: said.append(figure.texts[-1].get_text()))
+    monkeypatch.setattr(part_style, "save", lambda figure, _: said.append(figure.texts[-1].get_text()))
     bgars.write_part_pictures(result, capture, tmp_path)
     assert len(said) == 4
     assert all("capture one_ball" in line for line in said)

@@ -51,7 +51,7 @@ def quick(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
     def touch(_: object, __: object, place: Path) -> dict[str, str]:
         for name in PICTURES:
-            (place / name).touch()
+            iio.imwrite(place / name, np.zeros((2, 2), np.uint8))
         return PICTURES
 
     monkeypatch.setattr(bgars, "write_part_pictures", touch)
@@ -171,7 +171,7 @@ def test_an_output_that_is_a_file_is_refused_before_the_work(quick: Path, tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("level", "words"), [(0, ["light_02.png", "black", "got 0"]), (255, ["light_02.png", "saturated", "50%", "100%"])]
+    ("level", "words"), [(0, ["light_02.png", "black", "0.0%"]), (255, ["light_02.png", "saturated", "50%", "100%"])]
 )
 def test_a_dead_or_saturated_light_is_refused_by_name(
     quick: Path, tmp_path: Path, level: int, words: list[str]

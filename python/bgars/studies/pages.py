@@ -94,7 +94,7 @@ def part_labels(found: ProcessTrend) -> tuple[str, ...]:
     --------
     >>> from types import SimpleNamespace
     >>> part_labels(SimpleNamespace(serials=("SN1",), times=("2026-01-31T12:00:00Z",)))
-    ('SN1\\n01-31 12:00',)
+    ('SN1\n01-31 12:00',)
     """
     if not any(found.serials) and not any(found.times):
         return ()

@@ -9,8 +9,10 @@ use super::super::real::Real;
 use super::super::settings::Field;
 use super::super::stencil::{EdgeRow, Stencil};
 use super::camera::Pinhole;
-use super::reweigh::Shares;
 use super::settings::Setting;
+
+/// Weights of the differences to the right and upward; the opposite ones have the rest.
+pub(super) type Shares = [Vec<f64>; 2];
 
 /// The pixels of the box, row-major; numbers of pixels outside the mask are zero.
 #[derive(Debug)]

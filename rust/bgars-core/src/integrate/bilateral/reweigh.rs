@@ -4,15 +4,12 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::super::checkerboard::BAND_ROWS;
-use super::pixels::Pixels;
+use super::pixels::{Pixels, Shares};
 
 /// Largest argument of the sigmoid, either way: beyond, one side has all but `e^-70`, which is still a normal number in `f32`.
 const MAX_ARGUMENT: f64 = 70.0;
 /// Sums of the energy in flight.
 const LANES: usize = 8;
-
-/// Weights of the differences to the right and upward; the opposite ones have the rest.
-pub(super) type Shares = [Vec<f64>; 2];
 
 /// Both sides of every pixel alike: where the iteration starts.
 pub(super) fn even(pixels: &Pixels) -> Shares {

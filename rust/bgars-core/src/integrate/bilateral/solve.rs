@@ -13,8 +13,8 @@ use super::super::settings::{Field, Progress};
 use super::super::system::System;
 use super::camera::Pinhole;
 use super::jacobi::{Diagonal, Laplacian};
-use super::pixels::{Pixels, assemble};
-use super::reweigh::{Shares, even, reweigh};
+use super::pixels::{Pixels, Shares, assemble};
+use super::reweigh::{even, reweigh};
 use super::settings::{BilateralParams, BilateralSurface, Setting};
 use crate::{Error, Result};
 
