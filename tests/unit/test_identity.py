@@ -45,7 +45,9 @@ def test_one_inspection_takes_its_identity_from_side_file_and_options(tmp_path: 
     with (folder / "capture.toml").open("a") as file:
         file.write('\n[part]\nserial = "SN5"\nlot = "L2"\n')
     out = tmp_path / "out"
-    CliRunner().invoke(app, ["inspect", str(folder), "-o", str(out), "--lot", "other", "--station-name", "S9", "--parquet"])
+    CliRunner().invoke(
+        app, ["inspect", str(folder), "-o", str(out), "--lot", "other", "--station-name", "S9", "--parquet"]
+    )
     result = bgars.read_result(out)
     assert (result.serial, result.identity.lot, result.identity.station) == ("SN5", "L2", "S9")
     assert result.identity.captured_utc
