@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import signal
 import subprocess
 import sys
 import time
@@ -58,12 +59,14 @@ def kill_often(inbox: Path, store: Path, kills: int, parts: int) -> Iterator[tup
         running.kill()
         running.communicate()
         yield census(inbox, store)
+    # With nothing left to do the end may come before the program listens to it.
+    ends = {0} if any(path.name.startswith("P") for path in inbox.iterdir()) else {0, -signal.SIGTERM}
     running = subprocess.Popen(command(inbox, store), stdout=subprocess.DEVNULL)
     deadline = time.monotonic() + 120
     while any(path.name.startswith("P") for path in inbox.iterdir()) and time.monotonic() < deadline:
         time.sleep(0.05)
     running.terminate()
-    assert running.wait(30) == 0
+    assert running.wait(30) in ends
     yield census(inbox, store)
 
 
