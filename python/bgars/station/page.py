@@ -101,7 +101,10 @@ def _lights(lights: LightCalibration) -> Iterable[str]:
         if common > own
         else "the highlights themselves (expose so that they just clip; a sharper image)"
     )
-    yield f"<p>By a {html.escape(lights.sphere)} ball; residual {lights.residual_px:.3f} px. Limited by {limit}.</p>"
+    # One mirror ball gives each light one highlight: nothing is left over to disagree.
+    alone = lights.sphere == "mirror" and len(lights.balls) == 1
+    residual = "one ball shows no residual" if alone else f"residual {lights.residual_px:.3f} px"
+    yield f"<p>By a {html.escape(lights.sphere)} ball; {residual}. Limited by {limit}.</p>"
 
 
 def _sky(directions: np.ndarray, u_deg: np.ndarray) -> str:
@@ -122,7 +125,8 @@ def _sky(directions: np.ndarray, u_deg: np.ndarray) -> str:
     )
     title = "Lights as the camera sees them; rings at elevations of 0, 30 and 60 degrees; shaded: 20 u"
     sides = f'width="{SIDE}" height="{SIDE}"'
-    return f'<svg {sides} role="img" aria-label="{title}"><title>{title}</title>{rings}{"".join(marks)}</svg>'
+    drawing = f'<svg {sides} role="img" aria-label="{title}"><title>{title}</title>{rings}{"".join(marks)}</svg>'
+    return f"<figure>{drawing}<figcaption>{title}</figcaption></figure>"
 
 
 def _flat(flat: FlatField) -> Iterable[str]:
