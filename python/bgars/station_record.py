@@ -96,6 +96,8 @@ class LightCalibration:
         Standard uncertainty of each direction, on either of the two axes across it.
     u_own_deg, u_common_deg : (L,) float64
         Its parts: of each light alone, and what the outlines of the balls move in all of them together.
+    u_lens_deg : (L,) float64 or None
+        The part of `u_common_deg` that comes from a camera of which nothing was stated.
     u_positions_um : (L, 3) float64 or None
         Near lights: standard uncertainty of x, y, z.
     u_intensities : (L,) float64 or None
@@ -121,6 +123,7 @@ class LightCalibration:
     residual_px: float
     u_positions_um: Array | None = None
     u_intensities: Array | None = None
+    u_lens_deg: Array | None = None
     lamp_deg: float = float("nan")
     findings: tuple[Remark, ...] = field(default=())
 

@@ -28,7 +28,7 @@ WRONG_SIGMAS, WRONG_SHARE = 4.0, 0.01
 SOFT_PX = 2.5
 """Width of an edge from which on a ball is out of focus."""
 SOFT_SHARE = 0.03
-MATT_FLOOR_PX = 0.25
+MATT_FLOOR_PX = 0.15
 """Shading of a matt ball runs into its edge."""
 NOT_SEEN_U_PX = 0.5
 """Uncertainty of a stated outline that the images do not show."""
@@ -67,15 +67,17 @@ def outlines_of(
         No ball is found, or it is cut off by the edge of the image.
     """
     pictures = _pictures(levels)
+    dim = float(np.median(pictures[0])) + 2.0 * levels.noise
+    steps = (levels.rounding, levels.rounding, levels.rounding / max(dim, levels.noise))
     height, width = pictures[0].shape
     findings: list[Remark] = []
     outlines: list[Outline] = []
     if given is None:
         start = _disc_of_mask(capture)
         found = (
-            find_outline(pictures, partial(shading_misfit, levels) if matt else None)
+            find_outline(pictures, partial(shading_misfit, levels) if matt else None, steps)
             if start is None
-            else (refine_outline(pictures, start) or as_outline(start))
+            else _joined(refine_outline(pictures, start, steps), start)
         )
         if found is None:
             msg = (
@@ -85,7 +87,7 @@ def outlines_of(
             raise CalibrationError(msg)
         outlines.append(found)
     for index, circle in enumerate(() if given is None else given):
-        seen = refine_outline(pictures, circle)
+        seen = refine_outline(pictures, circle, steps)
         name = "outline" if given is None or len(given) == 1 else f"outline {index}"
         if seen is None or seen.arc < 0.5:  # noqa: PLR2004 - half of it
             outlines.append(as_outline(circle, NOT_SEEN_U_PX))
@@ -110,7 +112,7 @@ def outlines_of(
             u_px = np.maximum(off, NOT_SEEN_U_PX)
             outlines.append(replace(as_outline(circle), u_centre_px=float(u_px[:2].max()), u_radius_px=float(u_px[2])))
         else:
-            outlines.append(seen)
+            outlines.append(_joined(seen, circle))
     for index, outline in enumerate(outlines):
         findings += _judge(capture, outline, height, width)
         if matt and not outline.given:
@@ -159,6 +161,18 @@ def _judge(capture: Capture, outline: Outline, height: int, width: int) -> list[
 def _pictures(levels: Levels) -> list[Array]:
     mean = levels.images.mean(axis=0)
     return [mean, levels.images.max(axis=0), np.log(np.maximum(mean, 0.0) + 2.0 * levels.noise)]
+
+
+def _joined(seen: Outline | None, stated_px: Array) -> Outline:
+    """Mean of a stated circle and what the images show, by their uncertainties."""
+    if seen is None:
+        return as_outline(stated_px, NOT_SEEN_U_PX)
+    centre, radius = (1.0 / (1.0 + (u / NOT_SEEN_U_PX) ** 2) for u in (seen.u_centre_px, seen.u_radius_px))
+    x, y, r = stated_px + np.array([centre, centre, radius]) * (seen.circle_px - stated_px)
+    u_centre, u_radius = (NOT_SEEN_U_PX * math.sqrt(1.0 - share) for share in (centre, radius))
+    return replace(
+        seen, x_px=float(x), y_px=float(y), radius_px=float(r), u_centre_px=u_centre, u_radius_px=u_radius
+    )
 
 
 def _disc_of_mask(capture: Capture) -> Array | None:

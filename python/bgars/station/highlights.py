@@ -35,6 +35,13 @@ MISFIT, TAIL_MISFIT = 0.04, 0.2
 KNOTS = 64
 GRID_PX = 0.03
 """What pixels, as areas that are sampled at points, leave of a position."""
+CENTROID_GRID_PX = 0.02
+"""The same of a centroid: sums over whole pixels are true to the sampling of a blurred spot."""
+AROUND, TAIL_PX, RING_PX = 1.5, 3.0, 3.0
+"""Light of a highlight reaches so many of its extents, and so many pixels more; around it a ring shows its ground."""
+LOPSIDED_SHARE, COARSE_PX = 0.3, 0.25
+WINDOW_PX, WINDOW_ROUNDS, LEAST_GAIN = 0.5, 12, 0.2
+"""A window as wide as the spot, and half a pixel more, keeps the noise of its surroundings out."""
 SUBPIXELS = 3
 MOST_PIXELS = 60
 """Half the side of the patch that is fitted, at most."""
@@ -172,20 +179,57 @@ def fit_highlight(
     normal = jacobian.T @ jacobian
     covariance = np.linalg.pinv(normal)[:2, :2] * max(1.0, misfit**2) + GRID_PX**2 * np.eye(2)
     x_px, y_px, log_level, log_extent, log_blur, _ = fit.x
+    saturated = bool((seen[np.hypot(rows - spot.row, cols - spot.col) < spot.extent_px + 2.0] >= clip).any())
+    lamp_deg, blur_px = math.degrees(2.0 * math.exp(log_extent) / to_px), math.exp(log_blur)
+    if not saturated:
+        place, covariance, total = _centroid(image - still, spot, sphere, noise, camera_px)
+        return Highlight(
+            float(place[0]), float(place[1]), covariance, lamp_deg, blur_px, total / to_px**2, False, misfit
+        )
     if np.hypot(x_px - start[0], y_px - start[1]) > max(2.0, spot.extent_px):
         return None
-    saturated = bool((seen >= clip).any())
-    extent = math.exp(log_extent) / to_px
-    return Highlight(
-        float(x_px),
-        float(y_px),
-        covariance,
-        math.degrees(2.0 * extent),
-        math.exp(log_blur),
-        math.nan if saturated else math.exp(log_level) * math.pi * extent**2,
-        saturated,
-        misfit,
-    )
+    return Highlight(float(x_px), float(y_px), covariance, lamp_deg, blur_px, math.nan, True, misfit)
+
+
+def _centroid(
+    change: Array, spot: Spot, sphere: Sphere, noise: float, camera_px: float
+) -> tuple[Array, Array, float]:
+    """Place of the mean direction of the light of a whole highlight, its covariance, and the sum of its levels.
+
+    Noise of every pixel counts; so do a slope of what lies around, and a middle of the bright pixels elsewhere, for a
+    disc has both in one place.
+    """
+    rows, cols = np.mgrid[: change.shape[0], : change.shape[1]]
+    apart = np.hypot(rows - spot.row, cols - spot.col)
+    reach = AROUND * spot.extent_px + TAIL_PX
+    inside, ring = apart <= reach, (apart > reach) & (apart <= reach + RING_PX)
+    points = np.stack([cols + 0.5 - change.shape[1] / 2.0, change.shape[0] / 2.0 - rows - 0.5], axis=-1)
+    middle = points[inside].mean(axis=0)
+    # A plane through the ring: what the board, seen in the ball, changes with the light.
+    plane = np.column_stack([np.ones(int(ring.sum())), points[ring] - middle])
+    level, *slope = np.linalg.lstsq(plane, change[ring], rcond=None)[0]
+    light = change[inside] - level - (points[inside] - middle) @ slope
+    total = max(float(light.sum()), noise)
+    _, directions = reflected(points[inside], sphere, camera_px)
+    wide = spot.extent_px + WINDOW_PX
+    place = middle_of(spot, change.shape, sphere, camera_px)
+    # Under a Gaussian window the mean moves by less than the spot: repeated until both are in one place.
+    for _ in range(WINDOW_ROUNDS):
+        off = points[inside] - place
+        window = np.exp(-0.5 * np.square(off).sum(axis=1) / wide**2)
+        mean = (window * light) @ directions
+        place = image_of((mean / np.linalg.norm(mean))[None, :], np.zeros(1), sphere, camera_px)[0]
+    off = points[inside] - place
+    window = np.exp(-0.5 * np.square(off).sum(axis=1) / wide**2)
+    seen = max(float(window @ light), noise)
+    spread = 0.5 * float(window * light @ np.square(off).sum(axis=1)) / seen
+    gain = 1.0 / max(1.0 - spread / wide**2, LEAST_GAIN)
+    covariance = (gain * noise / seen) ** 2 * (window**2 * off.T) @ off + CENTROID_GRID_PX**2 * np.eye(2)
+    sloping = gain * np.square(off).T @ window * np.array(slope) / seen
+    lopsided = LOPSIDED_SHARE * (middle_of(spot, change.shape, sphere, camera_px) - place)
+    # The bright pixels of a small spot are few: their middle is no better than a share of a pixel.
+    lopsided = np.sign(lopsided) * np.maximum(np.abs(lopsided) - LOPSIDED_SHARE * COARSE_PX, 0.0)
+    return place, covariance + np.outer(sloping, sloping) + np.outer(lopsided, lopsided), total
 
 
 def middle_of(spot: Spot, shape: tuple[int, ...], sphere: Sphere, camera_px: float = math.inf) -> Array:

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 QUANTISED = 0.29
 """Standard deviation of rounding, of a step."""
+DITHERED = 0.4
+"""Noise, of a step of grey levels, that makes means of levels true to less than a step."""
 SAMPLE = 500_000
 """Pixels that the noise is taken from, about."""
 
@@ -30,6 +32,8 @@ class Levels(NamedTuple):
     images: Array
     clip: float
     noise: float
+    rounding: float = 0.0
+    """Step of the grey levels where noise does not blur it; 0 where it does."""
 
 
 def linear_levels(capture: Capture) -> Levels:
@@ -66,7 +70,8 @@ def linear_levels(capture: Capture) -> Levels:
     top = (clip - float(np.max(dark))) * 255.0 / full
     images[clipped] = np.maximum(images[clipped], top)
     step = 255.0 / full if capture.images.dtype.kind == "u" else 0.0
-    return Levels(images, top, max(noise_of(images), QUANTISED * step, 1e-3))
+    noise = noise_of(images)
+    return Levels(images, top, max(noise, QUANTISED * step, 1e-3), step if noise < DITHERED * step else 0.0)
 
 
 def noise_of(images: Array) -> float:

@@ -19,6 +19,11 @@ Array = NDArray[np.float64]
 NEAR_SIGMAS = 4.0
 """Lights are near where one over their distance is, for half of them, so many standard deviations from 0."""
 LEAST_U_RAD = 1e-6
+LENS_SIDES = 0.2
+"""One over the distance of a camera of which nothing is stated, standard deviation, in sides of the image: telecentric
+lenses stand at 0, macro lenses at 0.1 to 0.2, ordinary ones at 0.3 to 0.7."""
+VIEW_RAD = math.radians(0.3)
+"""Angle by which such a camera looks aside at the middle of its image: mounted by hand, or a picture that was cut."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +46,11 @@ class LightSolution:
         NaN where not seen.
     outlines_px : (B, 3)
         Outlines after the fit.
+    u_lens_deg : (L,)
+        The part that comes from a camera of which nothing is stated; 0 of one that is.
+    views_deg : (B, 2)
+        By how much each ball is seen from another side than the camera says; standard deviations `u_views_deg` (B,)
+        were expected.
     reduced_chi_square : float
         1 is as stated; NaN where nothing is to spare.
     """
@@ -53,6 +63,9 @@ class LightSolution:
     residuals_px: Array
     outlines_px: Array
     reduced_chi_square: float
+    u_lens_deg: Array
+    views_deg: Array
+    u_views_deg: Array
 
     @property
     def u_deg(self) -> Array:
@@ -72,6 +85,7 @@ def solve_lights(
     u_outlines_px: Array,
     camera_px: float,
     near: bool | None,
+    side_px: float | None = None,
 ) -> LightSolution:
     """Fit the lights to highlights.
 
@@ -85,6 +99,8 @@ def solve_lights(
         Distance of the camera.
     near : bool or None
         Positions or directions; None: positions where the highlights ask for them.
+    side_px : float, optional
+        Longer side of the image, where nothing is known of the camera: it may then stand at some such sides.
 
     Raises
     ------
@@ -99,10 +115,10 @@ def solve_lights(
             f"{int(seen[:, index].sum())}"
         )
         raise CalibrationError(msg)
-    distant = _solve(places_px, covariances_px2, outlines_px, u_outlines_px, camera_px, near=False)
+    distant = _solve(places_px, covariances_px2, outlines_px, u_outlines_px, camera_px, near=False, side_px=side_px)
     if near is False or int(seen.sum(axis=0).min()) < 2:  # noqa: PLR2004
         return distant
-    placed = _solve(places_px, covariances_px2, outlines_px, u_outlines_px, camera_px, near=True)
+    placed = _solve(places_px, covariances_px2, outlines_px, u_outlines_px, camera_px, near=True, side_px=side_px)
     if near:
         return placed
     sure = placed.nearness / np.sqrt(placed.covariance[:, 2, 2])
@@ -110,7 +126,13 @@ def solve_lights(
 
 
 def _solve(
-    places: Array, covariances: Array, outlines: Array, u_outlines: Array, camera_px: float, near: bool
+    places: Array,
+    covariances: Array,
+    outlines: Array,
+    u_outlines: Array,
+    camera_px: float,
+    near: bool,
+    side_px: float | None,
 ) -> LightSolution:
     balls, lights = places.shape[:2]
     seen: NDArray[np.bool_] = np.asarray(np.isfinite(places).all(axis=2))
@@ -121,48 +143,77 @@ def _solve(
     size = 3 if near else 2
     scale_px = float(np.max(np.abs(outlines)))
 
+    part, rest_of = lights * size, lights * size + 3 * balls
+    u_lens = 0.0 if side_px is None else LENS_SIDES / side_px
+    # A ball aside is seen from aside, by its distance over the camera's.
+    u_views = np.hypot(VIEW_RAD, u_lens * np.hypot(*outlines[:, :2].T)) if side_px is not None else np.zeros(balls)
+
     def unpack(values: Array) -> tuple[Array, Array, Array]:
-        turns = values[: lights * size].reshape(lights, size)
+        turns = values[:part].reshape(lights, size)
         directions = first + np.einsum("lk,lkc->lc", turns[:, :2], across)
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
         nearness = turns[:, 2] / scale_px if near else np.zeros(lights)
-        circles = outlines + u_outlines * values[lights * size :].reshape(balls, 3)
+        circles = outlines + u_outlines * values[part:rest_of].reshape(balls, 3)
         return directions, nearness, circles
 
     def off(values: Array) -> Array:
         directions, nearness, circles = unpack(values)
-        fitted = np.array([image_of(directions, nearness, sphere_of_outline(c, camera_px), camera_px) for c in circles])
+        lens = camera_px
+        views = np.zeros((balls, 2))
+        if side_px is not None:
+            # No camera stands behind the board: the sign of its inverse distance has no meaning.
+            lens = 1.0 / max(u_lens * abs(float(values[rest_of])), 1e-9)
+            views = u_views[:, None] * values[rest_of + 1 :].reshape(balls, 2)
+        fitted = np.array(
+            [
+                image_of(_turned(directions, view), nearness, sphere_of_outline(circle, lens), lens)
+                for circle, view in zip(circles, views, strict=True)
+            ]
+        )
         rest: Array = places - fitted
         return rest
 
     def residuals(values: Array) -> Array:
         scaled = np.einsum("blij,blj->bli", whiten, np.where(seen[..., None], off(values), 0.0))
-        rows: Array = np.concatenate([scaled[seen].ravel(), values[lights * size :]])
+        rows: Array = np.concatenate([scaled[seen].ravel(), values[part:]])
         return rows
 
-    start = np.zeros(lights * size + 3 * balls)
-    fit = least_squares(
-        residuals, start, x_scale=np.concatenate([np.full(lights * size, 0.01), np.ones(3 * balls)]), max_nfev=60
-    )
+    start = np.zeros(rest_of + (0 if side_px is None else 1 + 2 * balls))
+    scales = np.where(np.arange(len(start)) < part, 0.01, 1.0)
+    fit = least_squares(residuals, start, x_scale=scales, max_nfev=60)
     directions, nearness, circles = unpack(fit.x)
-    spare = 2 * int(seen.sum()) - lights * size
+    spare = 2 * int(seen.sum()) - part
     chi = float(np.square(fit.fun).sum() / spare) if spare > 0 else math.nan
     raised = max(1.0, chi) if spare > 0 else 1.0
     jacobian = np.asarray(fit.jac, dtype=np.float64)
     normal = jacobian.T @ jacobian
     covariance: Array = np.asarray(np.linalg.pinv(normal) * raised, dtype=np.float64)
-    part = lights * size
+    known: Array = np.asarray(np.linalg.pinv(normal[:rest_of, :rest_of]) * raised, dtype=np.float64)
     alone: Array = np.asarray(np.linalg.pinv(normal[:part, :part]) * raised, dtype=np.float64)
+    whole = _blocks(covariance, lights, size, scale_px)
+    views = np.zeros((balls, 2)) if side_px is None else u_views[:, None] * fit.x[rest_of + 1 :].reshape(balls, 2)
     return LightSolution(
         directions,
         nearness,
-        _blocks(covariance, lights, size, scale_px),
+        whole,
         _blocks(alone, lights, size, scale_px),
         across,
         np.where(seen[..., None], off(fit.x), np.nan),
         circles,
         chi,
+        np.sqrt(np.maximum(_u_deg(whole) ** 2 - _u_deg(_blocks(known, lights, size, scale_px)) ** 2, 0.0)),
+        np.degrees(views),
+        np.degrees(u_views),
     )
+
+
+def _turned(directions: Array, view_rad: Array) -> Array:
+    """Directions as a camera that looks aside by two small angles (toward x, toward y) sees them."""
+    turned = directions.copy()
+    turned[:, :2] -= directions[:, 2:] * view_rad
+    turned[:, 2] += directions[:, :2] @ view_rad
+    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+    return turned
 
 
 def _first(places: Array, outlines: Array, camera_px: float) -> Array:

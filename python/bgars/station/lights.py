@@ -30,6 +30,8 @@ Sphere = Literal["mirror", "matt"]
 
 MISFIT = 3.0
 """Reduced chi square from which on balls contradict each other."""
+LENS_SHARE = 0.5
+"""Share of an uncertainty by an unknown lens that is worth a word."""
 OFF_SIGMAS = 5.0
 UNSURE_DEG = 2.0
 """Standard uncertainty of a direction that is worth a word."""
@@ -126,6 +128,7 @@ def calibrate_lights(
         sphere=sphere,
         balls=tuple(_views(balls, solution)),
         residual_px=_rms(solution.residuals_px),
+        u_lens_deg=solution.u_lens_deg,
         u_positions_um=_u_positions(solution, pitch_um),
         u_intensities=u_intensities,
         lamp_deg=seen.lamp_deg,
@@ -146,7 +149,10 @@ def _solve(
     covariances = np.array([ball.covariances for ball in balls])
     circles = np.array([ball.outline.circle_px for ball in balls])
     u_circles = np.array([ball.outline.u_px for ball in balls])
-    solution = solve_lights(places, covariances, circles, u_circles, seen.camera_px, near)
+    # Nothing stated of the camera: it may be an ordinary one.
+    unknown = captures[0].camera_distance_mm is None
+    side_px = float(max(captures[0].images.shape[1:])) if unknown else None
+    solution = solve_lights(places, covariances, circles, u_circles, seen.camera_px, near, side_px)
     pitch_um = captures[0].pixel_pitch_um
     if diameter_um is not None:
         pitch_um = float(np.mean([diameter_um / (2.0 * circle[2]) for circle in solution.outlines_px]))
@@ -162,7 +168,7 @@ def _solve(
             "positions"
         )
         findings.append(Remark("doubt", message, "near-without-scale"))
-        solution = solve_lights(places, covariances, circles, u_circles, seen.camera_px, near=False)
+        solution = solve_lights(places, covariances, circles, u_circles, seen.camera_px, False, side_px)
     return solution, pitch_um
 
 
@@ -221,8 +227,8 @@ def _intensities(
 
 def _judge(solution: LightSolution, balls: list[SeenBall], captures: list[Capture], rig: LightRig) -> list[Remark]:
     """What the result says about itself, and about the rig that was declared."""
-    found: list[Remark] = []
     files = captures[0].files
+    found = _judge_lens(solution, balls)
     if len(balls) > 1 and solution.reduced_chi_square > MISFIT:
         found.append(
             Remark(
@@ -263,6 +269,30 @@ def _judge(solution: LightSolution, balls: list[SeenBall], captures: list[Captur
                 f"light {int(nearest[first])} is"
             )
             found.append(Remark("note", message, "order", light=first))
+    return found
+
+
+def _judge_lens(solution: LightSolution, balls: list[SeenBall]) -> list[Remark]:
+    """What a camera of which nothing is stated does to the result."""
+    found: list[Remark] = []
+    u_lens = float(np.median(solution.u_lens_deg))
+    if u_lens > LENS_SHARE * float(np.median(solution.u_deg)):
+        message = (
+            f"nothing is stated of the camera: a lens that is not telecentric leaves {u_lens:.2f} deg of the "
+            f"{float(np.median(solution.u_deg)):.2f} deg of uncertainty; state camera in capture.toml, or --camera"
+        )
+        found.append(Remark("note", message, "camera-unknown", u_lens, None, "deg"))
+    if len(balls) > 1:
+        views = solution.views_deg - solution.views_deg.mean(axis=0)
+        size, expected = np.hypot(*views.T), np.maximum(solution.u_views_deg, 0.05)
+        worst = int((size / expected).argmax())
+        if size[worst] > MISFIT * expected[worst]:
+            message = (
+                f"the balls are seen from sides that differ by about {2.0 * size[worst]:.1f} deg: an ordinary lens near "
+                "by, or pictures cut from larger ones; state the camera, and give whole images"
+            )
+            limit = float(MISFIT * expected[worst])
+            found.append(Remark("doubt", message, "views-differ", float(size[worst]), limit, "deg"))
     return found
 
 

@@ -14,7 +14,6 @@ from bgars.station.balls_seen import given_outlines, outlines_of
 from bgars.station.levels import linear_levels
 from bgars.station.matt_lights import shading_on
 from bgars.station.mirror_lights import highlights_on
-from bgars.station_record import Remark
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -27,8 +26,6 @@ __all__ = ["Observed", "SeenBall", "observe", "outlines_a_capture"]
 
 Array = NDArray[np.float64]
 
-ASIDE_SHARE = 0.15
-"""Distance of a ball from the image centre, of the longer side, from which on the lens matters."""
 ZENITH = 1e-9
 
 
@@ -96,8 +93,6 @@ def observe(
             progress((index + 1) / len(captures))
     _need_all(balls, captures)
     camera_px = _camera_px(captures[0], balls[0].outline, diameter_um) if sphere == "mirror" else math.inf
-    if math.isinf(camera_px):
-        findings += _lens_note(balls)
     known = [lamp[np.isfinite(lamp)] for lamp in lamps]
     lamp_deg = float(np.median(np.concatenate(known))) if known and sum(map(len, known)) else math.nan
     return Observed(balls, levels_of, strengths, lamp_deg, camera_px, findings)
@@ -171,22 +166,3 @@ def _need_all(balls: list[SeenBall], captures: list[Capture]) -> None:
         msg = f"{captures[0].name}: {shown}: no highlight on {'the ball' if len(balls) == 1 else 'any ball'}"
         raise CalibrationError(msg)
 
-
-def _lens_note(balls: list[SeenBall]) -> list[Remark]:
-    """Say what an ordinary lens would do, where none is stated."""
-    notes = []
-    for ball in balls:
-        stated = ball.capture.camera_distance_mm
-        side = max(ball.capture.images.shape[1:])
-        aside = math.hypot(ball.outline.x_px, ball.outline.y_px) / side
-        if stated is None and aside > ASIDE_SHARE:
-            notes.append(
-                Remark(
-                    "note",
-                    f"{ball.capture.name}: the ball is {100 * aside:.0f} % of the image aside and no camera is "
-                    "stated: taken as "
-                    "telecentric; state camera in capture.toml where the lens is an ordinary one",
-                    "camera-unknown",
-                )
-            )
-    return notes

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
 __all__ = ["Outline", "as_outline", "find_outline", "refine_outline"]
 
@@ -37,12 +37,16 @@ SEEN = 3.0
 """Edge points count where they lie within so many scales."""
 CORRELATED_POINTS = 3.0
 """Neighbouring edge points that share their error."""
-FLOOR_PX = 0.04
-"""What shading at the rim and the grid of pixels leave."""
+FLOOR_PX = 0.015
+"""What the grid of pixels leaves of an edge that is averaged over a whole outline."""
+WAVES = (2, 3, 4)
+"""Waves of an outline about its circle that say how well it is one: radius and centre are waves 0 and 1 of the same."""
 PLAIN_ARC = 0.7
 """Share of an outline that makes it plain: of several plain circles around one centre the ball is the largest."""
-EDGE_SHARE = 0.2
-"""Share of the width of an edge by which shading along it moves it in or out."""
+ALIKE = 2.0
+"""Pictures whose outline is so many times as uncertain have no say."""
+SMOOTH_PX = 0.7
+"""Width of the filter that takes slopes."""
 LEAST_ARC = 0.35
 """Share of the outline that must be seen."""
 
@@ -95,7 +99,9 @@ def as_outline(circle_px: Array, u_px: float = 0.5) -> Outline:
     return Outline(x, y, radius, u_px, u_px, given=True)
 
 
-def find_outline(pictures: list[Array], misfit: Callable[[Outline], float] | None = None) -> Outline | None:
+def find_outline(
+    pictures: list[Array], misfit: Callable[[Outline], float] | None = None, steps: Sequence[float] = ()
+) -> Outline | None:
     """Look for the outline of one ball in several pictures of it (H, W); None where there is no circle.
 
     `misfit` says how badly a circle explains what is inside it, where that can be told; else the ball is the largest
@@ -104,20 +110,27 @@ def find_outline(pictures: list[Array], misfit: Callable[[Outline], float] | Non
     starts = [start for picture in pictures if (start := _vote(picture)) is not None]
     # A mirror ball shows the horizon as a circle of 1 / sqrt(2) of its radius, often plainer than its own outline.
     starts += [start * [1.0, 1.0, math.sqrt(2.0)] for start in starts]
-    found = [refined for start in starts if (refined := refine_outline(pictures, start)) is not None]
+    found = [refined for start in starts if (refined := refine_outline(pictures, start, steps)) is not None]
     if misfit is not None and found:
         return min(found, key=misfit)
     return max(found, key=lambda one: min(one.arc, PLAIN_ARC) * one.radius_px, default=None)
 
 
-def refine_outline(pictures: list[Array], start_px: Array) -> Outline | None:
-    """Return where the edge lies around a circle (x, y, radius); None where too little of it is seen."""
-    fits = [fit for picture in pictures if (fit := _fit_edge(picture, start_px)) is not None]
+def refine_outline(pictures: list[Array], start_px: Array, steps: Sequence[float] = ()) -> Outline | None:
+    """Return where the edge lies around a circle (x, y, radius); None where too little of it is seen.
+
+    `steps` are the grey levels by which each picture is rounded, in its own units: an edge of few of them is nowhere.
+    """
+    rounding = [*steps, *[0.0] * (len(pictures) - len(steps))]
+    fits = [
+        fit for picture, step in zip(pictures, rounding, strict=True)
+        if (fit := _fit_edge(picture, start_px, step)) is not None
+    ]
     if not fits:
         return None
     best = max(fits, key=lambda one: one.arc / one.u_radius_px)
-    # Pictures that show the edge in another light see it elsewhere by as much as shading moves it.
-    alike = [fit for fit in fits if fit.arc > 0.5 * best.arc]
+    # Pictures that show the edge as well, in another light, see it elsewhere by as much as shading moves it.
+    alike = [fit for fit in fits if fit.arc > 0.5 * best.arc and fit.u_radius_px < ALIKE * best.u_radius_px]
     spread = np.array([fit.circle_px for fit in alike]) - best.circle_px
     off = 0.5 * np.abs(spread).max(axis=0)
     return replace(
@@ -167,18 +180,18 @@ def _vote(picture: Array) -> Array | None:
     return np.array([x, y, radius * step])
 
 
-def _fit_edge(picture: Array, start_px: Array) -> Outline | None:
+def _fit_edge(picture: Array, start_px: Array, step: float = 0.0) -> Outline | None:
     """Robust circle through the steepest places along rays from the centre (Cauchy weights)."""
     circle = np.array(start_px, dtype=np.float64)
     fit: Outline | None = None
     for share in WINDOWS:
         # An edge that is wider than the band would look like none.
         half = max(share * circle[2], LEAST_WINDOW_PX, 0.0 if fit is None else WIDE_EDGE * fit.edge_px)
-        angles, radii, widths = _edge_points(picture, circle, half)
-        if len(angles) < 12:  # noqa: PLR2004 - three unknowns, and something to judge them by
+        edge = _edge_points(picture, circle, half)
+        if len(edge.angles) < 12:  # noqa: PLR2004 - three unknowns, and something to judge them by
             return None
-        points = circle[:2] + radii[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
-        fit = _circle(points, widths, circle, count=_rays(circle[2]))
+        points = circle[:2] + edge.radii[:, None] * np.column_stack([np.cos(edge.angles), np.sin(edge.angles)])
+        fit = _circle(points, edge, circle, _rays(circle[2]), step)
         if fit is None:
             return None
         if (
@@ -194,8 +207,19 @@ def _rays(radius_px: float) -> int:
     return int(np.clip(2.0 * math.pi * radius_px / 1.5, 90, 2000))
 
 
-def _edge_points(picture: Array, circle: Array, half_px: float) -> tuple[Array, Array, Array]:
-    """Angle, radius and width of the strongest edge on each ray that shows one."""
+class _Edge(NamedTuple):
+    """The strongest edge on each ray that shows one."""
+
+    angles: Array
+    radii: Array
+    widths_px: Array
+    rises: Array
+    """Change of level across it."""
+    shading_px: Array
+    """From its steepest place to where half of the rise is reached: 0 of a plain step."""
+
+
+def _edge_points(picture: Array, circle: Array, half_px: float) -> _Edge:
     height, width = picture.shape
     count = _rays(circle[2])
     angles = np.arange(count) * 2.0 * math.pi / count
@@ -206,7 +230,8 @@ def _edge_points(picture: Array, circle: Array, half_px: float) -> tuple[Array, 
     rows, cols = height / 2.0 - 0.5 - y, x + width / 2.0 - 0.5
     values = ndimage.map_coordinates(picture, [rows, cols], order=1, mode="nearest")
     off = (rows < 1) | (rows > height - 2) | (cols < 1) | (cols > width - 2)
-    slope = np.abs(ndimage.gaussian_filter1d(values, 0.7 / step, axis=1, order=1))
+    signed = ndimage.gaussian_filter1d(values, SMOOTH_PX / step, axis=1, order=1) / step
+    slope = np.abs(signed)
     slope[off] = 0.0
     slope[:, :2] = slope[:, -2:] = 0.0
     at = slope.argmax(axis=1)
@@ -215,19 +240,32 @@ def _edge_points(picture: Array, circle: Array, half_px: float) -> tuple[Array, 
     around = np.percentile(slope, 20.0, axis=1)
     use = (peak > 3.0 * around + 1e-9) & (peak > 0.1 * np.percentile(peak, 90)) & (at > 1) & (at < len(radii) - 2)
     if not use.any():
-        return angles[:0], angles[:0], angles[:0]
+        return _Edge(*(angles[:0],) * 5)
     before, middle, after = slope[lines, at - 1], peak, slope[lines, np.minimum(at + 1, len(radii) - 1)]
     bend = before - 2.0 * middle + after
     shift = np.where(bend < 0, 0.5 * (before - after) / np.where(bend < 0, bend, -1.0), 0.0)
     radius = radii[at] + step * np.clip(shift, -1.0, 1.0)
     # A blurred step has slope (rise / s) / sqrt(2 pi): its width from its height and its rise.
     near = np.abs(radii[None, :] - radius[:, None]) < 1.0 + 0.25 * half_px
-    rise = slope.sum(axis=1, where=near)
-    wide = rise / np.maximum(peak, 1e-12) / math.sqrt(2.0 * math.pi) * step
-    return angles[use], radius[use], np.sqrt(np.maximum(wide[use] ** 2 - 0.7**2, 0.0))
+    rise = np.maximum(slope.sum(axis=1, where=near) * step, 1e-12)
+    wide = rise / np.maximum(peak, 1e-12) / math.sqrt(2.0 * math.pi)
+    # Of a plain step the steepest place is where half of the rise is reached; shading and dark rims part the two.
+    away = [round(side * (2.5 * float(np.median(wide[use])) + 0.5) / step) for side in (-1, 1)]
+    levels = ndimage.gaussian_filter1d(values, SMOOTH_PX / step, axis=1)
+    half_level = 0.5 * (_at(levels, at + away[0]) + _at(levels, at + away[1]))
+    gap = (half_level - levels[lines, at]) / np.where(use, signed[lines, at], 1.0)
+    shading = np.clip(gap, -0.5 * half_px, 0.5 * half_px)
+    blur = np.sqrt(np.maximum(wide**2 - SMOOTH_PX**2, 0.0))
+    return _Edge(angles[use], radius[use], blur[use], rise[use], shading[use])
 
 
-def _circle(points: Array, widths: Array, start: Array, count: int) -> Outline | None:
+def _at(lines: Array, places: NDArray[np.intp]) -> Array:
+    """(N,) value of each line at its place."""
+    value: Array = lines[np.arange(len(lines)), np.clip(places, 2, lines.shape[1] - 3)]
+    return value
+
+
+def _circle(points: Array, edge: _Edge, start: Array, count: int, step: float) -> Outline | None:
     circle = start.copy()
     scale = SCALE_PX
     for _ in range(ROUNDS):
@@ -242,22 +280,37 @@ def _circle(points: Array, widths: Array, start: Array, count: int) -> Outline |
     offset = points - circle[:2]
     off = np.hypot(*offset.T) - circle[2]
     # Edges of noise scatter over the whole band: they are no outline, however many there are.
-    soft_px = LARGEST_SCALE_EDGE * float(np.median(widths))
+    soft_px = LARGEST_SCALE_EDGE * float(np.median(edge.widths_px))
     good = np.abs(off) < SEEN * min(scale, max(LARGEST_SCALE_PX, LARGEST_SCALE_SHARE * circle[2], soft_px))
     arc = float(good.sum()) / count
     if arc < LEAST_ARC:
         return None
     rows = np.column_stack([offset[good] / np.hypot(*offset[good].T)[:, None], np.ones(int(good.sum()))])
     rms = float(np.sqrt(np.mean(off[good] ** 2)))
-    edge_px = float(np.median(widths[good]))
+    edge_px = float(np.median(edge.widths_px[good]))
     covariance = rms**2 * CORRELATED_POINTS * np.linalg.inv(rows.T @ rows)
     u = np.sqrt(np.diag(covariance))
+    waves_px = _waves_px(np.arctan2(*offset[good].T[::-1]), off[good])
+    # Half a step of rounding, or a black that is cut off, moves an edge of one pixel by its share of the rise.
+    rounded_px = step * max(1.0, edge_px) / float(np.median(edge.rises[good]))
+    shaded = [abs(float(np.mean(edge.shading_px[good] * row))) for row in (2.0 * rows[:, :2]).T]
+    moved_px = abs(float(np.median(edge.shading_px[good])))
     return Outline(
         float(circle[0]),
         float(circle[1]),
         float(circle[2]),
-        float(np.hypot(max(u[0], u[1]), FLOOR_PX)),
-        float(np.linalg.norm([u[2], FLOOR_PX, EDGE_SHARE * edge_px])),
+        float(np.linalg.norm([max(u[0], u[1]), FLOOR_PX, waves_px, rounded_px, max(shaded)])),
+        float(np.linalg.norm([u[2], FLOOR_PX, waves_px, rounded_px, moved_px])),
         edge_px,
         arc,
     )
+
+
+def _waves_px(angles: Array, off_px: Array) -> float:
+    """Root mean square amplitude of the low waves of an outline about its circle, above what scatter makes of them."""
+    columns = [wave(n * angles) for n in WAVES for wave in (np.cos, np.sin)]
+    rows = np.column_stack([np.ones(len(angles)), np.cos(angles), np.sin(angles), *columns])
+    normal = rows.T @ rows + 0.05 * len(angles) * np.diag([0.0] * 3 + [1.0] * len(columns))
+    found = np.linalg.solve(normal, rows.T @ off_px)[3:]
+    scatter = 2.0 * CORRELATED_POINTS * float(np.mean(off_px**2)) / len(angles)
+    return math.sqrt(max(float(np.mean(found**2)) - scatter, 0.0))
