@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -63,6 +64,15 @@ NearOption = Annotated[
         show_default=False,
     ),
 ]
+CameraOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="telecentric|MM",
+        help="The lens: telecentric, or its distance from the board in mm, where capture.toml does not say. Without, "
+        "either is allowed for in the uncertainty.",
+        show_default=False,
+    ),
+]
 DiameterOption = Annotated[
     float | None,
     typer.Option(metavar="MM", help="Diameter of the ball: the scale where capture.toml has none.", show_default=False),
@@ -84,13 +94,15 @@ def lights(
     outline: OutlineOption = None,
     near: NearOption = None,
     diameter_mm: DiameterOption = None,
+    camera: CameraOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Find where the lights are, on a ball (docs/station.md shows how to photograph it).
 
     Exit code 2 where there is no ball, or a light does not show on it; nothing is written then.
     """
-    found = _calibrate_lights([read_unlit(folder) for folder in folders], sphere, outline, near, diameter_mm)
+    captures = [_seen_by(read_unlit(folder), camera) for folder in folders]
+    found = _calibrate_lights(captures, sphere, outline, near, diameter_mm)
     keep_part(output, {"lights": found}, found.findings)
     if as_json:
         print_json({"bgars": bgars.__version__, **_lights_values(found), "file": str(output)})
@@ -137,6 +149,7 @@ def station(
         float | None, typer.Option(metavar="MM", help="Pitch of the grid.", show_default=False)
     ] = None,
     target: Annotated[Literal["dots", "chessboard"], typer.Option(help="Kind of the grid.")] = "dots",
+    camera: CameraOption = None,
     name: Annotated[str, typer.Option(help="Name of the station.")] = "station",
     as_json: JsonOption = False,
 ) -> None:
@@ -151,7 +164,7 @@ def station(
             parts["scale"], said = bgars.calibrate_scale(read_unlit(grid), 1000.0 * grid_pitch_mm, target=target)
             findings += said
         report("scale", 1.0)
-        captures = [read_unlit(folder) for folder in folders]
+        captures = [_seen_by(read_unlit(folder), camera) for folder in folders]
         if "scale" in parts:
             captures = [replace(one, pixel_pitch_um=parts["scale"].pixel_pitch_um) for one in captures]
         found = _calibrate_lights(captures, sphere, outline, near, diameter_mm)
@@ -185,6 +198,7 @@ def drift(
         typer.Option(help="What is in view; by default the kind of ball of the calibration.", show_default=False),
     ] = None,
     outline: OutlineOption = None,
+    camera: CameraOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Say what moved since the calibration, on a new capture of its reference.
@@ -192,7 +206,7 @@ def drift(
     Exit code 0: nothing beyond its limit. 1: something moved. 2: wrong use, or the reference cannot be read.
     """
     known = read_station(station)
-    capture = read_unlit(folder)
+    capture = _seen_by(read_unlit(folder), camera)
     circles = _circles(outline, [capture])
     found = station_drift(known, capture, reference=reference, outline=None if circles is None else circles[0])
     moved = [finding for finding in found if finding.severity == "fail"]
@@ -209,6 +223,20 @@ def drift(
         )
     if moved:
         raise typer.Exit(EXIT_MOVED)
+
+
+def _seen_by(capture: Capture, camera: str | None) -> Capture:
+    """The capture with the camera that the command line states."""
+    if camera is None:
+        return capture
+    try:
+        distance_mm = math.inf if camera == "telecentric" else float(camera)
+    except ValueError:
+        distance_mm = math.nan
+    if not distance_mm > 0:
+        msg = f"--camera: must be telecentric or a distance in mm above 0, got {camera!r}"
+        raise InputError(msg)
+    return replace(capture, camera_distance_mm=distance_mm)
 
 
 def _calibrate_lights(

@@ -45,6 +45,9 @@ class LightsTable(Strict):
     u_common_deg: list[NotNegative] = Field(
         description="its part that moves all lights together: outlines of the balls"
     )
+    u_lens_deg: list[NotNegative] | None = Field(
+        None, description="its part by a camera of which nothing was stated; absent: it was"
+    )
     u_positions_mm: list[Vector] | None = Field(None, description="standard uncertainties of positions_mm")
     u_intensities: list[NotNegative] | None = Field(None, description="of intensities; absent: they were not measured")
     lamp_deg: NotNegative | None = Field(None, description="angle of a whole lamp, where it was measured")
@@ -57,7 +60,15 @@ class LightsTable(Strict):
             msg = "needs exactly one of directions, positions_mm"
             raise ValueError(msg)
         count = len(self.directions or self.positions_mm or ())
-        for name in ("intensities", "u_deg", "u_own_deg", "u_common_deg", "u_positions_mm", "u_intensities"):
+        for name in (
+            "intensities",
+            "u_deg",
+            "u_own_deg",
+            "u_common_deg",
+            "u_lens_deg",
+            "u_positions_mm",
+            "u_intensities",
+        ):
             values = getattr(self, name)
             if values is not None and len(values) != count:
                 msg = f"{name}: must have one entry for each of the {count} lights, got {len(values)}"
@@ -217,6 +228,7 @@ def _lights(table: LightsTable) -> LightCalibration:
         u_deg=np.array(table.u_deg),
         u_own_deg=np.array(table.u_own_deg),
         u_common_deg=np.array(table.u_common_deg),
+        u_lens_deg=None if table.u_lens_deg is None else np.array(table.u_lens_deg),
         sphere=table.sphere,
         balls=(),
         residual_px=table.residual_px,
@@ -286,6 +298,7 @@ def _lights_values(lights: LightCalibration) -> dict[str, Any]:
         "u_deg": lights.u_deg.tolist(),
         "u_own_deg": lights.u_own_deg.tolist(),
         "u_common_deg": lights.u_common_deg.tolist(),
+        "u_lens_deg": lights.u_lens_deg.tolist() if lights.u_lens_deg is not None and lights.u_lens_deg.any() else None,
         "u_positions_mm": None if lights.u_positions_um is None else (lights.u_positions_um / MM).tolist(),
         "u_intensities": None if lights.u_intensities is None else lights.u_intensities.tolist(),
         "lamp_deg": lights.lamp_deg,

@@ -33,6 +33,7 @@ MATT_FLOOR_PX = 0.15
 NOT_SEEN_U_PX = 0.5
 """Uncertainty of a stated outline that the images do not show."""
 NOT_A_DISC = 0.1
+SEEN_ARC = 0.5
 LEAST_RADIUS_PX = 12.0
 
 
@@ -89,7 +90,18 @@ def outlines_of(
     for index, circle in enumerate(() if given is None else given):
         seen = refine_outline(pictures, circle, steps)
         name = "outline" if given is None or len(given) == 1 else f"outline {index}"
-        if seen is None or seen.arc < 0.5:  # noqa: PLR2004 - half of it
+        if seen is None or seen.arc < SEEN_ARC:
+            other = find_outline(pictures, None, steps)
+            if other is not None and other.arc > SEEN_ARC and _overlap(other.circle_px, circle):
+                message = (
+                    f"{capture.name}: {name}: no edge at the stated circle, radius {circle[2]:.1f} px at "
+                    f"({circle[0]:.1f}, {circle[1]:.1f}); the images show one of {other.radius_px:.1f} px at "
+                    f"({other.x_px:.1f}, {other.y_px:.1f}), x right, y up from the middle"
+                )
+                off = float(np.abs(other.circle_px - circle).max())
+                findings.append(Remark("doubt", message, "wrong-outline", off, None, "px"))
+                outlines.append(replace(as_outline(circle), u_centre_px=off, u_radius_px=off))
+                continue
             outlines.append(as_outline(circle, NOT_SEEN_U_PX))
             findings.append(
                 Remark("note", f"{capture.name}: {name}: not seen in the images, taken as stated", "outline-unseen")
@@ -170,9 +182,12 @@ def _joined(seen: Outline | None, stated_px: Array) -> Outline:
     centre, radius = (1.0 / (1.0 + (u / NOT_SEEN_U_PX) ** 2) for u in (seen.u_centre_px, seen.u_radius_px))
     x, y, r = stated_px + np.array([centre, centre, radius]) * (seen.circle_px - stated_px)
     u_centre, u_radius = (NOT_SEEN_U_PX * math.sqrt(1.0 - share) for share in (centre, radius))
-    return replace(
-        seen, x_px=float(x), y_px=float(y), radius_px=float(r), u_centre_px=u_centre, u_radius_px=u_radius
-    )
+    return replace(seen, x_px=float(x), y_px=float(y), radius_px=float(r), u_centre_px=u_centre, u_radius_px=u_radius)
+
+
+def _overlap(one_px: Array, other_px: Array) -> bool:
+    """True where two circles can be meant for one ball."""
+    return bool(np.hypot(*(one_px[:2] - other_px[:2])) < 0.5 * max(one_px[2], other_px[2]))
 
 
 def _disc_of_mask(capture: Capture) -> Array | None:

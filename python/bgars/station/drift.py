@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from bgars.records import Capture
-    from bgars.station_record import Station
+    from bgars.station_record import LightCalibration, Station
 
 __all__ = ["drift"]
 
@@ -80,7 +80,8 @@ def drift(
     turn_deg = np.degrees(
         2.0 * np.arcsin(np.clip(np.linalg.norm(now.rig.directions - seen_from, axis=1) / 2.0, 0.0, 1.0))
     )
-    u_deg = np.hypot(before.u_deg, now.u_deg) * math.sqrt(2.0)
+    # What an unknown lens does to both calibrations is alike, and no drift.
+    u_deg = np.hypot(_without_lens(before), _without_lens(now)) * math.sqrt(2.0)
     measured = before.u_intensities is not None and now.u_intensities is not None
     change = (
         now.rig.intensities / now.rig.intensities.mean() / (before.rig.intensities / before.rig.intensities.mean())
@@ -100,6 +101,13 @@ def drift(
             severity: Severity = "fail" if abs(change[index]) > limit else "note"
             found.append(Remark(severity, words, "light-strength", float(change[index]), limit, "", index))
     return tuple(found)
+
+
+def _without_lens(lights: LightCalibration) -> np.ndarray:
+    if lights.u_lens_deg is None:
+        return lights.u_deg
+    u_deg: np.ndarray = np.sqrt(np.maximum(lights.u_deg**2 - lights.u_lens_deg**2, lights.u_own_deg**2))
+    return u_deg
 
 
 def _origins(station: Station, outline_px: np.ndarray, capture: Capture) -> np.ndarray:

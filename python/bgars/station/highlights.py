@@ -178,7 +178,7 @@ def fit_highlight(
     jacobian = np.asarray(fit.jac, dtype=np.float64)
     normal = jacobian.T @ jacobian
     covariance = np.linalg.pinv(normal)[:2, :2] * max(1.0, misfit**2) + GRID_PX**2 * np.eye(2)
-    x_px, y_px, log_level, log_extent, log_blur, _ = fit.x
+    x_px, y_px, _, log_extent, log_blur, _ = fit.x
     saturated = bool((seen[np.hypot(rows - spot.row, cols - spot.col) < spot.extent_px + 2.0] >= clip).any())
     lamp_deg, blur_px = math.degrees(2.0 * math.exp(log_extent) / to_px), math.exp(log_blur)
     if not saturated:
@@ -191,9 +191,7 @@ def fit_highlight(
     return Highlight(float(x_px), float(y_px), covariance, lamp_deg, blur_px, math.nan, True, misfit)
 
 
-def _centroid(
-    change: Array, spot: Spot, sphere: Sphere, noise: float, camera_px: float
-) -> tuple[Array, Array, float]:
+def _centroid(change: Array, spot: Spot, sphere: Sphere, noise: float, camera_px: float) -> tuple[Array, Array, float]:
     """Place of the mean direction of the light of a whole highlight, its covariance, and the sum of its levels.
 
     Noise of every pixel counts; so do a slope of what lies around, and a middle of the bright pixels elsewhere, for a

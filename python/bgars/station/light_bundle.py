@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,9 @@ from scipy.optimize import least_squares
 
 from bgars.errors import CalibrationError
 from bgars.station.mirror import image_of, reflected, sphere_of_outline
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 __all__ = ["LightSolution", "solve_lights"]
 
@@ -22,6 +26,8 @@ LEAST_U_RAD = 1e-6
 LENS_SIDES = 0.2
 """One over the distance of a camera of which nothing is stated, standard deviation, in sides of the image: telecentric
 lenses stand at 0, macro lenses at 0.1 to 0.2, ordinary ones at 0.3 to 0.7."""
+ASKED = 4.0
+"""Fall of chi square, for each of its parameters, from which on the balls ask for a lens."""
 VIEW_RAD = math.radians(0.3)
 """Angle by which such a camera looks aside at the middle of its image: mounted by hand, or a picture that was cut."""
 
@@ -178,11 +184,19 @@ def _solve(
         rows: Array = np.concatenate([scaled[seen].ravel(), values[part:]])
         return rows
 
+    spare = 2 * int(seen.sum()) - part
     start = np.zeros(rest_of + (0 if side_px is None else 1 + 2 * balls))
     scales = np.where(np.arange(len(start)) < part, 0.01, 1.0)
     fit = least_squares(residuals, start, x_scale=scales, max_nfev=60)
+    if side_px is not None and spare > 0:
+        # What the balls can be explained without needs no explaining: the lens is fitted only where they ask for it.
+        stiff = least_squares(
+            lambda values: residuals(np.append(values, start[rest_of:])), start[:rest_of], x_scale=scales[:rest_of]
+        )
+        if 2.0 * (stiff.cost - fit.cost) < ASKED * (len(start) - rest_of):
+            fit.x = np.append(stiff.x, start[rest_of:])
+            fit.fun, fit.jac = residuals(fit.x), _jacobian(residuals, fit.x)
     directions, nearness, circles = unpack(fit.x)
-    spare = 2 * int(seen.sum()) - part
     chi = float(np.square(fit.fun).sum() / spare) if spare > 0 else math.nan
     raised = max(1.0, chi) if spare > 0 else 1.0
     jacobian = np.asarray(fit.jac, dtype=np.float64)
@@ -205,6 +219,13 @@ def _solve(
         np.degrees(views),
         np.degrees(u_views),
     )
+
+
+def _jacobian(residuals: Callable[[Array], Array], at: Array) -> Array:
+    """Forward differences: at a lens of which nothing is known only one side exists."""
+    here, step = residuals(at), 1e-4
+    columns = [(residuals(at + step * axis) - here) / step for axis in np.eye(len(at))]
+    return np.column_stack(columns)
 
 
 def _turned(directions: Array, view_rad: Array) -> Array:

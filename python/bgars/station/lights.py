@@ -288,8 +288,8 @@ def _judge_lens(solution: LightSolution, balls: list[SeenBall]) -> list[Remark]:
         worst = int((size / expected).argmax())
         if size[worst] > MISFIT * expected[worst]:
             message = (
-                f"the balls are seen from sides that differ by about {2.0 * size[worst]:.1f} deg: an ordinary lens near "
-                "by, or pictures cut from larger ones; state the camera, and give whole images"
+                f"the balls are seen from sides that differ by about {2.0 * size[worst]:.1f} deg: an ordinary lens "
+                "near by, or pictures cut from larger ones; state the camera, and give whole images"
             )
             limit = float(MISFIT * expected[worst])
             found.append(Remark("doubt", message, "views-differ", float(size[worst]), limit, "deg"))

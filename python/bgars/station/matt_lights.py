@@ -30,6 +30,8 @@ SECTORS = 8
 """Parts of a ball that are left out in turn (jackknife): what the model misses is alike within each."""
 NOT_LAMBERT = 0.06
 """Root mean square residual, of the brightest level, from which on a general monotone law is fitted, too."""
+EXPLAINED = 2.0
+"""Residual, of the noise, up to which Lambert's law explains a ball wholly."""
 SATURATED_SHARE = 0.2
 """Share of the lit pixels that are clipped from which on an image is burnt out."""
 LEAST_LEVEL = 12.0
@@ -90,25 +92,31 @@ def shading_on(capture: Capture, levels: Levels, outline: Outline) -> SeenShadin
             )
             raise CalibrationError(msg)
         direction = vector / strength
-        if residual > NOT_LAMBERT * peak:
+        own[light], jacobians[light] = _spread(points, values, used, outline, levels.noise, direction)
+        if residual > EXPLAINED * levels.noise:
+            # Two laws that explain the ball as badly: the truth is as likely nearer to either of them.
             general, left = _monotone(_normals(points, outline.circle_px), values, used, direction)
-            findings.append(
-                Remark(
-                    "note",
-                    f"{capture.name}: {name}: the ball does not follow Lambert's law ({100 * residual / peak:.1f} "
-                    "% off): "
-                    f"a general monotone law is taken ({100 * left / peak:.1f} % off)",
-                    "not-lambert",
-                    residual / peak,
-                    NOT_LAMBERT,
-                    "",
-                    light,
+            half = 0.5 * _across(direction) @ (general - direction)
+            own[light] += np.outer(half, half)
+            if residual > NOT_LAMBERT * peak:
+                findings.append(
+                    Remark(
+                        "note",
+                        f"{capture.name}: {name}: the ball does not follow Lambert's law ({100 * residual / peak:.1f} "
+                        "% off): "
+                        f"a general monotone law is taken ({100 * left / peak:.1f} % off)",
+                        "not-lambert",
+                        residual / peak,
+                        NOT_LAMBERT,
+                        "",
+                        light,
+                    )
                 )
-            )
-            direction = general
+                direction = general
+            else:
+                direction = (direction + general) / np.linalg.norm(direction + general)
         directions[light], strengths[light] = direction, strength
         u_strengths[light] = residual / math.sqrt(max(int(used.sum()) / 50.0, 1.0))
-        own[light], jacobians[light] = _spread(points, values, used, outline, levels.noise, direction)
     return SeenShading(directions, own, jacobians, strengths, u_strengths, findings)
 
 
@@ -199,9 +207,7 @@ def _spread(
         tries.append(vector / np.linalg.norm(vector))
     off = np.array(tries) - np.mean(tries, axis=0)
     covariance = (SECTORS - 1) / SECTORS * off.T @ off
-    level = np.cross([0.0, 0.0, 1.0], direction)
-    level = np.array([1.0, 0.0, 0.0]) if np.linalg.norm(level) < 1e-9 else level / np.linalg.norm(level)  # noqa: PLR2004
-    across = np.stack([level, np.cross(direction, level)])
+    across = _across(direction)
     columns = []
     step = 0.5
     for axis in np.eye(3):
@@ -209,3 +215,10 @@ def _spread(
         behind, _ = _fit(_normals(points, circle - step * axis), values, used, noise)
         columns.append((ahead / np.linalg.norm(ahead) - behind / np.linalg.norm(behind)) / (2 * step))
     return across @ covariance @ across.T + STEP_RAD**2 * np.eye(2), np.column_stack(columns)
+
+
+def _across(direction: Array) -> Array:
+    """(2, 3) unit vectors across a direction: one level, one upward."""
+    level = np.cross([0.0, 0.0, 1.0], direction)
+    level = np.array([1.0, 0.0, 0.0]) if np.linalg.norm(level) < 1e-9 else level / np.linalg.norm(level)  # noqa: PLR2004
+    return np.stack([level, np.cross(direction, level)])

@@ -33,6 +33,11 @@ POOR_FIT, FAR_SHARE = 3.0, 0.3
 """Misfit of a disc, and distance of its middle from that of the bright pixels, of its radius, that make it none."""
 ROUGH_SHARE = 0.15
 """Uncertainty of the middle of a highlight of any shape, of its radius."""
+ALIKE = {
+    "wide-highlight": "wide highlights: broad lamps, a rough ball, or burnt out",
+    "no-disc": "the highlight is no disc; the middle of its bright pixels is taken",
+}
+FEW = 3
 
 
 class SeenHighlights(NamedTuple):
@@ -118,7 +123,24 @@ def highlights_on(capture: Capture, levels: Levels, outline: Outline, camera_px:
             continue
         places[index], covariances[index] = (fit.x_px, fit.y_px), fit.covariance_px2
         lamp_deg[index], flux[index] = fit.lamp_deg, fit.flux
-    return SeenHighlights(places, covariances, lamp_deg, flux, findings)
+    return SeenHighlights(places, covariances, lamp_deg, flux, _together(findings, capture.name, count))
+
+
+def _together(findings: list[Remark], name: str, count: int) -> list[Remark]:
+    """Say once what is true of many lights."""
+    kept = []
+    for code, words in ALIKE.items():
+        alike = [one for one in findings if one.code == code]
+        if len(alike) <= FEW:
+            continue
+        findings = [one for one in findings if one.code != code]
+        sizes = [one.value for one in alike if one.value is not None]
+        span = f" ({min(sizes):.0f} to {max(sizes):.0f} {alike[0].unit})" if sizes else ""
+        lights = "all lights" if len(alike) == count else f"{len(alike)} of {count} lights"
+        first = alike[0]
+        top = max(sizes) if sizes else None
+        kept.append(Remark(first.severity, f"{name}: {lights}: {words}{span}", code, top, first.limit, first.unit))
+    return [*findings, *kept]
 
 
 def _saturated(levels: Levels, index: int, spot: Spot) -> bool:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from bgars.records import Capture
     from bgars.station.levels import Levels
     from bgars.station.outline import Outline
+    from bgars.station_record import Remark
 
 __all__ = ["Observed", "SeenBall", "observe", "outlines_a_capture"]
 
@@ -165,4 +166,3 @@ def _need_all(balls: list[SeenBall], captures: list[Capture]) -> None:
         shown = ", ".join(missing[:4]) + (", ..." if len(missing) > 4 else "")  # noqa: PLR2004
         msg = f"{captures[0].name}: {shown}: no highlight on {'the ball' if len(balls) == 1 else 'any ball'}"
         raise CalibrationError(msg)
-

@@ -45,6 +45,8 @@ PLAIN_ARC = 0.7
 """Share of an outline that makes it plain: of several plain circles around one centre the ball is the largest."""
 ALIKE = 2.0
 """Pictures whose outline is so many times as uncertain have no say."""
+MOVED_SHARE = 0.5
+"""Uncertainty of what shading beside an edge moves it by, of that."""
 SMOOTH_PX = 0.7
 """Width of the filter that takes slopes."""
 LEAST_ARC = 0.35
@@ -123,7 +125,8 @@ def refine_outline(pictures: list[Array], start_px: Array, steps: Sequence[float
     """
     rounding = [*steps, *[0.0] * (len(pictures) - len(steps))]
     fits = [
-        fit for picture, step in zip(pictures, rounding, strict=True)
+        fit
+        for picture, step in zip(pictures, rounding, strict=True)
         if (fit := _fit_edge(picture, start_px, step)) is not None
     ]
     if not fits:
@@ -293,14 +296,19 @@ def _circle(points: Array, edge: _Edge, start: Array, count: int, step: float) -
     waves_px = _waves_px(np.arctan2(*offset[good].T[::-1]), off[good])
     # Half a step of rounding, or a black that is cut off, moves an edge of one pixel by its share of the rise.
     rounded_px = step * max(1.0, edge_px) / float(np.median(edge.rises[good]))
-    shaded = [abs(float(np.mean(edge.shading_px[good] * row))) for row in (2.0 * rows[:, :2]).T]
-    moved_px = abs(float(np.median(edge.shading_px[good])))
+    # Shading and dark rims move the steepest place about as far to one side as half of the rise lies to the other.
+    usual = float(np.median(edge.shading_px[good]))
+    reach_px = 3.0 * (1.4826 * float(np.median(np.abs(edge.shading_px[good] - usual))) + FLOOR_PX)
+    gap_px = np.clip(edge.shading_px[good], usual - reach_px, usual + reach_px)
+    moved_px, *_ = np.linalg.lstsq(rows, gap_px, rcond=None)
+    circle = circle - moved_px
+    u_moved = MOVED_SHARE * np.abs(moved_px)
     return Outline(
         float(circle[0]),
         float(circle[1]),
         float(circle[2]),
-        float(np.linalg.norm([max(u[0], u[1]), FLOOR_PX, waves_px, rounded_px, max(shaded)])),
-        float(np.linalg.norm([u[2], FLOOR_PX, waves_px, rounded_px, moved_px])),
+        float(np.linalg.norm([max(u[0], u[1]), FLOOR_PX, waves_px, rounded_px, max(u_moved[:2])])),
+        float(np.linalg.norm([u[2], FLOOR_PX, waves_px, rounded_px, u_moved[2]])),
         edge_px,
         arc,
     )
