@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.errors import InputError
+from bgars.station_lens import straightened
 
 if TYPE_CHECKING:
     from bgars.records import Capture
@@ -28,7 +29,7 @@ def with_station(capture: Capture, station: Station) -> Capture:
     """Return a capture with what the station knows better: lights, response, flat field, pixel pitch, camera.
 
     With a flat field the images are float32 ratios to the flat board, times what a light at the image centre gives
-    there; clipped pixels stay clipped.
+    there; clipped pixels stay clipped. With a lens that distorts they are resampled without its distortion.
 
     Raises
     ------
@@ -57,6 +58,8 @@ def with_station(capture: Capture, station: Station) -> Capture:
         capture = _with_response(capture, station.response)
     if station.flat is not None:
         capture = _with_flat(capture, station.flat, station.name)
+    if station.scale is not None and station.scale.distortion:
+        capture = straightened(capture, station.scale.distortion)
     return capture
 
 

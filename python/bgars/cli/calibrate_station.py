@@ -101,7 +101,8 @@ def lights(
 
     Exit code 2 where there is no ball, or a light does not show on it; nothing is written then.
     """
-    captures = [_seen_by(read_unlit(folder), camera) for folder in folders]
+    known = _existing(output)
+    captures = [_seen_by(_raw(folder, known), camera) for folder in folders]
     found = _calibrate_lights(captures, sphere, outline, near, diameter_mm)
     keep_part(output, {"lights": found}, found.findings)
     if as_json:
@@ -118,7 +119,7 @@ def flat(folder: FolderArgument, output: OutputOption, as_json: JsonOption = Fal
     fall-off no longer bend the surface.
     """
     known = _existing(output)
-    found, findings = bgars.calibrate_flat(_raw(folder, known))
+    found, findings = bgars.calibrate_flat(_raw(folder, replace(known, scale=None)))
     if known.lights is not None and known.scale is not None:
         findings = (*findings, *falloff_findings(found, known.lights, known.scale.pixel_pitch_um))
     keep_part(output, {"flat": found}, findings)
@@ -206,7 +207,8 @@ def drift(
     Exit code 0: nothing beyond its limit. 1: something moved. 2: wrong use, or the reference cannot be read.
     """
     known = read_station(station)
-    capture = _seen_by(read_unlit(folder), camera)
+    kind = reference or (known.lights.sphere if known.lights is not None else "flat")
+    capture = _seen_by(_raw(folder, replace(known, scale=None) if kind == "flat" else known), camera)
     circles = _circles(outline, [capture])
     found = station_drift(known, capture, reference=reference, outline=None if circles is None else circles[0])
     moved = [finding for finding in found if finding.severity == "fail"]
@@ -288,9 +290,9 @@ def _existing(path: Path) -> Station:
 
 
 def _raw(folder: Path, known: Station) -> Capture:
-    """A capture with the response that is known already."""
+    """A capture with the response, scale and distortion that are known already."""
     capture = read_unlit(folder)
-    return bgars.with_station(capture, bgars.Station(known.name, response=known.response))
+    return bgars.with_station(capture, bgars.Station(known.name, response=known.response, scale=known.scale))
 
 
 def keep_part(output: Path, parts: dict[str, Any], findings: tuple[Remark, ...], name: str | None = None) -> None:

@@ -1,0 +1,276 @@
+"""Measure the calibration of stations and rewrite the tables of docs/station.md.
+
+Commands: ``make station`` for the page (needs BGARS_DATA for the photographs; 5 minutes),
+``python docs/make_station.py balls|near|photographs|psm|board|parts`` for one table on the terminal.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import bgars
+import imageio.v3 as iio
+import numpy as np
+from bgars.io.capture import read_unlit
+from numpy.typing import NDArray
+
+sys.path.append(str(Path(__file__).parent.parent / "tests" / "unit"))
+from rendered_spheres import render, ring
+from station_trial import LIGHTS, SIDE, as_capture, calibrated, hardware, spoiled, trial
+
+Array = NDArray[np.float64]
+HERE = Path(__file__).parent
+PAGE = HERE / "station.md"
+START, END = "<!-- tables: make station -->", "<!-- end of station tables -->"
+MITSUBA = HERE.parent / "benches" / "station" / "balls"
+JUDGED = HERE.parent / "benches" / "station" / "judged.json"
+SEEDS, MATT_SEEDS, NEAR_SEEDS, PARTS = 12, 6, 3, 10
+DISC_PX = 1200.0
+TWO = 2.0
+
+
+def apart_deg(one: Array, other: Array) -> Array:
+    """(L,) angles between directions."""
+    return np.degrees(2.0 * np.arcsin(np.clip(np.linalg.norm(one - other, axis=1) / 2.0, 0.0, 1.0)))
+
+
+def on_axes_deg(found: Array, true: Array) -> Array:
+    """(L, 2) errors on two axes across."""
+    level = np.cross([0.0, 0.0, 1.0], true)
+    level /= np.linalg.norm(level, axis=1, keepdims=True)
+    up = np.cross(true, level)
+    return np.degrees(np.stack([np.sum((found - true) * axis, axis=1) for axis in (level, up)], axis=1))
+
+
+def case(seed: int, kind: str) -> tuple[Array, bgars.Capture]:
+    """Eight lamps of 2 degrees and a ball of about 200 pixels, drawn from a seed."""
+    rng = np.random.default_rng([seed, 300])
+    lights = ring(8, rng.uniform(25, 70), rng.uniform(0, 45))
+    lights += rng.normal(0, 0.05, lights.shape)
+    lights /= np.linalg.norm(lights, axis=1, keepdims=True)
+    ball = (*rng.uniform(-12, 12, 2), 100.0 + rng.uniform(-2, 2))
+    images = render(
+        lights, ball=ball, size=(260, 260), kind=kind, samples=3, seed=seed,
+        board=float(rng.uniform(0.1, 0.8)) if kind == "mirror" else 0.05,
+        lamp_level=float(10 ** rng.uniform(-0.1, 1.8)), blur_px=float(rng.uniform(0.4, 0.9)),
+    )  # fmt: skip
+    return lights, as_capture(images, bgars.LightRig.ring(8))
+
+
+def row(name: str, captures: int, errors: list[Array], scaled: list[Array]) -> str:
+    """A line of the table of balls."""
+    error, z = np.concatenate(errors), np.concatenate(scaled).ravel()
+    return (
+        f"| {name} | {captures} | {error.mean():.3f} | {np.percentile(error, 95):.3f} | {error.max():.3f} | "
+        f"{100 * np.mean(np.abs(z) < 1):.0f} % | {100 * np.mean(np.abs(z) < TWO):.0f} % |"
+    )
+
+
+def balls() -> Iterator[str]:
+    """Rendered balls: error of directions and coverage of u."""
+    yield "| balls of 200 px, 8 bit | captures | mean error (deg) | 95 % | largest | within u | within 2 u |"
+    yield "|---|---|---|---|---|---|---|"
+    for kind, seeds in (("mirror", SEEDS), ("matt", MATT_SEEDS)):
+        errors, scaled = [], []
+        for seed in range(seeds):
+            lights, capture = case(seed, kind)
+            found = bgars.calibrate_lights(capture, kind)  # type: ignore[arg-type]
+            errors.append(apart_deg(found.rig.directions, lights))
+            scaled.append(on_axes_deg(found.rig.directions, lights) / found.u_deg[:, None])
+        yield row(f"{kind}, own ray tracer", seeds, errors, scaled)
+    if MITSUBA.is_dir():
+        judged = {}
+        for folder in sorted(one for one in MITSUBA.iterdir() if (one / "truth.json").exists()):
+            truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
+            lights = np.array(truth["lights"])
+            found = bgars.calibrate_lights(read_unlit(folder))
+            off = apart_deg(found.rig.directions, lights)
+            z = on_axes_deg(found.rig.directions, lights) / found.u_deg[:, None]
+            judged[folder.name] = {"off_deg": off.round(5).tolist(), "scaled": z.round(4).tolist()}
+        JUDGED.write_text(json.dumps(judged, indent=1) + "\n", encoding="utf-8")
+    if JUDGED.exists():
+        judged = json.loads(JUDGED.read_text(encoding="utf-8"))
+        errors = [np.array(one["off_deg"]) for one in judged.values()]
+        yield row("mirror, Mitsuba", len(judged), errors, [np.array(one["scaled"]) for one in judged.values()])
+
+
+def near() -> Iterator[str]:
+    """Rendered near lamps: a ball of 120 px at three places."""
+    head = "near lamps at 500 to 800 px, a ball of 120 px at three places"
+    yield f"| {head} | lamps | median error, of the distance | 95 % | within u | within 2 u |"
+    yield "|---|---|---|---|---|---|"
+    share, scaled = [], []
+    for seed in range(NEAR_SEEDS):
+        rng = np.random.default_rng([seed, 301])
+        lamps = ring(6, 45.0, rng.uniform(0, 60)) * rng.uniform(500, 800, (6, 1))
+        captures = []
+        for place, (x, y) in enumerate([(-70.0, -45.0), (75.0, -40.0), (5.0, 75.0)]):
+            images = render(
+                lamps, ball=(x, y, 60.0), size=(290, 290), near=True, seed=10 * seed + place, samples=3,
+                blur_px=0.6, lamp_level=3.0,
+            )  # fmt: skip
+            captures.append(as_capture(images, bgars.LightRig.ring(6), 20.0))
+        found = bgars.calibrate_lights(captures, near=True)
+        if found.rig.positions_um is None or found.u_positions_um is None:
+            continue
+        off = found.rig.positions_um / 20.0 - lamps
+        share += (np.linalg.norm(off, axis=1) / np.linalg.norm(lamps, axis=1)).tolist()
+        scaled.append(20.0 * off / found.u_positions_um)
+    z = np.abs(np.concatenate(scaled))
+    yield (
+        f"| mirror, own ray tracer | {len(share)} | {100 * np.median(share):.2f} % | "
+        f"{100 * np.percentile(share, 95):.2f} % | {100 * np.mean(z < 1):.0f} % | {100 * np.mean(z < TWO):.0f} % |"
+    )
+
+
+def frog_ball(folder: Path) -> tuple[bgars.Capture, Array]:
+    """A chrome ball of the frog set and its published outline (column, row from the bottom, radius)."""
+    images = np.stack(
+        [np.rint(iio.imread(folder / f"Image_{i:02d}.JPG").astype(float).mean(axis=2)) for i in range(1, 21)]
+    )
+    col, up, radius = np.loadtxt(folder / "circle_data.txt")
+    height, width = images.shape[1:]
+    shape = (height, width)
+    capture = bgars.Capture(
+        images.astype(np.uint8), bgars.LightRig.ring(20), np.ones(shape, np.bool_), saturation=250.0
+    )
+    return capture, np.array([col - 0.5 - width / 2.0, up - 0.5 - height / 2.0, radius])
+
+
+def photographs() -> Iterator[str]:
+    """Two calibrations of the same lights, by photographs."""
+    real = Path(os.environ["BGARS_DATA"]) / "real"
+    yield "| photographs | median difference (deg) | largest | expected by u, median | within 2 u |"
+    yield "|---|---|---|---|---|"
+    chrome = bgars.calibrate_lights(bgars.read_capture(real / "psm_chrome"))
+    gray = bgars.calibrate_lights(bgars.read_capture(real / "psm_gray"), "matt")
+    one, two = (frog_ball(real / "harv_frog" / name) for name in ("chrome1", "chrome2"))
+    first, second = (bgars.calibrate_lights(capture, outline=circle) for capture, circle in (one, two))
+    both = bgars.calibrate_lights([one[0], two[0]], outline=[one[1], two[1]], near=False)
+    pairs = (
+        ("psm: chrome ball and matt ball", chrome, gray),
+        ("frog: either chrome ball", first, second),
+    )
+    for name, a, b in pairs:
+        off, u = apart_deg(a.rig.directions, b.rig.directions), np.hypot(a.u_deg, b.u_deg)
+        yield against(name, off, u)
+    own = np.loadtxt(real / "psm_chrome" / "light_directions.txt")
+    yield against("psm: chrome ball and published", apart_deg(chrome.rig.directions, unit(own)), chrome.u_deg)
+    probes = unit(np.loadtxt(real / "harv_frog" / "light_directions_probes.txt"))
+    yield against("frog: both balls and published", apart_deg(both.rig.directions, probes), both.u_deg)
+
+
+def unit(vectors: Array) -> Array:
+    """Rows of length 1."""
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
+
+
+def against(name: str, off: Array, u: Array) -> str:
+    """A line of the table of photographs; an error of u on either axis is one of 1.18 u in its median."""
+    return (
+        f"| {name} | {np.median(off):.2f} | {off.max():.2f} | {1.18 * np.median(u):.2f} | "
+        f"{100 * np.mean(off < TWO * np.sqrt(2) * u):.0f} % |"
+    )
+
+
+def psm() -> Iterator[str]:
+    """Reconstruction with our directions beside the published ones."""
+    real = Path(os.environ["BGARS_DATA"]) / "real"
+    ours = bgars.calibrate_lights(bgars.read_capture(real / "psm_chrome")).rig
+    yield "| psm set | measure | published directions | ours |"
+    yield "|---|---|---|---|"
+    for name in ("gray", "cat", "buddha", "horse"):
+        capture = bgars.read_capture(real / f"psm_{name}")
+        rigs = (capture.rig, replace(ours, files=capture.rig.files))
+        cells = []
+        for rig in rigs:
+            field = bgars.estimate_normals(replace(capture, rig=rig))
+            cells.append(sphere_error(field, real) if name == "gray" else left(capture, rig, field))
+        measure = "median error against the sphere (deg)" if name == "gray" else "residual of the images (%)"
+        yield f"| {name} | {measure} | {cells[0]:.2f} | {cells[1]:.2f} |"
+
+
+def sphere_error(field: bgars.NormalField, real: Path) -> float:
+    """Median angle between normals and those of the published circle."""
+    col, line, radius = np.loadtxt(real / "psm_gray" / "sphere_cx_cy_r.txt")
+    rows, cols = np.mgrid[: field.mask.shape[0], : field.mask.shape[1]]
+    x, y = (cols - col) / radius, (line - rows) / radius
+    inside = field.mask & (np.hypot(x, y) < 0.9)  # noqa: PLR2004 - the rim is steep
+    true = np.stack([x, y, np.sqrt(np.maximum(1.0 - x**2 - y**2, 0.0))], axis=-1)
+    cosine = np.sum(field.normals[inside] * true[inside], axis=1)
+    return float(np.degrees(np.median(np.arccos(np.clip(cosine, -1.0, 1.0)))))
+
+
+def left(capture: bgars.Capture, rig: bgars.LightRig, field: bgars.NormalField) -> float:
+    """Root mean square of what Lambert's law leaves of lit pixels with the best normals, per cent of their level."""
+    levels = capture.images[:, field.mask].astype(np.float64)
+    lit = levels > np.percentile(levels, 20)
+    shading = rig.directions @ field.normals[field.mask].T
+    shading[~lit | (shading < 0.1)] = 0.0  # noqa: PLR2004 - grazing
+    albedo = np.sum(levels * shading, axis=0) / np.maximum(np.sum(shading**2, axis=0), 1e-9)
+    off = np.where(shading > 0, levels - albedo * shading, 0.0)
+    return float(100.0 * np.sqrt(np.sum(off**2) / np.sum(np.where(shading > 0, levels, 0.0) ** 2)))
+
+
+def board() -> Iterator[str]:
+    """A flat board through the simulated station: what is left of flatness."""
+    yield "| flat board, 290 px | dome (px, of 1,200 px) |"
+    yield "|---|---|"
+    real = hardware(7)
+    station = calibrated(real)
+    lit = real.intensities * real.lights[:, 2]
+    flat = 0.55 * (lit / lit.max())[:, None, None] * np.ones((SIDE, SIDE))
+    seen = as_capture(spoiled(flat, real.rng), bgars.LightRig.ring(LIGHTS))
+    for name, capture in (("uncalibrated", seen), ("calibrated station", bgars.with_station(seen, station))):
+        field = bgars.estimate_normals(capture)
+        height = bgars.integrate_normals(field).height[5:-5, 5:-5]
+        rows, cols = np.mgrid[: height.shape[0], : height.shape[1]]
+        plane = np.column_stack([np.ones(height.size), rows.ravel(), cols.ravel()])
+        use = np.isfinite(height.ravel())
+        bend = height.ravel()[use] - plane[use] @ np.linalg.lstsq(plane[use], height.ravel()[use], rcond=None)[0]
+        # A dome grows with the square of the width that it spans, as a share of it with the width.
+        yield f"| {name} | {float(np.ptp(bend)) * (DISC_PX / SIDE) ** 2:.1f} |"
+
+
+def parts() -> Iterator[str]:
+    """Ten parts by the calibrated station, against exact knowledge."""
+    yield "| ten parts of nine balls, error (um, rms) | balls | height | diameter | x | y |"
+    yield "|---|---|---|---|---|---|"
+    for one in trial(PARTS):
+        yield f"| {one.name} | {one.balls} | " + " | ".join(f"{value:.2f}" for value in one.rms_um) + " |"
+
+
+TABLES: dict[str, Callable[[], Iterator[str]]] = {
+    "balls": balls,
+    "near": near,
+    "photographs": photographs,
+    "psm": psm,
+    "board": board,
+    "parts": parts,
+}
+
+
+def main(names: list[str]) -> None:
+    """Print tables; with none named, all of them, and write the page."""
+    warnings.simplefilter("ignore", bgars.CaptureWarning)
+    blocks = []
+    for name in names or list(TABLES):
+        lines = list(TABLES[name]())
+        print("\n".join(lines), flush=True)  # noqa: T201 - what it is for
+        blocks.append("\n".join(lines))
+    if names:
+        return
+    page = PAGE.read_text(encoding="utf-8")
+    before, rest = page.split(START)
+    after = rest.split(END)[1]
+    PAGE.write_text(before + START + "\n\n" + "\n\n".join(blocks) + "\n\n" + END + after, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
