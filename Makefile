@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral simulator experiments method check-faults kills line schema constants studies performance bench fuzz clean
+.PHONY: demo test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral station station-balls simulator experiments method check-faults kills line schema constants studies performance bench fuzz clean
 
 demo: $(VENV)/.run-time ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
@@ -52,6 +52,13 @@ reality: $(VENV)/.installed ## Judge benches/reality/scenes and rewrite its tabl
 
 bilateral: data $(VENV)/.installed ## Rewrite the bilateral tables of docs/accuracy.md, draw their pictures (needs BGARS_DATA)
 	$(BIN)/python docs/make_bilateral.py
+
+station: data $(VENV)/.installed ## Measure the calibration of stations and rewrite the tables of docs/station.md (5 minutes; needs BGARS_DATA)
+	$(BIN)/python docs/make_station.py
+
+station-balls: $(VENV)/.installed ## Render balls for it with Mitsuba (20 s a seed; needs an LLVM, see benches/reality)
+	$(BIN)/python -m pip install --quiet --requirement benches/reality/requirements.txt
+	$(BIN)/python benches/station/render_balls.py benches/station/balls 101 102 103 104 105 106 107 108 109 110
 
 simulator: data $(VENV)/.installed ## Rewrite the tables of docs/simulator.md (needs BGARS_DATA)
 	$(BIN)/python docs/make_simulator_check.py

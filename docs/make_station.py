@@ -1,5 +1,7 @@
 """Measure the calibration of stations and rewrite the tables of docs/station.md.
 
+Balls by Mitsuba are judged where benches/station/render_balls.py rendered them; benches/station/judged.json keeps it.
+
 Commands: ``make station`` for the page (needs BGARS_DATA for the photographs; 5 minutes),
 ``python docs/make_station.py balls|near|photographs|psm|board|parts`` for one table on the terminal.
 """
@@ -19,6 +21,7 @@ import imageio.v3 as iio
 import numpy as np
 from bgars.io.capture import read_unlit
 from numpy.typing import NDArray
+from scipy import ndimage
 
 sys.path.append(str(Path(__file__).parent.parent / "tests" / "unit"))
 from rendered_spheres import render, ring
@@ -232,7 +235,8 @@ def board() -> Iterator[str]:
         height = bgars.integrate_normals(field).height[5:-5, 5:-5]
         rows, cols = np.mgrid[: height.shape[0], : height.shape[1]]
         plane = np.column_stack([np.ones(height.size), rows.ravel(), cols.ravel()])
-        use = np.isfinite(height.ravel())
+        inside = ndimage.binary_erosion(field.mask, iterations=5)[5:-5, 5:-5]
+        use = inside.ravel() & np.isfinite(height.ravel())
         bend = height.ravel()[use] - plane[use] @ np.linalg.lstsq(plane[use], height.ravel()[use], rcond=None)[0]
         # A dome grows with the square of the width that it spans, as a share of it with the width.
         yield f"| {name} | {float(np.ptp(bend)) * (DISC_PX / SIDE) ** 2:.1f} |"

@@ -95,6 +95,7 @@ from .station_record import Remark as Remark
 from .station_record import ResponseCurve as ResponseCurve
 from .station_record import Scale as Scale
 from .station_record import Station as Station
+from .station_record import Verification as Verification
 from .store import Store as Store
 from .store import open_store as open_store
 from .studies import GaugeStudy as GaugeStudy

@@ -20,6 +20,7 @@ __all__ = [
     "Scale",
     "Severity",
     "Station",
+    "Verification",
 ]
 
 Array = NDArray[np.float64]
@@ -222,6 +223,40 @@ class Scale:
     camera_distance_mm: float | None = None
 
 
+@dataclass(frozen=True)
+class Verification:
+    """How readings of a part of known sizes compare with these.
+
+    Attributes
+    ----------
+    quantity : str
+        "height" or "diameter".
+    captures, balls : int
+        Inspections of the part, and its balls that count.
+    bias_um, u_bias_um : float
+        Mean error, and its standard uncertainty with that of the known sizes.
+    slope, u_slope : float
+        Change of the error with the size; NaN for fewer than three sizes.
+    repeatability_um : float
+        Standard deviation of a reading when the part is put back; NaN for one capture.
+    largest_um : float
+        Largest error of a single reading.
+    mpe_um : float or None
+        Maximum permissible error that it was judged by.
+    """
+
+    quantity: str
+    captures: int
+    balls: int
+    bias_um: float
+    u_bias_um: float
+    slope: float
+    u_slope: float
+    repeatability_um: float
+    largest_um: float
+    mpe_um: float | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Station:
     """A station as it was calibrated; what is None was not.
@@ -238,6 +273,8 @@ class Station:
         When, ISO 8601.
     findings : tuple of Remark
         What the calibrations noticed.
+    verified : tuple of Verification
+        Against a part of known sizes, and `verified_utc`, when.
     """
 
     name: str = "station"
@@ -247,3 +284,5 @@ class Station:
     scale: Scale | None = None
     calibrated_utc: str = ""
     findings: tuple[Remark, ...] = ()
+    verified: tuple[Verification, ...] = ()
+    verified_utc: str = ""

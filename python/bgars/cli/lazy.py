@@ -40,6 +40,7 @@ LAZY_COMMANDS = {
         "bgars.cli.teach",
         "Write a part recipe from golden parts: layout, empty places, nominal sizes.",
     ),
+    "verify": ("bgars.cli.verify", "Compare a station with a part of known sizes: bias, linearity, repeatability."),
     "simulate": ("bgars.cli.simulate", "Photograph a simulated part with known truth."),
     "experiment": ("bgars.cli.experiment", "Reproduce the paper's figures on simulated captures."),
 }

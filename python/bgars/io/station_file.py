@@ -16,7 +16,7 @@ from bgars.errors import FileFormatError, InputError
 from bgars.io.atomic import atomic_file
 from bgars.io.strict_toml import Strict, checked, read_values
 from bgars.rig import LightRig
-from bgars.station_record import FlatField, LightCalibration, Remark, ResponseCurve, Scale, Station
+from bgars.station_record import FlatField, LightCalibration, Remark, ResponseCurve, Scale, Station, Verification
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -122,6 +122,21 @@ class ScaleTable(Strict):
     camera_distance_mm: Positive | None = Field(None, description="where it is known")
 
 
+class VerifyTable(Strict):
+    """An entry of ``[[verified]]``."""
+
+    quantity: Literal["height", "diameter"] = Field(description="height or diameter")
+    captures: int = Field(description="inspections of the part of known sizes")
+    balls: int = Field(description="its balls")
+    bias_um: Number = Field(description="mean error")
+    u_bias_um: NotNegative | None = Field(None, description="its standard uncertainty, with that of the known sizes")
+    slope: Number | None = Field(None, description="change of the error with the size")
+    u_slope: NotNegative | None = Field(None, description="its standard uncertainty")
+    repeatability_um: NotNegative | None = Field(None, description="standard deviation when the part is put back")
+    largest_um: NotNegative = Field(description="largest error of a single reading")
+    mpe_um: Positive | None = Field(None, description="maximum permissible error that it was judged by")
+
+
 class FindingTable(Strict):
     """An entry of ``[[findings]]``."""
 
@@ -142,6 +157,8 @@ class StationFile(Strict):
     flat: FlatTable | None = None
     response: ResponseTable | None = None
     scale: ScaleTable | None = None
+    verified_utc: str = Field("", description="when it was compared with a part of known sizes, ISO 8601")
+    verified: list[VerifyTable] = Field(default_factory=list, description="how it compared (bgars verify)")
     findings: list[FindingTable] = Field(default_factory=list, description="what the calibrations noticed")
 
 
@@ -160,6 +177,7 @@ def station_keys() -> list[tuple[str, str]]:
         "flat": FlatTable,
         "response": ResponseTable,
         "scale": ScaleTable,
+        "verified": VerifyTable,
     }
     keys = [(name, str(entry.description)) for name, entry in StationFile.model_fields.items() if name not in tables]
     for table, model in tables.items():
@@ -211,8 +229,19 @@ def read_station(path: str | PathLike[str]) -> Station:
         if scale is None
         else Scale(**{**scale.model_dump(), "tilt_deg": math.nan if scale.tilt_deg is None else scale.tilt_deg}),
         calibrated_utc=table.calibrated_utc,
+        verified=tuple(_verified(one) for one in table.verified),
+        verified_utc=table.verified_utc,
         findings=tuple(Remark(one.severity, one.message, one.code) for one in table.findings),
     )
+
+
+def _verified(table: VerifyTable) -> Verification:
+    unknown = {"u_bias_um", "slope", "u_slope", "repeatability_um"}
+    values: dict[str, Any] = table.model_dump()
+    known: dict[str, Any] = {
+        key: math.nan if value is None and key in unknown else value for key, value in values.items()
+    }
+    return Verification(**known)
 
 
 def _lights(table: LightsTable) -> LightCalibration:
@@ -263,6 +292,8 @@ def write_station(station: Station, path: str | PathLike[str]) -> None:
     path = Path(path)
     lines = [f'format = "{STATION_FORMAT}"', f"version = {STATION_VERSION}", f"name = {json.dumps(station.name)}"]
     lines += [f"calibrated_utc = {json.dumps(station.calibrated_utc)}", f"bgars = {json.dumps(version('bgars'))}"]
+    if station.verified_utc:
+        lines += [f"verified_utc = {json.dumps(station.verified_utc)}"]
     if station.lights is not None:
         lines += _table("lights", _lights_values(station.lights))
     if station.flat is not None:
@@ -279,6 +310,8 @@ def write_station(station: Station, path: str | PathLike[str]) -> None:
         lines += _table("response", {**values, "u_radiance": curve.u_radiance, "source": curve.source})
     if station.scale is not None:
         lines += _table("scale", dict(vars(station.scale)))
+    for one in station.verified:
+        lines += _table("[verified]", dict(vars(one)))
     for finding in station.findings:
         lines += ["", "[[findings]]", f"severity = {json.dumps(finding.severity)}"]
         lines += [f"code = {json.dumps(finding.code)}", f"message = {json.dumps(finding.message)}"]

@@ -190,9 +190,11 @@ def _solve(
     fit = least_squares(residuals, start, x_scale=scales, max_nfev=60)
     if side_px is not None and spare > 0:
         # What the balls can be explained without needs no explaining: the lens is fitted only where they ask for it.
-        stiff = least_squares(
-            lambda values: residuals(np.append(values, start[rest_of:])), start[:rest_of], x_scale=scales[:rest_of]
-        )
+
+        def by_the_rest(values: Array) -> Array:
+            return residuals(np.append(values, start[rest_of:]))
+
+        stiff = least_squares(by_the_rest, start[:rest_of], x_scale=scales[:rest_of], max_nfev=60)
         if 2.0 * (stiff.cost - fit.cost) < ASKED * (len(start) - rest_of):
             fit.x = np.append(stiff.x, start[rest_of:])
             fit.fun, fit.jac = residuals(fit.x), _jacobian(residuals, fit.x)

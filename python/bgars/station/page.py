@@ -53,6 +53,12 @@ def write_station_page(station: Station, path: str | PathLike[str]) -> None:
         ),
         "<h2>Scale</h2>",
         *(_scale(station.scale) if station.scale else _missing("bgars calibrate scale FOLDER -o station.toml")),
+        "<h2>Verification</h2>",
+        *(
+            _verified(station)
+            if station.verified
+            else _missing("bgars verify FOLDER... --known known.csv --station station.toml")
+        ),
         "<h2>What was noticed</h2><ul>",
         *(
             f'<li class="{one.severity}">{html.escape(one.severity)}: {html.escape(one.message)}</li>'
@@ -162,6 +168,27 @@ def _scale(scale: Scale) -> Iterable[str]:
         "points, residual "
         f"{scale.residual_px:.3f} px; distortion at the corners {100 * scale.distortion:.2f} %.</p>"
     )
+
+
+def _verified(station: Station) -> Iterable[str]:
+    def shown(value: float, unit: str = "um") -> str:
+        return "" if math.isnan(value) else f"{value:+.2f} {unit}" if value < 0 else f"{value:.2f} {unit}"
+
+    rows = [
+        [
+            one.quantity,
+            shown(one.bias_um),
+            shown(one.u_bias_um),
+            shown(1000.0 * one.slope, "um/mm"),
+            shown(one.repeatability_um),
+            shown(one.largest_um),
+            "" if one.mpe_um is None else shown(one.mpe_um),
+            f"{one.balls} x {one.captures}",
+        ]
+        for one in station.verified
+    ]
+    yield f"<p>Against a part of known sizes, {html.escape(station.verified_utc)}.</p>"
+    yield _table(["", "bias", "u of bias", "slope", "repeatability", "largest error", "permissible", "balls"], rows)
 
 
 def _table(head: list[str], rows: list[list[str]]) -> str:

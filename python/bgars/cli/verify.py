@@ -1,0 +1,102 @@
+"""The command ``bgars verify``: a station against a part of known sizes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+import bgars
+from bgars.cli.calibrate_station import said_values
+from bgars.cli.console import print_json, say, stage_progress, utc_now
+from bgars.errors import InputError
+from bgars.io.station_file import read_station, write_station
+from bgars.station.page import write_station_page
+from bgars.station.verify import READINGS, read_known
+from bgars.station.verify import verify as compare
+
+if TYPE_CHECKING:
+    from bgars.station_record import Remark, Verification
+
+__all__ = ["register"]
+
+EXIT_BROKEN = 1
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("verify")(verify)
+
+
+def verify(
+    folders: Annotated[
+        list[Path], typer.Argument(metavar="FOLDER...", help="Captures of the known part.", show_default=False)
+    ],
+    known: Annotated[
+        Path,
+        typer.Option(
+            metavar="known.csv", help="Calibrated sizes: name, height_um, diameter_um, u_um.", show_default=False
+        ),
+    ],
+    station: Annotated[
+        Path, typer.Option(metavar="station.toml", help="The station; the result is kept in it.", show_default=False)
+    ],
+    recipe: Annotated[
+        Path | None,
+        typer.Option("--recipe", "-r", metavar="PART.toml", help="Layout: names of the balls.", show_default=False),
+    ] = None,
+    mpe_um: Annotated[
+        float | None,
+        typer.Option(metavar="UM", help="Maximum permissible error of a single reading.", show_default=False),
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
+    ] = False,
+) -> None:
+    """Compare a station with a part of known sizes: bias, linearity, repeatability (protocol: docs/station.md).
+
+    Exit code 0: within --mpe-um, or none was given. 1: an error is beyond it, or that it is kept cannot be shown.
+    """
+    if mpe_um is not None and not (math.isfinite(mpe_um) and mpe_um > 0):
+        msg = f"--mpe-um: must be finite and above 0, got {mpe_um:g}"
+        raise InputError(msg)
+    sizes = read_known(known)
+    kept = read_station(station)
+    results = []
+    with stage_progress() as report:
+        for index, folder in enumerate(folders):
+            results.append(bgars.inspect(bgars.read_capture(folder, station=kept), recipe))
+            report("known part", (index + 1) / len(folders))
+    found: list[Verification] = []
+    said: list[Remark] = []
+    for quantity in READINGS:
+        if any(math.isfinite(getattr(one, f"{quantity}_um")) for one in sizes.values()):
+            one, remarks = compare(results, sizes, quantity=quantity, mpe_um=mpe_um)
+            found.append(one)
+            said += remarks
+    others = tuple(one for one in kept.findings if one.code not in {remark.code for remark in said})
+    new = replace(kept, verified=tuple(found), verified_utc=utc_now(), findings=(*others, *said))
+    write_station(new, station)
+    write_station_page(new, station.with_suffix(".html"))
+    broken = any(remark.severity == "fail" for remark in said)
+    if as_json:
+        print_json({"station": str(station), "verified": [vars(one) for one in found], **said_values(tuple(said))})
+    else:
+        for one in found:
+            slope = (
+                ""
+                if math.isnan(one.slope)
+                else f", {1000 * one.slope:+.1f} um a millimetre (u {1000 * one.u_slope:.1f})"
+            )
+            again = "" if math.isnan(one.repeatability_um) else f", repeats to {one.repeatability_um:.2f} um"
+            say(
+                f"{one.quantity}: bias {one.bias_um:+.2f} um (u {one.u_bias_um:.2f} um){slope}{again}; largest error "
+                f"{one.largest_um:.2f} um, {one.balls} balls in {one.captures} captures"
+            )
+        for remark in said:
+            say(f"{remark.severity}: {remark.message}")
+    if broken:
+        raise typer.Exit(EXIT_BROKEN)
