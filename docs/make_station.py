@@ -232,7 +232,8 @@ def board() -> Iterator[str]:
     seen = as_capture(spoiled(flat, real.rng), bgars.LightRig.ring(LIGHTS))
     for name, capture in (("uncalibrated", seen), ("calibrated station", bgars.with_station(seen, station))):
         field = bgars.estimate_normals(capture)
-        height = bgars.integrate_normals(field).height[5:-5, 5:-5]
+        surface = bgars.integrate_normals(field)
+        height = surface.height[5:-5, 5:-5] / (surface.pixel_pitch_um or 1.0)
         rows, cols = np.mgrid[: height.shape[0], : height.shape[1]]
         plane = np.column_stack([np.ones(height.size), rows.ravel(), cols.ravel()])
         inside = ndimage.binary_erosion(field.mask, iterations=5)[5:-5, 5:-5]

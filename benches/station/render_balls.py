@@ -4,7 +4,9 @@
 
 A seed draws eight lamps of 2 degrees at any elevation from 25 to 70 degrees, a ball of about 200 pixels anywhere near
 the middle, a chrome or a black one, the board's grey, the exposure and the blur of the lens; noise is 1 level of 8 bit.
-A lamp is a thousand times as bright as a board: where the board, and so the outline, is seen, highlights are clipped. Needs mitsuba, numpy, scipy and an LLVM.
+A lamp is a thousand times as bright as a board: where the board, and so the outline, is seen, highlights are clipped.
+
+Needs mitsuba, numpy, scipy and an LLVM.
 """
 
 from __future__ import annotations

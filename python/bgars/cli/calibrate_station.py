@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -10,11 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 import bgars
+from bgars.cli.camera_option import CameraOption, seen_by
 from bgars.cli.console import print_json, say, stage_progress, utc_now
 from bgars.errors import InputError
 from bgars.io.capture import read_unlit
 from bgars.io.station_file import is_station_file, read_station, write_station
 from bgars.station import drift as station_drift
+from bgars.station.ball_pictures import write_balls
 from bgars.station.flat import falloff_findings
 from bgars.station.page import write_station_page
 
@@ -64,15 +65,6 @@ NearOption = Annotated[
         show_default=False,
     ),
 ]
-CameraOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="telecentric|MM",
-        help="The lens: telecentric, or its distance from the board in mm, where capture.toml does not say. Without, "
-        "either is allowed for in the uncertainty.",
-        show_default=False,
-    ),
-]
 DiameterOption = Annotated[
     float | None,
     typer.Option(metavar="MM", help="Diameter of the ball: the scale where capture.toml has none.", show_default=False),
@@ -102,8 +94,9 @@ def lights(
     Exit code 2 where there is no ball, or a light does not show on it; nothing is written then.
     """
     known = _existing(output)
-    captures = [_seen_by(_raw(folder, known), camera) for folder in folders]
+    captures = [seen_by(_raw(folder, known), camera) for folder in folders]
     found = _calibrate_lights(captures, sphere, outline, near, diameter_mm)
+    write_balls(captures, found, output.with_suffix(".balls.svg"))
     keep_part(output, {"lights": found}, found.findings)
     if as_json:
         print_json({"bgars": bgars.__version__, **_lights_values(found), "file": str(output)})
@@ -158,6 +151,7 @@ def station(
     if (grid is None) != (grid_pitch_mm is None):
         msg = "--grid and --grid-pitch-mm: give both or none"
         raise InputError(msg)
+    _existing(output)
     parts: dict[str, Any] = {}
     findings: list[Remark] = []
     with stage_progress() as report:
@@ -165,7 +159,7 @@ def station(
             parts["scale"], said = bgars.calibrate_scale(read_unlit(grid), 1000.0 * grid_pitch_mm, target=target)
             findings += said
         report("scale", 1.0)
-        captures = [_seen_by(read_unlit(folder), camera) for folder in folders]
+        captures = [seen_by(read_unlit(folder), camera) for folder in folders]
         if "scale" in parts:
             captures = [replace(one, pixel_pitch_um=parts["scale"].pixel_pitch_um) for one in captures]
         found = _calibrate_lights(captures, sphere, outline, near, diameter_mm)
@@ -178,6 +172,7 @@ def station(
             if "scale" in parts:
                 findings += falloff_findings(parts["flat"], found, parts["scale"].pixel_pitch_um)
         report("flat", 1.0)
+    write_balls(captures, found, output.with_suffix(".balls.svg"))
     keep_part(output, parts, tuple(findings), name=name)
     if as_json:
         print_json(
@@ -208,7 +203,7 @@ def drift(
     """
     known = read_station(station)
     kind = reference or (known.lights.sphere if known.lights is not None else "flat")
-    capture = _seen_by(_raw(folder, replace(known, scale=None) if kind == "flat" else known), camera)
+    capture = seen_by(_raw(folder, replace(known, scale=None) if kind == "flat" else known), camera)
     circles = _circles(outline, [capture])
     found = station_drift(known, capture, reference=reference, outline=None if circles is None else circles[0])
     moved = [finding for finding in found if finding.severity == "fail"]
@@ -225,20 +220,6 @@ def drift(
         )
     if moved:
         raise typer.Exit(EXIT_MOVED)
-
-
-def _seen_by(capture: Capture, camera: str | None) -> Capture:
-    """The capture with the camera that the command line states."""
-    if camera is None:
-        return capture
-    try:
-        distance_mm = math.inf if camera == "telecentric" else float(camera)
-    except ValueError:
-        distance_mm = math.nan
-    if not distance_mm > 0:
-        msg = f"--camera: must be telecentric or a distance in mm above 0, got {camera!r}"
-        raise InputError(msg)
-    return replace(capture, camera_distance_mm=distance_mm)
 
 
 def _calibrate_lights(

@@ -5,6 +5,7 @@ from bgars.station.flat import calibrate_flat
 from bgars.station.lights import calibrate_lights
 from bgars.station.response import response_from_bracket, response_from_sums, srgb_response
 from bgars.station.scale import calibrate_scale
+from bgars.station.verify import verify
 
 __all__ = [
     "calibrate_flat",
@@ -14,4 +15,5 @@ __all__ = [
     "response_from_bracket",
     "response_from_sums",
     "srgb_response",
+    "verify",
 ]

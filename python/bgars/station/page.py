@@ -38,11 +38,13 @@ def write_station_page(station: Station, path: str | PathLike[str]) -> None:
     FileFormatError
         The folder is missing or not writable.
     """
+    pictures = Path(path).with_suffix(".balls.svg")
     parts = [
         f"<h1>{html.escape(station.name)}</h1>",
         f"<p>Calibrated {html.escape(station.calibrated_utc or 'at a time that is not known')}.</p>",
         "<h2>Lights</h2>",
         *(_lights(station.lights) if station.lights else _missing("bgars calibrate lights FOLDER -o station.toml")),
+        *(_balls(pictures) if station.lights and pictures.is_file() else ()),
         "<h2>Evenness</h2>",
         *(_flat(station.flat) if station.flat else _missing("bgars calibrate flat FOLDER -o station.toml")),
         "<h2>Response of the camera</h2>",
@@ -111,6 +113,14 @@ def _lights(lights: LightCalibration) -> Iterable[str]:
     alone = lights.sphere == "mirror" and len(lights.balls) == 1
     residual = "one ball shows no residual" if alone else f"residual {lights.residual_px:.3f} px"
     yield f"<p>By a {html.escape(lights.sphere)} ball; {residual}. Limited by {limit}.</p>"
+
+
+def _balls(pictures: Path) -> Iterable[str]:
+    """The balls as they were seen, where calibration left their pictures beside the station."""
+    drawing = pictures.read_text(encoding="utf-8")
+    if drawing.startswith("<svg"):
+        caption = "Brightest level of all lights; red: outline; yellow: highlight of each light"
+        yield f"<figure>{drawing}<figcaption>{caption}</figcaption></figure>"
 
 
 def _sky(directions: np.ndarray, u_deg: np.ndarray) -> str:
