@@ -25,6 +25,7 @@ RECORDS = {
     "part_result": 3,
     "station_record": 3,
     "station_apply": 3.5,
+    "station_lens": 3.4,
     "kernel_capture": 3.5,
     "kernel_outputs": 3.5,
     "anchoring": 3.5,

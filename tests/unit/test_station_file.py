@@ -243,3 +243,25 @@ def test_every_key_is_documented() -> None:
     for key, meaning in station_keys():
         assert f"`{key}`" in page, key
         assert meaning in page, key
+
+
+def test_a_lens_that_distorts_is_straightened_and_clipped_pixels_stay_clipped() -> None:
+    rows, cols = np.mgrid[:120, :160].astype(np.float64)
+    down, right, half2 = rows - 59.5, cols - 79.5, (120**2 + 160**2) / 4.0
+    inverse = np.ones_like(rows)
+    for _ in range(20):
+        inverse = 1.0 / (1.0 + 0.01 * (down**2 + right**2) * inverse**2 / half2)
+
+    def scene(y: np.ndarray, x: np.ndarray) -> np.ndarray:
+        return 100.0 + 60.0 * np.sin(x / 9.0) * np.cos(y / 11.0) + 200.0 * (np.hypot(x - 40, y + 30) < 8)
+
+    bent = np.minimum(np.rint(scene(down * inverse, right * inverse)), 255).astype(np.uint8)
+    images = np.repeat(bent[None], 6, axis=0)
+    rig = bgars.LightRig.from_directions(LIGHTS)
+    capture = bgars.Capture(images, rig, np.ones((120, 160), np.bool_), saturation=255.0)
+    seen = bgars.with_station(capture, bgars.Station("line 3", scale=bgars.Scale(3.4, 0.002, distortion=0.01)))
+    plain = np.hypot(right - 40, down + 30) > 12
+    inside = seen.mask & plain
+    assert np.abs(seen.images[0][inside] - scene(down, right)[inside]).max() < 1.0
+    assert (seen.images[0][np.hypot(right - 40, down + 30) < 6] >= seen.saturation).all()
+    assert (seen.images[0][plain] < seen.saturation).all()

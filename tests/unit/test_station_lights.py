@@ -81,6 +81,31 @@ def test_a_wrong_radius_moves_all_lights_together_and_is_doubted(lights: Array, 
     assert (off_deg(found.rig.directions, lights) < 3 * np.sqrt(2) * found.u_deg).all()
 
 
+def test_a_lens_of_which_nothing_is_stated_counts_in_u(mirror: NDArray[np.uint8]) -> None:
+    known = bgars.calibrate_lights(capture_of(mirror, camera_distance_mm=np.inf))
+    unknown = bgars.calibrate_lights(capture_of(mirror))
+    np.testing.assert_array_equal(known.rig.directions, unknown.rig.directions)
+    assert unknown.u_lens_deg is not None
+    assert known.u_lens_deg is not None
+    assert not known.u_lens_deg.any()
+    assert float(np.median(known.u_deg)) < 0.12
+    assert float(np.median(unknown.u_lens_deg)) > 0.5
+    assert {"camera-unknown"} <= {one.code for one in unknown.findings}
+
+
+def test_a_stated_circle_where_there_is_none_is_doubted(mirror: NDArray[np.uint8]) -> None:
+    found = bgars.calibrate_lights(capture_of(mirror), outline=(BALL[0], -BALL[1] + 9.0, BALL[2]))
+    assert found.doubts[0].code == "wrong-outline"
+    assert float(np.median(found.u_common_deg)) > 2.0
+
+
+def test_what_is_true_of_many_lights_is_said_once(lights: Array) -> None:
+    broad = render(lights, ball=BALL, size=(260, 260), lamp_deg=14.0, **LENS)
+    doubts = [one.message for one in bgars.calibrate_lights(capture_of(broad)).doubts]
+    assert sum("wide highlights" in message for message in doubts) == 1
+    assert "all lights: wide highlights" in " ".join(doubts)
+
+
 def test_near_lamps_come_out_in_space_from_three_places_of_a_ball() -> None:
     lamps_px = ring(6, 45.0) * np.array([500.0, 700.0, 600.0, 550.0, 800.0, 650.0])[:, None]
     places = [(-70.0, -45.0), (75.0, -40.0), (5.0, 75.0)]

@@ -81,7 +81,8 @@ def _one(capture: Capture, ball: BallView, left: int, top: int) -> str:
             at = (zoom * (px + width / 2.0 - first_col), zoom * (height / 2.0 - py - first_row))
             found.append(
                 f'<path d="M{at[0] - 5:.1f} {at[1]:.1f}h10m-5 -5v10" stroke="#fc0" fill="none"/>'
-                f'<text x="{at[0] + 6:.1f}" y="{at[1] - 4:.1f}" fill="#fc0">{light}</text>'
+                f'<text x="{at[0] + 6:.1f}" y="{at[1] - 4:.1f}" fill="#fc0" stroke="#000" '
+                f'stroke-width="2.5" paint-order="stroke">{light}</text>'
             )
     u = ball.u_outline_px
     words = f"{ball.capture}: radius {radius:.2f} px (u {u[2]:.2f}), centre u {u[0]:.2f} px"

@@ -109,6 +109,9 @@ def _lights(lights: LightCalibration) -> Iterable[str]:
         if common > own
         else "the highlights themselves (expose so that they just clip; a sharper image)"
     )
+    lens = 0.0 if lights.u_lens_deg is None else float(np.median(lights.u_lens_deg))
+    if lens > max(math.sqrt(max(common**2 - lens**2, 0.0)), own):
+        limit = "what is not stated of the camera (telecentric, or its distance)"
     # One mirror ball gives each light one highlight: nothing is left over to disagree.
     alone = lights.sphere == "mirror" and len(lights.balls) == 1
     residual = "one ball shows no residual" if alone else f"residual {lights.residual_px:.3f} px"
