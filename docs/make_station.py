@@ -3,7 +3,7 @@
 Balls by Mitsuba are judged where benches/station/render_balls.py rendered them; benches/station/judged.json keeps it.
 
 Commands: ``make station`` for the page (needs BGARS_DATA for the photographs; 5 minutes),
-``python docs/make_station.py balls|near|photographs|psm|board|parts`` for one table on the terminal.
+``python docs/make_station.py balls|near|photographs|psm|board|parts`` for one table.
 """
 
 from __future__ import annotations
@@ -30,7 +30,6 @@ from station_trial import LIGHTS, SIDE, as_capture, calibrated, hardware, spoile
 Array = NDArray[np.float64]
 HERE = Path(__file__).parent
 PAGE = HERE / "station.md"
-START, END = "<!-- tables: make station -->", "<!-- end of station tables -->"
 MITSUBA = HERE.parent / "benches" / "station" / "balls"
 JUDGED = HERE.parent / "benches" / "station" / "judged.json"
 SEEDS, MATT_SEEDS, NEAR_SEEDS, PARTS = 12, 6, 3, 10
@@ -262,19 +261,16 @@ TABLES: dict[str, Callable[[], Iterator[str]]] = {
 
 
 def main(names: list[str]) -> None:
-    """Print tables; with none named, all of them, and write the page."""
+    """Print tables and write each to its place on the page; with none named, all of them."""
     warnings.simplefilter("ignore", bgars.CaptureWarning)
-    blocks = []
     for name in names or list(TABLES):
-        lines = list(TABLES[name]())
-        print("\n".join(lines), flush=True)  # noqa: T201 - what it is for
-        blocks.append("\n".join(lines))
-    if names:
-        return
-    page = PAGE.read_text(encoding="utf-8")
-    before, rest = page.split(START)
-    after = rest.split(END)[1]
-    PAGE.write_text(before + START + "\n\n" + "\n\n".join(blocks) + "\n\n" + END + after, encoding="utf-8")
+        table = "\n".join(TABLES[name]())
+        print(table, flush=True)  # noqa: T201 - what it is for
+        page = PAGE.read_text(encoding="utf-8")
+        start, end = f"<!-- table {name}: make station -->", f"<!-- end of {name} -->"
+        before, rest = page.split(start)
+        _, after = rest.split(end)
+        PAGE.write_text(f"{before}{start}\n\n{table}\n\n{end}{after}", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -76,7 +76,7 @@ def test_the_command_keeps_its_result_in_the_station(tmp_path: Path) -> None:
         "verify", str(tmp_path / "part"), "--known", str(tmp_path / "known.csv"), "--station", str(station),
         "--mpe-um", "5",
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    assert done.code == 0, done.stderr
     assert "height: bias +0.00 um" in done.stdout
     kept = bgars.read_station(station)
     assert [(one.quantity, one.balls, one.mpe_um) for one in kept.verified] == [("height", 16, 5.0)]
