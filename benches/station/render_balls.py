@@ -61,15 +61,26 @@ def render(c: dict, light: np.ndarray) -> np.ndarray:
             "far_clip": 4000.0,
             "to_world": transform().look_at(origin=[0, 0, 2000], target=[0, 0, 0], up=[0, 1, 0])
             @ transform().scale([half, half, 1]),
-            "film": {"type": "hdrfilm", "width": SIDE, "height": SIDE, "pixel_format": "luminance",
-                     "rfilter": {"type": "box"}},
+            "film": {
+                "type": "hdrfilm",
+                "width": SIDE,
+                "height": SIDE,
+                "pixel_format": "luminance",
+                "rfilter": {"type": "box"},
+            },
             "sampler": {"type": "multijitter", "sample_count": 81},
         },
-        "board": {"type": "rectangle", "to_world": transform().scale([3000, 3000, 1]),
-                  "bsdf": {"type": "diffuse", "reflectance": c["board"]}},
+        "board": {
+            "type": "rectangle",
+            "to_world": transform().scale([3000, 3000, 1]),
+            "bsdf": {"type": "diffuse", "reflectance": c["board"]},
+        },
         "ball": {"type": "sphere", "center": [x, y, radius], "radius": radius, "bsdf": mirror},
-        "lamp": {"type": "disk", "to_world": disc @ transform().scale([FAR * math.tan(lamp)] * 2 + [1]),
-                 "emitter": {"type": "area", "radiance": 1.0 / solid}},
+        "lamp": {
+            "type": "disk",
+            "to_world": disc @ transform().scale([FAR * math.tan(lamp)] * 2 + [1]),
+            "emitter": {"type": "area", "radiance": 1.0 / solid},
+        },
         "room": {"type": "constant", "radiance": 0.004},
     }
     return np.array(mi.render(mi.load_dict(scene), seed=1)).reshape(SIDE, SIDE)
