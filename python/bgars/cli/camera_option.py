@@ -11,7 +11,7 @@ import typer
 from bgars.errors import InputError
 
 if TYPE_CHECKING:
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
 
 __all__ = ["CameraOption", "seen_by"]
 

@@ -14,12 +14,13 @@ from bgars.cli.calibrate_station import said_values
 from bgars.cli.console import print_json, say, stage_progress, utc_now
 from bgars.errors import InputError
 from bgars.io.station_file import read_station, write_station
-from bgars.station.page import write_station_page
+from bgars.report.html.station_page import write_station_page
 from bgars.station.verify import READINGS, read_known
 from bgars.station.verify import verify as compare
 
 if TYPE_CHECKING:
-    from bgars.station_record import Remark, Verification
+    from bgars.records.remark import Remark
+    from bgars.records.station import Verification
 
 __all__ = ["register"]
 

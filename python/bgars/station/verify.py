@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from bgars.errors import CalibrationError, FileFormatError, InputError
-from bgars.station_record import Remark, Verification
+from bgars.records.remark import Remark
+from bgars.records.station import Verification
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from bgars.part_result import PartResult
+    from bgars.records.part_result import PartResult
 
 __all__ = ["Known", "read_known", "verify"]
 
