@@ -30,6 +30,8 @@ FLOOR_PX = 0.03
 ROUNDS = 5
 CAUCHY = 2.0
 """Scale of the Cauchy loss of spreads, in standard deviations."""
+ROWS_OF_BLOCK = 128
+"""Rows that are factorised together."""
 MIN_STRETCHES = 20
 """Stretches of edge that tell their spread by lamp and lens."""
 
@@ -69,7 +71,7 @@ def fit_spread(edges: Edges) -> EdgeSpread:
     weight = 1.0 / u
     part = np.zeros(3)
     for _ in range(ROUNDS):
-        part = nnls(columns * weight[:, None], (spread - floor) * weight)[0] / size
+        part = _not_below_zero(columns * weight[:, None], (spread - floor) * weight) / size
         residual = spread - floor - (columns * size) @ part
         scale = max(1.4826 * float(np.median(np.abs(residual / u))), 0.1)
         weight = 1.0 / (u * np.sqrt(1.0 + (residual / (CAUCHY * scale * u)) ** 2))
@@ -77,3 +79,17 @@ def fit_spread(edges: Edges) -> EdgeSpread:
     round_lamp = float((weight**2 * way * by_lamp).sum() / max(float((weight**2 * way * way).sum()), 1e-30))
     sharp, wide, high = np.sqrt([floor + part[0], part[1], part[2]])
     return EdgeSpread(float(sharp), float(np.sqrt(round_lamp)), float(wide), float(high))
+
+
+def _not_below_zero(system: Array, right: Array) -> Array:
+    """Least squares, none below zero, of many rows and few columns: the triangle of their QR says as much.
+
+    Block by block, which is as many small factorisations as one thread does best.
+    """
+    rows = np.column_stack([system, right])
+    padding = np.zeros((-len(rows) % ROWS_OF_BLOCK, rows.shape[1]))
+    blocks = np.concatenate([rows, padding]).reshape(-1, ROWS_OF_BLOCK, rows.shape[1])
+    triangles: Array = np.linalg.qr(blocks).R
+    triangle: Array = np.linalg.qr(triangles.reshape(-1, rows.shape[1])).R
+    part: Array = nnls(triangle[:, :-1], triangle[:, -1])[0]
+    return part
