@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,7 +89,7 @@ def _not_below_zero(system: Array, right: Array) -> Array:
     rows = np.column_stack([system, right])
     padding = np.zeros((-len(rows) % ROWS_OF_BLOCK, rows.shape[1]))
     blocks = np.concatenate([rows, padding]).reshape(-1, ROWS_OF_BLOCK, rows.shape[1])
-    triangles: Array = np.linalg.qr(blocks).R
-    triangle: Array = np.linalg.qr(triangles.reshape(-1, rows.shape[1])).R
+    triangles = cast("Array", np.linalg.qr(blocks, mode="r"))
+    triangle = cast("Array", np.linalg.qr(triangles.reshape(-1, rows.shape[1]), mode="r"))
     part: Array = nnls(triangle[:, :-1], triangle[:, -1])[0]
     return part
