@@ -37,9 +37,9 @@ from .io.result_file import read_result as read_result
 from .io.station_file import read_station as read_station
 from .io.station_file import write_station as write_station
 from .io.truth import read_truth as read_truth
-from .line import Batch as Batch
-from .line import Naming as Naming
-from .line import inspect_many as inspect_many
+from .line.batch import Batch as Batch
+from .line.batch import inspect_many as inspect_many
+from .line.naming import Naming as Naming
 from .material_records import ReflectanceFit as ReflectanceFit
 from .material_records import SurfaceLobe as SurfaceLobe
 from .material_records import SurfaceMaterial as SurfaceMaterial
