@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 from base64 import b64encode
@@ -9,8 +10,8 @@ from dataclasses import asdict, dataclass
 from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
-import imageio.v3 as iio
 import numpy as np
+from PIL import Image
 
 from bgars.errors import FileFormatError
 from bgars.io.surface_file import SURFACE_FILE, read_surface, surface_bytes
@@ -94,8 +95,9 @@ def photograph_of(capture: Capture) -> Photograph:
     meaning = f"mean of the {len(capture.images)} images, square root of the grey levels"
     if step > 1:
         meaning += f", every {step}th pixel"
-    jpeg = iio.imwrite("<bytes>", _stretched(total), extension=".jpg", quality=QUALITY)
-    return Photograph(bytes(jpeg), left_um, left_um + wide_um, top_um - high_um, top_um, meaning)
+    jpeg = io.BytesIO()
+    Image.fromarray(_stretched(total)).save(jpeg, "jpeg", quality=QUALITY)
+    return Photograph(jpeg.getvalue(), left_um, left_um + wide_um, top_um - high_um, top_um, meaning)
 
 
 def _stretched(values: NDArray[np.float32]) -> NDArray[np.uint8]:
