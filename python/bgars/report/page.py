@@ -21,6 +21,7 @@ from bgars.report.identity import identity_facts
 from bgars.report.page_budget import BUDGET_COLUMNS, budget_table
 from bgars.report.page_charts import coplanarity_chart, histogram_charts
 from bgars.report.page_chosen import chosen_marks
+from bgars.report.page_files import REPORT_FILES
 from bgars.report.page_material import material_facts, material_rows
 from bgars.report.page_photograph import side_files
 from bgars.report.page_picture import part_picture
@@ -49,12 +50,6 @@ if TYPE_CHECKING:
 
 __all__ = ["REPORT_FILES", "write_page", "write_report"]
 
-REPORT_FILES = {
-    "report.html": "open in a browser: verdict, balls, charts and a 3-D view on one page that needs no network",
-    "photograph.jpg": "the part as the camera saw it, for `bgars report`",
-    "report.json": "where the photograph lies, and the lights, for `bgars report`",
-    "surface.npz": "height map of the part, for the 3-D view of `bgars report`",
-}
 TEMPLATES = Path(__file__).parent / "template"
 SEATS_TOLD = 3
 SHARED_PLOTLY = "plotly.min.js"
