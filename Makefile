@@ -17,7 +17,7 @@ test-rust:
 
 test-python: $(VENV)/.installed
 	@.ci/find-browser || test "$$BGARS_REQUIRE_BROWSER" != 1
-	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal
 
 lint: $(VENV)/.installed ## Formatting, clippy, ruff, mypy, and the stub against the compiled module
 	cargo fmt --check --all
