@@ -34,6 +34,8 @@ RECONSTRUCTION = FolderNames(
     judged=False,
 )
 
+WRITERS = ("write_mesh", "write_normal_map", "write_height")
+
 NORMALS = FolderNames(
     frozenset({"normals.png", "albedo.tif", "confidence.tif", "measured.png", "lights_kept.png"}),
     frozenset(),
@@ -68,6 +70,8 @@ def write_reconstruction(
         if missing("matplotlib"):
             del files["overview.png"]
             warn(f"overview.png is left out: it {how_to_install('matplotlib')}")
+        for name in WRITERS:
+            getattr(bgars, name)  # loaded by one thread
         with ThreadPoolExecutor(1) as beside:
             # Compressing and writing leave the interpreter to the picture.
             written = beside.submit(_write_files, result, folder, mesh_format, directx)

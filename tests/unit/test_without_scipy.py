@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import scipy
+from bgars.anchoring import _blurred
 from bgars.balls.outward import _fast_length, _largest_around
 from bgars.inspection.normal_distribution import normal_distribution
 from bgars.inspection.spread import _nonnegative
@@ -37,3 +38,10 @@ def test_the_largest_value_around_is_that_of_scipy() -> None:
 def test_lengths_of_transforms_are_the_fast_ones() -> None:
     for least in (1, 7, 431, 997, 2049, 5003):
         assert _fast_length(least) == scipy.fft.next_fast_len(least, real=True)
+
+
+def test_the_blur_is_that_of_scipy() -> None:
+    values = np.random.default_rng(5).random((61, 84))
+    for sigma_px in (0.8, 5.0, 40.0):
+        expected = scipy.ndimage.gaussian_filter(values, sigma_px, mode="constant")
+        np.testing.assert_allclose(_blurred(values, sigma_px), expected, atol=1e-13)
