@@ -49,8 +49,9 @@ class PictureProcess:
     ) -> None:
         if self._process is not None:
             self._process.kill()
+        self._sender.shutdown()  # first: it may be sending
+        if self._process is not None:
             self._process.communicate()
-        self._sender.shutdown()
 
     def start(self, result: PartResult, capture: Capture, folder: Path) -> None:
         """Begin to draw, as :func:`bgars.write_part_pictures` does."""
