@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import scipy
-from bgars.anchoring import _blurred
 from bgars.balls.outward import _fast_length, _largest_around
 from bgars.inspection.normal_distribution import normal_distribution
 from bgars.inspection.spread import _nonnegative
+from bgars.surface.anchoring import _blurred
 
 
 def test_the_normal_distribution_is_that_of_scipy() -> None:

@@ -20,17 +20,17 @@ from bgars.extras import how_to_install, missing
 from bgars.io.atomic import FolderNames, atomic_folder
 from bgars.io.given_paths import need_file, need_folder, need_output
 from bgars.line.naming import identity_of
-from bgars.normal_methods import DEFAULT_METHOD
-from bgars.part_identity import PartIdentity
-from bgars.report.page_budget import main_causes
-from bgars.report.page_files import REPORT_FILES
-from bgars.report.part import PICTURES
+from bgars.normals.methods import DEFAULT_METHOD
+from bgars.records.part_identity import PartIdentity
+from bgars.report.figures.part import PICTURES
+from bgars.report.html.budget import main_causes
+from bgars.report.html.files import REPORT_FILES
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
-    from bgars.part_result import PartResult
-    from bgars.report.part_process import PictureProcess
+    from bgars.records.part_result import PartResult
+    from bgars.report.figures.process import PictureProcess
 
 __all__ = ["EXIT_NOT_PASSED", "register"]
 
@@ -168,7 +168,7 @@ def _painter(*, wanted: bool) -> AbstractContextManager[PictureProcess | None]:
     """A process for the pictures, where this one is the command's own and may use more than one core."""
     if not wanted or not may_start_processes():
         return nullcontext()
-    from bgars.report.part_process import PictureProcess  # noqa: PLC0415 - loaded when it is used
+    from bgars.report.figures.process import PictureProcess  # noqa: PLC0415 - loaded when it is used
 
     return PictureProcess()
 
