@@ -17,6 +17,7 @@ from bgars.flatten import find_bow, flattened
 from bgars.noise_floor import without_background
 from bgars.records import every_pixel
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
 
 
 @pytest.fixture(scope="module")
@@ -130,6 +131,42 @@ def test_faults_of_all_images_are_named(relief: bgars.Capture, balls: bgars.Capt
     assert "clipped" in kinds(replace(relief, images=np.clip(600.0 * levels, 0, 255).astype(np.uint8)))
     bright = np.clip(balls.images + 0.3 * balls.images.max(axis=0), 0, 255).astype(np.uint8)
     assert "ambient" in kinds(replace(balls, images=bright))
+
+
+def test_noise_that_falls_with_light_tells_a_curve(balls: bgars.Capture) -> None:
+    """On shiny balls, where no matt model holds; levels are spread first, so that no comb tells."""
+    random = np.random.default_rng(1)
+    linear = np.clip((balls.images + random.uniform(-0.5, 0.5, balls.images.shape)) / 255.0, 0.0, 1.0)
+    for gamma in (1.8, 2.2):
+        told = bgars.check(replace(balls, images=np.rint(255.0 * linear ** (1.0 / gamma)).astype(np.uint8))).told
+        assert [each.kind for each in told] == ["response"]
+        assert "noise of dark parts" in told[0].message
+    constant = np.clip(balls.images + random.normal(0.0, 2.0, balls.images.shape), 0, 255)
+    assert "response" not in kinds(replace(balls, images=np.rint(constant).astype(np.uint8)))
+
+
+def test_a_stated_response_is_no_fault(balls: bgars.Capture) -> None:
+    random = np.random.default_rng(1)
+    linear = np.clip((balls.images + random.uniform(-0.5, 0.5, balls.images.shape)) / 255.0, 0.0, 1.0)
+    encoded = np.rint(255.0 * linear ** (1.0 / 2.2)).astype(np.uint8)
+    table = (np.arange(256) / 255.0).astype(np.float32) ** np.float32(2.2)
+    assert kinds(replace(balls, images=encoded, response=table)) == []
+
+
+@pytest.mark.parametrize("levels", [4, 10])
+def test_a_small_veil_is_the_lower_end_of_shadows(balls: bgars.Capture, levels: int) -> None:
+    told = bgars.check(replace(balls, images=np.minimum(balls.images, 255 - levels) + np.uint8(levels))).told
+    assert [each.kind for each in told] == ["ambient"]
+    lit = np.median(np.median(balls.images, axis=0))
+    assert told[0].value == pytest.approx(levels / lit, rel=0.4)
+
+
+def test_a_blurred_image_is_named(balls: bgars.Capture) -> None:
+    levels = balls.images.astype(np.float64)
+    levels[2] = gaussian_filter(levels[2], 1.2)
+    levels[2] += np.random.default_rng(0).normal(0.0, 0.8, levels[2].shape)
+    told = bgars.check(replace(balls, images=np.clip(np.rint(levels), 0, 255).astype(np.uint8))).told
+    assert [(each.kind, each.image) for each in told] == [("focus", 2)]
 
 
 def test_a_flat_field_is_no_evidence() -> None:
