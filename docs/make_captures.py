@@ -71,8 +71,8 @@ def _own(rows: list[dict[str, Any]]) -> list[str]:
         return []
     found, right = sum(bool(row["kinds"]) for row in rows), sum(row["right"] for row in rows)
     return [
-        f"Of {len(rows)} parts rendered with a faulty camera, of any size down to nothing, {found} are found and {right}",
-        "given the right cause.",
+        f"Of {len(rows)} parts rendered with a faulty camera, of any size down to nothing, {found} are found and",
+        f"{right} given the right cause.",
     ]
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from bgars.balls import find_balls
+from bgars.check_pipeline import check_before
 from bgars.circle_pixels import inside_circles
 from bgars.errors import InputError
 from bgars.inspection import measure_balls
@@ -49,6 +50,7 @@ def inspect(
     *,
     method: Method = DEFAULT_METHOD,
     surface: bool = False,
+    check: bool = True,
     threads: int | None = None,
     progress: Callable[[InspectionStage, float], object] | None = None,
 ) -> PartResult:
@@ -66,6 +68,9 @@ def inspect(
     surface : bool
         Integrate the normals, too: ``result.surface`` is then the height map that :func:`bgars.write_report` draws. No
         reading depends on it.
+    check : bool
+        Look first whether the images show what the capture says (:func:`bgars.check`): wrong geometry is refused, and
+        what else is found is a :class:`~bgars.CaptureWarning`, kept in ``result.warnings``.
     threads : int, optional
         Most threads to work on; the result does not depend on it.
     progress : callable, optional
@@ -80,7 +85,8 @@ def inspect(
     Raises
     ------
     InputError
-        No pixel pitch, a black or saturated image, a recipe that contradicts itself.
+        No pixel pitch, a black or saturated image, a recipe that contradicts itself; lights in wrong order, mirrored
+        or below the surface, an image twice or turned, a dead lamp (`check`).
     CalibrationError
         Images that do not show what the rig says.
     """
@@ -93,6 +99,7 @@ def inspect(
             progress(stage, fraction)
 
     check_capture(capture)
+    found_first = check_before(capture) if check else ()
     material, warnings = _material(recipe, method, len(capture.rig))
     report("find", 0.0)
     with ThreadPoolExecutor(1) as background:
@@ -113,7 +120,7 @@ def inspect(
         files=checksums(files),
         version=version("bgars"),
         light_files=[path.name for path in capture.files],
-        warnings=warnings,
+        warnings=(*found_first, *warnings),
     )
     report("judge", 1.0)
     fit = None if field is None else field.reflectance

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from bgars.check_pipeline import check_before
 from bgars.flatten import Bow, Flatten, find_bow, flattened
 from bgars.integrate import Difference, integrate_normals
 from bgars.mesh import check_faces, mesh_from_height, mesh_size
@@ -102,6 +103,7 @@ def reconstruct(
     difference: Difference = "trapezoid",
     weights: Literal["confidence"] | None = None,
     flatten: Flatten | None = None,
+    check: bool = True,
     threads: int | None = None,
     progress: Callable[[Stage, float], object] | None = None,
 ) -> Reconstruction:
@@ -117,6 +119,9 @@ def reconstruct(
         See :func:`bgars.integrate_normals`.
     flatten : {"plane", "quadratic"}, optional
         Take one plane, or one quadratic surface, off all heights: what near or wrong lights bend a flat part to.
+    check : bool
+        Look first whether the images show what the capture says (:func:`bgars.check`): wrong geometry is refused, and
+        what else is found is a :class:`~bgars.CaptureWarning`.
     threads : int, optional
         Most threads to work on; see :func:`bgars.estimate_normals`.
     progress : callable, optional
@@ -125,7 +130,8 @@ def reconstruct(
     Raises
     ------
     InputError
-        See the stages.
+        See the stages; lights in wrong order, mirrored or below the surface, an image twice or turned, a dead lamp
+        (`check`).
     ConvergenceError
         The integration did not reach its tolerance.
 
@@ -142,6 +148,8 @@ def reconstruct(
         if progress is not None:
             progress(stage, fraction)
 
+    if check:
+        check_before(capture)
     report("normals", 0.0)
     field = estimate_normals(
         capture,

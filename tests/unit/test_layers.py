@@ -40,8 +40,11 @@ BASE = {
 STAGES = dict.fromkeys(
     ("io", "pixelwise", "shape_images", "reflectance", "integrate", "mesh", "balls", "inspection", "checks"), 4
 )
-PIPELINES = ("check_pipeline", "calibrate", "pipeline", "evaluate", "part_anchors", "recipes", "cfx")
-JOINED = {"normals": 4.5, **dict.fromkeys(PIPELINES, 5), "station": 5, "part_surface": 5.2, "inspection_pipeline": 5.4}
+PIPELINES = ("calibrate", "pipeline", "evaluate", "part_anchors", "recipes", "cfx")
+JOINED = {
+    **{"normals": 4.5, "check_pipeline": 4.6, "station": 5, "part_surface": 5.2, "inspection_pipeline": 5.4},
+    **dict.fromkeys(PIPELINES, 5),
+}
 LATER = {
     **JOINED,
     "batch": 6,

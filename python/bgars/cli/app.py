@@ -185,7 +185,7 @@ def reconstruct(
     def run(capture: bgars.Capture, **options: Any) -> bgars.Reconstruction:  # noqa: ANN401
         surface = _material_from(material, capture)
         return bgars.reconstruct(
-            capture, method=method, threshold=threshold, material=surface, flatten=flatten, **options
+            capture, method=method, threshold=threshold, material=surface, flatten=flatten, check=False, **options
         )
 
     _need_places(folder, output)

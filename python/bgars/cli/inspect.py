@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import bgars
+from bgars.check_pipeline import told_by
 from bgars.cli.console import print_json, say, say_files, stage_progress, utc_now, warn
 from bgars.cli.first_check import check_first
 from bgars.cli.options import ForceOption, LotOption, MethodOption, OperatorOption, StationNameOption, StationOption
@@ -129,8 +130,9 @@ def inspect(
     with stage_progress() as report, atomic_folder(output, NAMES) as place:
         part = None if recipe is None else bgars.read_part_recipe(recipe)
         capture = bgars.read_capture(folder, station=station)
-        check_first(capture, force=force)
-        result = bgars.inspect(capture, part, method=method, surface=page, progress=report)
+        findings = check_first(capture, force=force)
+        result = bgars.inspect(capture, part, method=method, surface=page, check=False, progress=report)
+        result = replace(result, warnings=(*told_by(findings), *result.warnings))
         named, identity = identity_of(capture, PartIdentity(lot=lot, station=station_name, operator=operator))
         result = replace(result, serial=serial or named, identity=identity, inspected_utc=utc_now())
         files = dict(FILES)

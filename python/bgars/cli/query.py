@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from bgars.cli.console import print_json, say
+from bgars.csv_cells import harmless
 from bgars.errors import InputError
 from bgars.io.result_file import read_result
 from bgars.store import open_store
@@ -69,8 +70,8 @@ def query(
         print_json({"columns": names, "rows": [dict(zip(names, row, strict=True)) for row in rows]})
     elif as_csv:
         writer = csv.writer(sys.stdout, lineterminator="\n")
-        writer.writerow(names)
-        writer.writerows([["; ".join(v) if isinstance(v, list) else v for v in row] for row in rows])
+        writer.writerow([harmless(name) for name in names])
+        writer.writerows([[_csv_cell(value) for value in row] for row in rows])
     else:
         _say_table(names, rows)
 
@@ -148,6 +149,13 @@ def _say_table(names: list[str], rows: list[list[Any]]) -> None:
         ]
         say("  ".join(padded).rstrip())
     say(f"({len(rows)} rows)" if len(rows) != 1 else "(1 row)")
+
+
+def _csv_cell(value: Any) -> Any:  # noqa: ANN401 - whatever was asked for
+    """Numbers as they are; texts such that no spreadsheet runs them."""
+    if isinstance(value, list):
+        value = "; ".join(map(str, value))
+    return harmless(value) if isinstance(value, str) else value
 
 
 def _cell(value: Any) -> str:  # noqa: ANN401 - whatever was asked for

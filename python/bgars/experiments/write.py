@@ -14,6 +14,7 @@ from bgars.experiments.page import page_of_all, section
 from bgars.experiments.registry import ALL, chosen
 from bgars.experiments.style import figure_style, save
 from bgars.io.atomic import atomic_file, atomic_folder
+from bgars.io.own_files import is_own, need_new_or_own
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -57,7 +58,7 @@ def write_experiments(
     Raises
     ------
     InputError
-        An unknown name, a radius out of range.
+        An unknown name, a radius out of range, a file in the way that no experiment wrote.
     FileFormatError
         The output cannot be written; nothing is left behind.
 
@@ -78,6 +79,7 @@ def write_experiments(
     if page is not None and Path(page).absolute().parent == output.absolute():
         own_page, page = Path(page).name, None
     way = "" if page is None else _way(Path(page).absolute().parent, output.absolute())
+    need_new_or_own(output / own_page if page is None else page)
     files: list[str] = []
     outcomes = {}
     with ExitStack() as opened:
@@ -88,6 +90,7 @@ def write_experiments(
         for experiment in experiments:
             outcome = experiment.run(Run(radius_px, _reporter(progress, experiment.name)))
             outcomes[experiment.name] = (experiment, outcome)
+            _need_own_or_new(outcome, output, experiment.name)
             for picture in outcome.pictures:
                 save(picture.figure, folder / f"{picture.stem}.png")
                 files.append(f"{picture.stem}.png")
@@ -115,6 +118,20 @@ def write_experiments(
             for experiment, outcome in outcomes.values()
         },
     }
+
+
+def _need_own_or_new(outcome: Outcome, folder: Path, name: str) -> None:
+    """Raise InputError where files of others are in the way; a table of an earlier run vouches for its pictures."""
+    table = folder / f"{name}.csv"
+    is_earlier = False
+    if table.is_file():
+        with table.open("rb") as file:
+            is_earlier = file.readline().decode("utf-8", "replace").rstrip() == ",".join(outcome.columns)
+    pictures = [folder / f"{picture.stem}.png" for picture in outcome.pictures]
+    foreign = [] if is_earlier else [path for path in (table, *pictures) if path.exists() and not is_own(path)]
+    if foreign:
+        msg = f"{foreign[0]}: is there already, and no experiment wrote it; move it away, or name another folder"
+        raise InputError(msg)
 
 
 def write_csv(outcome: Outcome, path: Path) -> None:

@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bgars.check_pipeline import check, refuse_wrong_geometry, told_by
 from bgars.errors import BgarsError
 from bgars.inspection_pipeline import inspect
 from bgars.io.capture import read_capture
@@ -130,7 +131,10 @@ def _inspected(job: Job, folder: Path, recipe_file: str, started: float) -> Outc
     key = key_of(digests, serial=serial, method=job.method, version=version("bgars"))
     if key in job.known:
         return Outcome(job.folder, serial, is_known=True, seconds=time.perf_counter() - started)
-    result = inspect(capture, recipe, method=job.method, threads=job.threads)
+    findings = check(capture)
+    refuse_wrong_geometry(findings, capture.name, way_out="'bgars check' shows it")
+    result = inspect(capture, recipe, method=job.method, threads=job.threads, check=False)
+    result = replace(result, warnings=(*told_by(findings), *result.warnings))
     identity = replace(identity, captured_utc=last_written_utc(capture))
     if recipe is not None and job.content:  # as it is where the folder is seen
         given = Path(job.recipe)
