@@ -87,7 +87,7 @@ kills: $(VENV)/.installed ## Kill `bgars watch` at KILLS random times: every par
 	rm -rf kill-test
 
 FUZZ_INPUTS ?= 1000000
-fuzz: $(VENV)/.installed ## Damaged files for every reader: FUZZ_INPUTS of them (hours); findings go to fuzz-findings
+fuzz: $(VENV)/.installed ## Damaged files for every reader, hostile arguments for every call: FUZZ_INPUTS of them (hours); findings go to fuzz-findings
 	$(BIN)/python tests/fuzz/fuzzer.py --inputs $(FUZZ_INPUTS)
 
 performance: $(VENV)/.installed ## Measure against the peers and rewrite docs/performance.md (long; leave the machine alone)

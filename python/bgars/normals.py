@@ -23,6 +23,7 @@ from bgars.pixelwise import (
 from bgars.plain_arrays import plain, plain_bool
 from bgars.reflectance import add_reflectance
 from bgars.scalar_checks import number, thread_count
+from bgars.whole_capture import need_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -144,6 +145,7 @@ def estimate_normals(
     capture = capture_of(
         images, light_directions, light_intensities, saturation, threads, needs_full_scale=method == "reflectance"
     )
+    need_whole(capture)
     use = combined_mask(capture, mask)
     if method == "reflectance":
         return _by_reflectance(capture, use, anchors, material, keep_sets, out, threads, progress)

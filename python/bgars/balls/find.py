@@ -17,6 +17,7 @@ from bgars.balls.places import look_again
 from bgars.balls.registration import register
 from bgars.errors import InputError
 from bgars.scalar_checks import thread_count
+from bgars.whole_capture import need_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -104,6 +105,7 @@ def find_balls(
     if layout is not None and capture.pixel_pitch_um is None:
         msg = "layout: needs capture.pixel_pitch_um, which is None, to lay micrometres over pixels"
         raise InputError(msg)
+    need_whole(capture)
     levels = Levels(capture, threads)
     found = find_circles(levels, progress)
     x_px = found.circles.col + 0.5 - levels.width / 2

@@ -25,6 +25,7 @@ from bgars.checks.table import check_table
 from bgars.checks.view import TILES, make_view
 from bgars.checks.vignetting import check_vignetting
 from bgars.checks.windows import cut_windows, fit_frames
+from bgars.whole_capture import need_whole
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -52,10 +53,13 @@ def check_capture(capture: Capture) -> Findings:
     Findings
         The worst first. A capture without evidence (a flat, evenly lit field) has no findings on what it cannot show.
     """
+    need_whole(capture)
     view = make_view(capture)
     inside = view.values.max(axis=0) > 0.0
     below = check_below(view)
     view = view.with_lights(raised(view.lights))
+    if not inside.any():
+        return Findings.of(below + check_dark(view, inside))
     found = below + dead_lamps(view, inside) + check_bit_depth(capture)
     found += check_dark(view, inside) + check_clipped(view, inside)
     gone = [each.image for each in found if each.kind == "lamp-dead" and each.image is not None]

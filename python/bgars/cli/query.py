@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import datetime
 import sys
+from decimal import Decimal
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -172,6 +173,8 @@ def _plain(value: Any) -> Any:  # noqa: ANN401 - as above
     """What JSON and CSV can hold."""
     if isinstance(value, float):
         return value if value == value and abs(value) != float("inf") else None  # noqa: PLR0124 - NaN
+    if isinstance(value, Decimal):
+        return float(value)
     if isinstance(value, datetime.datetime):
         return value.isoformat(timespec="seconds") + "Z"
     if isinstance(value, list):
