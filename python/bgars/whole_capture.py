@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import numbers
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -35,19 +34,19 @@ def need_whole(capture: Capture) -> None:
             msg = f"{name}: must have shape {size}, that of the images, got {values.shape}"
             raise InputError(msg)
     if capture.response is not None and images.dtype.kind == "u":
-        codes = int(np.iinfo(images.dtype).max) + 1
+        codes = 1 << 8 * images.dtype.itemsize
         if capture.response.shape != (codes,):
             msg = f"response: must have shape ({codes},), one value for every code, got {capture.response.shape}"
             raise InputError(msg)
-    for name, level in (
-        ("black_level", capture.black_level),
-        ("saturation", capture.saturation),
-        ("full_scale", capture.full_scale),
-    ):
-        if not isinstance(level, numbers.Real) or isinstance(level, bool):
-            msg = f"{name}: must be a number, got {level!r}"
+    for name in ("black_level", "saturation", "full_scale"):
+        if not _is_number(getattr(capture, name)):
+            msg = f"{name}: must be a number, got {getattr(capture, name)!r}"
             raise InputError(msg)
     pitch_um = capture.pixel_pitch_um
-    if pitch_um is not None and not (isinstance(pitch_um, numbers.Real) and 0.0 < pitch_um < float("inf")):
+    if pitch_um is not None and not (_is_number(pitch_um) and 0.0 < pitch_um < float("inf")):
         msg = f"pixel_pitch_um: must be finite and above 0, or None, got {pitch_um!r}"
         raise InputError(msg)
+
+
+def _is_number(value: Any) -> bool:  # noqa: ANN401 - whatever the constructor was given
+    return isinstance(value, int | float | np.number) and not isinstance(value, bool)

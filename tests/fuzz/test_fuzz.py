@@ -74,6 +74,19 @@ def test_a_capture_made_by_hand_must_fit_together() -> None:
                 function(wrong)
 
 
+def test_nor_does_a_masked_stack_take_any_mask() -> None:
+    images = np.ma.masked_array(np.full((4, 6, 7), 90, np.uint8), mask=False)
+    with pytest.raises(bgars.InputError, match=r"mask: must have shape \(6, 7\)"):
+        bgars.Capture(images, bgars.LightRig.ring(4), np.ones((6, 8), bool))
+
+
+def test_a_deep_side_file_is_refused_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "report.json").write_text("[" * 100_000, encoding="utf-8")
+    read, _ = READERS["page source"]
+    with pytest.raises(bgars.FileFormatError, match="remove it to do without"):
+        read(tmp_path / "report.json")
+
+
 def test_a_black_capture_is_dark_and_no_accident() -> None:
     black = bgars.Capture(np.zeros((4, 6, 7), np.uint8), bgars.LightRig.ring(4), np.ones((6, 7), bool))
     assert [each.kind for each in bgars.check(black)] == ["dark"]
