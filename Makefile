@@ -65,7 +65,7 @@ method: $(VENV)/.installed ## Draw the pictures of docs/reflectance.md and one o
 studies: $(VENV)/.installed ## Run the gauge studies of docs/studies.md again (15 minutes)
 	$(BIN)/python docs/make_studies.py
 
-check-faults: data $(VENV)/.installed ## Judge bgars check on captures with one fault each, rewrite the gallery of docs/captures.md (5 minutes; needs BGARS_DATA)
+check-faults: data $(VENV)/.installed ## Judge bgars check on captures with one fault each, rewrite the gallery of docs/captures.md (5 minutes; needs BGARS_DATA; BGARS_RENDERED: other rendered parts)
 	$(BIN)/python docs/make_captures.py
 
 schema: $(VENV)/.installed ## Write docs/result.schema.json, the JSON Schema of result.json, again
