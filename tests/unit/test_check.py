@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from bgars.checks.evidence import critical_t, paired_t
 from bgars.checks.hypotheses import alternatives
-from bgars.flatten import find_bow, flattened
 from bgars.line.job import Job, run_job
-from bgars.noise_floor import without_background
-from bgars.records import every_pixel
+from bgars.normals.noise_floor import without_background
+from bgars.records.plain_arrays import every_pixel
+from bgars.surface.flatten import find_bow, flattened
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 

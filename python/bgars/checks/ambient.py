@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.checks.patches import box_blocks, cut_patches
-from bgars.checks.records import Finding
+from bgars.records.findings import Finding
 
 if TYPE_CHECKING:
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
 
 __all__ = ["ShadowFloor", "check_ambient", "shadow_floor"]
 

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from bgars.checks.evidence import critical_t
 from bgars.checks.patches import cut_patches
-from bgars.checks.records import Finding
+from bgars.records.findings import Finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from bgars.checks.patches import Patch
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
 
 __all__ = ["check_focus"]
 

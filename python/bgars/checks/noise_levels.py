@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from bgars.checks.patches import cut_patches
 
 if TYPE_CHECKING:
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
 
 __all__ = ["NoiseCurve", "noise_curve", "noise_falls"]
 

@@ -12,7 +12,7 @@ from bgars.checks.view import linear_values, used_scale
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
 
 __all__ = ["Patch", "box_blocks", "cut_patches"]
 

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from bgars.checks.evidence import critical_t
 from bgars.checks.noise_levels import FALLS, noise_curve, noise_falls
-from bgars.checks.records import Finding
 from bgars.checks.view import tile_sums, used_scale
+from bgars.records.findings import Finding
 
 if TYPE_CHECKING:
     from bgars.checks.view import View
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
 
 __all__ = ["check_noise_of_levels", "check_response", "curvature"]
 

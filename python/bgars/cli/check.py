@@ -14,10 +14,10 @@ from bgars.errors import InputError
 from bgars.io.atomic import FolderNames, atomic_file, atomic_folder
 from bgars.io.given_paths import need_folder, need_output
 from bgars.io.own_files import need_new_or_own
-from bgars.report.check_page import check_page
+from bgars.report.html.check_page import check_page
 
 if TYPE_CHECKING:
-    from bgars.checks.records import Findings
+    from bgars.records.findings import Findings
 
 __all__ = ["EXIT_WRONG", "register"]
 

@@ -12,8 +12,8 @@ from typing import Annotated, Any
 import typer
 
 from bgars.cli.console import print_json, say
-from bgars.csv_cells import harmless
 from bgars.errors import InputError
+from bgars.files.csv_cells import harmless
 from bgars.io.result_file import read_result
 from bgars.store import open_store
 from bgars.store.query import VIEWS

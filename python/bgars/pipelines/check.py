@@ -1,0 +1,114 @@
+"""Check a capture, or a folder: what every command does before any number."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bgars.checks.run import check_capture
+from bgars.errors import CaptureWarning, InputError
+from bgars.io.capture import read_capture
+from bgars.records.capture import Capture
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from bgars.records.findings import Findings
+
+__all__ = ["check", "check_before", "refuse_wrong_geometry", "told_by"]
+
+
+def check(capture: Capture | str | PathLike[str]) -> Findings:
+    """Find out whether a capture shows what its description says.
+
+    Order and handedness of the lights, lights below the surface, images twice, dead or uneven lamps, exposure, frames
+    lit in part, ambient light, vignetting, motion, focus, noise, response and bit depth. It looks at a reduced copy.
+
+    Parameters
+    ----------
+    capture : Capture or path
+        A path is read with :func:`bgars.read_capture`.
+
+    Returns
+    -------
+    Findings
+        ``findings`` with the worst first; each has kind, severity ("note", "warning", "error"), image, message and
+        advice. A flat field is no evidence: nothing is said of what a capture cannot show.
+
+    Raises
+    ------
+    FileFormatError, InputError
+        As :func:`bgars.read_capture`.
+
+    References
+    ----------
+    P. N. Belhumeur, D. J. Kriegman, A. L. Yuille, The bas-relief ambiguity, IJCV 35 (1999) 33-44.
+
+    Examples
+    --------
+    >>> import bgars
+    >>> from dataclasses import replace
+    >>> capture = bgars.read_capture(bgars.sample_capture())
+    >>> bgars.check(capture)
+    Findings(nothing found)
+    >>> mirrored = bgars.LightRig.from_directions(capture.rig.directions * [1, -1, 1])
+    >>> bgars.check(replace(capture, rig=mirrored))
+    Findings(error handedness)
+    """
+    return check_capture(capture if isinstance(capture, Capture) else read_capture(Path(capture)))
+
+
+def told_by(findings: Findings) -> tuple[str, ...]:
+    """Return warnings and errors as texts, such as a result keeps."""
+    return tuple(f"capture: {each.kind}: {each.message}; {each.advice}" for each in findings.told)
+
+
+def check_before(capture: Capture, *, stacklevel: int = 3) -> tuple[str, ...]:
+    """Check a capture before a number is made of it.
+
+    Parameters
+    ----------
+    capture : Capture
+    stacklevel : int
+        Of the warnings: 3 shows the line that called the caller.
+
+    Returns
+    -------
+    tuple of str
+        What was found, each also a :class:`~bgars.CaptureWarning`.
+
+    Raises
+    ------
+    InputError
+        Where every normal would be wrong.
+    """
+    findings = check_capture(capture)
+    refuse_wrong_geometry(findings, capture.name, way_out="bgars.check shows it; check=False goes on all the same")
+    texts = told_by(findings)
+    for text in texts:
+        warnings.warn(f"{capture.name}: {text.removeprefix('capture: ')}", CaptureWarning, stacklevel=stacklevel)
+    return texts
+
+
+def refuse_wrong_geometry(findings: Findings, name: str, *, way_out: str) -> None:
+    """Raise InputError where every normal would be wrong.
+
+    Parameters
+    ----------
+    findings : Findings
+    name : str
+        Of the capture, for the message.
+    way_out : str
+        How to go on all the same.
+
+    Raises
+    ------
+    InputError
+        Lights in wrong order, mirrored or below the surface, an image twice or turned, a dead lamp.
+    """
+    wrong = findings.geometry_errors
+    if wrong:
+        told = "; ".join(f"{each.message}: {each.advice}" for each in wrong)
+        msg = f"{name}: {told} ({way_out})"
+        raise InputError(msg)
