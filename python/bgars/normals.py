@@ -68,7 +68,7 @@ def estimate_normals(
     method : {"reflectance", "robust-filter", "specular-filter", "lambertian", "blind"}
         ``reflectance``: on balls, the normal whose brightness under all lights, highlights included, fits the material
         best; the material is fitted on the balls themselves; other pixels are left to ``robust-filter``. Captures
-        with fewer than 6 lights, or with neither balls nor a material, are left to ``blind``: one material is fitted
+        with fewer than 4 lights, or with neither balls nor a material, are left to ``blind``: one material is fitted
         to the whole capture together with normals and albedo of every pixel, and taken where it predicts left-out
         lights better than least squares does (some 20 us a pixel; at least 5 lights). `NormalField.choice` says what
         was done. The other three solve ``I_k = rho l_k . n`` by least squares (Woodham 1980) over the lights they keep

@@ -154,7 +154,7 @@ def test_the_help_of_every_estimator_explains_each_method() -> None:
         (told,) = [option.help for option in commands[name].params if option.name == "method"]
         for method in get_args(Method):
             assert f"{method}: " in told, (name, method)
-        assert "without balls and a material, under fewer than 6 lights" in told
+        assert "without balls and a material, under fewer than 4 lights" in told
         assert ": blind. robust-filter: " in told
     (told,) = [option.help for option in commands["evaluate"].params if option.name == "method"]
     for method in METHODS:

@@ -13,7 +13,7 @@ __all__ = ["ForceOption", "LotOption", "MethodOption", "OperatorOption", "Statio
 
 METHOD_HELP = (
     "reflectance: on balls, highlights included, by the material that is fitted on them, elsewhere robust-filter; "
-    "without balls and a material, under fewer than 6 lights, or where no material explains the balls: blind. "
+    "without balls and a material, under fewer than 4 lights, or where no material explains the balls: blind. "
     "robust-filter: the window of sorted values that a matt facet explains best, shadows and highlights left out. "
     "specular-filter: the published sorted-gap filter. lambertian: all lights. "
     "blind: one material is fitted to the whole capture together with every normal, and taken where it predicts "
