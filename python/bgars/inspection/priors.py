@@ -63,8 +63,8 @@ penumbra, reflected light and a board that light enters leave of the model. Rend
 0.01 px; what a wide lamp shifts an edge by is known to half of its own size, for how its light is shared out over it is
 not known (parts as fine as 5 x 5 instead of 5 x 3 move tops by 0.1 to 1 px); where points scatter, some of it is alike
 on all balls."""
-EDGE_WAVES = (1.0, 0.5, 0.15, 0.15)
-"""The same of all edges together, and by cos a, cos 2a, cos 3a along them: tip and sides are moved alike, mostly."""
+EDGE_WAVES = (1.0, 1.0, 0.3, 0.3)
+"""The same of all edges together, and by cos a, cos 2a, cos 3a along them."""
 COARSE_SPREAD_PX = 2.0
 """What coarse edges are as good as."""
 WIDE_EDGE_PX, WIDE_EDGE_SHARE = 0.3, 0.05
