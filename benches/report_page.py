@@ -21,12 +21,12 @@ from pathlib import Path
 
 import bgars
 import numpy as np
-from bgars.ball_records import BallLayout
 from bgars.inspection.judge import judge_part
-from bgars.inspection_pipeline import BOARD_STEP
-from bgars.part_recipe import PartRecipe
-from bgars.part_surface import part_surface
-from bgars.report.page import plotly_script
+from bgars.pipelines.inspect import BOARD_STEP
+from bgars.pipelines.part_surface import part_surface
+from bgars.records.ball_layout import BallLayout
+from bgars.records.part_recipe import PartRecipe
+from bgars.report.html.page import plotly_script
 from playwright.sync_api import Browser, sync_playwright
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "unit"))

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import bgars
 import numpy as np
-from bgars.experiments.style import OKABE_ITO, TRUTH_STYLE, figure_style, new_figure, panels, save, tidy
+
+from experiments.style import OKABE_ITO, TRUTH_STYLE, figure_style, new_figure, panels, save, tidy
 
 SIZE = 80
 SLOPE = 0.5

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import bgars
-from bgars.light_files import read_filenames
-from bgars.normals import METHODS
+from bgars.files.light_files import read_filenames
+from bgars.normals.methods import METHODS
 
 PAGE = Path(__file__).parent / "accuracy.md"
 README = Path(__file__).parents[1] / "README.md"

@@ -18,7 +18,7 @@ import faults  # noqa: E402
 import good_captures  # noqa: E402
 import judge  # noqa: E402
 from bgars.checks.run import check_capture  # noqa: E402
-from bgars.report.check_pictures import small_image  # noqa: E402
+from bgars.report.figures.check_pictures import small_image  # noqa: E402
 
 TITLE = "## A gallery of bad captures"
 PICTURES = DOCS / "images" / "captures"

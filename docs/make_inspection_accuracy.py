@@ -18,8 +18,9 @@ from typing import NamedTuple
 
 import bgars
 import numpy as np
-from bgars.ball_records import BallMeasurement, FoundBall, FoundBalls
 from bgars.inspection import measure_balls
+from bgars.records.found_balls import FoundBall, FoundBalls
+from bgars.records.measured_balls import BallMeasurement
 from bgars.simulate.coplanarity import seating_plane
 from numpy.typing import NDArray
 
@@ -156,7 +157,7 @@ def scene_row(name: str, case: Case) -> str:
     return f"| {' | '.join('-' if 'nan' in cell else cell for cell in cells)} |"
 
 
-def _flat(ball: bgars.ball_records.MeasuredBall) -> bool:
+def _flat(ball: bgars.records.measured_balls.MeasuredBall) -> bool:
     return any("flat top" in reason for reason in ball.reasons)
 
 

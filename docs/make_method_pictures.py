@@ -11,9 +11,8 @@ from typing import NamedTuple
 
 import bgars
 import numpy as np
-from bgars.experiments.style import OKABE_ITO, TRUTH_STYLE, figure_style, new_figure, panels, save, tidy
-from bgars.material_records import SurfaceLobe, SurfaceMaterial
-from bgars.report.prior import prior_share, show_prior
+from bgars.records.surface_material import SurfaceLobe, SurfaceMaterial
+from bgars.report.figures.prior import prior_share, show_prior
 from bgars.simulate import Defect
 from matplotlib.colors import LogNorm
 from matplotlib.patches import Circle
@@ -35,6 +34,8 @@ from method_parts import (
     say,
 )
 from scipy.optimize import least_squares
+
+from experiments.style import OKABE_ITO, TRUTH_STYLE, figure_style, new_figure, panels, save, tidy
 
 ERROR_LIMITS_DEG = (0.02, 20.0)
 ROUGHNESSES = (0.2, 0.225, 0.25, 0.275, 0.3, 0.325, 0.35, 0.375, 0.4)
@@ -165,7 +166,7 @@ def fit_profile() -> None:
     say("fit", fit.loss, fit.material.diffuse_level, lobe, fit.material.masking, fit.material.standard_errors)
 
 
-def fitted(part: Part) -> bgars.material_records.ReflectanceFit:
+def fitted(part: Part) -> bgars.records.reflectance_fit.ReflectanceFit:
     """What the estimator learnt of a part."""
     fit = part.field.reflectance
     if fit is None or not fit.accepted:

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import bgars
 import numpy as np
-from bgars.ball_records import BallLayout
-from bgars.report.part_style import figure_style, new_figure, save
+from bgars.records.ball_layout import BallLayout
+from bgars.report.figures.style import figure_style, new_figure, save
 from bgars.studies.gauge import GaugeFigures
 from bgars.studies.study_folder import Run
 from bgars.studies.svg import PLACEMENT_COLORS

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import bgars
 import numpy as np
-from bgars.experiments.style import OKABE_ITO, TRUTH_STYLE, new_figure, panels, save, tidy
 from method_parts import BOARD, FOLDER, METAL, NOISY, PAINT, RIG, circle_normals, made, say
+
+from experiments.style import OKABE_ITO, TRUTH_STYLE, new_figure, panels, save, tidy
 
 
 class Squashed(NamedTuple):

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import bgars
 import numpy as np
-from bgars.material_records import SurfaceLobe, SurfaceMaterial
+from bgars.records.surface_material import SurfaceLobe, SurfaceMaterial
 from numpy.typing import NDArray
 
 FOLDER = Path(__file__).parent / "images" / "method"

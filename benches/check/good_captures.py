@@ -9,7 +9,7 @@ from pathlib import Path
 
 import bgars
 import numpy as np
-from bgars.records import every_pixel
+from bgars.records.plain_arrays import every_pixel
 from numpy.typing import NDArray
 
 __all__ = ["CHOSEN_ON", "JUDGED_ON", "captures", "turned"]

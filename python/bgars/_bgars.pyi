@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from bgars.balls.rim_pixels import RimPixels
 from bgars.inspection.shadow_edges import Lines
 from bgars.inspection.shadow_map import Casters
-from bgars.kernel_capture import KernelCapture
-from bgars.kernel_outputs import KernelOutputs
-from bgars.material_records import SurfaceMaterial
-from bgars.records import NormalField
+from bgars.normals.kernel_outputs import KernelOutputs
+from bgars.records.kernel_capture import KernelCapture
+from bgars.records.normal_field import NormalField
+from bgars.records.surface_material import SurfaceMaterial
 
 __all__ = [
     "BLIND_MIN_LIGHTS",

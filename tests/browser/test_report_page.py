@@ -13,8 +13,8 @@ import bgars
 import imageio.v3 as iio
 import numpy as np
 import pytest
-from bgars.report.page_units import with_micro
-from bgars.report.page_words import QUANTITIES, expanded, number
+from bgars.report.html.units import with_micro
+from bgars.report.html.words import QUANTITIES, expanded, number
 from report_parts import RESULTS, failing, hostile, inspected, passing, simulated
 from test_report_budget import budgeted
 

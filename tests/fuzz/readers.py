@@ -11,10 +11,10 @@ import bgars
 import imageio.v3 as iio
 import numpy as np
 import tifffile
+from bgars.files.light_files import read_filenames, read_intensities, read_lp
 from bgars.io.images import decode_stack
 from bgars.io.normal_map import read_stored_normals
 from bgars.io.surface_file import read_surface
-from bgars.light_files import read_filenames, read_intensities, read_lp
 
 
 def normals() -> np.ndarray:
@@ -74,7 +74,7 @@ def make_corpus(folder: Path) -> None:
 
 
 def _side(path: Path) -> object:
-    from bgars.report.page_photograph import read_side_files  # noqa: PLC0415 - draws in matplotlib
+    from bgars.report.html.photograph import read_side_files  # noqa: PLC0415 - draws in matplotlib
 
     return read_side_files(path)
 

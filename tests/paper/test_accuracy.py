@@ -7,7 +7,7 @@ from pathlib import Path
 import bgars
 import numpy as np
 import pytest
-from bgars.light_files import read_filenames
+from bgars.files.light_files import read_filenames
 
 pytestmark = pytest.mark.data
 

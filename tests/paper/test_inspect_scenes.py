@@ -8,8 +8,8 @@ from pathlib import Path
 
 import bgars
 import pytest
-from bgars.ball_records import BallLayout
-from bgars.part_recipe import Limits, PartRecipe
+from bgars.records.ball_layout import BallLayout
+from bgars.records.part_recipe import Limits, PartRecipe
 
 pytestmark = pytest.mark.data
 LIMITS = Limits(

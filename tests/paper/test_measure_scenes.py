@@ -10,8 +10,9 @@ from typing import NamedTuple
 import bgars
 import numpy as np
 import pytest
-from bgars.ball_records import BallMeasurement, FoundBall, FoundBalls
 from bgars.inspection import measure_balls
+from bgars.records.found_balls import FoundBall, FoundBalls
+from bgars.records.measured_balls import BallMeasurement
 from bgars.simulate.coplanarity import seating_plane
 from numpy.typing import NDArray
 

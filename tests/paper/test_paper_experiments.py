@@ -6,11 +6,12 @@ import csv
 from pathlib import Path
 
 import pytest
-from bgars.experiments.measure import COLUMNS, measure_all
-from bgars.experiments.reference import RADIUS_PX, STUDY, TOLERANCE_PERCENT, StudyValue
-from bgars.experiments.registry import EXPERIMENTS
-from bgars.experiments.setting import Setting
-from bgars.normals import METHODS
+from bgars.normals.methods import METHODS
+
+from experiments.measure import COLUMNS, measure_all
+from experiments.reference import RADIUS_PX, STUDY, TOLERANCE_PERCENT, StudyValue
+from experiments.registry import EXPERIMENTS
+from experiments.setting import Setting
 
 DOCS = Path(__file__).parents[2] / "docs"
 

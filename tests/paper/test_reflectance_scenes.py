@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import bgars
 import numpy as np
 import pytest
-from bgars.light_files import read_filenames
+from bgars.files.light_files import read_filenames
 
 if TYPE_CHECKING:
     from pathlib import Path

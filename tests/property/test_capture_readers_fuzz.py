@@ -15,6 +15,9 @@ import bgars
 import numpy as np
 import pytest
 import tifffile
+from bgars.files.light_files import read_filenames, read_intensities, read_numbers
+from bgars.files.light_formats import LIGHT_FORMATS, read_light_file
+from bgars.files.safe_files import decode_text
 from bgars.io.decoders.npy import npy_array
 from bgars.io.image_formats import format_of, read_pixels
 from bgars.io.image_listing import choose_series, natural_key, role_of
@@ -23,9 +26,6 @@ from bgars.io.image_tags import read_tags
 from bgars.io.masks import read_mask
 from bgars.io.recipe import read_recipe
 from bgars.io.response import read_response_table
-from bgars.light_files import read_filenames, read_intensities, read_numbers
-from bgars.light_formats import LIGHT_FORMATS, read_light_file
-from bgars.safe_files import decode_text
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from PIL import Image

@@ -8,11 +8,11 @@ from functools import cache
 
 import bgars
 import numpy as np
-from bgars.ball_records import BallLayout
 from bgars.inspection.judge import judge_part
-from bgars.part_material import part_material
-from bgars.part_recipe import Limits, PartRecipe
-from bgars.part_result import BallResult
+from bgars.records.ball_layout import BallLayout
+from bgars.records.ball_result import BallResult
+from bgars.records.part_material import part_material
+from bgars.records.part_recipe import Limits, PartRecipe
 from solder_fit import SOLDER_FIT
 from synthetic_parts import measured_part
 

@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 import bgars
-from bgars.part_identity import PartIdentity
+from bgars.records.part_identity import PartIdentity
 from judged_parts import judged
 
 DEFECTS = {3: {"B2": bgars.Defect.missing()}, 5: {"A1": bgars.Defect.missing()}}

@@ -6,7 +6,8 @@ import math
 
 import bgars
 import numpy as np
-from bgars.ball_records import BallMeasurement, FoundBall, FoundBalls, MeasuredBall
+from bgars.records.found_balls import FoundBall, FoundBalls
+from bgars.records.measured_balls import BallMeasurement, MeasuredBall
 
 NAN = math.nan
 

@@ -16,7 +16,7 @@ from bgars.cli.app import app
 from bgars.line import job
 from bgars.line.folders import capture_folders
 from bgars.line.local_pool import share_cores
-from bgars.part_identity import PartIdentity
+from bgars.records.part_identity import PartIdentity
 from line_captures import RECIPE, captures, copy_capture
 from typer.testing import CliRunner
 

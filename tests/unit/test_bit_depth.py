@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bgars.bit_depth import find_bit_depth, plateau_bits
+from bgars.records.bit_depth import find_bit_depth, plateau_bits
 
 
 def scene(seed: int, top: float, *, images: int = 4) -> np.ndarray:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bgars.normals import Method
+    from bgars.normals.methods import Method
 
 ALLOWED_DEG = 0.2
 """What the guard may cost against the best of the methods it chooses among."""

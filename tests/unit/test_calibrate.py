@@ -14,7 +14,7 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 from bgars.cli import main
-from bgars.material_records import loss_in_words
+from bgars.records.reflectance_fit import loss_in_words
 
 RING = bgars.LightRig.ring(8)
 SOLDER = bgars.Material(i_d=0.3, i_s=1.0, hardness=40)

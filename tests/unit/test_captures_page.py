@@ -6,11 +6,11 @@ from pathlib import Path
 
 import bgars
 import pytest
+from bgars.files.light_formats import LIGHT_FORMATS
 from bgars.io.image_formats import IMAGE_FORMATS
 from bgars.io.recipe import CaptureRecipe
 from bgars.io.strict_toml import checked
 from bgars.io.toml_text import read_values
-from bgars.light_formats import LIGHT_FORMATS
 
 PAGE = Path(__file__).parents[2] / "docs" / "captures.md"
 

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from bgars.checks.evidence import critical_t, paired_t
 from bgars.checks.hypotheses import alternatives
-from bgars.flatten import find_bow, flattened
-from bgars.noise_floor import without_background
-from bgars.records import every_pixel
+from bgars.normals.noise_floor import without_background
+from bgars.records.plain_arrays import every_pixel
+from bgars.surface.flatten import find_bow, flattened
 from numpy.typing import NDArray
 
 

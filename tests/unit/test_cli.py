@@ -21,7 +21,7 @@ import typer
 from bgars.cli.app import app
 from bgars.cli.console import activation
 from bgars.cli.lazy import LAZY_COMMANDS
-from bgars.normals import METHODS, Method
+from bgars.normals.methods import METHODS, Method
 from rich.text import Text
 
 

@@ -15,12 +15,13 @@ import bgars
 import imageio.v3 as iio
 import numpy as np
 import pytest
-from bgars.experiments import EXPERIMENTS, write_experiments
-from bgars.experiments.kept import solved
-from bgars.experiments.measure import measure
-from bgars.experiments.meshes import shape_residuals_px
-from bgars.experiments.setting import DIFFUSE, HARDNESS, SPECULAR, Setting
-from bgars.normals import METHODS
+from bgars.normals.methods import METHODS
+
+from experiments import EXPERIMENTS, write_experiments
+from experiments.kept import solved
+from experiments.measure import measure
+from experiments.meshes import shape_residuals_px
+from experiments.setting import DIFFUSE, HARDNESS, SPECULAR, Setting
 
 RADIUS_PX = 20
 ERROR_COLUMNS = (

@@ -7,9 +7,9 @@ from dataclasses import replace
 import bgars
 import numpy as np
 import pytest
-from bgars import ball_names
 from bgars.balls.highlights import highlight_circles
 from bgars.balls.levels import Levels
+from bgars.records import ball_names
 from bgars.simulate import ball_name
 
 SHINY = bgars.Material(i_d=0.5, i_s=1.0, hardness=40)

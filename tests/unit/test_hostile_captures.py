@@ -10,8 +10,8 @@ from pathlib import Path
 import bgars
 import numpy as np
 import pytest
+from bgars.files.safe_files import need_regular, read_bounded, read_text
 from bgars.io.toml_text import read_values
-from bgars.safe_files import need_regular, read_bounded, read_text
 from case_captures import LIGHTS, lp_lines, recipe, refused, write_directions, write_images, write_lp
 
 LINUX = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")

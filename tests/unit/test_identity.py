@@ -60,7 +60,7 @@ def test_one_inspection_takes_its_identity_from_side_file_and_options(tmp_path: 
 
 
 def test_pictures_say_which_part_they_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from bgars.report import part_style  # noqa: PLC0415
+    from bgars.report.figures import style as part_style  # noqa: PLC0415
 
     capture = bgars.read_capture(bgars.sample_capture())
     result = bgars.inspect(capture)

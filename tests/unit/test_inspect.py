@@ -13,12 +13,14 @@ import bgars
 import imageio.v3 as iio
 import numpy as np
 import pytest
-from bgars import inspection_pipeline
-from bgars.ball_records import BallLayout, BallMeasurement, FoundBalls
 from bgars.cli.app import app
 from bgars.cli.console import EXIT_BAD_INPUT
 from bgars.inspection.exposure import check_capture
-from bgars.report.part import PICTURES
+from bgars.pipelines import inspect as inspection_pipeline
+from bgars.records.ball_layout import BallLayout
+from bgars.records.found_balls import FoundBalls
+from bgars.records.measured_balls import BallMeasurement
+from bgars.report.figures.part import PICTURES
 from synthetic_parts import measured_part
 from typer.testing import CliRunner
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import bgars
 import pytest
-from bgars.ball_records import BallLayout
-from bgars.part_recipe import Limits, PartRecipe
+from bgars.records.ball_layout import BallLayout
+from bgars.records.part_recipe import Limits, PartRecipe
 
 LIMITS = Limits(
     true_position_um=30.0, diameter_um=(570.0, 630.0), height_um=(465.0, 535.0), seating_coplanarity_um=60.0

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import bgars
 import numpy as np
 import pytest
-from bgars.integration_inputs import DEFAULTS
+from bgars.surface.integration_inputs import DEFAULTS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bgars.integrate import IntegrationMethod
+    from bgars.surface.integrate import IntegrationMethod
 
 PLANE = np.tile(np.float32([-0.6, 0, 0.8]), (12, 12, 1))
 

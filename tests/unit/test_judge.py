@@ -9,10 +9,12 @@ from dataclasses import replace
 import bgars
 import numpy as np
 import pytest
-from bgars.ball_records import BallLayout, BallMeasurement, FoundBall, FoundBalls, MeasuredBall
 from bgars.inspection.decision import decide
 from bgars.inspection.judge import judge_part
-from bgars.part_recipe import Limits, PartRecipe
+from bgars.records.ball_layout import BallLayout
+from bgars.records.found_balls import FoundBall, FoundBalls
+from bgars.records.measured_balls import BallMeasurement, MeasuredBall
+from bgars.records.part_recipe import Limits, PartRecipe
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from synthetic_parts import measured_part

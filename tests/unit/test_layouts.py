@@ -12,7 +12,7 @@ import bgars
 import numpy as np
 import pytest
 from bgars import _bgars
-from bgars.surface_records import Anchors
+from bgars.records.anchors import Anchors
 
 SHAPE = (18, 23)
 Array = np.ndarray

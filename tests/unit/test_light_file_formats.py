@@ -9,8 +9,8 @@ from pathlib import Path
 import bgars
 import numpy as np
 import pytest
-from bgars.light_formats import LIGHT_FORMATS, read_light_file
-from bgars.mat_files import read_arrays
+from bgars.files.light_formats import LIGHT_FORMATS, read_light_file
+from bgars.files.mat_files import read_arrays
 from case_captures import (
     COUNT,
     LIGHTS,

@@ -9,11 +9,11 @@ import bgars
 import numpy as np
 import pytest
 from bgars.inspection.judge import judge_part
-from bgars.report.overview import _show_input
-from bgars.report.page_photograph import lamps_of
-from bgars.report.page_source import PageSource
-from bgars.report.page_tables import light_rows, raised_together
-from bgars.report.part_shadows import shadow_figure
+from bgars.report.figures.overview import _show_input
+from bgars.report.figures.shadows import shadow_figure
+from bgars.report.html.photograph import lamps_of
+from bgars.report.html.source import PageSource
+from bgars.report.html.tables import light_rows, raised_together
 from matplotlib.figure import Figure
 from report_parts import RIG, passing, simulated
 from synthetic_parts import measured_part

@@ -7,8 +7,9 @@ from dataclasses import replace
 import bgars
 import numpy as np
 import pytest
-from bgars.ball_records import BallMeasurement, FoundBall, FoundBalls
 from bgars.inspection import check_shadows, measure_balls
+from bgars.records.found_balls import FoundBall, FoundBalls
+from bgars.records.measured_balls import BallMeasurement
 from numpy.typing import NDArray
 
 PITCH_UM = 11.0

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 if TYPE_CHECKING:
-    from bgars.normals import Method
+    from bgars.normals.methods import Method
     from numpy.typing import NDArray
 
 ALLOWED_DEG = 0.2

@@ -18,7 +18,7 @@ import pytest
 from bgars.cli.app import app
 from bgars.cli.inspect import NAMES
 from bgars.cli.outputs import RECONSTRUCTION
-from bgars.csv_cells import harmless
+from bgars.files.csv_cells import harmless
 from bgars.io.atomic import FORGOTTEN_S, PARTIAL_PREFIX, atomic_file, atomic_folder
 from bgars.io.own_files import is_own
 from typer.testing import CliRunner

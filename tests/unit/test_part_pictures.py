@@ -10,7 +10,7 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 from bgars.inspection.judge import judge_part
-from bgars.report.shadow_outline import shadow_outline_um
+from bgars.report.figures.shadow_outline import shadow_outline_um
 from matplotlib.path import Path as Outline
 from synthetic_parts import measured_part
 

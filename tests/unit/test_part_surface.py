@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from bgars.cli.app import app
 from bgars.io.surface_file import surface_bytes
-from bgars.report.page import page_text
-from bgars.report.page_mesh import unpacked
-from bgars.report.page_source import PageSource, read_page_source
-from bgars.report.page_surface import OUTERMOST
+from bgars.report.html.mesh import unpacked
+from bgars.report.html.page import page_text
+from bgars.report.html.source import PageSource, read_page_source
+from bgars.report.html.surface import OUTERMOST
 from typer.testing import CliRunner
 
 CLIPPED_UM = 60.0

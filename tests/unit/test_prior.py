@@ -5,7 +5,7 @@ from __future__ import annotations
 import bgars
 import numpy as np
 import pytest
-from bgars.report.prior import prior_label, prior_pixels, prior_share, show_prior, stripes
+from bgars.report.figures.prior import prior_label, prior_pixels, prior_share, show_prior, stripes
 from matplotlib.figure import Figure
 
 SHAPE = (60, 80)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import bgars
 import numpy as np
 import pytest
-from bgars.circle_pixels import inside_circles
-from bgars.experiments.measure import filled_normals
+from bgars.records.circle_pixels import inside_circles
+
+from experiments.measure import filled_normals
 
 if TYPE_CHECKING:
     from collections.abc import Callable

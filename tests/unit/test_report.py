@@ -15,14 +15,14 @@ import numpy as np
 import plotly.graph_objects
 import pytest
 from bgars.cli.app import app
-from bgars.material_records import loss_in_words
-from bgars.report.page import page_text
-from bgars.report.page_material import material_facts
-from bgars.report.page_mesh import unpacked
-from bgars.report.page_photograph import photograph_of
-from bgars.report.page_source import PageSource, read_page_source
-from bgars.report.page_units import with_micro
-from bgars.report.page_words import QUANTITIES, expanded, number
+from bgars.records.reflectance_fit import loss_in_words
+from bgars.report.html.material import material_facts
+from bgars.report.html.mesh import unpacked
+from bgars.report.html.page import page_text
+from bgars.report.html.photograph import photograph_of
+from bgars.report.html.source import PageSource, read_page_source
+from bgars.report.html.units import with_micro
+from bgars.report.html.words import QUANTITIES, expanded, number
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from report_parts import NASTY, RESULTS, failing, hostile, passing, simulated

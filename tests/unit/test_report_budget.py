@@ -12,12 +12,12 @@ from bgars.inspection.judge import EACH_BALL
 from bgars.inspection.judge_ball import MISSING, UNCLEAR
 from bgars.inspection.results import FLAT_TOP
 from bgars.inspection.to_scale import SCALE
-from bgars.report.page import page_text
-from bgars.report.page_budget import ADVICE, BUDGET_COLUMNS, budget_table, main_causes
-from bgars.report.page_source import PageSource
-from bgars.report.page_tables import unmeasured
-from bgars.report.part_balls import part_figure
-from bgars.report.part_maps import deviation_figure
+from bgars.report.figures.balls import part_figure
+from bgars.report.figures.maps import deviation_figure
+from bgars.report.html.budget import ADVICE, BUDGET_COLUMNS, budget_table, main_causes
+from bgars.report.html.page import page_text
+from bgars.report.html.source import PageSource
+from bgars.report.html.tables import unmeasured
 from report_parts import NASTY, failing, passing, simulated
 from test_report import Page
 

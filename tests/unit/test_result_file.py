@@ -12,8 +12,8 @@ from typing import Any
 import bgars
 import jsonschema
 import pytest
-from bgars.ball_records import BallLayout
-from bgars.part_recipe import PartRecipe
+from bgars.records.ball_layout import BallLayout
+from bgars.records.part_recipe import PartRecipe
 from judged_parts import LIMITS, RECIPE, judged
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -9,7 +9,7 @@ from pathlib import Path
 import bgars
 import numpy as np
 import pytest
-from bgars.light_names import named_lights
+from bgars.files.light_names import named_lights
 
 UNJUDGED = "cannot be judged by their shadows"
 

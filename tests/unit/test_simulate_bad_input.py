@@ -11,7 +11,7 @@ from typing import Any
 import bgars
 import numpy as np
 import pytest
-from bgars.recipes import schema
+from bgars.pipelines.scene_recipes import schema
 from test_cli import bgars_command
 
 RIG = bgars.LightRig.ring(4)

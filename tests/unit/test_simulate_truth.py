@@ -8,7 +8,7 @@ from pathlib import Path
 import bgars
 import numpy as np
 import pytest
-from bgars import ball_names
+from bgars.records import ball_names
 from bgars.simulate import PlaneTruth, ball_name
 from bgars.simulate.coplanarity import regression_plane, seating_plane
 

@@ -11,8 +11,8 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 from bgars.io.station_file import is_station_file, station_keys
+from bgars.records.flat_field import FlatField
 from bgars.station import drift, response_from_bracket, response_from_sums
-from bgars.station_record import FlatField
 from rendered_spheres import render, ring
 from test_calibrate import bgars_command
 

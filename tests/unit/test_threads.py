@@ -20,7 +20,7 @@ from bgars.io.images import decode_stack
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bgars.normals import Method
+    from bgars.normals.methods import Method
 
 DIGEST = """
 import hashlib, sys, bgars

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import bgars
 from bgars.cli.app import app
-from bgars.report.page import page_text
-from bgars.report.page_scene import view_words
-from bgars.report.page_source import PageSource
-from bgars.report.part_maps import deviation_figure
-from bgars.report.part_style import part_title
+from bgars.report.figures.maps import deviation_figure
+from bgars.report.figures.style import part_title
+from bgars.report.html.page import page_text
+from bgars.report.html.scene import view_words
+from bgars.report.html.source import PageSource
 from bgars.studies.characteristics import CHARACTERISTICS
 from bgars.studies.pages import grr_page
 from judged_parts import RECIPE, judged

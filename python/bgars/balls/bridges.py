@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bgars.records import FloatArray
+    from bgars.records.pixels import FloatArray
 
 __all__ = ["joined_pairs"]
 

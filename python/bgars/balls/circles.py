@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bgars.balls.levels import Levels
-    from bgars.records import BoolArray, FloatArray
+    from bgars.records.pixels import BoolArray, FloatArray
 
 __all__ = [
     "MIN_SHARE",

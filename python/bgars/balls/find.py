@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from bgars.ball_names import ball_name
-from bgars.ball_records import FoundBall, FoundBalls
 from bgars.balls.bridges import joined_pairs
 from bgars.balls.circles import Detection, find_circles
 from bgars.balls.lattice import fit_lattice
@@ -16,16 +14,18 @@ from bgars.balls.levels import Levels
 from bgars.balls.places import look_again
 from bgars.balls.registration import register
 from bgars.errors import InputError
-from bgars.scalar_checks import thread_count
+from bgars.records.ball_names import ball_name
+from bgars.records.found_balls import FoundBall, FoundBalls
+from bgars.records.scalar_checks import thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from bgars.ball_records import BallLayout
     from bgars.balls.rim_fit import Circles
-    from bgars.records import Capture
+    from bgars.records.ball_layout import BallLayout
+    from bgars.records.capture import Capture
 
 __all__ = ["find_balls"]
 

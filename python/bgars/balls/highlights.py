@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bgars.balls.levels import Levels
-    from bgars.records import FloatArray
+    from bgars.records.pixels import FloatArray
 
     Array = NDArray[np.float64]
 

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bgars.records import Capture, FloatArray
+    from bgars.records.capture import Capture
+    from bgars.records.pixels import FloatArray
 
 __all__ = ["Levels", "block_means"]
 

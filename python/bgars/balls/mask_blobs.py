@@ -10,7 +10,7 @@ import scipy  # loads its modules when they are used
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bgars.records import BoolArray
+    from bgars.records.pixels import BoolArray
 
 __all__ = ["RoundBlobs", "round_blobs"]
 

@@ -14,8 +14,8 @@ from bgars.balls.levels import block_means
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from bgars.records import FloatArray
-    from bgars.rig import LightRig
+    from bgars.records.pixels import FloatArray
+    from bgars.records.rig import LightRig
 
 __all__ = ["Centre", "outward_centres", "slope_field"]
 

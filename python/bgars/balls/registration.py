@@ -13,7 +13,7 @@ from bgars.errors import InputError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bgars.ball_records import BallLayout
+    from bgars.records.ball_layout import BallLayout
 
     Points = NDArray[np.complex128]
 

@@ -12,7 +12,7 @@ from bgars import _bgars
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bgars.records import FloatArray
+    from bgars.records.pixels import FloatArray
 
     Array = NDArray[np.floating]
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.checks.cast_shadows import behind_steep
-from bgars.checks.records import Finding
+from bgars.records.findings import Finding
 
 if TYPE_CHECKING:
     from bgars.checks.view import View

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.checks.cast_shadows import judge_shadows
-from bgars.checks.records import Finding
+from bgars.records.findings import Finding
 
 if TYPE_CHECKING:
     from bgars.checks.view import View

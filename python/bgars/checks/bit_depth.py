@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bgars.bit_depth import find_bit_depth
-from bgars.checks.records import Finding
+from bgars.records.bit_depth import find_bit_depth
+from bgars.records.findings import Finding
 
 if TYPE_CHECKING:
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
 
 __all__ = ["check_bit_depth"]
 

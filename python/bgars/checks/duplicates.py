@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bgars.checks.records import Finding
-from bgars.same_images import same_images
+from bgars.records.findings import Finding
+from bgars.records.same_images import same_images
 
 if TYPE_CHECKING:
     from bgars.checks.view import View
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
 
 __all__ = ["alike_images", "check_duplicates"]
 

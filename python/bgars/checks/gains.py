@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bgars.checks.evidence import critical_t
 from bgars.checks.moments import loo_weights
-from bgars.checks.records import Finding
+from bgars.records.findings import Finding
 
 if TYPE_CHECKING:
     from bgars.checks.view import View

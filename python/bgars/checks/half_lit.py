@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bgars.checks.records import Finding
+from bgars.records.findings import Finding
 
 if TYPE_CHECKING:
     from bgars.checks.view import View

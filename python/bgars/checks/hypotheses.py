@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from bgars.checks.records import Kind
+    from bgars.records.findings import Kind
 
 __all__ = ["Hypothesis", "alternatives"]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.checks.evidence import critical_t
-from bgars.checks.records import Finding
+from bgars.records.findings import Finding
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bgars.checks.records import Finding
+from bgars.records.findings import Finding
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

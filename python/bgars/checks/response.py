@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.checks.evidence import critical_t
-from bgars.checks.records import Finding
 from bgars.checks.view import tile_sums
+from bgars.records.findings import Finding
 
 if TYPE_CHECKING:
     from bgars.checks.view import View
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
 
 __all__ = ["check_response", "curvature"]
 

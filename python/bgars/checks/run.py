@@ -19,18 +19,18 @@ from bgars.checks.moments import lit_everywhere, moments_by
 from bgars.checks.motion import check_motion
 from bgars.checks.noise import check_noise
 from bgars.checks.orientation import check_orientation
-from bgars.checks.records import Finding, Findings
 from bgars.checks.response import check_response
 from bgars.checks.table import check_table
 from bgars.checks.view import TILES, make_view
 from bgars.checks.vignetting import check_vignetting
 from bgars.checks.windows import cut_windows, fit_frames
+from bgars.records.findings import Finding, Findings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bgars.checks.view import View
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
 
 __all__ = ["check_capture"]
 

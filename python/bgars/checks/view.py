@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from bgars.records import Capture, PixelArray
+    from bgars.records.capture import Capture
+    from bgars.records.pixels import PixelArray
 
 __all__ = ["TILES", "View", "linear_values", "make_view", "tile_sums"]
 

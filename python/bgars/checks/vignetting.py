@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.checks.evidence import critical_t
-from bgars.checks.records import Finding
 from bgars.checks.view import TILES
+from bgars.records.findings import Finding
 
 if TYPE_CHECKING:
     from bgars.checks.view import View

@@ -17,7 +17,7 @@ from bgars.checks.view import linear_values
 
 if TYPE_CHECKING:
     from bgars.checks.view import View
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
 
 __all__ = ["FrameFit", "Windows", "cut_windows", "fit_frames"]
 

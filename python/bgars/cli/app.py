@@ -27,7 +27,7 @@ from bgars.cli.lazy import LazyGroup
 from bgars.cli.options import ForceOption, MethodOption, StationOption
 from bgars.errors import BgarsError
 from bgars.extras import EXTRA_OF, how_to_install
-from bgars.normal_methods import DEFAULT_METHOD, METHODS, Method
+from bgars.normals.methods import DEFAULT_METHOD, METHODS, Method
 
 __all__ = ["main"]
 
@@ -100,7 +100,7 @@ def top(
     """Options of the command itself."""
     if threads is not None:
         # The compiled module starts its threads at its first work, so this comes in time for all of it.
-        from bgars.scalar_checks import thread_count  # noqa: PLC0415 - loaded when it is asked
+        from bgars.records.scalar_checks import thread_count  # noqa: PLC0415 - loaded when it is asked
 
         os.environ["RAYON_NUM_THREADS"] = str(thread_count(threads, "--threads"))
     if version:
@@ -232,7 +232,7 @@ def normals(
     """
     from bgars.cli.first_check import check_first  # noqa: PLC0415 - loaded when it runs
     from bgars.cli.outputs import write_normals  # noqa: PLC0415
-    from bgars.noise_floor import without_background  # noqa: PLC0415
+    from bgars.normals.noise_floor import without_background  # noqa: PLC0415
 
     _need_places(folder, output)
     capture = bgars.read_capture(folder, channel=channel, station=station)
@@ -304,7 +304,7 @@ def evaluate(
     of them should be within the standard error that the method states, on photographs far fewer are
     (docs/accuracy.md).
     """
-    from bgars.light_files import read_filenames  # noqa: PLC0415 - loaded when it runs
+    from bgars.files.light_files import read_filenames  # noqa: PLC0415 - loaded when it runs
 
     names = None if images is None else read_filenames(images)
     capture = bgars.read_capture(folder, channel=channel, images=names)

@@ -18,8 +18,8 @@ from bgars.cli.inspect import EXIT_NOT_PASSED
 from bgars.cli.options import LotOption, MethodOption, OperatorOption, StationNameOption
 from bgars.line import Batch, Naming, inspect_many
 from bgars.line.batch import Progress
-from bgars.normals import DEFAULT_METHOD
-from bgars.part_identity import PartIdentity
+from bgars.normals.methods import DEFAULT_METHOD
+from bgars.records.part_identity import PartIdentity
 from bgars.store import open_store
 
 __all__ = ["SerialFrom", "StoreOption", "register"]

@@ -13,13 +13,14 @@ from bgars.cli.calibrate_station import register as register_station
 from bgars.cli.console import print_json, say, stage_progress
 from bgars.io.masks import read_mask
 from bgars.io.material_file import material_path
-from bgars.material_records import loss_in_words
-from bgars.pipeline import summarise_fit
+from bgars.pipelines.reconstruct import summarise_fit
+from bgars.records.reflectance_fit import loss_in_words
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from bgars.material_records import ReflectanceFit, SurfaceMaterial
+    from bgars.records.reflectance_fit import ReflectanceFit
+    from bgars.records.surface_material import SurfaceMaterial
 
 __all__ = ["register"]
 

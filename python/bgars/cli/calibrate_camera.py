@@ -13,8 +13,8 @@ from bgars.cli.calibrate_station import FolderArgument, JsonOption, OutputOption
 from bgars.cli.console import print_json, say
 from bgars.errors import InputError
 from bgars.io.capture import read_unlit
+from bgars.records.remark import Remark
 from bgars.station import response_from_bracket, response_from_sums, srgb_response
-from bgars.station_record import Remark
 
 __all__ = ["register"]
 

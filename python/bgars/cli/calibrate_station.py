@@ -13,13 +13,15 @@ from bgars.cli.console import print_json, say, stage_progress, utc_now
 from bgars.errors import InputError
 from bgars.io.capture import read_unlit
 from bgars.io.station_file import is_station_file, read_station, write_station
+from bgars.report.html.station_page import write_station_page
 from bgars.station import drift as station_drift
 from bgars.station.flat import falloff_findings
-from bgars.station.page import write_station_page
 
 if TYPE_CHECKING:
-    from bgars.records import Capture
-    from bgars.station_record import LightCalibration, Remark, Station
+    from bgars.records.capture import Capture
+    from bgars.records.light_calibration import LightCalibration
+    from bgars.records.remark import Remark
+    from bgars.records.station import Station
 
 __all__ = ["FolderArgument", "JsonOption", "OutputOption", "keep_part", "register", "said_values", "tell_findings"]
 

@@ -13,10 +13,10 @@ from bgars.cli.console import print_json, say
 from bgars.errors import InputError
 from bgars.io.atomic import FolderNames, atomic_file, atomic_folder
 from bgars.io.given_paths import need_folder, need_output
-from bgars.report.check_page import check_page
+from bgars.report.html.check_page import check_page
 
 if TYPE_CHECKING:
-    from bgars.checks.records import Findings
+    from bgars.records.findings import Findings
 
 __all__ = ["EXIT_WRONG", "register"]
 

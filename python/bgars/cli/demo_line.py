@@ -13,7 +13,7 @@ from bgars.line.lot_page import write_lot_page
 from bgars.line.naming import Naming
 from bgars.line.pages import page_name, write_part_page
 from bgars.line.watch import Watch, watched
-from bgars.part_identity import PartIdentity
+from bgars.records.part_identity import PartIdentity
 from bgars.store import open_store
 
 __all__ = ["demo_line"]

@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
 
 __all__ = ["describe", "describe_in_words"]
 

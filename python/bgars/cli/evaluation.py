@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from bgars.evaluate import Evaluation
+    from bgars.pipelines.evaluate import Evaluation
 
 __all__ = ["choice_in_words", "evaluation_table"]
 

@@ -9,8 +9,8 @@ import typer
 
 import bgars
 from bgars.cli.console import print_json, say, stage_progress
-from bgars.experiments import EXPERIMENTS, write_experiments
-from bgars.experiments.write import DEFAULT_RADIUS_PX
+from experiments import EXPERIMENTS, write_experiments
+from experiments.write import DEFAULT_RADIUS_PX
 
 __all__ = ["register"]
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bgars.check_pipeline import check, refuse_wrong_geometry
 from bgars.cli.console import error_console
+from bgars.pipelines.check import check, refuse_wrong_geometry
 
 if TYPE_CHECKING:
-    from bgars.checks.records import Finding, Findings
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
+    from bgars.records.findings import Finding, Findings
 
 __all__ = ["check_first", "warn"]
 

@@ -15,7 +15,7 @@ from bgars.cli.options import MethodOption
 from bgars.errors import InputError
 from bgars.io.atomic import FolderNames, atomic_folder
 from bgars.io.given_paths import need_file, need_folder, need_output
-from bgars.normal_methods import DEFAULT_METHOD
+from bgars.normals.methods import DEFAULT_METHOD
 from bgars.studies.pages import grr_page
 from bgars.studies.readings import readings_csv
 from bgars.studies.study_folder import write_single_results

@@ -19,14 +19,14 @@ from bgars.extras import how_to_install, missing
 from bgars.io.atomic import FolderNames, atomic_folder
 from bgars.io.given_paths import need_file, need_folder, need_output
 from bgars.line.naming import identity_of
-from bgars.normal_methods import DEFAULT_METHOD
-from bgars.part_identity import PartIdentity
-from bgars.report.page import REPORT_FILES
-from bgars.report.page_budget import main_causes
-from bgars.report.part import PICTURES
+from bgars.normals.methods import DEFAULT_METHOD
+from bgars.records.part_identity import PartIdentity
+from bgars.report.figures.part import PICTURES
+from bgars.report.html.budget import main_causes
+from bgars.report.html.page import REPORT_FILES
 
 if TYPE_CHECKING:
-    from bgars.part_result import PartResult
+    from bgars.records.part_result import PartResult
 
 __all__ = ["EXIT_NOT_PASSED", "register"]
 

@@ -10,18 +10,18 @@ import typer
 import bgars
 from bgars.cli.console import print_json, say, stage_progress
 from bgars.errors import FileFormatError, InputError
-from bgars.integrate import IntegrationMethod, Solver
 from bgars.io.height import HEIGHT_SUFFIXES, read_stored_height
 from bgars.io.mesh_files import MESH_SUFFIXES
 from bgars.io.normal_map import holds_normals, read_stored_normals
 from bgars.io.normal_map_pixels import NORMAL_MAP_SUFFIXES
-from bgars.pipeline import solver_fraction
-from bgars.scalar_checks import check_pitch
+from bgars.pipelines.reconstruct import solver_fraction
+from bgars.records.scalar_checks import check_pitch
+from bgars.surface.integrate import IntegrationMethod, Solver
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bgars.records import FloatArray
+    from bgars.records.pixels import FloatArray
 
 TAKEN = f"mesh takes a normal map ({', '.join(NORMAL_MAP_SUFFIXES)}) or a height map ({', '.join(HEIGHT_SUFFIXES)})"
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from bgars.normal_methods import Method
+from bgars.normals.methods import Method
 
 __all__ = ["ForceOption", "LotOption", "MethodOption", "OperatorOption", "StationNameOption", "StationOption"]
 

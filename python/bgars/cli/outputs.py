@@ -14,14 +14,14 @@ from bgars.extras import how_to_install, missing
 from bgars.io.atomic import FolderNames, atomic_folder
 from bgars.io.described_tiff import write_described
 from bgars.io.mesh_files import MESH_SUFFIXES, NATIVE_SUFFIXES
-from bgars.pipeline import summarise_field
+from bgars.pipelines.reconstruct import summarise_field
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from bgars.pipeline import Reconstruction
-    from bgars.records import NormalField
+    from bgars.pipelines.reconstruct import Reconstruction
+    from bgars.records.normal_field import NormalField
 
 __all__ = ["write_normals", "write_reconstruction"]
 

@@ -12,8 +12,8 @@ from bgars.errors import InputError
 from bgars.io.result_file import RESULT_NAME
 from bgars.line.lot_page import lot_facts, write_lot_page
 from bgars.line.pages import page_name, write_part_page
-from bgars.report.page import write_page
-from bgars.report.page_source import read_page_source
+from bgars.report.html.page import write_page
+from bgars.report.html.source import read_page_source
 from bgars.store import Store, is_store, open_store
 
 __all__ = ["register"]

@@ -10,7 +10,7 @@ import typer
 
 import bgars
 from bgars.cli.console import print_json, say, stage_progress
-from bgars.recipes import named_recipes, write_simulation_of
+from bgars.pipelines.scene_recipes import named_recipes, write_simulation_of
 
 __all__ = ["register"]
 

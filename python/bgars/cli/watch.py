@@ -17,8 +17,8 @@ from bgars.line.inbox import Inbox
 from bgars.line.naming import Naming
 from bgars.line.notify import Notifier
 from bgars.line.watch import Watch, watched
-from bgars.normals import DEFAULT_METHOD
-from bgars.part_identity import PartIdentity
+from bgars.normals.methods import DEFAULT_METHOD
+from bgars.records.part_identity import PartIdentity
 from bgars.store import open_store
 
 __all__ = ["register"]

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bgars.circle_pixels import inside_circles
+from bgars.records.circle_pixels import inside_circles
 
 if TYPE_CHECKING:
-    from bgars.records import NormalField
+    from bgars.records.normal_field import NormalField
 
 __all__ = ["SHAPE_TERMS", "Board", "board_from_normals", "height_terms", "outside_balls", "slope_terms"]
 

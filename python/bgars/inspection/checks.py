@@ -8,18 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.errors import CalibrationError, InputError
+from bgars.files.light_names import light_name, numbered
 from bgars.inspection.board import Board
 from bgars.inspection.image_shifts import MIN_STRETCHES
 from bgars.inspection.in_view import fitting_stretches
 from bgars.inspection.shadow_model import Balls, Lights
 from bgars.inspection.start import edge_steps
-from bgars.light_names import light_name, numbered
-from bgars.same_images import same_images
+from bgars.records.same_images import same_images
 
 if TYPE_CHECKING:
     from bgars.inspection.problem import Problem
     from bgars.inspection.shadow_edges import Edges
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
 
 __all__ = [
     "Complaint",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from bgars.part_result import Verdict
+from bgars.records.ball_result import Verdict
 
 __all__ = ["COVERAGE_FACTOR", "Decision", "decide", "worst"]
 

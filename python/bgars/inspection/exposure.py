@@ -9,7 +9,7 @@ import numpy as np
 from bgars.errors import InputError
 
 if TYPE_CHECKING:
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
 
 __all__ = ["check_capture"]
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from bgars.records import NormalField
+    from bgars.records.normal_field import NormalField
 
 __all__ = ["FlatTops", "flat_tops"]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.errors import CalibrationError
-from bgars.light_names import light_name
+from bgars.files.light_names import light_name
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

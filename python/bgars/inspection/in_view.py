@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars.files.light_names import light_name, numbered
 from bgars.inspection.board import Board
 from bgars.inspection.shadow_model import Balls, Lights, edge_at
 from bgars.inspection.start import ANGLES
-from bgars.light_names import light_name, numbered
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bgars.files.light_names import light_name
 from bgars.inspection.coplanarity import Coplanarity, measure_coplanarity, seating_budget
 from bgars.inspection.decision import COVERAGE_FACTOR, worst
 from bgars.inspection.judge_ball import Position, judge_ball
@@ -19,16 +20,18 @@ from bgars.inspection.places import Slot, match_balls
 from bgars.inspection.position import GridFit
 from bgars.inspection.to_scale import lens_scale, to_scale
 from bgars.inspection.warpage import board_height_um, board_terms, warpage
-from bgars.light_names import light_name
-from bgars.part_result import BallResult, PartResult, SeatingResult
+from bgars.records.ball_result import BallResult
+from bgars.records.part_result import PartResult
+from bgars.records.seating_result import SeatingResult
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from bgars.ball_records import BallMeasurement, FoundBalls
-    from bgars.part_recipe import PartRecipe
+    from bgars.records.found_balls import FoundBalls
+    from bgars.records.measured_balls import BallMeasurement
+    from bgars.records.part_recipe import PartRecipe
 
     Array = NDArray[np.float64]
 

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bgars.inspection.decision import decide
-from bgars.part_recipe import BALL_LIMITS
+from bgars.records.part_recipe import BALL_LIMITS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
-    from bgars.ball_records import MeasuredBall
     from bgars.inspection.places import Slot
-    from bgars.part_recipe import Limits
-    from bgars.part_result import Verdict
+    from bgars.records.ball_result import Verdict
+    from bgars.records.measured_balls import MeasuredBall
+    from bgars.records.part_recipe import Limits
 
 __all__ = ["NO_LIMITS", "UNCLEAR", "Position", "judge_ball", "true_position"]
 

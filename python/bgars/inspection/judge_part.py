@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 from bgars.inspection.decision import decide
 from bgars.inspection.judge_ball import NO_LIMITS, UNCLEAR
-from bgars.part_result import BallResult, PartCheck
+from bgars.records.ball_result import BallResult
+from bgars.records.part_check import PartCheck
 
 if TYPE_CHECKING:
     from bgars.inspection.coplanarity import Coplanarity
-    from bgars.part_recipe import Limits
+    from bgars.records.part_recipe import Limits
 
 __all__ = ["part_checks", "part_reasons"]
 

@@ -14,8 +14,10 @@ from bgars.inspection.shadow_fit import fit_shadows
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bgars.ball_records import BallMeasurement, FoundBalls
-    from bgars.records import Capture, NormalField
+    from bgars.records.capture import Capture
+    from bgars.records.found_balls import FoundBalls
+    from bgars.records.measured_balls import BallMeasurement
+    from bgars.records.normal_field import NormalField
 
 __all__ = ["check_shadows", "measure_balls"]
 
@@ -80,7 +82,7 @@ def measure_balls(
     Examples
     --------
     >>> import bgars
-    >>> from bgars.ball_records import FoundBall, FoundBalls
+    >>> from bgars.records.found_balls import FoundBall, FoundBalls
     >>> from bgars.inspection import measure_balls
     >>> scene = bgars.Scene.ball(600.0, height_um=500.0)
     >>> capture, truth = bgars.simulate(scene, bgars.LightRig.ring(8), bgars.Material(), bgars.Camera(supersample=4))

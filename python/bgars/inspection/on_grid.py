@@ -13,9 +13,9 @@ from bgars.inspection.position import GridFit, fit_grid
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bgars.ball_records import BallMeasurement
     from bgars.inspection.places import Slot
-    from bgars.part_recipe import PartRecipe
+    from bgars.records.measured_balls import BallMeasurement
+    from bgars.records.part_recipe import PartRecipe
 
     Array = NDArray[np.float64]
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from bgars.ball_names import ball_name
 from bgars.errors import InputError
-from bgars.part_recipe import layout_places
+from bgars.records.ball_names import ball_name
+from bgars.records.part_recipe import layout_places
 
 if TYPE_CHECKING:
-    from bgars.ball_records import BallKind, BallMeasurement, FoundBalls, MeasuredBall
-    from bgars.part_recipe import PartRecipe
+    from bgars.records.found_balls import BallKind, FoundBalls
+    from bgars.records.measured_balls import BallMeasurement, MeasuredBall
+    from bgars.records.part_recipe import PartRecipe
 
 __all__ = ["Slot", "match_balls"]
 

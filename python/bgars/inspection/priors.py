@@ -30,7 +30,7 @@ from bgars.inspection.population import q_spread
 if TYPE_CHECKING:
     from bgars.inspection.image_shifts import ImageShifts
     from bgars.inspection.problem import Problem
-    from bgars.records import NormalField
+    from bgars.records.normal_field import NormalField
 
 __all__ = ["COARSE_SPREAD_PX", "common_mixtures", "first_priors", "refined_priors", "with_edges", "with_shifts"]
 

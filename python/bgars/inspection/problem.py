@@ -13,9 +13,9 @@ from bgars.errors import InputError
 from bgars.inspection.radiance import Radiance
 
 if TYPE_CHECKING:
-    from bgars.ball_records import FoundBalls
-    from bgars.records import Capture
-    from bgars.rig import LightRig
+    from bgars.records.capture import Capture
+    from bgars.records.found_balls import FoundBalls
+    from bgars.records.rig import LightRig
 
 __all__ = ["Problem", "make_problem", "thread_count"]
 

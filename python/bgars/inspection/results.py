@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bgars.ball_records import BallMeasurement, MeasuredBall
+from bgars.files.light_names import light_name
 from bgars.inspection.budget import reading_budget
 from bgars.inspection.bundle import angles_rad
 from bgars.inspection.shape_or_lights import silhouettes_or_shadows, what_is_odd
-from bgars.light_names import light_name
+from bgars.records.measured_balls import BallMeasurement, MeasuredBall
 
 if TYPE_CHECKING:
-    from bgars.ball_records import FoundBall, FoundBalls
     from bgars.inspection.budget import Budget
     from bgars.inspection.bundle import Solution
     from bgars.inspection.flat_top import FlatTops
     from bgars.inspection.problem import Problem
     from bgars.inspection.shadow_edges import Edges
     from bgars.inspection.shadow_fit import Fit
+    from bgars.records.found_balls import FoundBall, FoundBalls
 
 __all__ = ["Usability", "judge_balls", "measurement"]
 

@@ -40,7 +40,7 @@ from bgars.inspection.edge_profile import NODES, Lamp, edge_profiles
 from bgars.inspection.shadow_map import Casters
 from bgars.inspection.shadow_model import Balls, Lights, edge_at, rays
 from bgars.inspection.spread import lamp_gradients
-from bgars.kernel_capture import kernel_capture
+from bgars.records.kernel_capture import kernel_capture
 
 if TYPE_CHECKING:
     from bgars.inspection.board import Board

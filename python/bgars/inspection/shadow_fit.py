@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from bgars.inspection.results import Usability
     from bgars.inspection.shadow_edges import Edges
     from bgars.inspection.spread import EdgeSpread
-    from bgars.records import NormalField
+    from bgars.records.normal_field import NormalField
 
 __all__ = ["Fit", "fit_shadows"]
 

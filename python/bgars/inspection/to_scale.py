@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from bgars.inspection.lens_scale import LensScale, fit_lens_scale
 
 if TYPE_CHECKING:
-    from bgars.ball_records import BallMeasurement, MeasuredBall
     from bgars.inspection.places import Slot
-    from bgars.part_recipe import PartRecipe
+    from bgars.records.measured_balls import BallMeasurement, MeasuredBall
+    from bgars.records.part_recipe import PartRecipe
 
 __all__ = ["SCALE", "lens_scale", "to_scale"]
 

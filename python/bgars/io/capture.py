@@ -29,11 +29,12 @@ from bgars.io.light_discovery import choose_mask, default_recipe
 from bgars.io.masks import opaque_everywhere, read_mask
 from bgars.io.recipe import RECIPE_NAME, CaptureRecipe, read_recipe
 from bgars.io.station_file import read_station
-from bgars.records import Capture, every_pixel
-from bgars.rig import LightRig
-from bgars.scalar_checks import thread_count
-from bgars.station_apply import with_station
-from bgars.station_record import Station
+from bgars.records.capture import Capture
+from bgars.records.plain_arrays import every_pixel
+from bgars.records.rig import LightRig
+from bgars.records.scalar_checks import thread_count
+from bgars.records.station import Station
+from bgars.records.station_apply import with_station
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,7 +44,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bgars.io.recipe import ChannelName
-    from bgars.records import BoolArray, FloatArray, PixelArray
+    from bgars.records.pixels import BoolArray, FloatArray, PixelArray
 
 __all__ = ["read_capture", "read_unlit"]
 

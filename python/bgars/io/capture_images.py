@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from bgars.errors import FileFormatError, InputError
+from bgars.files.light_files import read_filenames
 from bgars.io.image_formats import format_of
 from bgars.io.image_listing import Listing, choose_series, list_folder, natural_key, role_of, some_of
 from bgars.io.image_names import find_named_images
 from bgars.io.image_tags import read_tags
 from bgars.io.light_discovery import choose_mask
 from bgars.io.recipe import RECIPE_NAME
-from bgars.light_files import read_filenames
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bgars.errors import FileFormatError, InputError
+from bgars.files.light_files import read_intensities, read_numbers
+from bgars.files.light_formats import LightTable, read_light_file
+from bgars.files.light_names import light_name
 from bgars.io.recipe import RECIPE_NAME
-from bgars.light_files import read_intensities, read_numbers
-from bgars.light_formats import LightTable, read_light_file
-from bgars.light_names import light_name
-from bgars.rig import LightRig
+from bgars.records.rig import LightRig
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from bgars.bit_depth import FEWEST_BITS, find_bit_depth
 from bgars.errors import InputError
 from bgars.io.image_formats import format_of
 from bgars.io.image_tags import read_tags, upright
 from bgars.io.images import WEIGHTS, DecodedStack, decode_pages, decode_stack
 from bgars.io.recipe import RECIPE_NAME, CaptureRecipe, GammaResponse, TableResponse
 from bgars.io.response import Curve, gamma_curve, linearise, read_response_table, srgb_curve
-from bgars.records import float_full_scale
+from bgars.records.bit_depth import FEWEST_BITS, find_bit_depth
+from bgars.records.pixels import float_full_scale
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bgars.io.recipe import ChannelName
-    from bgars.records import FloatArray, PixelArray
+    from bgars.records.pixels import FloatArray, PixelArray
 
 __all__ = ["Decoding", "Levels", "levels_of", "linearise_floats", "read_dark", "response_table", "subtract_offset"]
 

@@ -11,7 +11,7 @@ import tifffile
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from bgars.records import FloatArray
+    from bgars.records.pixels import FloatArray
 
 __all__ = ["OWN", "description_of", "write_described"]
 

@@ -11,7 +11,7 @@ from bgars.errors import InputError
 from bgars.io.atomic import atomic_file
 from bgars.io.described_tiff import write_described
 from bgars.io.normal_map import write_normal_map
-from bgars.records import NormalField
+from bgars.records.normal_field import NormalField
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bgars.records import HeightMap
+    from bgars.records.height_map import HeightMap
 
 __all__ = ["NORMAL_FORMATS", "POINT_FORMATS", "write_normals", "write_points"]
 

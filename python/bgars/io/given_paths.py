@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bgars.errors import FileFormatError, InputError
-from bgars.safe_files import need_regular, shown
+from bgars.files.safe_files import need_regular, shown
 
 if TYPE_CHECKING:
     import os

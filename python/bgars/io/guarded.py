@@ -11,10 +11,10 @@ import numpy as np
 import tifffile
 
 from bgars.errors import FileFormatError
+from bgars.files.safe_files import need_readable
 from bgars.io.decoders.tiff import quiet
 from bgars.io.described_tiff import description_of
 from bgars.io.images import MAX_MEGAPIXELS
-from bgars.safe_files import need_readable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

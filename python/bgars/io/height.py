@@ -16,7 +16,8 @@ from bgars.io.guarded import load_npy, load_tiff
 if TYPE_CHECKING:
     from os import PathLike
 
-    from bgars.records import FloatArray, HeightMap
+    from bgars.records.height_map import HeightMap
+    from bgars.records.pixels import FloatArray
 
 __all__ = ["HEIGHT_SUFFIXES", "StoredHeight", "read_height", "read_stored_height", "write_height"]
 

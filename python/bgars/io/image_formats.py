@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from bgars.errors import FileFormatError
-from bgars.safe_files import need_regular
+from bgars.files.safe_files import need_regular
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bgars.records import PixelArray
+    from bgars.records.pixels import PixelArray
 
 __all__ = ["IMAGE_FORMATS", "IMAGE_SUFFIXES", "ImageFormat", "format_of", "read_pixels"]
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bgars.errors import FileFormatError
+from bgars.files.safe_files import shown
 from bgars.io.image_formats import IMAGE_SUFFIXES
-from bgars.safe_files import shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

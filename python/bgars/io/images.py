@@ -10,14 +10,14 @@ from bgars import _bgars
 from bgars.errors import FileFormatError, InputError, UnsupportedImageError
 from bgars.io.image_formats import format_of, read_pixels
 from bgars.io.image_stacks import read_stack
-from bgars.records import integer_full_scale
+from bgars.records.plain_arrays import integer_full_scale
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     from bgars.io.recipe import ChannelName
-    from bgars.records import FloatArray, PixelArray
+    from bgars.records.pixels import FloatArray, PixelArray
 
 __all__ = ["MAX_MEGAPIXELS", "DecodedStack", "decode_pages", "decode_stack"]
 

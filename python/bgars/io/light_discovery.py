@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bgars.errors import InputError
+from bgars.files.light_formats import LIGHT_FORMATS
 from bgars.io.image_listing import list_folder, some_of
 from bgars.io.recipe import RECIPE_NAME, CaptureRecipe
-from bgars.light_formats import LIGHT_FORMATS
 
 if TYPE_CHECKING:
     from bgars.io.image_listing import Listing

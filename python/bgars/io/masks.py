@@ -10,7 +10,7 @@ from bgars.errors import FileFormatError, InputError
 from bgars.io.image_formats import format_of, read_pixels
 from bgars.io.image_tags import read_tags, upright
 from bgars.io.images import MAX_MEGAPIXELS, decode_stack
-from bgars.records import integer_full_scale
+from bgars.records.plain_arrays import integer_full_scale
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bgars.records import BoolArray
+    from bgars.records.pixels import BoolArray
 
 __all__ = ["opaque_everywhere", "read_mask"]
 

@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from bgars.errors import InputError
 from bgars.io.atomic import atomic_file
 from bgars.io.strict_toml import Strict, checked, read_values
-from bgars.material_records import SurfaceLobe, SurfaceMaterial
+from bgars.records.surface_material import SurfaceLobe, SurfaceMaterial
 
 if TYPE_CHECKING:
     from os import PathLike

@@ -10,8 +10,8 @@ import numpy as np
 from bgars import _bgars
 from bgars.errors import InputError
 from bgars.io.atomic import atomic_file
-from bgars.records import HeightMap
-from bgars.scalar_checks import thread_count
+from bgars.records.height_map import HeightMap
+from bgars.records.scalar_checks import thread_count
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import trimesh
     from numpy.typing import NDArray
 
-    from bgars.records import NormalField
+    from bgars.records.normal_field import NormalField
 
 __all__ = ["MESH_SUFFIXES", "NATIVE_SUFFIXES", "write_mesh"]
 

@@ -18,15 +18,15 @@ from bgars.io.masks import read_mask
 from bgars.io.normal_map_encoding import Normals, normals_of
 from bgars.io.normal_map_pixels import NORMAL_MAP_SUFFIXES, is_normal_array, read_pixels
 from bgars.io.own_files import is_own, sign
-from bgars.plain_arrays import plain, without_mask
-from bgars.records import NormalField
+from bgars.records.normal_field import NormalField
+from bgars.records.plain_arrays import plain, without_mask
 
 if TYPE_CHECKING:
     from os import PathLike
 
     from numpy.typing import ArrayLike
 
-    from bgars.records import FloatArray
+    from bgars.records.pixels import FloatArray
 
 __all__ = ["holds_normals", "read_normal_map", "read_stored_normals", "write_normal_map"]
 

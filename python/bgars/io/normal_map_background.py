@@ -8,7 +8,7 @@ import numpy as np
 from scipy import ndimage
 
 if TYPE_CHECKING:
-    from bgars.records import BoolArray, FloatArray
+    from bgars.records.pixels import BoolArray, FloatArray
 
 __all__ = ["border_color", "is_cut_out"]
 

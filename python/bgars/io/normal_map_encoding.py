@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from bgars.io.normal_map_pixels import Pixels
-    from bgars.records import BoolArray, FloatArray
+    from bgars.records.pixels import BoolArray, FloatArray
 
 __all__ = ["Normals", "normals_of"]
 

@@ -15,7 +15,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bgars.records import BoolArray, FloatArray
+    from bgars.records.pixels import BoolArray, FloatArray
 
 __all__ = ["curl_agreement"]
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bgars.records import BoolArray, FloatArray
+    from bgars.records.pixels import BoolArray, FloatArray
 
 __all__ = ["NORMAL_MAP_SUFFIXES", "Pixels", "is_normal_array", "read_pixels"]
 

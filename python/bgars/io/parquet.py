@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 from bgars.errors import InputError
 from bgars.io.atomic import atomic_file
 from bgars.io.result_schema import BallTable, ResultTable
-from bgars.part_result import FORMAT, FORMAT_VERSION, BallResult
+from bgars.records.ball_result import BallResult
+from bgars.records.part_result import FORMAT, FORMAT_VERSION
 
 if TYPE_CHECKING:
     from os import PathLike
 
-    from bgars.part_result import PartResult
+    from bgars.records.part_result import PartResult
 
 __all__ = ["need_pyarrow", "write_parquet"]
 

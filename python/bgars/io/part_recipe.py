@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import ConfigDict, Field, model_validator
 
-from bgars.ball_names import ball_name, ball_place
-from bgars.ball_records import BallLayout
 from bgars.errors import FileFormatError, InputError
 from bgars.io.positions import read_positions
 from bgars.io.strict_toml import Strict, checked, read_values
-from bgars.part_recipe import BALL_LIMITS, PART_LIMITS, Limits, PartRecipe, View
+from bgars.records.ball_layout import BallLayout
+from bgars.records.ball_names import ball_name, ball_place
+from bgars.records.part_recipe import BALL_LIMITS, PART_LIMITS, Limits, PartRecipe, View
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

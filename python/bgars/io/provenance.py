@@ -14,7 +14,7 @@ from bgars.io.recipe import RECIPE_NAME, TableResponse, read_recipe
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
 
 __all__ = ["capture_files", "checksums"]
 

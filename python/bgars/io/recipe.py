@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
+from bgars.files.light_formats import MAX_LIGHTS
 from bgars.io.strict_toml import Strict, checked, read_values
-from bgars.light_formats import MAX_LIGHTS
 
 __all__ = [
     "RECIPE_NAME",

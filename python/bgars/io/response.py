@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bgars.errors import FileFormatError, InputError
-from bgars.light_files import read_text
+from bgars.files.light_files import read_text
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from bgars.records import FloatArray, PixelArray
+    from bgars.records.pixels import FloatArray, PixelArray
 
 __all__ = ["Curve", "gamma_curve", "linearise", "read_response_table", "srgb_curve"]
 

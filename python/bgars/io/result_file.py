@@ -9,15 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bgars.ball_records import BallLayout
 from bgars.errors import FileFormatError, InputError
+from bgars.files.safe_files import read_bounded
 from bgars.io.result_schema import Reading, ResultTable
 from bgars.io.strict_toml import checked
-from bgars.part_identity import PartIdentity
-from bgars.part_material import MaterialParameter, PartMaterial
-from bgars.part_recipe import Limits, PartRecipe
-from bgars.part_result import FORMAT, FORMAT_VERSION, BallResult, PartCheck, PartResult, SeatingResult
-from bgars.safe_files import read_bounded
+from bgars.records.ball_layout import BallLayout
+from bgars.records.ball_result import BallResult
+from bgars.records.part_check import PartCheck
+from bgars.records.part_identity import PartIdentity
+from bgars.records.part_material import MaterialParameter, PartMaterial
+from bgars.records.part_recipe import Limits, PartRecipe
+from bgars.records.part_result import FORMAT, FORMAT_VERSION, PartResult
+from bgars.records.seating_result import SeatingResult
 
 if TYPE_CHECKING:
     from os import PathLike

@@ -6,9 +6,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, Strict, model_validator
 
-from bgars.ball_records import BallKind
-from bgars.part_recipe import View
-from bgars.part_result import FORMAT, FORMAT_VERSION, Verdict
+from bgars.records.ball_result import Verdict
+from bgars.records.found_balls import BallKind
+from bgars.records.part_recipe import View
+from bgars.records.part_result import FORMAT, FORMAT_VERSION
 
 __all__ = ["ResultTable", "result_schema"]
 

@@ -15,8 +15,13 @@ from pydantic import Field, model_validator
 from bgars.errors import FileFormatError, InputError
 from bgars.io.atomic import atomic_file
 from bgars.io.strict_toml import Strict, checked, read_values
-from bgars.rig import LightRig
-from bgars.station_record import FlatField, LightCalibration, Remark, ResponseCurve, Scale, Station
+from bgars.records.flat_field import FlatField
+from bgars.records.light_calibration import LightCalibration
+from bgars.records.remark import Remark
+from bgars.records.response_curve import ResponseCurve
+from bgars.records.rig import LightRig
+from bgars.records.scale import Scale
+from bgars.records.station import Station
 
 if TYPE_CHECKING:
     from os import PathLike

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bgars.errors import FileFormatError
-from bgars.surface_map import PartSurface
+from bgars.records.part_surface import PartSurface
 
 if TYPE_CHECKING:
     from pathlib import Path

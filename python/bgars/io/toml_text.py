@@ -8,7 +8,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from bgars.errors import FileFormatError
-from bgars.safe_files import read_text
+from bgars.files.safe_files import read_text
 
 if sys.version_info >= (3, 11):
     import tomllib

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bgars.errors import FileFormatError
+from bgars.files.mat_files import read_arrays
+from bgars.files.safe_files import read_bounded, read_text
 from bgars.io.images import decode_stack
 from bgars.io.masks import read_mask
-from bgars.mat_files import read_arrays
-from bgars.records import Truth
-from bgars.safe_files import read_bounded, read_text
+from bgars.records.truth import Truth
 
 if TYPE_CHECKING:
     from os import PathLike
 
-    from bgars.records import FloatArray
+    from bgars.records.pixels import FloatArray
 
 __all__ = ["Truth", "read_truth"]
 

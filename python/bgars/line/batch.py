@@ -15,7 +15,7 @@ from bgars.line.folders import capture_folders
 from bgars.line.job import Job, Outcome, with_content
 from bgars.line.local_pool import run_local, share_cores, thread_environment
 from bgars.line.naming import Naming
-from bgars.normals import DEFAULT_METHOD, Method
+from bgars.normals.methods import DEFAULT_METHOD, Method
 from bgars.store import Store, open_store
 from bgars.store.rows import TIME_FORM
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Iterator
     from os import PathLike
 
-    from bgars.part_result import PartResult
+    from bgars.records.part_result import PartResult
 
 __all__ = ["Batch", "Progress", "inspect_many", "store_outcome"]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import imageio.v3 as iio
 
-from bgars.rig import LightRig
+from bgars.records.rig import LightRig
 from bgars.simulate import Camera, Defect, Jitter, Material, Scene, SimulationSetup, simulate
 
 if TYPE_CHECKING:

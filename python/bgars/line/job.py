@@ -11,16 +11,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bgars.errors import BgarsError
-from bgars.inspection_pipeline import inspect
 from bgars.io.capture import read_capture
 from bgars.io.part_recipe import read_part_recipe
 from bgars.io.provenance import capture_files, checksums
 from bgars.line.naming import Naming, last_written_utc
-from bgars.normals import DEFAULT_METHOD, Method
+from bgars.normals.methods import DEFAULT_METHOD, Method
+from bgars.pipelines.inspect import inspect
 from bgars.store.keys import key_of, part_key
 
 if TYPE_CHECKING:
-    from bgars.part_result import PartResult
+    from bgars.records.part_result import PartResult
 
 __all__ = ["Job", "Outcome", "run_job", "with_content"]
 

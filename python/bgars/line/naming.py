@@ -13,10 +13,10 @@ import numpy as np
 
 from bgars.errors import InputError
 from bgars.io.recipe import RECIPE_NAME, read_recipe
-from bgars.part_identity import PartIdentity
+from bgars.records.part_identity import PartIdentity
 
 if TYPE_CHECKING:
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
 
 __all__ = ["CODE", "Naming", "identity_of", "last_written_utc"]
 

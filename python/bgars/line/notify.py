@@ -20,7 +20,7 @@ from bgars.store.append import write_durably
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from bgars.part_result import PartResult
+    from bgars.records.part_result import PartResult
 
 __all__ = ["Notifier"]
 

@@ -11,11 +11,11 @@ from bgars.errors import BgarsError, InputError
 from bgars.io.capture import read_capture
 from bgars.io.provenance import capture_files, checksums
 from bgars.io.result_file import RESULT_NAME, parse_result
-from bgars.report.page import write_page
-from bgars.report.page_source import PageSource, source_of
+from bgars.report.html.page import write_page
+from bgars.report.html.source import PageSource, source_of
 
 if TYPE_CHECKING:
-    from bgars.part_result import PartResult
+    from bgars.records.part_result import PartResult
     from bgars.store import Store
 
 __all__ = ["page_name", "write_part_page"]

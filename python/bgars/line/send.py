@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
-from bgars.cfx import to_cfx
 from bgars.errors import FileFormatError, InputError
 from bgars.io.result_file import RESULT_NAME, parse_result
+from bgars.line.cfx import to_cfx
 from bgars.line.notify import message
 from bgars.store.append import write_durably
 

@@ -19,7 +19,7 @@ from bgars.line.inbox import Inbox, Waiting
 from bgars.line.job import Job, Outcome, run_job
 from bgars.line.naming import Naming
 from bgars.line.notify import Notifier
-from bgars.normals import DEFAULT_METHOD, Method
+from bgars.normals.methods import DEFAULT_METHOD, Method
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -18,7 +18,7 @@ from bgars.simulate.solids import Array, Points
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bgars.rig import LightRig
+    from bgars.records.rig import LightRig
     from bgars.simulate.camera import Camera
     from bgars.simulate.material import Material
     from bgars.simulate.sensor import Sensor

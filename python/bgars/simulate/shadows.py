@@ -12,7 +12,7 @@ from bgars.simulate.solids import Array, Bounds, Points
 from bgars.simulate.surface import Patch, World, window
 
 if TYPE_CHECKING:
-    from bgars.rig import LightRig
+    from bgars.records.rig import LightRig
 
 __all__ = ["Beam", "beam_at", "check_lights", "is_lit"]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bgars.records import Capture
+from bgars.records.capture import Capture
 from bgars.simulate.array import truncated_normal
 from bgars.simulate.checks import require, whole
 from bgars.simulate.render import Studio, render
@@ -20,7 +20,7 @@ from bgars.simulate.truth import SimulatedTruth, SimulationSetup, ball_table, co
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bgars.rig import LightRig
+    from bgars.records.rig import LightRig
     from bgars.simulate.board import Board
     from bgars.simulate.camera import Camera
     from bgars.simulate.material import Material, Variation

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bgars.records import BoolArray, FloatArray, Truth
+from bgars.records.pixels import BoolArray, FloatArray
+from bgars.records.truth import Truth
 from bgars.simulate.coplanarity import PlaneTruth, regression_plane, seating_plane
 
 if TYPE_CHECKING:
-    from bgars.rig import LightRig
+    from bgars.records.rig import LightRig
     from bgars.simulate.camera import Camera
     from bgars.simulate.material import Material
     from bgars.simulate.scene import Scene

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bgars.errors import CalibrationError, InputError
+from bgars.records.remark import Remark
 from bgars.station.matt_lights import shading_misfit
 from bgars.station.outline import Outline, as_outline, find_outline, refine_outline
-from bgars.station_record import Remark
 
 if TYPE_CHECKING:
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
     from bgars.station.levels import Levels
 
 __all__ = ["given_outlines", "outlines_of"]

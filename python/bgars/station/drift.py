@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bgars.errors import InputError
-from bgars.light_names import light_name
+from bgars.files.light_names import light_name
+from bgars.records.remark import Remark, Severity
+from bgars.records.station_apply import flat_maps
 from bgars.station.flat import calibrate_flat
 from bgars.station.lights import calibrate_lights
-from bgars.station_apply import flat_maps
-from bgars.station_record import Remark, Severity
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from bgars.records import Capture
-    from bgars.station_record import Station
+    from bgars.records.capture import Capture
+    from bgars.records.station import Station
 
 __all__ = ["drift"]
 

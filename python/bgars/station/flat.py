@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.errors import CalibrationError
-from bgars.light_names import light_name
+from bgars.files.light_names import light_name
+from bgars.records.flat_field import FlatField
+from bgars.records.remark import Remark
+from bgars.records.station_apply import flat_maps
 from bgars.station.levels import linear_levels
-from bgars.station_apply import flat_maps
-from bgars.station_record import FlatField, Remark
 
 if TYPE_CHECKING:
-    from bgars.records import Capture
-    from bgars.station_record import LightCalibration
+    from bgars.records.capture import Capture
+    from bgars.records.light_calibration import LightCalibration
 
 __all__ = ["calibrate_flat", "falloff_findings"]
 

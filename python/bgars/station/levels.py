@@ -12,7 +12,7 @@ from scipy import ndimage
 from bgars.errors import InputError
 
 if TYPE_CHECKING:
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
 
 __all__ = ["Levels", "linear_levels", "noise_of"]
 

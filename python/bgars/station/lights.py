@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bgars.errors import InputError
-from bgars.light_names import light_name
-from bgars.records import Capture
-from bgars.rig import LightRig
-from bgars.scalar_checks import check_pitch
+from bgars.files.light_names import light_name
+from bgars.records.capture import Capture
+from bgars.records.light_calibration import BallView, LightCalibration
+from bgars.records.remark import Remark
+from bgars.records.rig import LightRig
+from bgars.records.scalar_checks import check_pitch
 from bgars.station.light_bundle import solve_lights
 from bgars.station.observe import observe, outlines_a_capture
-from bgars.station_record import BallView, LightCalibration, Remark
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares, minimize
 
 from bgars.errors import CalibrationError
-from bgars.light_names import light_name
-from bgars.station_record import Remark
+from bgars.files.light_names import light_name
+from bgars.records.remark import Remark
 
 if TYPE_CHECKING:
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
     from bgars.station.levels import Levels
     from bgars.station.outline import Outline
 

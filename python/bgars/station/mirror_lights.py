@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.errors import CalibrationError
-from bgars.light_names import light_name
+from bgars.files.light_names import light_name
+from bgars.records.remark import Remark
 from bgars.station.highlights import REACH, find_spot, fit_highlight, glare, middle_of
 from bgars.station.mirror import sphere_of_outline
 from bgars.station.small_spots import SMALL_PX, place_small_spots
-from bgars.station_record import Remark
 
 if TYPE_CHECKING:
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
     from bgars.station.highlights import Spot
     from bgars.station.levels import Levels
     from bgars.station.outline import Outline

@@ -9,17 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bgars.errors import CalibrationError, InputError
-from bgars.light_names import light_name
+from bgars.files.light_names import light_name
+from bgars.records.remark import Remark
 from bgars.station.balls_seen import given_outlines, outlines_of
 from bgars.station.levels import linear_levels
 from bgars.station.matt_lights import shading_on
 from bgars.station.mirror_lights import highlights_on
-from bgars.station_record import Remark
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
     from bgars.station.levels import Levels
     from bgars.station.outline import Outline
 

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares, nnls
 
 from bgars.errors import CalibrationError, InputError
-from bgars.station_record import Remark, ResponseCurve
+from bgars.records.remark import Remark
+from bgars.records.response_curve import ResponseCurve
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

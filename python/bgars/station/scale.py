@@ -12,11 +12,12 @@ from scipy.optimize import least_squares
 from scipy.spatial import cKDTree
 
 from bgars.errors import CalibrationError, InputError
+from bgars.records.remark import Remark
+from bgars.records.scale import Scale
 from bgars.station.levels import linear_levels
-from bgars.station_record import Remark, Scale
 
 if TYPE_CHECKING:
-    from bgars.records import Capture
+    from bgars.records.capture import Capture
 
 __all__ = ["calibrate_scale", "fit_grid"]
 

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bgars.ball_names import ball_name
 from bgars.errors import CalibrationError, InputError
+from bgars.records.ball_names import ball_name
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from bgars.part_result import PartResult
+    from bgars.records.part_result import PartResult
 
 __all__ = ["Taught", "compact_names", "teach", "teach_text"]
 

@@ -22,7 +22,7 @@ from bgars.store.schema import FORMAT, FORMAT_VERSION, TABLES
 if TYPE_CHECKING:
     from os import PathLike
 
-    from bgars.part_result import PartResult
+    from bgars.records.part_result import PartResult
 
 __all__ = ["MARK", "Store", "is_store", "open_store"]
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from bgars.part_result import PartResult
+    from bgars.records.part_result import PartResult
 
 __all__ = ["failure_key", "key_of", "part_key"]
 

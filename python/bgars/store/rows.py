@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from bgars.errors import InputError
 from bgars.inspection.decision import decide
-from bgars.part_result import BallResult, PartCheck
+from bgars.records.ball_result import BallResult
+from bgars.records.part_check import PartCheck
 from bgars.store.keys import part_key
 from bgars.store.schema import READINGS
 
 if TYPE_CHECKING:
-    from bgars.part_result import PartResult
+    from bgars.records.part_result import PartResult
 
     Rows = dict[str, list[dict[str, Any]]]
 

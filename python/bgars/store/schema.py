@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bgars.io.parquet import need_pyarrow
 from bgars.io.result_schema import BallTable, CheckTable, ResultTable
-from bgars.part_result import BallResult, PartCheck
+from bgars.records.ball_result import BallResult
+from bgars.records.part_check import PartCheck
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import special
 
 if TYPE_CHECKING:
-    from bgars.part_recipe import PartRecipe
+    from bgars.records.part_recipe import PartRecipe
     from bgars.studies.readings import Readings
     from bgars.studies.references import References
 

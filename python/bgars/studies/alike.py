@@ -10,7 +10,7 @@ from bgars.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from bgars.part_result import PartResult
+    from bgars.records.part_result import PartResult
 
 __all__ = ["check_alike"]
 

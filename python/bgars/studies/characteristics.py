@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from bgars.part_recipe import PartRecipe
-    from bgars.part_result import PartResult
+    from bgars.records.part_recipe import PartRecipe
+    from bgars.records.part_result import PartResult
 
 __all__ = ["CHARACTERISTICS", "TITLES", "Characteristic", "part_readings"]
 

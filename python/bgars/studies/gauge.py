@@ -11,8 +11,8 @@ from scipy import special
 from bgars.studies.anova import Anova, crossed_anova
 
 if TYPE_CHECKING:
-    from bgars.part_recipe import PartRecipe
-    from bgars.part_result import Verdict
+    from bgars.records.ball_result import Verdict
+    from bgars.records.part_recipe import PartRecipe
     from bgars.studies.readings import Readings
 
 __all__ = ["ACCEPTABLE_PERCENT", "UNACCEPTABLE_PERCENT", "GaugeFigures", "Spread", "gauge_figures"]

@@ -14,7 +14,7 @@ from bgars.studies.readings import LeftOut, Readings, study_readings
 from bgars.studies.references import check_references
 
 if TYPE_CHECKING:
-    from bgars.part_result import Verdict
+    from bgars.records.ball_result import Verdict
     from bgars.studies.references import References
     from bgars.studies.study_folder import Study
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.lines import Line2D
 
-from bgars.report.part_style import VERDICT_COLORS, new_figure
+from bgars.report.figures.style import VERDICT_COLORS, new_figure
 from bgars.studies.gauge import ACCEPTABLE_PERCENT, UNACCEPTABLE_PERCENT
 from bgars.studies.svg import PLACEMENT_COLORS
 

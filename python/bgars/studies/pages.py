@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from bgars.report.page_units import with_micro
+from bgars.report.html.units import with_micro
 from bgars.studies.characteristics import TITLES
 from bgars.studies.gauge import ACCEPTABLE_PERCENT, UNACCEPTABLE_PERCENT
 from bgars.studies.grr_figures import deviation_figure, linearity_figure, share_figure

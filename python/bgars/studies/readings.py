@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bgars.csv_cells import harmless
+from bgars.files.csv_cells import harmless
 from bgars.studies.characteristics import CHARACTERISTICS, Characteristic, part_readings
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bgars.report.part_style import VERDICT_COLORS, new_figure
+from bgars.report.figures.style import VERDICT_COLORS, new_figure
 from bgars.studies.svg import PLACEMENT_COLORS
 
 if TYPE_CHECKING:

@@ -8,20 +8,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bgars.errors import BgarsError, CalibrationError, FileFormatError, InputError
-from bgars.inspection_pipeline import inspect
 from bgars.io.capture import read_capture
 from bgars.io.given_paths import need_folder
 from bgars.io.part_recipe import read_part_recipe
 from bgars.io.result_file import RESULT_NAME, read_result
-from bgars.normals import DEFAULT_METHOD, Method
-from bgars.part_recipe import PartRecipe
+from bgars.normals.methods import DEFAULT_METHOD, Method
+from bgars.pipelines.inspect import inspect
+from bgars.records.part_recipe import PartRecipe
 from bgars.studies.alike import check_alike
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from os import PathLike
 
-    from bgars.part_result import PartResult
+    from bgars.records.part_result import PartResult
 
 __all__ = ["Run", "Study", "natural", "read_study", "subfolders", "write_single_results"]
 

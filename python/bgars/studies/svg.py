@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from matplotlib import rc_context
 
-from bgars.report.part_style import figure_style
+from bgars.report.figures.style import figure_style
 
 if TYPE_CHECKING:
     from collections.abc import Callable

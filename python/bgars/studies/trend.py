@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bgars.part_result import PartResult, Verdict
+    from bgars.records.ball_result import Verdict
+    from bgars.records.part_result import PartResult
 
 __all__ = ["DEFAULT_SUBGROUP", "TARGET", "ProcessTrend", "Trend", "process_trend"]
 

@@ -10,7 +10,7 @@ use crate::convert::{Stack, array_of_triples, slice2, slice3, triples};
 use crate::errors::to_python;
 use crate::progress::{on_threads, watched};
 
-/// The attributes of `bgars.kernel_capture.KernelCapture`.
+/// The attributes of `bgars.records.kernel_capture.KernelCapture`.
 #[derive(FromPyObject)]
 pub struct Capture<'py> {
     images: Stack<'py>,

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bgars.io.image_formats import ImageFormat
-    from bgars.records import PixelArray
+    from bgars.records.pixels import PixelArray
 
 __all__ = ["exr_channels", "read_exr"]
 

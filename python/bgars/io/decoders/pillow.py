@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from bgars.io.image_formats import ImageFormat
-    from bgars.records import PixelArray
+    from bgars.records.pixels import PixelArray
 
 __all__ = ["read_pillow"]
 

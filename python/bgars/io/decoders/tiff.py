@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bgars.io.image_formats import ImageFormat
-    from bgars.records import PixelArray
+    from bgars.records.pixels import PixelArray
 
 __all__ = ["quiet", "read_tiff", "read_tiff_pages"]
 

@@ -1,0 +1,154 @@
+"""Lights in JSON: Meshroom's ``lights.json``, a plain map of image names, and relight's ``.dome``."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bgars.errors import FileFormatError
+from bgars.files.light_formats.table import MAX_LIGHTS, LightTable, checked_vectors
+from bgars.files.safe_files import read_text
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+__all__ = ["read_dome_table", "read_json_table"]
+
+AXES = ("x", "y", "z")
+CHANNELS = ("r", "g", "b")
+EXPECTED = (
+    'expected {"image.png": [x, y, z], ...}, a list of [x, y, z], or Meshroom\'s {"lights": [{"direction": [x, y, z], '
+    '"intensity": [r, g, b]}, ...]}'
+)
+
+
+def read_json_table(path: Path) -> LightTable:
+    """Read lights by image name, in a list, or as Meshroom (AliceVision) calibrates them.
+
+    Meshroom's axes are x right, y down and z away from the camera: they are turned to x right, y up, z to the camera.
+
+    Raises
+    ------
+    FileFormatError
+        The file is no JSON, or holds something else.
+    """
+    values = _load(path)
+    if isinstance(values, dict) and isinstance(values.get("lights"), list | dict):
+        return _meshroom(values["lights"], path)
+    if isinstance(values, list) and values and all(isinstance(v, dict) and "direction" in v for v in values):
+        return _meshroom(values, path)
+    if isinstance(values, dict):
+        for key in ("directions", "light_directions"):
+            if isinstance(values.get(key), list | dict):
+                values = values[key]
+                break
+    if isinstance(values, dict):
+        files = tuple(str(name) for name in values)
+        vectors = np.array([_vector(vector, path) for vector in values.values()]).reshape(-1, 3)
+        return LightTable(checked_vectors(vectors, path, files), files=files)
+    vectors = np.array([_vector(vector, path) for vector in values]).reshape(-1, 3)
+    return LightTable(checked_vectors(vectors, path))
+
+
+def read_dome_table(path: Path) -> LightTable:
+    """Read a dome of relight (CNR-ISTI): the directions of its lights, and how strong they are.
+
+    Positions of a dome are taken as directions from the image centre: relight does so unless the image is large.
+
+    Raises
+    ------
+    FileFormatError
+        The file is no JSON, or has neither directions nor positions.
+    """
+    values = _load(path)
+    if not isinstance(values, dict):
+        msg = f"{path}: must hold one object with directions or positions of the lights, got {type(values).__name__}"
+        raise FileFormatError(msg)
+    key = next((key for key in _dome_keys(values) if isinstance(values.get(key), list) and values[key]), None)
+    if key is None:
+        msg = f"{path}: has neither directions nor positions of the lights (found {', '.join(values) or 'nothing'})"
+        raise FileFormatError(msg)
+    vectors = np.array([_vector(vector, path) for vector in values[key]]).reshape(-1, 3)
+    notes = () if key == "directions" else (f"{key} taken as directions from the image centre",)
+    adjust = values.get("ledAdjust")
+    intensities: NDArray[np.float64] | None = None
+    if isinstance(adjust, list) and len(adjust) == len(vectors):
+        factors = np.array([_vector(factor, path, CHANNELS) for factor in adjust]).reshape(-1, 3)
+        if (factors > 0).all() and not np.allclose(factors, 1.0):
+            intensities = 1.0 / factors
+            notes = (*notes, "ledAdjust taken as the inverse of the intensities")
+    return LightTable(checked_vectors(vectors, path), intensities=intensities, free_length=True, notes=notes)
+
+
+def _dome_keys(values: dict[str, Any]) -> tuple[str, ...]:
+    if values.get("lightConfiguration") == "lights3d":
+        return ("positions3d", "positions", "directions")
+    return ("directions", "positionsSphere", "positions3d", "positions", "lights")
+
+
+def _meshroom(lights: list[Any] | dict[str, Any], path: Path) -> LightTable:
+    entries = list(lights.values()) if isinstance(lights, dict) else lights
+    files = tuple(str(name) for name in lights) if isinstance(lights, dict) else _names(entries)
+    if not all(isinstance(entry, dict) and "direction" in entry for entry in entries):
+        if isinstance(lights, list) and all(isinstance(entry, list) for entry in entries):
+            return LightTable(
+                checked_vectors(np.array([_vector(entry, path) for entry in entries]).reshape(-1, 3), path)
+            )
+        msg = f"{path}: lights without a direction; {EXPECTED}"
+        raise FileFormatError(msg)
+    vectors = np.array([_vector(entry["direction"], path) for entry in entries]).reshape(-1, 3)
+    strength = [entry.get("intensity") for entry in entries]
+    intensities = None
+    if all(isinstance(value, list | dict) for value in strength):
+        intensities = np.array([_vector(value, path, CHANNELS) for value in strength]).reshape(-1, 3)
+    notes: tuple[str, ...] = ()
+    if not files:
+        notes = ("lights taken in the order of the images, since Meshroom numbers views without their file names",)
+    if len(vectors) and (vectors[:, 2] < 0).all():
+        vectors = vectors * np.array([1.0, -1.0, -1.0])
+        notes = (*notes, "axes of Meshroom (y down, z away from the camera) turned to y up, z to the camera")
+    return LightTable(
+        checked_vectors(vectors, path, files), intensities=intensities, files=files, free_length=True, notes=notes
+    )
+
+
+def _names(entries: list[Any]) -> tuple[str, ...]:
+    """Image of each light, where every one has it under one of the usual keys."""
+    for key in ("file", "filename", "image", "path", "name"):
+        names = [entry.get(key) for entry in entries if isinstance(entry, dict)]
+        if names and len(names) == len(entries) and all(isinstance(name, str) for name in names):
+            return tuple(str(name) for name in names)
+    return ()
+
+
+def _vector(value: Any, path: Path, keys: tuple[str, ...] = AXES) -> list[float]:  # noqa: ANN401 - whatever a file held
+    if isinstance(value, dict):
+        value = [value.get(key) for key in keys]
+    if isinstance(value, list) and len(value) >= len(keys):
+        numbers = value[: len(keys)]
+        if all(isinstance(number, int | float) and not isinstance(number, bool) for number in numbers):
+            try:
+                return [float(number) for number in numbers]
+            except OverflowError:
+                pass
+    msg = f"{path}: must hold three numbers per light, got {repr(value)[:80]}; {EXPECTED}"
+    raise FileFormatError(msg)
+
+
+def _load(path: Path) -> Any:  # noqa: ANN401 - whatever a file holds
+    content = read_text(path).content
+    try:
+        values = json.loads(content)
+    except (ValueError, RecursionError) as error:
+        reason = "nested too deeply" if isinstance(error, RecursionError) else error
+        msg = f"{path}: is not valid JSON ({reason})"
+        raise FileFormatError(msg) from error
+    if not isinstance(values, list | dict) or len(values) > MAX_LIGHTS:
+        what = f"{len(values)} values" if isinstance(values, list | dict) else type(values).__name__
+        msg = f"{path}: holds {what}; {EXPECTED}"
+        raise FileFormatError(msg)
+    return values

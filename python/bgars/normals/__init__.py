@@ -1,0 +1,1 @@
+"""Normals from a light stack: the estimators."""

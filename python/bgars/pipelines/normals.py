@@ -1,0 +1,288 @@
+"""Normals from a light stack: the public function, which joins least squares, the ball finder and reflectance."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bgars import _bgars
+from bgars.balls import find_balls
+from bgars.errors import InputError
+from bgars.normals.methods import ALL_METHODS, DEFAULT_METHOD, METHODS, Method
+from bgars.normals.pixelwise import DEFAULT_THRESHOLD, PixelwiseMethod, capture_of, combined_mask, pixelwise_normals
+from bgars.normals.reflectance import add_reflectance
+from bgars.records.circle_pixels import inside_circles
+from bgars.records.found_balls import FoundBalls
+from bgars.records.plain_arrays import plain, plain_bool
+from bgars.records.scalar_checks import number, thread_count
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from bgars.records.capture import Capture
+    from bgars.records.normal_field import NormalField
+    from bgars.records.surface_material import SurfaceMaterial
+
+__all__ = ["DEFAULT_METHOD", "METHODS", "Method", "estimate_normals"]
+
+CIRCLE_VALUES = 3
+RIM_PX = 0.01
+BRIDGE_WIDTH = 0.8
+"""Half width of the strip between two joined balls that is looked at, in radii of the smaller."""
+
+
+def estimate_normals(
+    images: Capture | ArrayLike,
+    light_directions: ArrayLike | None = None,
+    *,
+    method: Method = DEFAULT_METHOD,
+    mask: ArrayLike | None = None,
+    light_intensities: ArrayLike | None = None,
+    saturation: float | None = None,
+    threshold: float | None = None,
+    anchors: FoundBalls | ArrayLike | None = None,
+    material: SurfaceMaterial | None = None,
+    keep_sets: bool = False,
+    out: NormalField | None = None,
+    threads: int | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> NormalField:
+    """Estimate the surface normal of every pixel.
+
+    Parameters
+    ----------
+    images : Capture or (L, H, W) array_like of uint8, uint16 or float32
+        A capture, or one image per light. A C-contiguous array, read-only or not, is used where it lies; strided and
+        Fortran-ordered ones (a crop, a transposed stack) and float64 are copied once.
+    light_directions : (L, 3) array_like
+        Unit vectors from the surface to the light; only with plain arrays.
+    method : {"reflectance", "robust-filter", "specular-filter", "lambertian", "blind"}
+        ``reflectance``: on balls, the normal whose brightness under all lights, highlights included, fits the material
+        best; the material is fitted on the balls themselves; other pixels are left to ``robust-filter``. Captures
+        with fewer than 4 lights, or with neither balls nor a material, are left to ``blind``: one material is fitted
+        to the whole capture together with normals and albedo of every pixel, and taken where it predicts left-out
+        lights better than least squares does (some 20 us a pixel; at least 5 lights). `NormalField.choice` says what
+        was done. The other three solve ``I_k = rho l_k . n`` by least squares (Woodham 1980) over the lights they keep
+        at a pixel: ``lambertian`` all; ``specular-filter``, as published: sort the values, cut at the first gap over
+        `threshold` with at least 3 values kept; ``robust-filter`` the window of sorted values that a Lambertian facet
+        explains best (docs/method.md).
+    mask : (H, W) array_like of bool, optional
+        True = use; combined with the capture's own mask.
+    light_intensities : (L,) array_like, optional
+        Relative intensities, divided out; only with plain arrays.
+    saturation : float, optional
+        Grey level that counts as clipped; only with plain arrays. Full scale of an integer dtype by default, none for
+        floats.
+    threshold : float, optional
+        Gap of ``specular-filter`` in grey levels of 255, scaled with the bit depth; 50, as published, by default.
+    anchors : FoundBalls, (N, 3) array_like, or (H, W) array_like of bool, optional
+        Balls for ``reflectance``: from :func:`bgars.find_balls`, or circles (x right and y up from the image centre,
+        radius, in pixels), or the mask of one ball. By default they are looked for.
+    material : SurfaceMaterial, optional
+        Material for ``reflectance`` that was fitted before, with the same rig and exposure
+        (:func:`bgars.read_material`). Without balls every pixel is then taken to be of it.
+    keep_sets : bool
+        Also return which lights were kept: `NormalField.kept_sets`, (H, W, L) bool.
+    out : NormalField, optional
+        Result of an earlier call on images of the same size, to be overwritten and returned. After an error in the
+        pixels, or an interruption, its content means nothing.
+    threads : int, optional
+        Most threads to work on; by default what the environment variable ``RAYON_NUM_THREADS`` says, else one a core.
+        The result does not depend on it.
+    progress : callable, optional
+        Called with the fraction done, at most ten times a second; not at all where the work is done before that.
+
+    Returns
+    -------
+    NormalField
+        A pixel whose kept lights are coplanar or nearly so (27 det / tr^3 of ``L^T L`` below 1e-6), whose solution is
+        zero or faces away from the camera is invalid: NaN, mask False. A ball's pixel whose light alone does not fix
+        the normal to 2 degrees is drawn to the sphere of its circle: `measured` is False there.
+
+    Raises
+    ------
+    InputError
+        Counts or shapes that do not fit, fewer than 3 or coplanar lights, an empty mask, NaN inside the mask; anchors,
+        a material or a threshold with a method that uses none.
+
+    References
+    ----------
+    R. J. Woodham, "Photometric method for determining surface orientation from multiple images", Opt. Eng. 19 (1980).
+    R. L. Cook, K. E. Torrance, "A reflectance model for computer graphics", ACM Trans. Graph. 1 (1982).
+
+    Examples
+    --------
+    >>> import bgars, numpy as np
+    >>> rig = bgars.LightRig.ring(4)
+    >>> images = np.full((4, 1, 1), 100, np.uint8)  # one pixel, equally bright under all lights: it faces the camera
+    >>> float(bgars.estimate_normals(images, rig.directions).normals[0, 0, 2])
+    1.0
+    """
+    threads = thread_count(threads)
+    if method not in ALL_METHODS:
+        msg = f"method: must be one of {', '.join(ALL_METHODS)}; got {method!r}"
+        raise InputError(msg)
+    for name, value, user in (
+        ("threshold", threshold, "specular-filter"),
+        ("anchors", anchors, "reflectance"),
+        ("material", material, "reflectance"),
+    ):
+        if value is not None and method != user:
+            msg = f"{name}: only the method {user} uses it, got method {method!r}"
+            raise InputError(msg)
+    threshold = None if threshold is None else number("threshold", threshold)
+    saturation = None if saturation is None else number("saturation", saturation)
+    capture = capture_of(
+        images, light_directions, light_intensities, saturation, threads, needs_full_scale=method == "reflectance"
+    )
+    use = combined_mask(capture, mask)
+    if method == "reflectance":
+        return _by_reflectance(capture, use, anchors, material, keep_sets, out, threads, progress)
+    return pixelwise_normals(
+        capture,
+        method=method,
+        mask=use,
+        threshold=DEFAULT_THRESHOLD if threshold is None else threshold,
+        keep_sets=keep_sets,
+        out=out,
+        threads=threads,
+        progress=progress,
+    )
+
+
+def _by_reflectance(
+    capture: Capture,
+    use: NDArray[np.bool_] | None,
+    anchors: FoundBalls | ArrayLike | None,
+    material: SurfaceMaterial | None,
+    keep_sets: bool,
+    out: NormalField | None,
+    threads: int | None,
+    progress: Callable[[float], object] | None,
+) -> NormalField:
+    """Method ``reflectance`` where it can work, else what stands in for it."""
+
+    def part(start: float, end: float) -> Callable[[float], object] | None:
+        if progress is None:
+            return None
+        return lambda fraction: progress(start + (end - start) * fraction)
+
+    def pixelwise(
+        name: PixelwiseMethod,
+        share: tuple[float, float] = (0.0, 1.0),
+        pixels: NDArray[np.bool_] | None = use,
+        *,
+        fills: bool = False,
+    ) -> NormalField:
+        return pixelwise_normals(
+            capture,
+            method=name,
+            mask=pixels,
+            keep_sets=keep_sets,
+            out=out,
+            fills=fills,
+            threads=threads,
+            progress=part(*share),
+        )
+
+    lights = len(capture.rig)
+    fallback: PixelwiseMethod = "blind" if lights >= _bgars.BLIND_MIN_LIGHTS else "robust-filter"
+    least = _bgars.REFLECTANCE_MIN_LIGHTS
+    if lights < least:
+        return _because(pixelwise(fallback), f"reflectance needs {least} lights, the capture has {lights}")
+    given = "found" if anchors is None else "given"
+    found = anchors if anchors is not None else find_balls(capture, threads=threads, progress=part(0.0, 0.3))
+    circles_px = _circles(found, capture.mask.shape)
+    if not len(circles_px) and material is None:
+        return _because(pixelwise(fallback, (0.3, 1.0)), f"no balls {given} to fit a material on, and none given")
+    free = _free_pixels(found, capture.mask.shape) if len(circles_px) else np.ones(capture.mask.shape, np.bool_)
+    field = add_reflectance(
+        pixelwise("robust-filter", (0.3, 0.5), _outside(circles_px, use, capture.mask.shape), fills=True),
+        capture,
+        circles_px,
+        mask=use,
+        free=free,
+        material=material,
+        threads=threads,
+        progress=part(0.5, 1.0),
+    )
+    balls = len(circles_px)
+    source = "given" if material is not None else f"fitted on {balls} ball{'s' if balls != 1 else ''} {given}"
+    fit = field.reflectance
+    if fit is not None and not fit.accepted:
+        reason = f"the material {source} does not explain the balls: {fit.refusal}"
+        return replace(_because(pixelwise(fallback, (0.5, 1.0)), reason), reflectance=fit)
+    where = "on balls, robust-filter elsewhere" if balls else "where it explains the pixel, robust-filter elsewhere"
+    shape = "" if fit is None else fit.shape_in_words
+    checked = f"loss {0.0 if fit is None else fit.loss:.3f}" if balls else "no balls to check it by"
+    return replace(field, choice=f"reflectance {where}: material {source}{shape}, {checked}")
+
+
+def _because(field: NormalField, reason: str) -> NormalField:
+    """The field with the reason why its method stands in for reflectance."""
+    return replace(field, choice=f"{field.choice.removesuffix(', as asked')}; {reason}")
+
+
+def _circles(anchors: FoundBalls | ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """(N, 4): x right, y up, radius of each anchor and standard uncertainty of the radius, in pixels."""
+    if isinstance(anchors, FoundBalls):
+        circles = [(ball.x_px, ball.y_px, ball.radius_px, ball.u_radius_px) for ball in anchors.balls]
+        return np.array(circles, np.float64).reshape(-1, CIRCLE_VALUES + 1)
+    given = plain("anchors", anchors)
+    if given.dtype == np.bool_:
+        given = plain_bool("anchors", given)
+        if given.shape != shape or not given.any():
+            msg = (
+                f"anchors: a mask of one ball must have shape {shape} and pixels, got {given.shape}, {given.sum()} True"
+            )
+            raise InputError(msg)
+        rows, cols = np.nonzero(given)
+        centre = (cols.mean() + 0.5 - shape[1] / 2, shape[0] / 2 - rows.mean() - 0.5)
+        return _exact([[*centre, np.sqrt(given.sum() / np.pi)]])
+    if given.shape[1:] != (CIRCLE_VALUES,) or given.dtype.kind not in "fiu":
+        msg = f"anchors: must be balls, circles of shape (N, 3) or a mask of one ball, got {given.dtype} {given.shape}"
+        raise InputError(msg)
+    if not (np.isfinite(given).all() and (given[:, 2] > 0).all()):
+        msg = "anchors: circles must be finite, with radii above 0 px"
+        raise InputError(msg)
+    return _exact(given)
+
+
+def _exact(circles_px: ArrayLike) -> NDArray[np.float64]:
+    """Circles without uncertainty."""
+    return np.pad(np.asarray(circles_px, np.float64), ((0, 0), (0, 1)))
+
+
+def _outside(
+    circles_px: NDArray[np.float64], use: NDArray[np.bool_] | None, shape: tuple[int, ...]
+) -> NDArray[np.bool_] | None:
+    """The pixels to use outside all circles, or all of them where none is outside."""
+    # A little smaller, so that no pixel at a rim falls between both methods.
+    outside = ~inside_circles(((x, y, radius - RIM_PX) for x, y, radius in circles_px[:, :3]), shape)
+    if use is not None:
+        outside &= use
+    return outside if outside.any() else use
+
+
+def _free_pixels(anchors: FoundBalls | ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
+    """Strips between joined balls; None without any."""
+    if not isinstance(anchors, FoundBalls) or not anchors.bridges:
+        return None
+    balls = {ball.name: ball for ball in anchors.balls}
+    height, width = shape
+    x_px = np.arange(width) + 0.5 - width / 2
+    y_px = (height / 2 - np.arange(height) - 0.5)[:, None]
+    free = np.zeros(shape, np.bool_)
+    for first, second in anchors.bridges:
+        one, other = balls[first], balls[second]
+        dx, dy = other.x_px - one.x_px, other.y_px - one.y_px
+        length = max(np.hypot(dx, dy), 1e-9)
+        along = ((x_px - one.x_px) * dx + (y_px - one.y_px) * dy) / length
+        across = ((x_px - one.x_px) * dy - (y_px - one.y_px) * dx) / length
+        half_width = BRIDGE_WIDTH * min(one.radius_px, other.radius_px)
+        free |= (along > 0) & (along < length) & (np.abs(across) < half_width)
+    return free

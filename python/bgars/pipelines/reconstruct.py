@@ -1,0 +1,177 @@
+"""The main job: capture -> normals -> height -> mesh, joined here and nowhere else."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from bgars.normals.methods import DEFAULT_METHOD, Method
+from bgars.normals.noise_floor import without_background
+from bgars.pipelines.normals import estimate_normals
+from bgars.records.scalar_checks import thread_count
+from bgars.surface.flatten import Bow, Flatten, find_bow, flattened
+from bgars.surface.integrate import Difference, integrate_normals
+from bgars.surface.mesh import check_faces, mesh_from_height, mesh_size
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import trimesh
+
+    from bgars.records.capture import Capture
+    from bgars.records.height_map import HeightMap
+    from bgars.records.normal_field import NormalField
+    from bgars.records.reflectance_fit import ReflectanceFit
+    from bgars.records.surface_material import SurfaceMaterial
+
+__all__ = ["Reconstruction", "reconstruct", "solver_fraction", "summarise_field", "summarise_fit"]
+
+Stage = Literal["normals", "height"]
+
+
+@dataclass(frozen=True, eq=False)
+class Reconstruction:
+    """What the main job makes of a capture: one record per stage.
+
+    Attributes
+    ----------
+    capture : Capture
+    field : NormalField
+    height : HeightMap
+    mesh : trimesh.Trimesh
+        Made when it is first asked for; :func:`bgars.write_mesh` writes PLY and OBJ from `height` and `field` alone.
+    bow : Bow or None
+        A bow of the whole part that may be the lights' doing (before it was taken off).
+    """
+
+    capture: Capture
+    field: NormalField
+    height: HeightMap
+    bow: Bow | None = None
+
+    @cached_property
+    def mesh(self) -> trimesh.Trimesh:
+        """The surface as triangles."""
+        return mesh_from_height(self.height, self.field)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the scalars of every stage as plain Python values, for JSON."""
+        vertices, faces = mesh_size(self.height)
+        return {
+            "capture": self.capture.name,
+            "lights": len(self.capture.rig),
+            "image_size_px": [int(self.capture.images.shape[2]), int(self.capture.images.shape[1])],
+            "pixel_pitch_um": self.capture.pixel_pitch_um,
+            "normals": summarise_field(self.field),
+            "height": {**self.height.summary(), "bow": None if self.bow is None else str(self.bow)},
+            "mesh": {"vertices": vertices, "faces": faces},
+        }
+
+
+def summarise_field(field: NormalField) -> dict[str, Any]:
+    """Return the scalars of a normal field as plain Python values."""
+    valid = int(field.mask.sum())
+    return {
+        "method": field.method,
+        "choice": field.choice,
+        "valid_pixels": valid,
+        "measured_share": float((field.measured & field.mask).sum() / valid) if valid else 0.0,
+        "mean_confidence": float(field.confidence[field.mask].mean()) if field.mask.any() else 0.0,
+        "mean_lights_kept": float(field.lights_kept[field.mask].mean()) if field.mask.any() else 0.0,
+        "reflectance": None if field.reflectance is None else summarise_fit(field.reflectance),
+    }
+
+
+def summarise_fit(fit: ReflectanceFit) -> dict[str, Any]:
+    """Return a material and how it was fitted as plain Python values."""
+    return {
+        "accepted": fit.accepted,
+        "loss": fit.loss,
+        "balls": len(fit.circles_px),
+        "own_material": sum(fit.own_material),
+        "residuals_learnt": fit.residuals_learnt,
+        "material": asdict(fit.material),
+    }
+
+
+def reconstruct(
+    capture: Capture,
+    *,
+    method: Method = DEFAULT_METHOD,
+    threshold: float | None = None,
+    material: SurfaceMaterial | None = None,
+    difference: Difference = "trapezoid",
+    weights: Literal["confidence"] | None = None,
+    flatten: Flatten | None = None,
+    threads: int | None = None,
+    progress: Callable[[Stage, float], object] | None = None,
+) -> Reconstruction:
+    """Turn a capture into normals, a height map and a mesh.
+
+    Parameters
+    ----------
+    capture : Capture
+        From :func:`bgars.read_capture`.
+    method, threshold, material
+        See :func:`bgars.estimate_normals`.
+    difference, weights
+        See :func:`bgars.integrate_normals`.
+    flatten : {"plane", "quadratic"}, optional
+        Take one plane, or one quadratic surface, off all heights: what near or wrong lights bend a flat part to.
+    threads : int, optional
+        Most threads to work on; see :func:`bgars.estimate_normals`.
+    progress : callable, optional
+        Called with (stage, fraction done of that stage); the solver's fraction is logarithmic in its residual.
+
+    Raises
+    ------
+    InputError
+        See the stages.
+    ConvergenceError
+        The integration did not reach its tolerance.
+
+    Examples
+    --------
+    >>> import bgars
+    >>> result = bgars.reconstruct(bgars.read_capture(bgars.sample_capture()))
+    >>> result.height.unit, len(result.height.components)
+    ('um', 1)
+    """
+    threads = thread_count(threads)
+
+    def report(stage: Stage, fraction: float) -> None:
+        if progress is not None:
+            progress(stage, fraction)
+
+    report("normals", 0.0)
+    field = estimate_normals(
+        capture,
+        method=method,
+        threshold=threshold,
+        material=material,
+        threads=threads,
+        progress=lambda fraction: report("normals", fraction),
+    )
+    field = without_background(field, capture)
+    report("normals", 1.0)
+    height = integrate_normals(
+        field,
+        difference=difference,
+        weights=weights,
+        threads=threads,
+        progress=lambda _, residual: report("height", solver_fraction(residual)),
+    )
+    report("height", 1.0)
+    bow = find_bow(height) if flatten != "quadratic" else None
+    if flatten is not None:
+        height = flattened(height, flatten)
+    check_faces(*mesh_size(height))
+    return Reconstruction(capture, field, height, bow)
+
+
+def solver_fraction(residual: float, tolerance: float = 1e-8) -> float:
+    """How far a residual has come on its way from 1 to the tolerance, on a log scale."""
+    return float(np.clip(np.log(max(residual, tolerance)) / np.log(tolerance), 0.0, 1.0))

@@ -1,0 +1,90 @@
+"""A capture: one part, photographed under one light at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bgars.records.pixels import BoolArray, FloatArray, PixelArray
+from bgars.records.plain_arrays import (
+    keep,
+    masked_pixels,
+    pixel_array,
+    plain,
+    plain_bool,
+)
+from bgars.records.shown import ShownCapture
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from bgars.records.rig import LightRig
+
+__all__ = ["Capture"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Capture(ShownCapture):
+    """One part, photographed under one light at a time.
+
+    Attributes
+    ----------
+    images : (L, H, W) uint8, uint16 or float32
+        One image a light, grey levels as the camera gave them.
+    rig : LightRig
+        The L lights, in the order of the images.
+    mask : (H, W) bool
+        True = use.
+    pixel_pitch_um, pixel_pitch_u_um : float or None
+        Size of a pixel on the board, None when unknown (lengths then stay in pixels); its standard uncertainty.
+    camera_distance_mm : float or None
+        Entrance pupil to board along the optical axis; infinite for a telecentric lens, None when not stated.
+    dark : (H, W) of the images' dtype, or None
+        Image with all lights off.
+    response : (256,) or (65536,) float32, or None
+        Linear grey level of every code (the camera's inverse response); None for a linear camera.
+    black_level, saturation : float
+        Grey level of no light, used where there is no dark frame; that at and above which a pixel counts as clipped.
+    full_scale : float
+        Grey level of full scale; thresholds "of 255" scale with it and albedo 1 means it. NaN: the kernels find it.
+    files, folder : tuple of Path, Path or None
+        The image files, for messages and reports; where the capture was read from.
+    assumed : tuple of str
+        What had to be assumed to read it: each was also a :class:`~bgars.CaptureWarning`.
+    """
+
+    images: PixelArray
+    rig: LightRig
+    mask: BoolArray
+    pixel_pitch_um: float | None = None
+    dark: PixelArray | None = None
+    response: FloatArray | None = None
+    black_level: float = 0.0
+    saturation: float = float("inf")
+    full_scale: float = 255.0
+    files: tuple[Path, ...] = ()
+    folder: Path | None = None
+    pixel_pitch_u_um: float | None = None
+    camera_distance_mm: float | None = None
+    assumed: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Bring the arrays into the layout of the kernels; what a numpy masked stack hides is not used."""
+        hidden = masked_pixels(self.images)
+        mask = plain_bool("mask", self.mask)
+        arrays: dict[str, Any] = {
+            "images": pixel_array("images", self.images),
+            "mask": mask if hidden is None else mask & ~hidden,
+        }
+        if self.dark is not None:
+            arrays["dark"] = plain("dark", self.dark)
+        if self.response is not None:
+            arrays["response"] = plain("response", self.response, np.float32)
+        keep(self, arrays)
+
+    @property
+    def name(self) -> str:
+        """Name of the capture's folder, or "capture"."""
+        return "capture" if self.folder is None else self.folder.resolve().name

@@ -1,0 +1,89 @@
+"""Calibrated lights, and what was seen of the balls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bgars.records.remark import Remark
+
+if TYPE_CHECKING:
+    from bgars.records.rig import LightRig
+
+__all__ = ["BallView", "LightCalibration"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class BallView:
+    """A reference ball in one capture.
+
+    Attributes
+    ----------
+    capture : str
+        Name of the capture.
+    outline_px : (3,) float64
+        x, y (from the image centre, y up) and radius, as measured.
+    u_outline_px : (3,) float64
+        Standard uncertainties.
+    highlights_px : (L, 2) float64
+        Places of the highlights, matt balls: of the brightest points; NaN where not seen.
+    residuals_px : (L, 2) float64
+        Measured less fitted place; NaN where not seen.
+    """
+
+    capture: str
+    outline_px: Array
+    u_outline_px: Array
+    highlights_px: Array
+    residuals_px: Array
+
+
+@dataclass(frozen=True, eq=False)
+class LightCalibration:
+    """Lights as reference balls show them.
+
+    Attributes
+    ----------
+    rig : LightRig
+        The lights, with `u_deg`.
+    u_deg : (L,) float64
+        Standard uncertainty of each direction, on either of the two axes across it.
+    u_own_deg, u_common_deg : (L,) float64
+        Its parts: of each light alone, and what the outlines of the balls move in all of them together.
+    u_positions_um : (L, 3) float64 or None
+        Near lights: standard uncertainty of x, y, z.
+    u_intensities : (L,) float64 or None
+        Relative; None where intensities were not measured.
+    lamp_deg : float
+        Angle of a whole lamp as the balls show it; NaN where not measured.
+    sphere : {"mirror", "matt", "balls"}
+        What was in view.
+    balls : tuple of BallView
+        One a ball and capture.
+    residual_px : float
+        Root mean square of the residuals; 0 where there is nothing to spare.
+    findings : tuple of Remark
+        What was noticed.
+    """
+
+    rig: LightRig
+    u_deg: Array
+    u_own_deg: Array
+    u_common_deg: Array
+    sphere: str
+    balls: tuple[BallView, ...]
+    residual_px: float
+    u_positions_um: Array | None = None
+    u_intensities: Array | None = None
+    lamp_deg: float = float("nan")
+    findings: tuple[Remark, ...] = field(default=())
+
+    @property
+    def doubts(self) -> tuple[Remark, ...]:
+        """The findings that are more than notes."""
+        return tuple(finding for finding in self.findings if finding.severity != "note")

@@ -1,0 +1,46 @@
+"""The response curve of a camera."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["ResponseCurve"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseCurve:
+    """Inverse response of the camera.
+
+    Attributes
+    ----------
+    levels, radiances : (K,) float64
+        Grey levels as a share of full scale, 0 to 1, and the light that they stand for, 1 at full scale.
+    u_radiance : float
+        Standard uncertainty, of full scale.
+    source : str
+        How it was found.
+    """
+
+    levels: Array
+    radiances: Array
+    u_radiance: float = 0.0
+    source: str = ""
+
+    @property
+    def nonlinearity(self) -> float:
+        """Largest distance from a straight line, of full scale."""
+        return float(np.abs(self.radiances - self.levels).max())
+
+    @property
+    def gamma(self) -> float:
+        """Exponent of the power law that comes nearest."""
+        use = (self.levels > 0.1) & (self.levels < 1.0) & (self.radiances > 0)  # noqa: PLR2004 - away from the black
+        if not use.any():
+            return 1.0
+        x, y = np.log(self.levels[use]), np.log(self.radiances[use])
+        return float(x @ y / (x @ x))

@@ -1,0 +1,36 @@
+"""Images that are equal bit by bit."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from bgars.records.pixels import PixelArray
+
+__all__ = ["same_images"]
+
+SAMPLE = 50_000
+
+
+def same_images(images: PixelArray) -> tuple[int, int] | None:
+    """First two of (L, H, W) images that are equal, unless they are empty; None where there are none.
+
+    Examples
+    --------
+    >>> images = np.arange(24, dtype=np.uint8).reshape(3, 2, 4)
+    >>> images[2] = images[0]
+    >>> same_images(images), same_images(images[:2])
+    ((0, 2), None)
+    """
+    stack = images.reshape(len(images), -1)
+    step = max(1, stack.shape[1] // SAMPLE)
+    sample = stack[:, ::step]
+    for second in range(1, len(stack)):
+        if sample[second].min() == sample[second].max():
+            continue
+        for first in range(second):
+            if np.array_equal(sample[first], sample[second]) and np.array_equal(stack[first], stack[second]):
+                return first, second
+    return None

@@ -1,0 +1,78 @@
+"""What is prior and what is measured, made visible: stripes where a pixel's own light does not fix its normal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.patches import Patch
+
+from bgars.records.circle_pixels import inside_circles
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from bgars.records.normal_field import NormalField
+
+__all__ = ["STRIPE_COLOR", "prior_label", "prior_pixels", "prior_share", "show_prior", "stripes"]
+
+STRIPE_COLOR = (0.08, 0.08, 0.08)
+STRIPE_ALPHA = 0.75
+OVERLAY_PX = 1200
+"""Size that a small image is enlarged to, so that stripes are finer than its pixels."""
+STRIPES = 75
+"""Along the longer side of the image."""
+SMALL_SHARE = 0.001
+
+
+def prior_pixels(field: NormalField) -> NDArray[np.bool_]:
+    """(H, W) True where a normal is valid but not measured."""
+    return field.mask & ~field.measured
+
+
+def prior_label(field: NormalField) -> str:
+    """Where the normals of these pixels come from."""
+    fit = field.reflectance
+    if fit is not None and fit.accepted:
+        return (
+            "drawn to the sphere of its circle (prior)" if fit.circles_px else "fixed by its light to over 2° (prior)"
+        )
+    return "left to its neighbours (prior)"
+
+
+def stripes(prior: NDArray[np.bool_], count: float = STRIPES) -> NDArray[np.float64]:
+    """Opacity of diagonal stripes over pixels, `count` of them along the longer side of the image."""
+    row, col = np.arange(prior.shape[0])[:, None], np.arange(prior.shape[1])
+    wave = np.cos(2.0 * np.pi * count / max(prior.shape) * (row + col))
+    opacity: NDArray[np.float64] = STRIPE_ALPHA * np.where(prior, np.clip(0.5 + 1.5 * wave, 0.0, 1.0), 0.0)
+    return opacity
+
+
+def show_prior(axes: Axes, field: NormalField, extent: tuple[float, float, float, float], *, legend: bool) -> None:
+    """Lay stripes over a picture where its normals are a prior, and say so below it; nothing where none are."""
+    prior = prior_pixels(field)
+    if not prior.any():
+        return
+    step = max(1, -(-max(prior.shape) // OVERLAY_PX))
+    enlarge = max(1, OVERLAY_PX // max(prior.shape))
+    shown = prior[::step, ::step].repeat(enlarge, axis=0).repeat(enlarge, axis=1)
+    overlay = np.zeros((*shown.shape, 4))
+    overlay[..., :3] = STRIPE_COLOR
+    overlay[..., 3] = stripes(shown)
+    axes.imshow(overlay, extent=extent, interpolation="antialiased")
+    if legend:
+        patch = Patch(facecolor="white", edgecolor=STRIPE_COLOR, hatch="//////", linewidth=0.8)
+        text = f"{prior_label(field)}: {prior_share(field)}"
+        axes.legend([patch], [text], loc="upper center", bbox_to_anchor=(0.5, -0.13), frameon=False, fontsize=9)
+
+
+def prior_share(field: NormalField) -> str:
+    """How many of the normals on balls, or of all where there are none, are a prior."""
+    prior = prior_pixels(field)
+    fit = field.reflectance
+    where, name = field.mask, "normals"
+    if fit is not None and fit.accepted and fit.circles_px:
+        where, name = field.mask & inside_circles(fit.circles_px, field.mask.shape), "normals on balls"
+    share = (prior & where).sum() / max(int(where.sum()), 1)
+    return f"{100 * share:.1f} % of the {name}" if share >= SMALL_SHARE else f"under 0.1 % of the {name}"

@@ -1,0 +1,174 @@
+"""The page of a station: every calibration with its residuals, and what limits it. One file, no network."""
+
+from __future__ import annotations
+
+import html
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bgars.io.atomic import atomic_file
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from os import PathLike
+
+    from bgars.records.flat_field import FlatField
+    from bgars.records.light_calibration import LightCalibration
+    from bgars.records.response_curve import ResponseCurve
+    from bgars.records.scale import Scale
+    from bgars.records.station import Station
+
+__all__ = ["write_station_page"]
+
+STYLE = """
+body { font: 15px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
+h1, h2 { font-weight: 600; } h2 { margin-top: 2.2rem; border-bottom: 1px solid #ccc; }
+table { border-collapse: collapse; } td, th { padding: .15rem .7rem; text-align: right; }
+th { border-bottom: 1px solid #888; font-weight: 600; } td:first-child, th:first-child { text-align: left; }
+.doubt, .fail { color: #a33; font-weight: 600; } svg { max-width: 100%; margin: 1rem 2rem 0 0; }
+.missing { color: #777; }
+"""
+SIDE = 300
+
+
+def write_station_page(station: Station, path: str | PathLike[str]) -> None:
+    """Write ``station.html``.
+
+    Raises
+    ------
+    FileFormatError
+        The folder is missing or not writable.
+    """
+    parts = [
+        f"<h1>{html.escape(station.name)}</h1>",
+        f"<p>Calibrated {html.escape(station.calibrated_utc or 'at a time that is not known')}.</p>",
+        "<h2>Lights</h2>",
+        *(_lights(station.lights) if station.lights else _missing("bgars calibrate lights FOLDER -o station.toml")),
+        "<h2>Evenness</h2>",
+        *(_flat(station.flat) if station.flat else _missing("bgars calibrate flat FOLDER -o station.toml")),
+        "<h2>Response of the camera</h2>",
+        *(
+            _response(station.response)
+            if station.response
+            else _missing("bgars calibrate response FOLDER -o station.toml")
+        ),
+        "<h2>Scale</h2>",
+        *(_scale(station.scale) if station.scale else _missing("bgars calibrate scale FOLDER -o station.toml")),
+        "<h2>What was noticed</h2><ul>",
+        *(
+            f'<li class="{one.severity}">{html.escape(one.severity)}: {html.escape(one.message)}</li>'
+            for one in station.findings
+        ),
+        "</ul>",
+    ]
+    page = (
+        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{html.escape(station.name)}</title>'
+        f"<style>{STYLE}</style></head><body>{''.join(parts)}</body></html>\n"
+    )
+    with atomic_file(path) as place:
+        Path(place).write_text(page, encoding="utf-8")
+
+
+def _missing(command: str) -> list[str]:
+    return [f'<p class="missing">Not calibrated. <code>{html.escape(command)}</code></p>']
+
+
+def _lights(lights: LightCalibration) -> Iterable[str]:
+    rig = lights.rig
+    head = ["light", "azimuth (deg)", "elevation (deg)", "u (deg)", "own", "common", "strength"]
+    if rig.positions_um is not None:
+        head += ["x (mm)", "y (mm)", "z (mm)"]
+    rows = []
+    for index in range(len(rig)):
+        cells = [
+            str(index),
+            f"{rig.azimuths_deg[index]:.2f}",
+            f"{rig.elevations_deg[index]:.2f}",
+            f"{lights.u_deg[index]:.3f}",
+        ]
+        cells += [
+            f"{lights.u_own_deg[index]:.3f}",
+            f"{lights.u_common_deg[index]:.3f}",
+            f"{rig.intensities[index]:.3f}",
+        ]
+        if rig.positions_um is not None:
+            cells += [f"{value / 1000.0:.2f}" for value in rig.positions_um[index]]
+        rows.append(cells)
+    yield _table(head, rows)
+    yield _sky(rig.directions, lights.u_deg)
+    common, own = float(np.median(lights.u_common_deg)), float(np.median(lights.u_own_deg))
+    limit = (
+        "the outline of the ball (a larger ball, or a plainer background)"
+        if common > own
+        else "the highlights themselves (expose so that they just clip; a sharper image)"
+    )
+    # One mirror ball gives each light one highlight: nothing is left over to disagree.
+    alone = lights.sphere == "mirror" and len(lights.balls) == 1
+    residual = "one ball shows no residual" if alone else f"residual {lights.residual_px:.3f} px"
+    yield f"<p>By a {html.escape(lights.sphere)} ball; {residual}. Limited by {limit}.</p>"
+
+
+def _sky(directions: np.ndarray, u_deg: np.ndarray) -> str:
+    """Where the lights are, seen from above; circles of 20 u."""
+    marks = []
+    for index, ((x, y, _), u) in enumerate(zip(directions, u_deg, strict=True)):
+        cx, cy = SIDE / 2 * (1 + 0.92 * x), SIDE / 2 * (1 - 0.92 * y)
+        size = max(20 * math.radians(u) * SIDE / 2, 1.0)
+        marks.append(
+            f'<circle cx="{cx:.1f}" cy="{cy:.1f}" r="{size:.1f}" fill="#4477aa55"/><circle cx="{cx:.1f}" '
+            f'cy="{cy:.1f}" r="2"/>'
+        )
+        marks.append(f'<text x="{cx + 6:.1f}" y="{cy - 4:.1f}" font-size="11">{index}</text>')
+    rings = "".join(
+        f'<circle cx="{SIDE / 2}" cy="{SIDE / 2}" r="{SIDE / 2 * 0.92 * math.cos(math.radians(e)):.1f}" '
+        'fill="none" stroke="#ccc"/>'
+        for e in (0, 30, 60)
+    )
+    title = "Lights as the camera sees them; rings at elevations of 0, 30 and 60 degrees; shaded: 20 u"
+    sides = f'width="{SIDE}" height="{SIDE}"'
+    drawing = f'<svg {sides} role="img" aria-label="{title}"><title>{title}</title>{rings}{"".join(marks)}</svg>'
+    return f"<figure>{drawing}<figcaption>{title}</figcaption></figure>"
+
+
+def _flat(flat: FlatField) -> Iterable[str]:
+    levels = flat.coefficients[:, 0]
+    rows = [[str(index), f"{100 * level / levels.mean():.1f} %"] for index, level in enumerate(levels)]
+    yield _table(["light", "level, of the mean"], rows)
+    yield (
+        f"<p>Polynomials of degree {flat.degree} over {flat.size_px[1]} x {flat.size_px[0]} pixels; "
+        f"{100 * flat.residual:.2f} % of the "
+        "level is left, noise taken off: what limits it is the board's own texture.</p>"
+    )
+
+
+def _response(curve: ResponseCurve) -> Iterable[str]:
+    points = " ".join(
+        f"{SIDE * x:.1f},{SIDE * (1 - y):.1f}" for x, y in zip(curve.levels, curve.radiances, strict=True)
+    )
+    yield (
+        f'<svg width="{SIDE}" height="{SIDE}" role="img"><title>Light over grey level</title>'
+        f'<rect width="{SIDE}" height="{SIDE}" fill="none" stroke="#ccc"/><line x1="0" y1="{SIDE}" x2="{SIDE}" '
+        'y2="0" stroke="#ccc"/>'
+        f'<polyline points="{points}" fill="none" stroke="#4477aa" stroke-width="2"/></svg>'
+    )
+    yield (
+        f"<p>By {html.escape(curve.source)}: {100 * curve.nonlinearity:.1f} % off a straight line, gamma about "
+        f"{curve.gamma:.2f}; u {100 * curve.u_radiance:.2f} % of full scale.</p>"
+    )
+
+
+def _scale(scale: Scale) -> Iterable[str]:
+    yield (
+        f"<p>A pixel is {scale.pixel_pitch_um:.4f} um (u {scale.pixel_pitch_u_um:.2g} um) by {scale.points} "
+        "points, residual "
+        f"{scale.residual_px:.3f} px; distortion at the corners {100 * scale.distortion:.2f} %.</p>"
+    )
+
+
+def _table(head: list[str], rows: list[list[str]]) -> str:
+    top = "".join(f"<th>{html.escape(cell)}</th>" for cell in head)
+    body = "".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"

@@ -1,0 +1,1 @@
+"""Surfaces from normals: integration, anchors, meshes, shape images."""

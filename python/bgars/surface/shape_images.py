@@ -1,0 +1,106 @@
+"""Images of a surface's shape: slope, curvature, and what stands out at a chosen scale, such as dents and scratches."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy  # loads its modules when they are used
+
+from bgars.errors import InputError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bgars.records.height_map import HeightMap
+
+    FloatArray = NDArray[np.float32]
+
+__all__ = ["ShapeImages", "shape_images"]
+
+LEAST_WEIGHT = 0.5
+"""Share of a smoothing window that must be valid."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeImages:
+    """Shape of a surface, smoothed to a scale; NaN where invalid. The unit is that of the heights, um or px.
+
+    Attributes
+    ----------
+    slope_deg : (H, W) float32
+        Angle between the surface and the image plane.
+    mean_curvature : (H, W) float32
+        Half the sum of the principal curvatures, 1 / unit; a dome is negative, a dent positive.
+    gaussian_curvature : (H, W) float32
+        Product of the principal curvatures, 1 / unit^2; positive on domes and dents, negative on saddles.
+    flattened : (H, W) float32
+        Heights less their smoothed selves, in the unit: what is finer than the scale, such as scratches.
+    unit : str
+        "um" or "px".
+    """
+
+    slope_deg: FloatArray
+    mean_curvature: FloatArray
+    gaussian_curvature: FloatArray
+    flattened: FloatArray
+    unit: str
+
+
+def shape_images(height: HeightMap, *, scale_px: float = 2.0) -> ShapeImages:
+    """Return slope, curvatures and fine relief of a height map.
+
+    Heights are smoothed by a Gaussian over the valid pixels; slope and curvatures are those of the smoothed surface,
+    by central differences (do Carmo, Differential Geometry of Curves and Surfaces, 1976, section 3-3).
+
+    Parameters
+    ----------
+    height : HeightMap
+        From :func:`bgars.integrate_normals`.
+    scale_px : float
+        Standard deviation of the Gaussian, above 0: details finer than this go to `flattened`.
+
+    Raises
+    ------
+    InputError
+        A scale that is not finite and above 0, or a map of fewer than 2 x 2 pixels.
+
+    Examples
+    --------
+    A ball of radius 50 has mean curvature -1 / 50 at its top:
+
+    >>> import bgars, numpy as np
+    >>> row, col = np.mgrid[-20:21, -20:21]
+    >>> ball = bgars.HeightMap.from_array(np.sqrt(2500.0 - row**2 - col**2).astype(np.float32))
+    >>> shape = bgars.shape_images(ball)
+    >>> round(float(shape.mean_curvature[20, 20]), 3), round(float(shape.slope_deg[20, 30]), 0)
+    (-0.02, 12.0)
+    """
+    if not (math.isfinite(scale_px) and scale_px > 0):
+        msg = f"scale_px: must be finite and above 0, got {scale_px}"
+        raise InputError(msg)
+    if min(height.mask.shape) < len(("one", "two")):
+        msg = f"height: must have 2 x 2 pixels at least, got {height.mask.shape}"
+        raise InputError(msg)
+    spacing = 1.0 if height.pixel_pitch_um is None else height.pixel_pitch_um
+    weight = scipy.ndimage.gaussian_filter(height.mask.astype(np.float64), scale_px)
+    filled = np.where(height.mask, height.height.astype(np.float64), 0.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        smooth = scipy.ndimage.gaussian_filter(filled, scale_px) / weight
+    smooth[(weight < LEAST_WEIGHT) | ~height.mask] = np.nan
+    z_down, z_x = np.gradient(smooth, spacing)
+    z_y = -z_down
+    z_x_down, z_xx = np.gradient(z_x, spacing)
+    z_yy = -np.gradient(z_y, spacing, axis=0)
+    z_xy = -z_x_down
+    steep = 1.0 + z_x**2 + z_y**2
+    mean = ((1.0 + z_x**2) * z_yy - 2.0 * z_x * z_y * z_xy + (1.0 + z_y**2) * z_xx) / (2.0 * steep**1.5)
+    return ShapeImages(
+        np.degrees(np.arctan(np.sqrt(steep - 1.0))).astype(np.float32),
+        mean.astype(np.float32),
+        ((z_xx * z_yy - z_xy**2) / steep**2).astype(np.float32),
+        (height.height - smooth).astype(np.float32),
+        height.unit,
+    )
