@@ -137,7 +137,7 @@ def test_evaluate_on_the_sample() -> None:
     "command",
     [
         *("", "demo", "reconstruct", "normals", "mesh", "info", "evaluate", "inspect", "calibrate material"),
-        *("simulate", "experiment", "grr", "report", "spc"),
+        *("simulate", "grr", "report", "spc"),
         *("batch", "watch", "query", "capture", "send", "store add", "store compact", "store export"),
     ],
 )

@@ -41,7 +41,6 @@ LAZY_COMMANDS = {
         "Write a part recipe from golden parts: layout, empty places, nominal sizes.",
     ),
     "simulate": ("bgars.cli.simulate", "Photograph a simulated part with known truth."),
-    "experiment": ("bgars.cli.experiment", "Reproduce the paper's figures on simulated captures."),
 }
 """Of each command, in the order of the help: the module whose ``register`` adds it, and its line in the list."""
 
