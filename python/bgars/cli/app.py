@@ -15,6 +15,7 @@ from bgars.cli.console import activation, print_json, say, shown_path, stage_pro
 from bgars.cli.evaluation import choice_in_words, evaluation_table
 from bgars.cli.lazy import LazyGroup
 from bgars.cli.options import (
+    METHOD_ARGUMENTS,
     ChannelChoice,
     DirectxOption,
     FlattenOption,
@@ -238,6 +239,7 @@ def evaluate(
         typer.Option(
             "--method",
             "-m",
+            **METHOD_ARGUMENTS,
             help=f"Estimator; by default each of {', '.join(METHODS)}. blind is what reflectance uses without balls.",
             show_default=False,
         ),

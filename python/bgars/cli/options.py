@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
-from bgars.normals.methods import Method
+from bgars.normals.methods import TABLE, Method, method_names
 
 __all__ = [
+    "METHOD_ARGUMENTS",
+    "METHOD_METAVAR",
     "ChannelChoice",
     "DirectxOption",
     "FlattenOption",
@@ -28,16 +30,28 @@ __all__ = [
 
 ChannelOption = Literal["luminance", "mean", "red", "green", "blue"]
 
-METHOD_HELP = (
-    "reflectance: on balls, highlights included, by the material that is fitted on them, elsewhere robust-filter; "
-    "without balls and a material, under fewer than 6 lights, or where no material explains the balls: blind. "
-    "robust-filter: the window of sorted values that a matt facet explains best, shadows and highlights left out. "
-    "specular-filter: the published sorted-gap filter. lambertian: all lights. "
-    "blind: one material is fitted to the whole capture together with every normal, and taken where it predicts "
-    "lights left out about as well as least squares and robust-filter, else the better of these; slow; under fewer "
-    "than 5 lights robust-filter."
-)
-MethodOption = Annotated[Method, typer.Option("--method", "-m", help=METHOD_HELP)]
+
+def method_name(text: str) -> Method:
+    """A method of bgars, or one that a package added; anything else is refused with the list of names."""
+    if text not in TABLE and text not in method_names():
+        msg = f"must be one of {', '.join(method_names())}; got {text!r}"
+        raise typer.BadParameter(msg)
+    return text
+
+
+def _completed(incomplete: str) -> list[str]:
+    return [name for name in method_names() if name.startswith(incomplete)]
+
+
+def _place(name: Method) -> tuple[bool, int]:
+    """The best method first, those that are not compared last."""
+    return not TABLE[name].is_compared, -list(TABLE).index(name)
+
+
+METHOD_HELP = " ".join(f"{name}: {TABLE[name].summary}" for name in sorted(TABLE, key=_place))
+METHOD_METAVAR = "METHOD"
+METHOD_ARGUMENTS: dict[str, Any] = {"parser": method_name, "metavar": METHOD_METAVAR, "autocompletion": _completed}
+MethodOption = Annotated[Method, typer.Option("--method", "-m", help=METHOD_HELP, **METHOD_ARGUMENTS)]
 ForceOption = Annotated[
     bool,
     typer.Option(
