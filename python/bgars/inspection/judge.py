@@ -21,6 +21,7 @@ from bgars.inspection.position import GridFit
 from bgars.inspection.to_scale import lens_scale, to_scale
 from bgars.inspection.warpage import board_height_um, board_terms, warpage
 from bgars.records.ball_result import BallResult
+from bgars.records.input_file import InputFile
 from bgars.records.part_result import PartResult
 from bgars.records.seating_result import SeatingResult
 
@@ -52,7 +53,7 @@ def judge_part(
     *,
     name: str = "part",
     pixel_pitch_um: float = math.nan,
-    files: tuple[tuple[str, str], ...] = (),
+    files: Sequence[tuple[str, str]] = (),
     version: str = "",
     light_files: Sequence[str] = (),
     warnings: tuple[str, ...] = (),
@@ -167,7 +168,7 @@ def judge_part(
         warnings=(*warnings, *measurement.warnings, *_own_warnings(recipe, fit, coplanarity, balls)),
         recipe=recipe,
         pixel_pitch_um=pixel_pitch_um,
-        files=files,
+        files=tuple(InputFile(*file) for file in files),
         version=version,
     )
 

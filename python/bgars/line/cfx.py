@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from bgars.errors import InputError
 from bgars.inspection.decision import decide
-from bgars.records.plain_values import DIGITS
+from bgars.records.keys import DIGITS
 
 if TYPE_CHECKING:
     from bgars.records.ball_result import BallResult, Verdict

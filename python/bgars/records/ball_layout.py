@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Annotated
 
 from bgars.errors import InputError
 from bgars.records.ball_names import ball_name
+from bgars.records.keys import Key
 
 __all__ = ["BallLayout"]
 
@@ -38,11 +40,11 @@ class BallLayout:
     ('B1', 1, 0, 0.0, -800.0)
     """
 
-    rows: int | None = None
-    cols: int | None = None
-    pitch_um: float | None = None
-    depopulated: tuple[str, ...] = ()
-    positions: tuple[tuple[str, float, float], ...] = ()
+    rows: Annotated[int | None, Key("rows of the grid; null with a list of positions")] = None
+    cols: Annotated[int | None, Key("columns of the grid; null with a list of positions")] = None
+    pitch_um: Annotated[float | None, Key("distance of neighbours, in um; null with a list of positions")] = None
+    depopulated: Annotated[tuple[str, ...], Key("names of places without a ball")] = ()
+    positions: Annotated[tuple[tuple[str, float, float], ...], Key("name, x and y in um of each place, or empty")] = ()
 
     def __post_init__(self) -> None:
         if self.positions:
