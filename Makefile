@@ -51,16 +51,16 @@ reality: $(VENV)/.installed ## Judge benches/reality/scenes and rewrite its tabl
 	$(BIN)/python docs/make_reality.py --workers $(WORKERS) --keep benches/reality/judged
 
 bilateral: data $(VENV)/.installed ## Rewrite the bilateral tables of docs/accuracy.md, draw their pictures (needs BGARS_DATA)
-	$(BIN)/python docs/make_bilateral.py
+	PYTHONPATH=. $(BIN)/python docs/make_bilateral.py
 
 simulator: data $(VENV)/.installed ## Rewrite the tables of docs/simulator.md (needs BGARS_DATA)
 	$(BIN)/python docs/make_simulator_check.py
 
 experiments: $(VENV)/.installed ## Run the paper's experiments again and rewrite docs/experiments.md
-	$(BIN)/bgars experiment all -o docs/images/experiments --page docs/experiments.md
+	$(BIN)/python -m experiments all -o docs/images/experiments --page docs/experiments.md
 
 method: $(VENV)/.installed ## Draw the pictures of docs/reflectance.md and one of docs/inspection.md again
-	$(BIN)/python docs/make_method_pictures.py
+	PYTHONPATH=. $(BIN)/python docs/make_method_pictures.py
 
 studies: $(VENV)/.installed ## Run the gauge studies of docs/studies.md again (15 minutes)
 	$(BIN)/python docs/make_studies.py

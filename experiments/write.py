@@ -161,7 +161,7 @@ def _way(start: Path, goal: Path) -> str:
 
 def _command(output: Path, page: str | os.PathLike[str] | None, radius_px: int) -> str:
     """The command that writes this page again."""
-    parts = ["bgars experiment all", f"-o {output.as_posix() if not output.is_absolute() else 'OUT'}"]
+    parts = ["python -m experiments all", f"-o {output.as_posix() if not output.is_absolute() else 'OUT'}"]
     if page is not None:
         parts.append(f"--page {Path(page).as_posix() if not Path(page).is_absolute() else 'PAGE'}")
     if radius_px != DEFAULT_RADIUS_PX:

@@ -139,7 +139,7 @@ def _inspected(job: Job, folder: Path, recipe_file: str, started: float) -> Outc
     if recipe is not None and job.content:  # as it is where the folder is seen
         given = Path(job.recipe)
         recipe = replace(recipe, file=given)
-        files = tuple((given.name if name == Path(RECIPE).name else name, d) for name, d in result.files)
+        files = tuple(f._replace(name=given.name) if f.name == Path(RECIPE).name else f for f in result.files)
         result = replace(result, recipe=recipe, files=files)
     result = replace(result, serial=serial, identity=identity)
     if part_key(result) != key:
