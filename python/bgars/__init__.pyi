@@ -28,6 +28,7 @@ from .line.batch import Batch as Batch
 from .line.batch import inspect_many as inspect_many
 from .line.cfx import to_cfx as to_cfx
 from .line.naming import Naming as Naming
+from .normals.methods import register_method as register_method
 from .pipelines.calibrate_material import calibrate_material as calibrate_material
 from .pipelines.check import check as check
 from .pipelines.evaluate import Evaluation as Evaluation

@@ -49,7 +49,7 @@ def test_every_public_name_can_be_had_and_is_what_type_checkers_see() -> None:
 
 def test_a_function_is_not_replaced_by_a_module_of_its_name() -> None:
     loaded_by(
-        "import bgars.evaluate, bgars.simulate.scene, bgars.records.findings;"
+        "import bgars.pipelines.evaluate, bgars.simulate.scene, bgars.records.findings, bgars.pipelines.inspect;"
         "assert callable(bgars.evaluate) and callable(bgars.simulate) and callable(bgars.check)"
     )
 

@@ -21,6 +21,7 @@ from bgars.io.atomic import FolderNames, atomic_folder
 from bgars.io.given_paths import need_file, need_folder, need_output
 from bgars.line.naming import identity_of
 from bgars.normals.methods import DEFAULT_METHOD
+from bgars.pipelines.check import told_by
 from bgars.records.part_identity import PartIdentity
 from bgars.report.figures.part import PICTURES
 from bgars.report.html.budget import main_causes
@@ -133,8 +134,9 @@ def inspect(
     with stage_progress() as report, atomic_folder(output, NAMES) as place, _painter(wanted=pictures) as painter:
         part = None if recipe is None else bgars.read_part_recipe(recipe)
         capture = bgars.read_capture(folder, station=station)
-        check_first(capture, force=force)
-        result = bgars.inspect(capture, part, method=method, surface=page, progress=report)
+        findings = check_first(capture, force=force)
+        result = bgars.inspect(capture, part, method=method, surface=page, check=False, progress=report)
+        result = replace(result, warnings=(*told_by(findings), *result.warnings))
         named, identity = identity_of(capture, PartIdentity(lot=lot, station=station_name, operator=operator))
         result = replace(result, serial=serial or named, identity=identity, inspected_utc=utc_now())
         files = dict(FILES)

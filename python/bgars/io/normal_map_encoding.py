@@ -130,10 +130,18 @@ def _decoded(
 
     if fits(plain):
         return plain
-    other = _linear(values, pixels.bits) if pixels.bits else values * 2.0 - 1.0
-    if fits(other):
-        notes.append("its codes are sRGB and were made linear" if pixels.bits else "its floats run from 0 to 1")
-        return other
+    others = (
+        [("its codes are sRGB and were made linear", _linear(values, pixels.bits))]
+        if pixels.bits
+        else [
+            ("its floats run from 0 to 1", values * 2.0 - 1.0),
+            ("its floats run from 0 to 255", values * (2.0 / 255.0) - 1.0),
+        ]
+    )
+    for note, vectors in others:
+        if fits(vectors):
+            notes.append(note)
+            return vectors
     return _refuse(path, plain, inner)
 
 

@@ -156,7 +156,7 @@ def read_side_files(path: Path) -> tuple[Photograph | None, tuple[Lamp, ...], Pa
         )
         surface = values.get("surface")
         digest = None if surface is None else str(surface["sha256"])
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         msg = f"{path}: is not what `bgars inspect` writes beside its result ({error!r}); remove it to do without"
         raise FileFormatError(msg) from error
     photograph = _read_jpeg(path.with_name(PHOTOGRAPH_FILE), (left_um, right_um, bottom_um, top_um), meaning)
