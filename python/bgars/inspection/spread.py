@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from bgars.inspection.bundle_model import tangents
 from bgars.inspection.shadow_model import light_derivatives
@@ -71,7 +71,7 @@ def fit_spread(edges: Edges) -> EdgeSpread:
     weight = 1.0 / u
     part = np.zeros(3)
     for _ in range(ROUNDS):
-        part = _not_below_zero(columns * weight[:, None], (spread - floor) * weight) / size
+        part = _nonnegative(columns * weight[:, None], (spread - floor) * weight) / size
         residual = spread - floor - (columns * size) @ part
         scale = max(1.4826 * float(np.median(np.abs(residual / u))), 0.1)
         weight = 1.0 / (u * np.sqrt(1.0 + (residual / (CAUCHY * scale * u)) ** 2))
@@ -81,15 +81,28 @@ def fit_spread(edges: Edges) -> EdgeSpread:
     return EdgeSpread(float(sharp), float(np.sqrt(round_lamp)), float(wide), float(high))
 
 
-def _not_below_zero(system: Array, right: Array) -> Array:
-    """Least squares, none below zero, of many rows and few columns: the triangle of their QR says as much.
+def _nonnegative(columns: Array, values: Array) -> Array:
+    """Least squares on a few columns, none of the weights below zero: the best of all choices of columns.
 
-    Block by block, which is as many small factorisations as one thread does best.
+    ``scipy.optimize.nnls`` takes longer to import than a small part to measure.
     """
-    rows = np.column_stack([system, right])
+    triangle, wanted = _triangle(columns, values)
+    best, least = np.zeros(columns.shape[1]), float(wanted @ wanted)
+    for choice in product((False, True), repeat=columns.shape[1]):
+        chosen = np.flatnonzero(choice)
+        found = np.zeros(columns.shape[1])
+        found[chosen] = np.linalg.lstsq(triangle[:, chosen], wanted, rcond=None)[0] if chosen.size else 0.0
+        loss = float(np.sum(np.square(triangle @ found - wanted)))
+        if loss < least and (found >= 0.0).all():
+            best, least = found, loss
+    return best
+
+
+def _triangle(columns: Array, values: Array) -> tuple[Array, Array]:
+    """Triangle of a QR factorisation and the values turned alike, block by block: no product wakes a second thread."""
+    rows = np.column_stack([columns, values])
     padding = np.zeros((-len(rows) % ROWS_OF_BLOCK, rows.shape[1]))
     blocks = np.concatenate([rows, padding]).reshape(-1, ROWS_OF_BLOCK, rows.shape[1])
     triangles = cast("Array", np.linalg.qr(blocks, mode="r"))
     triangle = cast("Array", np.linalg.qr(triangles.reshape(-1, rows.shape[1]), mode="r"))
-    part: Array = nnls(triangle[:, :-1], triangle[:, -1])[0]
-    return part
+    return triangle[:, :-1], triangle[:, -1]

@@ -21,8 +21,8 @@ use super::variation::ball_materials;
 use crate::normals::{NormalMapMut, check_finite};
 use crate::{Error, ImageStack, Lights, Pixel, Radiometry, Result};
 
-/// Fewest lights: two unknowns, and enough beyond them to see that a light is wrong.
-pub const MIN_LIGHTS: usize = 6;
+/// Fewest lights: two unknowns of a normal and its brightness, and one value beyond them.
+pub const MIN_LIGHTS: usize = 4;
 
 /// Pixels that a material is fitted on, in all and at least of each ball.
 const FIT_PIXELS: usize = 3000;
@@ -291,7 +291,7 @@ fn check<P: Pixel>(
     if lights.len() < MIN_LIGHTS {
         return Err(Error::OutOfRange {
             argument: "lights",
-            rule: "at least 6 for the reflectance estimator",
+            rule: "at least 4 for the reflectance estimator",
             value: lights.len() as f64,
         });
     }
