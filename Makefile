@@ -17,7 +17,7 @@ test-rust:
 
 test-python: $(VENV)/.installed
 	@.ci/find-browser || test "$$BGARS_REQUIRE_BROWSER" != 1
-	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal
 
 lint: $(VENV)/.installed ## Formatting, clippy, ruff, mypy, and the stub against the compiled module
 	cargo fmt --check --all
@@ -51,7 +51,7 @@ reality: $(VENV)/.installed ## Judge benches/reality/scenes and rewrite its tabl
 	$(BIN)/python docs/make_reality.py --workers $(WORKERS) --keep benches/reality/judged
 
 bilateral: data $(VENV)/.installed ## Rewrite the bilateral tables of docs/accuracy.md, draw their pictures (needs BGARS_DATA)
-	$(BIN)/python docs/make_bilateral.py
+	PYTHONPATH=. $(BIN)/python docs/make_bilateral.py
 
 station: data $(VENV)/.installed ## Measure the calibration of stations and rewrite the tables of docs/station.md (5 minutes; needs BGARS_DATA)
 	$(BIN)/python docs/make_station.py
@@ -64,15 +64,15 @@ simulator: data $(VENV)/.installed ## Rewrite the tables of docs/simulator.md (n
 	$(BIN)/python docs/make_simulator_check.py
 
 experiments: $(VENV)/.installed ## Run the paper's experiments again and rewrite docs/experiments.md
-	$(BIN)/bgars experiment all -o docs/images/experiments --page docs/experiments.md
+	$(BIN)/python -m experiments all -o docs/images/experiments --page docs/experiments.md
 
 method: $(VENV)/.installed ## Draw the pictures of docs/reflectance.md and one of docs/inspection.md again
-	$(BIN)/python docs/make_method_pictures.py
+	PYTHONPATH=. $(BIN)/python docs/make_method_pictures.py
 
 studies: $(VENV)/.installed ## Run the gauge studies of docs/studies.md again (15 minutes)
 	$(BIN)/python docs/make_studies.py
 
-check-faults: data $(VENV)/.installed ## Judge bgars check on captures with one fault each, rewrite the gallery of docs/captures.md (5 minutes; needs BGARS_DATA)
+check-faults: data $(VENV)/.installed ## Judge bgars check on captures with one fault each, rewrite the gallery of docs/captures.md (5 minutes; needs BGARS_DATA; BGARS_RENDERED: other rendered parts)
 	$(BIN)/python docs/make_captures.py
 
 schema: $(VENV)/.installed ## Write docs/result.schema.json, the JSON Schema of result.json, again
@@ -94,7 +94,7 @@ kills: $(VENV)/.installed ## Kill `bgars watch` at KILLS random times: every par
 	rm -rf kill-test
 
 FUZZ_INPUTS ?= 1000000
-fuzz: $(VENV)/.installed ## Damaged files for every reader: FUZZ_INPUTS of them (hours); findings go to fuzz-findings
+fuzz: $(VENV)/.installed ## Damaged files for every reader, hostile arguments for every call: FUZZ_INPUTS of them (hours); findings go to fuzz-findings
 	$(BIN)/python tests/fuzz/fuzzer.py --inputs $(FUZZ_INPUTS)
 
 performance: $(VENV)/.installed ## Measure against the peers and rewrite docs/performance.md (long; leave the machine alone)

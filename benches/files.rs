@@ -4,9 +4,10 @@
 
 use std::path::PathBuf;
 
-use bgars_core::io::decode::{Channel, Color, decode_stack};
+use bgars_core::io::decode::{Channel, Color};
 use bgars_core::io::{HeightSource, MeshFormat, MeshView, write_mesh_file};
 use bgars_core::mesh::{HeightMesh, triangulate};
+use bgars_suite::files::decode_stack;
 use bgars_suite::masks::{rectangle, wavy_heights};
 use bgars_suite::stacks::wavy;
 use bgars_suite::{THREADS, keep_short, on_threads};

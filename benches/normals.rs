@@ -5,7 +5,7 @@
 use std::hint::black_box;
 use std::ops::ControlFlow;
 
-use bgars_core::normals::{Method, RobustParams, estimate};
+use bgars_core::normals::{Method, estimate};
 use bgars_core::{ImageStack, Lights, Pixel, Radiometry};
 use bgars_suite::stacks::wavy;
 use bgars_suite::{THREADS, keep_short, on_threads};
@@ -64,9 +64,7 @@ fn normals(criterion: &mut Criterion) {
     }
     let side = 512;
     let (images, lights) = wavy(8, side, to_u8);
-    for (name, method) in
-        [("lambertian", Method::Lambertian), ("robust-filter", Method::RobustFilter(RobustParams::DEFAULT))]
-    {
+    for (name, method) in [("lambertian", Method::Lambertian), ("robust-filter", Method::RobustFilter)] {
         let case = Case { images: &images, lights: &lights, side, full_scale: 255.0, method };
         measure(criterion, &format!("{name}, u8, 8 lights, {side} x {side}"), &case);
     }

@@ -1,6 +1,7 @@
 """The paper's experiments: every figure a command, a picture and a table.
 
-Simulates, estimates, integrates and compares; ``bgars experiment`` runs it, docs/experiments.md shows it.
+Simulates, estimates, integrates and compares. ``python -m experiments`` at the top of the repository runs it,
+docs/experiments.md shows it.
 """
 
 from experiments.outcome import Experiment, Outcome, Picture, Run

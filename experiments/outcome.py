@@ -84,7 +84,7 @@ class Experiment:
     title : str
         Heading of its section.
     summary : str
-        One line for ``bgars experiment --help``.
+        One line for ``python -m experiments --help``.
     run : callable
         Takes a :class:`Run`, returns an :class:`Outcome`.
     """

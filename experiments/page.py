@@ -61,7 +61,7 @@ def section(experiment: Experiment, outcome: Outcome, folder: str, level: int) -
         lines += [f"![{picture.caption}]({folder}{picture.stem}.png)", "", f"*{picture.caption}*", ""]
     lines += [paragraph(outcome), "", *outcome.table, ""]
     csv = f"[{experiment.name}.csv]({folder}{experiment.name}.csv)"
-    lines += [f"Every column: {csv}. Command: `bgars experiment {experiment.name} -o OUT`."]
+    lines += [f"Every column: {csv}. Command: `python -m experiments {experiment.name} -o OUT`."]
     return wrapped(lines)
 
 

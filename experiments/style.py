@@ -74,5 +74,5 @@ def tidy(axes: Axes) -> None:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a PNG without the traces of the software that made it: the same figure, the same file."""
-    figure.savefig(path, format="png", metadata={"Software": None}, pil_kwargs={"optimize": True})
+    """Write a PNG that names bgars and no other software: the same figure, the same file."""
+    figure.savefig(path, format="png", metadata={"Software": "bgars"}, pil_kwargs={"optimize": True})

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from bgars.errors import InputError
 from bgars.io.atomic import atomic_file, atomic_folder
+from bgars.io.own_files import is_own, need_new_or_own
 
 from experiments.outcome import Outcome, Run
 from experiments.page import page_of_all, section
@@ -58,7 +59,7 @@ def write_experiments(
     Raises
     ------
     InputError
-        An unknown name, a radius out of range.
+        An unknown name, a radius out of range, a file in the way that no experiment wrote.
     FileFormatError
         The output cannot be written; nothing is left behind.
 
@@ -79,6 +80,7 @@ def write_experiments(
     if page is not None and Path(page).absolute().parent == output.absolute():
         own_page, page = Path(page).name, None
     way = "" if page is None else _way(Path(page).absolute().parent, output.absolute())
+    need_new_or_own(output / own_page if page is None else page)
     files: list[str] = []
     outcomes = {}
     with ExitStack() as opened:
@@ -89,6 +91,7 @@ def write_experiments(
         for experiment in experiments:
             outcome = experiment.run(Run(radius_px, _reporter(progress, experiment.name)))
             outcomes[experiment.name] = (experiment, outcome)
+            _need_own_or_new(outcome, output, experiment.name)
             for picture in outcome.pictures:
                 save(picture.figure, folder / f"{picture.stem}.png")
                 files.append(f"{picture.stem}.png")
@@ -118,6 +121,20 @@ def write_experiments(
     }
 
 
+def _need_own_or_new(outcome: Outcome, folder: Path, name: str) -> None:
+    """Raise InputError where files of others are in the way; a table of an earlier run vouches for its pictures."""
+    table = folder / f"{name}.csv"
+    is_earlier = False
+    if table.is_file():
+        with table.open("rb") as file:
+            is_earlier = file.readline().decode("utf-8", "replace").rstrip() == ",".join(outcome.columns)
+    pictures = [folder / f"{picture.stem}.png" for picture in outcome.pictures]
+    foreign = [] if is_earlier else [path for path in (table, *pictures) if path.exists() and not is_own(path)]
+    if foreign:
+        msg = f"{foreign[0]}: is there already, and no experiment wrote it; move it away, or name another folder"
+        raise InputError(msg)
+
+
 def write_csv(outcome: Outcome, path: Path) -> None:
     """Write the rows, numbers to four decimals at most."""
     with path.open("w", encoding="utf-8", newline="") as file:
@@ -144,7 +161,7 @@ def _way(start: Path, goal: Path) -> str:
 
 def _command(output: Path, page: str | os.PathLike[str] | None, radius_px: int) -> str:
     """The command that writes this page again."""
-    parts = ["bgars experiment all", f"-o {output.as_posix() if not output.is_absolute() else 'OUT'}"]
+    parts = ["python -m experiments all", f"-o {output.as_posix() if not output.is_absolute() else 'OUT'}"]
     if page is not None:
         parts.append(f"--page {Path(page).as_posix() if not Path(page).is_absolute() else 'PAGE'}")
     if radius_px != DEFAULT_RADIUS_PX:

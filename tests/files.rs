@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 
 use bgars_core::Error;
 use bgars_core::io::color::read_color;
-use bgars_core::io::decode::{Channel, Color, StackData, decode_stack};
+use bgars_core::io::decode::{Channel, Color};
 use bgars_core::io::rgb16::write_png16;
 use bgars_core::io::{MeshView, obj::write_obj, ply::write_ply};
 use bgars_core::mesh::triangulate;
+use bgars_suite::files::{StackData, decode_stack};
 use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage};
 
 const LIMIT: f64 = 100.0;

@@ -3,7 +3,7 @@
 
 use std::ops::ControlFlow;
 
-use bgars_core::normals::{Method, NormalMap, RobustParams, estimate};
+use bgars_core::normals::{Method, NormalMap, estimate};
 use bgars_core::{Error, ImageStack, Lights, Pixel, Radiometry};
 use bgars_suite::stacks::{estimate_row, tilted_ring};
 
@@ -22,9 +22,7 @@ fn the_bits_are_the_same_for_one_and_two_threads() {
         let bits: Vec<u32> = map.normals.iter().chain(&map.confidence).map(|value| value.to_bits()).collect();
         (bits, map.kept_sets)
     };
-    for method in
-        [Method::Lambertian, Method::SpecularFilter { threshold: 50.0 }, Method::RobustFilter(RobustParams::DEFAULT)]
-    {
+    for method in [Method::Lambertian, Method::SpecularFilter { threshold: 50.0 }, Method::RobustFilter] {
         assert_eq!(on_threads(1, method), on_threads(2, method));
     }
 }
@@ -137,11 +135,7 @@ fn a_value_that_is_not_finite_is_found_wherever_it_is_and_harms_no_other_pixel()
         for lights in
             [Lights::directional(&directions).unwrap(), Lights::near(&positions, &vec![5000.0; count]).unwrap()]
         {
-            for method in [
-                Method::Lambertian,
-                Method::SpecularFilter { threshold: 20.0 },
-                Method::RobustFilter(RobustParams::DEFAULT),
-            ] {
+            for method in [Method::Lambertian, Method::SpecularFilter { threshold: 20.0 }, Method::RobustFilter] {
                 let clean = estimate_row(&images, &lights, None, method, 255.0);
                 for (bad, value, bad_image) in [
                     (0, f32::NAN, count - 1),

@@ -3,7 +3,7 @@
 
 use std::ops::ControlFlow;
 
-use bgars_core::normals::{Method, NormalMap, NormalMapMut, RobustParams, estimate, estimate_into};
+use bgars_core::normals::{Method, NormalMap, NormalMapMut, estimate, estimate_into};
 use bgars_core::{Error, ImageStack, Lights, Pixel, Radiometry, blind};
 use bgars_suite::stacks::{estimate_row, tilted_ring};
 use nalgebra::{DMatrix, DVector};
@@ -112,9 +112,9 @@ fn slow_kept(method: Method, values: &[f32], directions: &[[f64; 3]], full_scale
     match method {
         Method::Lambertian => vec![true; values.len()],
         Method::SpecularFilter { threshold } => slow_specular_filter(values, threshold * full_scale / 255.0),
-        Method::RobustFilter(params) => {
+        Method::RobustFilter => {
             let clipped: Vec<bool> = values.iter().map(|&value| value >= full_scale).collect();
-            slow_robust_filter(values, &clipped, directions, f64::from(full_scale), f64::from(params.noise_level))
+            slow_robust_filter(values, &clipped, directions, f64::from(full_scale), 1.0)
         }
     }
 }
@@ -165,8 +165,7 @@ fn of_both(map: &NormalMap) -> [nalgebra::Vector3<f64>; 2] {
     [0, BOTH[0]].map(|pixel| nalgebra::Vector3::from_column_slice(&map.normals[3 * pixel..3 * pixel + 3]).cast())
 }
 
-const METHODS: [Method; 3] =
-    [Method::Lambertian, Method::SpecularFilter { threshold: 50.0 }, Method::RobustFilter(RobustParams::DEFAULT)];
+const METHODS: [Method; 3] = [Method::Lambertian, Method::SpecularFilter { threshold: 50.0 }, Method::RobustFilter];
 
 /// Numbers of lights: few, and so many that the fast kernel looks over them first.
 fn counts() -> impl Strategy<Value = usize> {
@@ -175,7 +174,7 @@ fn counts() -> impl Strategy<Value = usize> {
 
 /// The methods that the fast kernel serves with so many lights.
 fn methods(count: usize) -> impl Iterator<Item = Method> {
-    METHODS.into_iter().filter(move |method| count <= 16 || !matches!(method, Method::RobustFilter(_)))
+    METHODS.into_iter().filter(move |method| count <= 16 || !matches!(method, Method::RobustFilter))
 }
 
 proptest! {
@@ -228,7 +227,7 @@ proptest! {
             directions.iter().map(|&light| (albedo * nalgebra::Vector3::from(light).dot(&normal)) as f32).collect();
         prop_assume!(values.iter().all(|&value| value > 0.05));
         let lights = Lights::directional(&directions).unwrap();
-        for method in [Method::Lambertian, Method::RobustFilter(RobustParams::DEFAULT)] {
+        for method in [Method::Lambertian, Method::RobustFilter] {
             let map = estimate_row(&repeated(&values), &lights, None, method, 1.0);
             for found in of_both(&map) {
                 prop_assert!((found - normal).norm().to_degrees() < 1e-3, "{method:?}: {found} is not {normal}");
@@ -257,7 +256,7 @@ fn near_lights_give_back_the_normal_of_a_board_point_off_the_centre() {
         }
     }
     let stack = ImageStack::new(&images, 8, height, width).unwrap();
-    for method in [Method::Lambertian, Method::RobustFilter(RobustParams::DEFAULT)] {
+    for method in [Method::Lambertian, Method::RobustFilter] {
         let radiometry = Radiometry { saturation: f32::INFINITY, ..Radiometry::linear(8, 1.0) };
         let map =
             estimate(&stack, &lights, &radiometry, None, method, false, &mut |_| ControlFlow::Continue(())).unwrap();

@@ -109,9 +109,13 @@ def fired_twice(capture: bgars.Capture, random: np.random.Generator) -> bgars.Ca
     levels = _levels(capture)
     index = _one(capture, random)
     top = _top(capture)
-    copy = levels[(index + 1) % len(levels)]
-    levels[index] = copy + random.normal(0, 1.0, copy.shape) * np.sqrt(np.maximum(copy, 1) / top / 12000) * top
+    levels[index] = _fresh_noise(levels[(index + 1) % len(levels)], top, random)
     return _stored(capture, levels)
+
+
+def _fresh_noise(levels: Array, top: float, random: np.random.Generator) -> Array:
+    """Noise of an image whose own was smoothed away: shot noise of 12,000 electrons."""
+    return levels + random.normal(0.0, 1.0, levels.shape) * np.sqrt(np.maximum(levels, 1.0) / top / 12000.0) * top
 
 
 def too_dark(capture: bgars.Capture, random: np.random.Generator) -> bgars.Capture:
@@ -142,9 +146,18 @@ def rows_late(capture: bgars.Capture, random: np.random.Generator) -> bgars.Capt
 
 
 def ambient(capture: bgars.Capture, random: np.random.Generator) -> bgars.Capture:
+    """Light of the room on the part, from a thirtieth to nearly half of that of the lamps."""
     levels = _levels(capture)
     usual = levels.max(axis=0) - _offset(capture)
-    return _stored(capture, levels * 0.7 + gaussian_filter(usual, 1.5) * float(random.uniform(0.15, 0.4)))
+    return _stored(capture, levels * 0.7 + gaussian_filter(usual, 1.5) * float(np.exp(random.uniform(-3.5, -0.9))))
+
+
+def veil(capture: bgars.Capture, random: np.random.Generator) -> bgars.Capture:
+    """The same in all pixels: stray light in the lens, or a black level nobody took away."""
+    levels = _levels(capture)
+    usual = float(np.median(np.median(levels, axis=0) - _offset(capture)))
+    size = max(float(np.exp(random.uniform(-3.5, -1.6))) * usual, 1.5 / 255.0 * float(capture.saturation))
+    return _stored(capture, levels * 0.8 + size)
 
 
 def vignetting(capture: bgars.Capture, random: np.random.Generator) -> bgars.Capture:
@@ -166,7 +179,8 @@ def moved(capture: bgars.Capture, random: np.random.Generator) -> bgars.Capture:
 def blurred(capture: bgars.Capture, random: np.random.Generator) -> bgars.Capture:
     levels = _levels(capture)
     index = _one(capture, random)
-    levels[index] = gaussian_filter(levels[index], float(random.uniform(1.0, 3.0)))
+    blurred_levels = gaussian_filter(levels[index], float(random.uniform(0.9, 3.0)))
+    levels[index] = _fresh_noise(blurred_levels, _top(capture), random)
     return _stored(capture, levels)
 
 
@@ -179,7 +193,9 @@ def noisy(capture: bgars.Capture, random: np.random.Generator) -> bgars.Capture:
 
 def gamma(capture: bgars.Capture, random: np.random.Generator) -> bgars.Capture:
     top = _top(capture)
-    linear = np.clip((_levels(capture) - _offset(capture)) / top, 0, 1)
+    # Cameras bend before they round: levels of 8 bits are spread first, or combs would give the curve away.
+    spread = random.uniform(-0.5, 0.5, capture.images.shape)
+    linear = np.clip((_levels(capture) + spread - _offset(capture)) / top, 0, 1)
     return replace(_stored(capture, linear ** (1 / float(random.uniform(1.8, 2.4))) * top), dark=None)
 
 
@@ -241,6 +257,7 @@ FAULTS: dict[str, tuple[str, Fault]] = {
     "rows without light": ("half-lit", rows_dark),
     "rows of the next light": ("half-lit", rows_late),
     "ambient light": ("ambient", ambient),
+    "veil of stray light": ("ambient", veil),
     "vignetting": ("vignetting", vignetting),
     "moved": ("motion", moved),
     "blurred": ("focus", blurred),
@@ -255,10 +272,10 @@ FAULTS: dict[str, tuple[str, Fault]] = {
 
 
 SHOWN_BY: dict[str, tuple[str, ...]] = {
-    # What the images of the others cannot tell, whoever looks at them: floors of shadows where there are none, a curve
-    # where the only matt thing is a plane, bumps from hollows without a cast shadow.
+    # What the images of the others cannot tell, whoever looks at them: floors of shadows where there are none, bumps
+    # from hollows without a cast shadow.
     "ambient light": ("array", "rendered"),
-    "gamma": ("relief", "rendered"),
+    "veil of stray light": ("array", "rendered"),
     "half turn": ("array", "rendered"),
 }
 

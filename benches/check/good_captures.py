@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Iterator
 from dataclasses import replace
@@ -12,31 +13,61 @@ import numpy as np
 from bgars.records.plain_arrays import every_pixel
 from numpy.typing import NDArray
 
-__all__ = ["CHOSEN_ON", "JUDGED_ON", "captures", "turned"]
+__all__ = ["CHOSEN_ON", "FAULTY", "JUDGED_ON", "captures", "deviations", "rendered", "turned"]
 
 RENDERED_CHOSEN = ("1", "10", "11", "12", "13", "14", "15", "16", "17", "18", "19", "2")
 RENDERED_JUDGED = ("20", "21", "22", "23", "24", "3", "4", "5", "6", "7", "8", "9")
+FAULTY = {
+    # What the renderer's camera does wrong on purpose, and what a check should call it.
+    "ambient": "ambient",
+    "glare": "ambient",
+    "no_dark": "ambient",
+    "undeclared_gamma": "response",
+    "flicker": "ambient",
+    "intensities": "lamp-uneven",
+    "shift_one": "motion",
+    "shift_half": "motion",
+    "noise": "noise",
+    "overexposed": "clipped",
+    "underexposed": "dark",
+}
+"""Deviations of rendered parts that are faults of the capture: such parts are no good captures."""
 CHOSEN_ON = "chosen"
 JUDGED_ON = "judged"
-SIMULATED = 34
-RELIEFS = 30
+SIMULATED = 42
+RELIEFS = 36
 
 
 def captures(which: str) -> Iterator[tuple[str, bgars.Capture]]:
     """Yield names and captures: a hundred, other ones for choosing thresholds than for judging."""
     judged = which == JUDGED_ON
-    start = 9000 if judged else 1000
+    start = 50_000 if judged else 1000
     for seed in range(start, start + SIMULATED):
         yield f"array {seed}", array(seed)
     for seed in range(start, start + RELIEFS):
         yield f"relief {seed}", relief(seed)
-    data = os.environ.get("BGARS_DATA")
-    if data is None:
-        return
-    for name in RENDERED_JUDGED if judged else RENDERED_CHOSEN:
-        capture = bgars.read_capture(Path(data) / "reality" / name)
+    for folder in rendered(which):
+        if deviations(folder) & set(FAULTY):
+            continue
+        capture = bgars.read_capture(folder)
         for quarter in range(3):
-            yield f"rendered part {name}, turned {90 * quarter}", turned(capture, quarter)
+            yield f"rendered part {folder.name}, turned {90 * quarter}", turned(capture, quarter)
+
+
+def rendered(which: str) -> list[Path]:
+    """Folders of rendered parts: for judging, those of BGARS_RENDERED where it is set (seeds nobody has looked at)."""
+    fresh, data = os.environ.get("BGARS_RENDERED"), os.environ.get("BGARS_DATA")
+    if which == JUDGED_ON and fresh is not None:
+        return sorted(path.parent for path in Path(fresh).glob("*/scene.json"))
+    if data is None:
+        return []
+    names = RENDERED_JUDGED if which == JUDGED_ON else RENDERED_CHOSEN
+    return [Path(data) / "reality" / name for name in names]
+
+
+def deviations(folder: Path) -> set[str]:
+    """What a rendered part deviates in, as its scene.json says."""
+    return set(json.loads((folder / "scene.json").read_text(encoding="utf-8"))["deviations"])
 
 
 def array(seed: int) -> bgars.Capture:

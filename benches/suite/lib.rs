@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::missing_panics_doc)]
 
 pub mod balls;
+pub mod files;
 pub mod masks;
 pub mod slits;
 pub mod stacks;

@@ -24,10 +24,11 @@ from .io.result_file import read_result as read_result
 from .io.station_file import read_station as read_station
 from .io.station_file import write_station as write_station
 from .io.truth import read_truth as read_truth
-from .line import Batch as Batch
-from .line import Naming as Naming
-from .line import inspect_many as inspect_many
+from .line.batch import Batch as Batch
+from .line.batch import inspect_many as inspect_many
 from .line.cfx import to_cfx as to_cfx
+from .line.naming import Naming as Naming
+from .normals.methods import register_method as register_method
 from .pipelines.calibrate_material import calibrate_material as calibrate_material
 from .pipelines.check import check as check
 from .pipelines.evaluate import Evaluation as Evaluation

@@ -29,6 +29,7 @@ __all__ = [
     "integrate_bilateral",
     "integrate_normals",
     "measure_edges",
+    "normal_distribution",
     "predict_left_out",
     "read_color",
     "rim_bands",
@@ -145,6 +146,7 @@ def measure_edges(
     mask: NDArray[np.bool_] | None,
     threads: int | None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+def normal_distribution(values: NDArray[np.float64], *, threads: int | None) -> NDArray[np.float64]: ...
 def read_color(path: str | PathLike[str], max_megapixels: float) -> tuple[NDArray[np.float32], int]: ...
 def rim_bands(
     circles: NDArray[np.float64],

@@ -1,4 +1,6 @@
-"""`make fuzz`: damaged files for every reader. A reader may read them, or refuse them in one line; nothing else.
+"""`make fuzz`: damaged files for every reader, hostile arguments for every call that takes arrays.
+
+Each may answer, or refuse in one line; nothing else.
 
     python tests/fuzz/fuzzer.py --inputs 1000000 --seed 1
 
@@ -22,6 +24,7 @@ from collections import Counter
 from pathlib import Path
 
 import bgars
+from hostile import CALLS, hostile_call
 from mutate import mutated
 from readers import READERS, make_corpus
 
@@ -63,6 +66,34 @@ def verdict_of(name: str, path: Path) -> str:
     return "" if time.perf_counter() - start < SLOW_S else "slow"
 
 
+def verdict_of_call(name: str, chance: random.Random) -> str:
+    """Call with hostile arguments; as :func:`verdict_of`."""
+    signal.signal(signal.SIGALRM, _too_slow)
+    signal.alarm(SLOW_S)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return hostile_call(name, chance)
+    except Slow:
+        return f"slow: more than {SLOW_S} s"
+    finally:
+        signal.alarm(0)
+
+
+def run_calls(name: str, seed: int, start: int, inputs: int, keep: Path) -> Counter[str]:
+    """Call so many times; return how many there were of each verdict."""
+    found: Counter[str] = Counter()
+    current = keep / f"current-{multiprocessing.current_process().pid}"
+    for number in range(start, start + inputs):
+        current.write_text(f"{name}\t{seed}\t{number}", encoding="utf-8")
+        verdict = verdict_of_call(name, random.Random(f"{seed}/{name}/{number}"))
+        found[verdict] += 1
+        if verdict and found[verdict] <= 3:
+            sys.stderr.write(f"{name} {seed}/{number}: {verdict}\n")
+    current.unlink()
+    return found
+
+
 def one_input(corpus: Path, name: str, seed: int, number: int) -> tuple[str, bytes]:
     """File name and bytes of an input."""
     chance = random.Random(f"{seed}/{name}/{number}")
@@ -76,7 +107,9 @@ def one_input(corpus: Path, name: str, seed: int, number: int) -> tuple[str, byt
 
 
 def run_batch(corpus: Path, name: str, seed: int, start: int, inputs: int, keep: Path) -> Counter[str]:
-    """Read so many inputs; return how many there were of each verdict."""
+    """Read so many inputs, or make so many calls; return how many there were of each verdict."""
+    if name in CALLS:
+        return run_calls(name, seed, start, inputs, keep)
     found: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder) / "in"
@@ -110,7 +143,7 @@ def run(inputs: int, seed: int, keep: Path, only: str | None = None) -> Counter[
     with tempfile.TemporaryDirectory() as folder:
         corpus = Path(folder) / "corpus"
         make_corpus(corpus)
-        names = [only] if only else list(READERS)
+        names = [only] if only else [*READERS, *CALLS]
         each = -(-inputs // len(names))
         context = multiprocessing.get_context("spawn")  # threads of the parent would not be there after a fork
         for start in range(0, each, BATCH):
@@ -120,7 +153,7 @@ def run(inputs: int, seed: int, keep: Path, only: str | None = None) -> Counter[
                 child = context.Process(target=_limited, args=((corpus, name, seed, start, count, keep), results))
                 child.start()
                 try:
-                    found = results.get(timeout=60 + SLOW_S * 3)
+                    found = results.get(timeout=600 + SLOW_S * 3)
                 except Exception:
                     found = Counter({"process died or hung": 1})
                     child.kill()
@@ -137,7 +170,7 @@ def main() -> int:
     parser.add_argument("--inputs", type=int, default=100_000)
     parser.add_argument("--seed", type=int, default=int(time.time()))
     parser.add_argument("--keep", type=Path, default=Path("fuzz-findings"))
-    parser.add_argument("--only", choices=sorted(READERS))
+    parser.add_argument("--only", choices=sorted([*READERS, *CALLS]))
     given = parser.parse_args()
     wrong = run(given.inputs, given.seed, given.keep, given.only)
     for verdict, times in wrong.most_common():

@@ -64,7 +64,7 @@ def make_corpus(folder: Path) -> None:
     lobe = bgars.SurfaceLobe(strength_level=255.0, roughness=0.2, tail=0.0)
     bgars.write_material(bgars.SurfaceMaterial(30.0, 0.0, 0.0, (lobe,), "smith", gains=(1.0,) * 8), folder / "m.toml")
     (folder / "p.csv").write_text("name,x_um,y_um\nA1,0,0\nA2,800,0\n", encoding="utf-8")
-    recipes = Path(bgars.__file__).parent / "recipes" / "named"
+    recipes = Path(bgars.__file__).parent / "pipelines" / "scene_recipes" / "named"
     for name in ("hemisphere", "defects-5x5"):
         shutil.copy(recipes / f"{name}.toml", folder / f"scene-{name}.toml")
     scene = bgars.read_scene("hemisphere")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from pathlib import Path
+from random import Random
 
 import bgars
 import numpy as np
@@ -13,6 +14,9 @@ import tifffile
 
 sys.path.insert(0, str(Path(__file__).parent))
 import fuzzer
+from hostile import CALLS, hostile_call
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from readers import READERS, make_corpus
 
 INPUTS = 60
@@ -43,6 +47,49 @@ def test_whole_files_are_read(name: str, corpus: Path) -> None:
 def test_damaged_files_are_read_or_refused_in_one_line(name: str, corpus: Path, tmp_path: Path) -> None:
     found = fuzzer.run_batch(corpus, name, SEED, 0, INPUTS, tmp_path)
     assert found == Counter({"": INPUTS})
+
+
+@pytest.mark.parametrize("name", CALLS)
+@pytest.mark.filterwarnings("ignore")
+@settings(max_examples=30, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@given(chance=st.randoms(use_true_random=False))
+def test_hostile_arguments_are_answered_or_refused(name: str, chance: Random) -> None:
+    assert hostile_call(name, chance) == ""
+
+
+def test_a_capture_made_by_hand_must_fit_together() -> None:
+    rig = bgars.LightRig.ring(4)
+    images = np.full((4, 6, 7), 90, np.uint8)
+    mask = np.ones((6, 7), bool)
+    bgars.check(bgars.Capture(images, rig, mask))
+    for wrong, said in (
+        (bgars.Capture(images[:3], rig, mask), "one light for each of the 3 images, got 4"),
+        (bgars.Capture(images[0], rig, mask), r"images: must have shape \(lights, rows, columns\)"),
+        (bgars.Capture(images, rig, mask.T), r"mask: must have shape \(6, 7\)"),
+        (bgars.Capture(images, rig, mask, dark=images[0, :3]), r"dark: must have shape \(6, 7\)"),
+        (bgars.Capture(images, rig, mask, saturation="x"), "saturation: must be a number"),  # type: ignore[arg-type]
+    ):
+        for function in (bgars.check, bgars.find_balls, bgars.estimate_normals):
+            with pytest.raises(bgars.InputError, match=said):
+                function(wrong)
+
+
+def test_nor_does_a_masked_stack_take_any_mask() -> None:
+    images = np.ma.masked_array(np.full((4, 6, 7), 90, np.uint8), mask=False)
+    with pytest.raises(bgars.InputError, match=r"mask: must have shape \(6, 7\)"):
+        bgars.Capture(images, bgars.LightRig.ring(4), np.ones((6, 8), bool))
+
+
+def test_a_deep_side_file_is_refused_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "report.json").write_text("[" * 100_000, encoding="utf-8")
+    read, _ = READERS["page source"]
+    with pytest.raises(bgars.FileFormatError, match="remove it to do without"):
+        read(tmp_path / "report.json")
+
+
+def test_a_black_capture_is_dark_and_no_accident() -> None:
+    black = bgars.Capture(np.zeros((4, 6, 7), np.uint8), bgars.LightRig.ring(4), np.ones((6, 7), bool))
+    assert [each.kind for each in bgars.check(black)] == ["dark"]
 
 
 def test_a_tiff_of_more_rows_than_its_table_of_strips_is_refused_at_once(tmp_path: Path) -> None:

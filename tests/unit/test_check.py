@@ -9,14 +9,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import bgars
+import imageio.v3 as iio
 import numpy as np
 import pytest
 from bgars.checks.evidence import critical_t, paired_t
 from bgars.checks.hypotheses import alternatives
+from bgars.line.job import Job, run_job
 from bgars.normals.noise_floor import without_background
 from bgars.records.plain_arrays import every_pixel
 from bgars.surface.flatten import find_bow, flattened
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
 
 
 @pytest.fixture(scope="module")
@@ -130,6 +133,78 @@ def test_faults_of_all_images_are_named(relief: bgars.Capture, balls: bgars.Capt
     assert "clipped" in kinds(replace(relief, images=np.clip(600.0 * levels, 0, 255).astype(np.uint8)))
     bright = np.clip(balls.images + 0.3 * balls.images.max(axis=0), 0, 255).astype(np.uint8)
     assert "ambient" in kinds(replace(balls, images=bright))
+
+
+def test_noise_that_falls_with_light_tells_a_curve(balls: bgars.Capture) -> None:
+    """On shiny balls, where no matt model holds; levels are spread first, so that no comb tells."""
+    random = np.random.default_rng(1)
+    linear = np.clip((balls.images + random.uniform(-0.5, 0.5, balls.images.shape)) / 255.0, 0.0, 1.0)
+    for gamma in (1.8, 2.2):
+        told = bgars.check(replace(balls, images=np.rint(255.0 * linear ** (1.0 / gamma)).astype(np.uint8))).told
+        assert [each.kind for each in told] == ["response"]
+        assert "noise of dark parts" in told[0].message
+    constant = np.clip(balls.images + random.normal(0.0, 2.0, balls.images.shape), 0, 255)
+    assert "response" not in kinds(replace(balls, images=np.rint(constant).astype(np.uint8)))
+
+
+def test_a_stated_response_is_no_fault(balls: bgars.Capture) -> None:
+    random = np.random.default_rng(1)
+    linear = np.clip((balls.images + random.uniform(-0.5, 0.5, balls.images.shape)) / 255.0, 0.0, 1.0)
+    encoded = np.rint(255.0 * linear ** (1.0 / 2.2)).astype(np.uint8)
+    table = (np.arange(256) / 255.0).astype(np.float32) ** np.float32(2.2)
+    assert kinds(replace(balls, images=encoded, response=table)) == []
+
+
+@pytest.mark.parametrize("levels", [4, 10])
+def test_a_small_veil_is_the_lower_end_of_shadows(balls: bgars.Capture, levels: int) -> None:
+    told = bgars.check(replace(balls, images=np.minimum(balls.images, 255 - levels) + np.uint8(levels))).told
+    assert [each.kind for each in told] == ["ambient"]
+    lit = np.median(np.median(balls.images, axis=0))
+    assert told[0].value == pytest.approx(levels / lit, rel=0.4)
+
+
+def test_a_blurred_image_is_named(balls: bgars.Capture) -> None:
+    levels = balls.images.astype(np.float64)
+    levels[2] = gaussian_filter(levels[2], 1.2)
+    levels[2] += np.random.default_rng(0).normal(0.0, 0.8, levels[2].shape)
+    told = bgars.check(replace(balls, images=np.clip(np.rint(levels), 0, 255).astype(np.uint8))).told
+    assert [(each.kind, each.image) for each in told] == [("focus", 2)]
+
+
+def test_python_checks_before_any_number(balls: bgars.Capture) -> None:
+    mirrored = with_lights(balls, balls.rig.directions * [1, -1, 1])
+    for function in (bgars.reconstruct, bgars.inspect):
+        with pytest.raises(bgars.InputError, match=r"lights on the other side in y.*check=False goes on"):
+            function(mirrored)
+    assert bgars.reconstruct(mirrored, method="robust-filter", check=False).field.mask.any()
+
+
+def test_what_is_found_is_warned_of_and_kept_with_the_part(balls: bgars.Capture) -> None:
+    veiled = replace(balls, images=np.minimum(balls.images, 245) + np.uint8(10))
+    with pytest.warns(bgars.CaptureWarning, match="ambient: the deepest shadows still have"):
+        result = bgars.inspect(veiled, method="robust-filter")
+    assert result.warnings[0].startswith("capture: ambient: the deepest shadows")
+    assert not any("ambient" in each for each in bgars.inspect(veiled, method="robust-filter", check=False).warnings)
+
+
+def test_a_batch_keeps_findings_with_the_part_and_refuses_wrong_lights(balls: bgars.Capture, tmp_path: Path) -> None:
+    veiled = np.minimum(balls.images, 245) + np.uint8(10)
+    for name, sign in (("veiled", 1), ("mirrored", -1)):
+        folder = tmp_path / name
+        folder.mkdir()
+        for index, image in enumerate(veiled if sign == 1 else balls.images):
+            iio.imwrite(folder / f"{index}.png", image)
+        lights = balls.rig.directions * [1, sign, 1]
+        rows = ", ".join(str(each.tolist()) for each in lights)
+        text = f"pixel_pitch_um = 10.0\n[lights]\ndirections = [{rows}]\n"
+        (folder / "capture.toml").write_text(text, encoding="utf-8")
+    kept = run_job(Job(str(tmp_path / "veiled"), method="robust-filter"))
+    assert kept.result is not None
+    assert kept.result.warnings[0].startswith("capture: ambient")
+    refused = run_job(Job(str(tmp_path / "mirrored"), method="robust-filter"))
+    assert refused.result is None
+    assert refused.is_input
+    assert "lights on the other side in y" in refused.reason
 
 
 def test_a_flat_field_is_no_evidence() -> None:

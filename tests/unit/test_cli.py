@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
+import warnings
 from collections.abc import Iterator
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
+from unittest.mock import patch
 
 import bgars
 import numpy as np
@@ -18,21 +22,43 @@ import pytest
 import tifffile
 import trimesh
 import typer
-from bgars.cli.app import app
+from bgars.cli.app import app, main
 from bgars.cli.console import activation
 from bgars.cli.lazy import LAZY_COMMANDS
-from bgars.normals.methods import METHODS, Method
+from bgars.normals.methods import ALL_METHODS, METHODS
 from rich.text import Text
 
 
 def bgars_command(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run a command as its process does, but in this one."""
+    arguments = tuple(map(str, arguments))
+    stdout, stderr = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8") for _ in range(2))
+    before, code = Path.cwd(), 0
+    with redirect_stdout(stdout), redirect_stderr(stderr), warnings.catch_warnings():
+        try:
+            os.chdir(cwd or before)
+            with patch.object(sys, "argv", ["bgars", *arguments]):
+                main()
+        except SystemExit as end:
+            code = end.code if isinstance(end.code, int) else int(end.code is not None)
+        finally:
+            os.chdir(before)
+    told = []
+    for stream in (stdout, stderr):
+        stream.seek(0)
+        told.append(stream.read())
+    return subprocess.CompletedProcess(arguments, code, *told)
+
+
+def bgars_process(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run a command in a process of its own."""
     return subprocess.run(
         [sys.executable, "-m", "bgars", *map(str, arguments)], capture_output=True, text=True, check=False, cwd=cwd
     )
 
 
 def test_demo_writes_everything_and_says_what_to_open(tmp_path: Path) -> None:
-    run = bgars_command("demo", cwd=tmp_path)
+    run = bgars_process("demo", cwd=tmp_path)
     assert run.returncode == 0, run.stderr
     assert run.stderr == "", "quiet in pipes"
     for name in ("overview.png", "mesh.ply", "normals.png", "height.tif", "height.npy", "summary.json"):
@@ -137,7 +163,7 @@ def test_evaluate_on_the_sample() -> None:
     "command",
     [
         *("", "demo", "reconstruct", "normals", "mesh", "info", "evaluate", "inspect", "calibrate material"),
-        *("simulate", "experiment", "grr", "report", "spc"),
+        *("simulate", "grr", "report", "spc"),
         *("batch", "watch", "query", "capture", "send", "store add", "store compact", "store export"),
     ],
 )
@@ -152,9 +178,9 @@ def test_the_help_of_every_estimator_explains_each_method() -> None:
     commands = {name: loaded(command) for name, command in typer.main.get_command(app).commands.items()}
     for name in ("reconstruct", "normals", "inspect", "grr"):
         (told,) = [option.help for option in commands[name].params if option.name == "method"]
-        for method in get_args(Method):
+        for method in ALL_METHODS:
             assert f"{method}: " in told, (name, method)
-        assert "without balls and a material, under fewer than 6 lights" in told
+        assert "without balls and a material, under fewer than 4 lights" in told
         assert ": blind. robust-filter: " in told
     (told,) = [option.help for option in commands["evaluate"].params if option.name == "method"]
     for method in METHODS:
@@ -240,6 +266,18 @@ def test_wrong_use_is_exit_code_2(tmp_path: Path, arguments: list[str], words: s
     assert words in run.stderr
     assert "Traceback" not in run.stderr
     assert list(tmp_path.iterdir()) == [], "nothing is left behind"
+
+
+def test_a_process_ends_in_the_same_code_and_words(tmp_path: Path) -> None:
+    run = bgars_process("reconstruct", "nowhere", "-o", "out", cwd=tmp_path)
+    assert (run.returncode, run.stdout, run.stderr) == (2, "", "error: nowhere: no such folder\n")
+
+
+def test_inspect_draws_on_a_process_of_its_own(tmp_path: Path) -> None:
+    run = bgars_process("inspect", bgars.sample_capture(), "-o", tmp_path / "out", "--json")
+    assert run.returncode == 1, run.stderr
+    assert run.stderr == ""
+    assert set(json.loads(run.stdout)["output"]) == {path.name for path in (tmp_path / "out").iterdir()}
 
 
 def test_an_output_that_cannot_be_written_fails_before_the_work(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import re
 import subprocess
 import sys
@@ -45,9 +46,14 @@ def header_of(folder: Path, name: str) -> str:
     return (folder / f"{name}.csv").read_text(encoding="utf-8").split("\n", 1)[0]
 
 
-def bgars_command(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+def experiments_command(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "bgars", *map(str, arguments)], capture_output=True, text=True, check=False, cwd=cwd
+        [sys.executable, "-m", "experiments", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=cwd,
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])},
     )
 
 
@@ -206,8 +212,8 @@ def test_least_squares_over_chosen_lights_is_numpys() -> None:
 
 def test_the_command_prints_json_and_links_from_a_page_elsewhere(tmp_path: Path) -> None:
     (tmp_path / "docs").mkdir()
-    run = bgars_command(
-        *("experiment", "fig9", "-o", "docs/images/x", "--page", "docs/x.md", "--radius-px", 12, "--json"), cwd=tmp_path
+    run = experiments_command(
+        *("fig9", "-o", "docs/images/x", "--page", "docs/x.md", "--radius-px", 12, "--json"), cwd=tmp_path
     )
     assert run.returncode == 0, run.stderr
     assert run.stderr == "", "quiet in pipes"
@@ -226,7 +232,7 @@ def test_a_page_in_the_output_folder_is_one_of_its_files(tmp_path: Path) -> None
 
 
 def test_help_lists_every_experiment_in_a_line() -> None:
-    run = bgars_command("experiment", "--help")
+    run = experiments_command("--help")
     assert run.returncode == 0
     for name in (*EXPERIMENTS, "all"):
         assert re.search(rf"\b{name}\b", run.stdout), name
@@ -242,7 +248,7 @@ def test_help_lists_every_experiment_in_a_line() -> None:
     ],
 )
 def test_bad_input_is_exit_code_2_and_leaves_nothing(tmp_path: Path, arguments: list[str], words: list[str]) -> None:
-    run = bgars_command("experiment", *arguments, cwd=tmp_path)
+    run = experiments_command(*arguments, cwd=tmp_path)
     assert run.returncode == 2, run.stdout
     for part in words:
         assert part in run.stderr

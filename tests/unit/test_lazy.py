@@ -49,6 +49,22 @@ def test_every_public_name_can_be_had_and_is_what_type_checkers_see() -> None:
 
 def test_a_function_is_not_replaced_by_a_module_of_its_name() -> None:
     loaded_by(
-        "import bgars.evaluate, bgars.simulate.scene, bgars.records.findings;"
+        "import bgars.pipelines.evaluate, bgars.simulate.scene, bgars.records.findings, bgars.pipelines.inspect;"
         "assert callable(bgars.evaluate) and callable(bgars.simulate) and callable(bgars.check)"
     )
+
+
+def test_ordinary_parts_need_no_scipy(tmp_path: Path) -> None:
+    call = f"""
+import contextlib, sys
+from bgars.cli.app import main
+for name in ("inspect", "reconstruct"):
+    sys.argv = ["bgars", name, {str(bgars.sample_capture())!r}, "-o", {str(tmp_path)!r} + "/" + name, "--json"]
+    with contextlib.suppress(SystemExit):
+        main()
+print()
+print("loaded", *(name for name in sys.modules if name in {{"scipy.fft", "scipy.ndimage", "scipy.optimize"}}))
+"""
+    run = subprocess.run([sys.executable, "-c", call], capture_output=True, text=True, check=True)
+    assert run.stdout.splitlines()[-1] == "loaded"
+    assert {path.name for path in tmp_path.iterdir()} == {"inspect", "reconstruct"}

@@ -205,7 +205,6 @@ def test_diameters_of_found_balls_are_covered_on_captures_of_all_kinds(
     assert all(share >= 0.45 for share in shares), shares
 
 
-@pytest.mark.xfail(strict=True, reason="0.876: what stretches of edge scatter beyond their noise is stated too large")
 def test_diameters_of_found_balls_are_not_covered_too_often(diameters_within_u: list[NDArray[np.bool_]]) -> None:
     assert np.concatenate(diameters_within_u).mean() <= 0.86
 

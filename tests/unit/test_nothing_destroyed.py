@@ -192,3 +192,57 @@ def _is_number(cell: str) -> bool:
         return bool(np.isscalar(float(cell)))
     except ValueError:
         return False
+
+
+def heights(tmp_path: Path) -> Path:
+    path = tmp_path / "heights.tif"
+    bgars.write_height(bgars.HeightMap.from_array(np.zeros((4, 5), np.float32), pixel_pitch_um=10.0), path)
+    return path
+
+
+@pytest.mark.parametrize("suffix", ["ply", "obj", "stl", "glb"])
+def test_a_mesh_replaces_its_own_kind_and_nothing_else(suffix: str, tmp_path: Path) -> None:
+    source, output = heights(tmp_path), tmp_path / f"part.{suffix}"
+    assert command("mesh", source, "-o", output)[0] == 0
+    assert is_own(output)
+    assert command("mesh", source, "-o", output)[0] == 0, "again, over its own"
+    output.write_bytes(b"a scan of last year")
+    assert "bgars did not write it" in command("mesh", source, "-o", output)[1]
+    assert output.read_bytes() == b"a scan of last year"
+
+
+def test_a_material_replaces_no_recipe(tmp_path: Path) -> None:
+    mine = tmp_path / "part.toml"
+    mine.write_text('name = "mine"\nrows = 4\n', encoding="utf-8")
+    said = command("calibrate", "material", bgars.sample_capture(), "-o", mine)[1]
+    assert "bgars did not write it" in said
+    assert mine.read_text(encoding="utf-8").startswith('name = "mine"')
+
+
+def test_own_tables_of_text_are_known(tmp_path: Path) -> None:
+    lobe = bgars.SurfaceLobe(strength_level=255.0, roughness=0.2, tail=0.0)
+    bgars.write_material(bgars.SurfaceMaterial(30.0, 0.0, 0.0, (lobe,), "smith", gains=(1.0,) * 8), tmp_path / "m.toml")
+    bgars.write_station(bgars.Station("bench"), tmp_path / "s.toml")
+    assert is_own(tmp_path / "m.toml")
+    assert is_own(tmp_path / "s.toml")
+    assert not any(is_own(path) for path in bgars.sample_capture().glob("*.toml"))
+
+
+def test_a_page_replaces_no_page_of_others(tmp_path: Path) -> None:
+    page = tmp_path / "report.html"
+    page.write_text("<html>minutes of a meeting</html>", encoding="utf-8")
+    assert "bgars did not write it" in command("check", bgars.sample_capture(), "-o", page)[1]
+    assert "bgars did not write it" in command("report", tmp_path, "-o", page)[1]
+    assert page.read_text(encoding="utf-8") == "<html>minutes of a meeting</html>"
+
+
+def test_an_experiment_replaces_its_own_files_and_no_others(tmp_path: Path) -> None:
+    run = ("experiment", "fig3", "-o", tmp_path, "--radius-px", "12")
+    assert command(*run)[0] == 0
+    assert command(*run)[0] == 0, "again, over its own"
+    for name in ("fig3.md", "fig3.csv", "fig3.png"):
+        for path in tmp_path.iterdir():
+            path.unlink()
+        (tmp_path / name).write_bytes(b"mine")
+        assert "is there already" in command(*run)[1]
+        assert content(tmp_path) == {name: b"mine"}

@@ -71,6 +71,12 @@ def test_the_command_prints_tables_csv_and_json(store: bgars.Store) -> None:
     assert "parts (8 rows)" in run(store.folder).output
 
 
+def test_no_cell_of_csv_is_a_formula(store: bgars.Store) -> None:
+    sql = """select '=1+2' as "=name", '@x' as at, -1.5 as number, ['+a', 'b'] as list"""
+    rows = list(csv.reader(io.StringIO(run(store.folder, sql, "--csv").output)))
+    assert rows == [["'=name", "at", "number", "list"], ["'=1+2", "'@x", "-1.5", "'+a; b"]]
+
+
 @pytest.mark.parametrize(
     ("sql", "words"),
     [

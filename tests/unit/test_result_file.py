@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import json
+import math
 import runpy
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import bgars
 import jsonschema
 import pytest
+from bgars.io.result_schema import table_of
 from bgars.records.ball_layout import BallLayout
+from bgars.records.keys import Key, as_plain, keys_of
+from bgars.records.part_check import PartCheck
 from bgars.records.part_recipe import PartRecipe
+from bgars.records.seating_result import SeatingResult
 from judged_parts import LIMITS, RECIPE, judged
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -72,6 +77,26 @@ def test_the_published_schema_is_the_generated_one() -> None:
             assert len(entry["description"]) > 10, key
             if key.endswith("_um"):
                 assert " um" in entry["description"] or "um " in entry["description"], key
+
+
+@pytest.mark.parametrize("record", [bgars.PartResult, bgars.BallResult, PartCheck, SeatingResult, bgars.PartRecipe])
+def test_every_field_of_a_result_is_a_key_of_the_file(record: type) -> None:
+    assert [entry.name for entry in fields(record) if entry.name != "surface"] == list(keys_of(record))
+
+
+def test_a_field_is_all_that_a_reading_takes() -> None:
+    @dataclass(frozen=True)
+    class Weighed:
+        """A ball on a balance."""
+
+        mass_ug: Annotated[float, Key("mass of the solder, in ug", is_late=True)] = math.nan
+
+    assert as_plain(Weighed()) == {"mass_ug": None}
+    table = table_of(Weighed)
+    assert table.model_validate({}).mass_ug is None
+    assert table.model_json_schema()["properties"]["mass_ug"]["description"] == "mass of the solder, in ug"
+    with pytest.raises(ValueError, match="mass_ug"):
+        table.model_validate({"mass_ug": "heavy"})
 
 
 def test_what_a_recipe_knows_of_balls_and_lattice_comes_back(tmp_path: Path) -> None:

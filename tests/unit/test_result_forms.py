@@ -11,7 +11,7 @@ from pathlib import Path
 
 import bgars
 import pytest
-from bgars.io.result_schema import BallTable
+from bgars.records.keys import keys_of
 from cfx_names import ENUMERATIONS, MESSAGE_NAME, PROPERTIES, SUGGESTED_CATEGORIES, VERSION
 from judged_parts import LIMITS, RECIPE, judged
 
@@ -68,7 +68,7 @@ def test_parquet_holds_every_reading_with_its_unit(tmp_path: Path) -> None:
             value = getattr(ball, entry.name)
             known = not (isinstance(value, float) and math.isnan(value))
             assert row[entry.name] == ((list(value) if isinstance(value, tuple) else value) if known else None)
-    assert set(BallTable.model_fields) - {"budget"} <= set(table.column_names)
+    assert set(keys_of(bgars.BallResult)) - {"budget"} <= set(table.column_names)
     empty = replace(result, balls=())
     bgars.write_parquet(empty, tmp_path / "none.parquet")
     assert parquet.read_table(tmp_path / "none.parquet").schema.equals(table.schema)

@@ -17,6 +17,7 @@ from bgars.errors import InputError
 from bgars.records.ball_names import ball_name
 from bgars.records.found_balls import FoundBall, FoundBalls
 from bgars.records.scalar_checks import thread_count
+from bgars.records.whole_capture import need_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bgars.balls.rim_fit import Circles
-    from bgars.records.ball_layout import BallLayout
+    from bgars.records.ball_layout import BallLayout, LayoutPlace
     from bgars.records.capture import Capture
 
 __all__ = ["find_balls"]
@@ -104,6 +105,7 @@ def find_balls(
     if layout is not None and capture.pixel_pitch_um is None:
         msg = "layout: needs capture.pixel_pitch_um, which is None, to lay micrometres over pixels"
         raise InputError(msg)
+    need_whole(capture)
     levels = Levels(capture, threads)
     found = find_circles(levels, progress)
     x_px = found.circles.col + 0.5 - levels.width / 2
@@ -225,14 +227,14 @@ def _from_layout(
             missing_px.append((float(x), float(y)))
         else:
             names[ball], row[ball], col[ball] = name, r, c
-    rows = layout.rows or max(place[1] for place in places) + 1
-    cols = layout.cols or max(place[2] for place in places) + 1
+    rows = layout.rows or max(place.row for place in places) + 1
+    cols = layout.cols or max(place.col for place in places) + 1
     # The place (0, 0), which need not have a ball.
-    first = min(places, key=lambda place: (place[1], place[2]))
-    left_um, top_um = min(place[3] for place in places), max(place[4] for place in places)
+    first = min(places, key=lambda place: (place.row, place.col))
+    left_um, top_um = min(place.x_um for place in places), max(place.y_um for place in places)
     if layout.pitch_um is not None:
         left_um, top_um = 0.0, 0.0
-    shift = (left_um - first[3] + 1j * (top_um - first[4])) * fit.scale_px_per_um * np.exp(1j * fit.angle_rad)
+    shift = (left_um - first.x_um + 1j * (top_um - first.y_um)) * fit.scale_px_per_um * np.exp(1j * fit.angle_rad)
     at = places.index(first)
     pitch_um = layout.pitch_um or _nearest_distance_um(places)
     return _Grid(
@@ -249,11 +251,11 @@ def _from_layout(
     )
 
 
-def _nearest_distance_um(places: tuple[tuple[str, int, int, float, float], ...]) -> float | None:
+def _nearest_distance_um(places: tuple[LayoutPlace, ...]) -> float | None:
     """Median distance to the nearest other place."""
     if len(places) < 2:  # noqa: PLR2004 - a distance needs two
         return None
-    points = np.array([x + 1j * y for *_, x, y in places])
+    points = np.array([place.x_um + 1j * place.y_um for place in places])
     apart = np.abs(points[:, None] - points)
     np.fill_diagonal(apart, np.inf)
     return float(np.median(apart.min(axis=1)))

@@ -1,55 +1,129 @@
-"""Light that is in every image: daylight, a lamp that stays on, a black level that nobody took away.
+"""Light that is in every image: daylight, a lamp that stays on, stray light in the lens, a black level left in.
 
-In cast shadows only such light is left. They are looked for where they must be: on level ground, with something steep
-between it and the lamp (`cast_shadows.py`).
+Nothing is darker than such light. Light from neighbours fades into the depth of shadows, so that without it the
+darkness of shadows has no lower end but zero. The lower end is extrapolated from three percentiles of what lies in cast
+shadow: level - a = C p^k (as for the location of a Weibull distribution).
+
+References
+----------
+S. D. Dubey, Some percentile estimators for Weibull parameters, Technometrics 9 (1967) 119-129.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bgars.checks.cast_shadows import behind_steep
+from bgars.checks.patches import box_blocks, cut_patches
 from bgars.records.findings import Finding
 
 if TYPE_CHECKING:
-    from bgars.checks.view import View
+    from bgars.records.capture import Capture
 
-__all__ = ["check_ambient", "shadow_floor"]
+__all__ = ["ShadowFloor", "check_ambient", "shadow_floor"]
 
-AMBIENT = 0.20
-"""Light in cast shadows, of the light beside them: neighbours give up to 12 percent, and so much tilts
-normals by degrees."""
-NO_SHADOW = 0.8
-"""Of the light beside them: so bright a place is in no shadow at all."""
-DARKEST_PERCENT = (5.0, 10.0)
-"""Percentiles of the light behind something steep that must both be shadows: not all that is steep casts one."""
-MIN_PIXELS = 100
+Array = NDArray[np.float64]
+Floats = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+AMBIENT = 0.02
+"""Of the light of the lit surface: so much on a slope of 45 degrees under lamps at 45 degrees tilts it by a degree."""
+LEVELS = 1.0
+"""Grey levels of 8 bits below which a floor is rounding, of image and dark frame: three standard errors."""
+LOW_PERCENT, HIGH_PERCENT = 1.0, 25.0
+"""Of shadowed places, sorted; a third between them in equal ratios."""
+MOST_LOW_PERCENT = 5.0
+LOW_PLACES = 20
+"""Places below the lowest percentile, at least: fewer do not fix it."""
+SHADOWED = 0.6
+"""Of what the other lights promise: less is shadow."""
+FACES = 0.3
+"""Of the lit level: a promise of less is no evidence."""
+LIT_QUANTILE = 0.6
+"""Of the lights of a pixel: most light it."""
+DROPPED = 4
+"""One light in so many, the brightest ones, may be a highlight."""
+MIN_SHARE = 0.01
+"""Shadowed places, of all pairs of place and light: fewer are slips of the promise."""
+BLOCK_PX = 3
+FAINT = 3.0 / 255.0
+"""Lit level below which everything is dark."""
+SOLVABLE = 1e-3
+"""Determinant of three directions, squared: below, they lie in one plane to some degrees."""
 
 
-def shadow_floor(view: View, lights: NDArray[np.float64]) -> tuple[float, float] | None:
-    """Light that is left in cast shadows, of that beside them, at two percentiles; None where there are none."""
-    share = behind_steep(view, lights)
-    if share.size < MIN_PIXELS:
+class ShadowFloor(NamedTuple):
+    """Lower end of shadows and usual lit level, of full scale; shadowed places."""
+
+    floor: float
+    lit: float
+    places: int
+
+
+def shadow_floor(capture: Capture, lights: Array) -> ShadowFloor | None:
+    """Return what is left in the deepest cast shadows; None where there are none."""
+    gains = capture.rig.intensities.astype(np.float32)
+    if len(gains) != len(lights):
         return None
-    low, high = np.percentile(share, DARKEST_PERCENT)
-    return float(low), float(high)
+    shadows, lit, pairs = [], [], 0
+    for patch in cut_patches(capture):
+        if min(patch.inside.shape) < BLOCK_PX:
+            continue
+        inside = box_blocks(patch.inside.astype(np.float32), BLOCK_PX) > 0.99  # noqa: PLR2004 - all of a block
+        levels = box_blocks(patch.levels, BLOCK_PX)[:, inside] / gains[:, None]
+        levels[box_blocks(patch.clipped.astype(np.float32), BLOCK_PX)[:, inside] > 0] = np.inf
+        usual = np.quantile(levels, LIT_QUANTILE, axis=0, method="lower")
+        used = np.isfinite(usual) & (usual > FAINT)
+        levels, usual = levels[:, used], usual[used]
+        shadows.append((levels * gains[:, None])[_in_shadow(levels, usual, lights)])
+        lit.append(usual)
+        pairs += levels.size
+    if not lit or pairs == 0:
+        return None
+    dark = np.concatenate(shadows)
+    percent = max(LOW_PERCENT, 100.0 * LOW_PLACES / max(dark.size, 1))
+    if dark.size < MIN_SHARE * pairs or percent > MOST_LOW_PERCENT:
+        return None
+    percents = (percent, (percent * HIGH_PERCENT) ** 0.5, HIGH_PERCENT)
+    low, middle, high = (float(each) for each in np.percentile(dark, percents))
+    bend = low + high - 2.0 * middle
+    floor = (low * high - middle**2) / bend if bend > 0.0 else low - (high - low)
+    return ShadowFloor(min(floor, low), float(np.median(np.concatenate(lit))), int(dark.size))
 
 
-def check_ambient(view: View, lights: NDArray[np.float64]) -> list[Finding]:
+def _in_shadow(levels: Floats, usual: Floats, lights: Array) -> Mask:
+    """(L, N) places that get far less than the brighter lights, but for the brightest ones, promise."""
+    count = len(levels)
+    top = count - (count // DROPPED if count > 4 else 0)  # noqa: PLR2004 - three lights are needed
+    rank = np.argsort(np.argsort(levels, axis=0), axis=0)
+    keep = (rank < top) & (rank >= top - max(3, min(count // 2, top))) & np.isfinite(levels)
+    weight = keep.astype(np.float64)
+    products = (lights[:, :, None] * lights[:, None, :]).reshape(count, 9)
+    matrix = (weight.T @ products).reshape(-1, 3, 3)
+    right = np.where(keep, levels, 0.0).T.astype(np.float64) @ lights
+    solved = np.abs(np.linalg.det(matrix)) > SOLVABLE
+    matrix[~solved] = np.eye(3)
+    promise = lights @ np.linalg.solve(matrix, right[..., None])[..., 0].T
+    shadowed: Mask = solved & ~keep & (levels < SHADOWED * promise) & (promise > FACES * usual) & (levels < usual)
+    return shadowed
+
+
+def check_ambient(capture: Capture, lights: Array) -> list[Finding]:
     """Find light common to all images."""
-    floor = shadow_floor(view, lights)
-    if floor is None or floor[0] < AMBIENT or floor[1] > NO_SHADOW:
+    found = shadow_floor(capture, lights)
+    if found is None or found.floor < LEVELS / 255.0 or found.floor < AMBIENT * found.lit:
         return []
+    share = found.floor / found.lit
     return [
         Finding(
             "ambient",
             "warning",
-            f"cast shadows still have {floor[0]:.0%} of the light beside them: ambient light, or a black level",
+            f"the deepest shadows still have {share:.0%} of the light of the lit surface: ambient light, stray light, "
+            "or a black level",
             "darken the room, take an image with all lamps off and give it as 'dark' in capture.toml (or black_level)",
-            value=floor[0],
+            value=share,
             limit=AMBIENT,
             unit="of the light",
         )

@@ -23,7 +23,7 @@ from bgars.checks.view import TILES, tile_sums
 if TYPE_CHECKING:
     from bgars.checks.view import View
 
-__all__ = ["ShadowVerdict", "behind_steep", "judge_shadows"]
+__all__ = ["ShadowVerdict", "judge_shadows"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -87,18 +87,6 @@ def _sides(ground: _Ground, light: Array) -> tuple[Mask, Mask]:
         return nothing, nothing
     towards, away = (_near(ground.upright, side * light[:2] / across) for side in (1.0, -1.0))
     return ground.level & towards & ~away, ground.level & away & ~towards
-
-
-def behind_steep(view: View, lights: Array) -> Array:
-    """(N,) light, of what its normal promises, of level ground behind something steep as the lamps see it."""
-    ground = _ground(view, lights)
-    if ground is None:
-        return np.zeros(0)
-    found = []
-    for index, light in enumerate(lights):
-        towards, _ = _sides(ground, light)
-        found.append(ground.share[index][towards & ground.lit[index]])
-    return np.concatenate(found)
 
 
 def judge_shadows(view: View) -> ShadowVerdict:

@@ -1,47 +1,149 @@
-"""Images blurred against the others."""
+"""Images blurred against the others: the share of fine detail in each, whatever the detail is.
+
+Of every image two bands of detail are taken, one of about a pixel and one of about two. Blur takes more of the finer
+one; contrast, albedo and the strength of a lamp act on both alike. Edges of parts and shadows are as sharp under every
+lamp, so that the images are compared with each other. The same bands of the other images, blurred step by step, turn
+what is missing into the variance of a blur.
+"""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bgars.checks.evidence import critical_t
+from bgars.checks.patches import cut_patches
 from bgars.records.findings import Finding
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
-    from bgars.checks.windows import FrameFit
+    from bgars.checks.patches import Patch
+    from bgars.records.capture import Capture
 
 __all__ = ["check_focus"]
 
-BLURRED_PX2 = 0.8
-"""Variance of added blur that is told: standard deviation 0.9 px, a little more than a good lens has itself."""
-OF_OTHERS = 8.0
-"""Times the usual difference of the other images from their median."""
+Array = NDArray[np.float64]
+Floats = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+BLURRED_PX2 = 0.35
+"""Variance of added blur that is told: half of that of a sharp lens and its pixels."""
+OF_OTHERS = 5.0
+"""Times the usual difference between the other images."""
+EQUAL = 0.003
+"""Logarithm of the share of fine detail to which images are equal, at best."""
+MIN_IMAGES = 4
+PASS_PX2 = 0.5
+"""Variance of one binomial filter of three pixels."""
+STEPS = (0, 1, 2, 4, 6)
+"""Passes after which the bands are taken."""
+BAND, NEXT_BAND, PASSES = (1, 3), (2, 6), 12
+"""Passes between which lie the finer and the coarser band; passes in all."""
+TILE_PX = 48
+COVERED = 0.3
+"""Share of a tile that must be inside the mask and unclipped."""
+MIN_TILES = 4
 
 
-def check_focus(fit: FrameFit, names: Sequence[str]) -> list[Finding]:
-    """Find an image that is less sharp than the others."""
-    if len(names) < 6:  # noqa: PLR2004 - of fewer, what is left over does not tell which it is
+def check_focus(capture: Capture, kept: NDArray[np.intp], names: Sequence[str]) -> list[Finding]:
+    """Find an image that is less sharp than the others.
+
+    Parameters
+    ----------
+    capture : Capture
+    kept : (K,) intp
+        Images with light of their own.
+    names : sequence of str
+        Of these.
+    """
+    if len(kept) < MIN_IMAGES:
         return []
-    middle = float(np.median(fit.blur_px2))
-    added = fit.blur_px2 - middle
-    index = int(np.argmax(added))
-    usual = float(np.median(np.abs(np.delete(added, index))))
-    certain = added[index] > critical_t(fit.tiles, len(names)) * fit.u_blur_px2[index]
-    if added[index] < BLURRED_PX2 or not certain or added[index] < OF_OTHERS * usual:
+    tiles = np.array([each for patch in cut_patches(capture) for each in _energies(patch.levels[kept], _bad(patch))])
+    if len(tiles) < MIN_TILES:
         return []
+    total = tiles.sum(axis=0)
+    detail = _detail(total)
+    apart = _apart(detail[0])
+    left_out = np.array([_apart(_detail(total - each)[0]) for each in tiles])
+    error = np.sqrt((len(tiles) - 1) * left_out.var(axis=0))
+    index = int(np.argmin(apart))
+    others = np.delete(apart, index)
+    usual = max(float(1.4826 * np.median(np.abs(others - np.median(others)))), EQUAL)
+    sharp = np.median(np.delete(detail, index, axis=1), axis=1)
+    if not (np.diff(sharp) < 0.0).all():
+        return []
+    blur_px2 = float(np.interp(-detail[0, index], -sharp, PASS_PX2 * np.array(STEPS)))
+    certain = -apart[index] > critical_t(len(tiles), len(kept)) * error[index] and -apart[index] > OF_OTHERS * usual
+    if blur_px2 < BLURRED_PX2 or not certain:
+        return []
+    more = "at least " if blur_px2 >= PASS_PX2 * STEPS[-1] else "about "
     return [
         Finding(
             "focus",
             "warning",
-            f"{names[index]} is blurred against the others (about {added[index] ** 0.5:.1f} px more)",
+            f"{names[index]} is blurred against the others ({more}{blur_px2**0.5:.1f} px more)",
             "look for vibration, a moved focus ring, or autofocus between the images, and take it again",
             image=index,
-            value=float(added[index] ** 0.5),
+            value=blur_px2**0.5,
             limit=BLURRED_PX2**0.5,
             unit="px",
         )
     ]
+
+
+def _detail(energy: Array) -> Array:
+    """(S, L) logarithm of finer over coarser detail, at each step of blur."""
+    ratio: Array = np.log(np.maximum(energy[:, 0], 1e-12) / np.maximum(energy[:, 1], 1e-12))
+    return ratio
+
+
+def _apart(detail: Array) -> Array:
+    """(L,) each image against the median of all."""
+    apart: Array = detail - np.median(detail)
+    return apart
+
+
+def _bad(patch: Patch) -> Mask:
+    """(h, w) pixels near something clipped, or outside."""
+    bad: Mask = patch.clipped.any(axis=0) | ~patch.inside
+    for _ in range(PASSES // 2):
+        wider = bad.copy()
+        wider[1:] |= bad[:-1]
+        wider[:-1] |= bad[1:]
+        wider[:, 1:] |= bad[:, :-1]
+        wider[:, :-1] |= bad[:, 1:]
+        bad = wider
+    return bad
+
+
+def _energies(levels: Floats, bad: Mask) -> Iterator[Array]:
+    """(S, 2, L) sums of squares of both bands, at each step of blur, of every tile."""
+    if min(bad.shape) <= 2 * PASSES:
+        return
+    smooth: list[Floats] = [levels]
+    for _ in range(PASSES):
+        smooth.append(_binomial(smooth[-1]))
+    rows, cols = (each - 2 * PASSES for each in bad.shape)
+    inner = [
+        each[..., PASSES - done : PASSES - done + rows, PASSES - done : PASSES - done + cols]
+        for done, each in enumerate(smooth)
+    ]
+    use = ~bad[PASSES:-PASSES, PASSES:-PASSES]
+    squares = np.array(
+        [[np.square(inner[step + low] - inner[step + high]) * use for low, high in (BAND, NEXT_BAND)] for step in STEPS]
+    )
+    for row in range(0, rows, TILE_PX):
+        for col in range(0, cols, TILE_PX):
+            at = np.s_[..., row : row + TILE_PX, col : col + TILE_PX]
+            if use[at].mean() >= COVERED:
+                yield squares[at].sum(axis=(-2, -1), dtype=np.float64)
+
+
+def _binomial(stack: Floats) -> Floats:
+    """Filter (1, 2, 1) / 4 along both axes, where it fits."""
+    quarter, half = np.float32(0.25), np.float32(0.5)
+    rows = quarter * (stack[..., :-2, :] + stack[..., 2:, :]) + half * stack[..., 1:-1, :]
+    return np.asarray(quarter * (rows[..., :-2] + rows[..., 2:]) + half * rows[..., 1:-1], np.float32)

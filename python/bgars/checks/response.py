@@ -13,14 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.checks.evidence import critical_t
-from bgars.checks.view import tile_sums
+from bgars.checks.noise_levels import FALLS, noise_curve, noise_falls
+from bgars.checks.view import tile_sums, used_scale
 from bgars.records.findings import Finding
 
 if TYPE_CHECKING:
     from bgars.checks.view import View
     from bgars.records.capture import Capture
 
-__all__ = ["check_response", "curvature"]
+__all__ = ["check_noise_of_levels", "check_response", "curvature"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -34,6 +35,10 @@ STRONGEST = 2.4
 SHADED = 0.2
 """Relative change between the lights, root of the sum of squares: pixels that see less cannot show how it bends."""
 MIN_PIXELS = 150
+ADVICE = (
+    "switch gamma (sRGB, tone curves) off in the camera, or state the response in capture.toml: 'srgb', a gamma, or a "
+    "measured table"
+)
 JPEG = (".jpg", ".jpeg")
 
 
@@ -59,6 +64,28 @@ def curvature(view: View, lit: Mask, lights: Array) -> tuple[float, float, float
     return bend, error, tiles
 
 
+def check_noise_of_levels(capture: Capture) -> list[Finding]:
+    """Find a camera curve by its noise, which falls from the shadows to the lit surface."""
+    if capture.images.dtype.kind != "u":
+        return []
+    curve = noise_curve(capture)
+    ratio = 0.0 if curve is None else noise_falls(curve, 1.0 / used_scale(capture, capture.images))
+    if ratio < FALLS:
+        return []
+    return [
+        Finding(
+            "response",
+            "warning",
+            f"grey levels are not linear in light: the noise of dark parts is {ratio**0.5:.1f} times that of bright "
+            "ones, which no linear camera does",
+            ADVICE,
+            value=ratio,
+            limit=FALLS,
+            unit="ratio of variances",
+        )
+    ]
+
+
 def check_response(capture: Capture, view: View, lit: Mask, lights: Array) -> list[Finding]:
     """Find a camera curve that was not undone."""
     if len(lights) < 5 or not lit.any():  # noqa: PLR2004 - one degree of freedom does not tell
@@ -73,8 +100,7 @@ def check_response(capture: Capture, view: View, lit: Mask, lights: Array) -> li
                 "response",
                 "warning",
                 f"grey levels are not linear in light: they look like {told}",
-                "switch gamma (sRGB, tone curves) off in the camera, or state the response in capture.toml: gamma, "
-                "or a measured table",
+                ADVICE,
                 value=gamma,
                 limit=1.0 - 2.0 * BENT,
                 unit="gamma",

@@ -19,12 +19,13 @@ from bgars.checks.moments import lit_everywhere, moments_by
 from bgars.checks.motion import check_motion
 from bgars.checks.noise import check_noise
 from bgars.checks.orientation import check_orientation
-from bgars.checks.response import check_response
+from bgars.checks.response import check_noise_of_levels, check_response
 from bgars.checks.table import check_table
 from bgars.checks.view import TILES, make_view
 from bgars.checks.vignetting import check_vignetting
 from bgars.checks.windows import cut_windows, fit_frames
 from bgars.records.findings import Finding, Findings
+from bgars.records.whole_capture import need_whole
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -52,10 +53,13 @@ def check_capture(capture: Capture) -> Findings:
     Findings
         The worst first. A capture without evidence (a flat, evenly lit field) has no findings on what it cannot show.
     """
+    need_whole(capture)
     view = make_view(capture)
     inside = view.values.max(axis=0) > 0.0
     below = check_below(view)
     view = view.with_lights(raised(view.lights))
+    if not inside.any():
+        return Findings.of(below + check_dark(view, inside))
     found = below + dead_lamps(view, inside) + check_bit_depth(capture)
     found += check_dark(view, inside) + check_clipped(view, inside)
     gone = [each.image for each in found if each.kind == "lamp-dead" and each.image is not None]
@@ -92,32 +96,31 @@ def _between(capture: Capture, view: View, gone: list[int]) -> list[Finding]:
 def _single(capture: Capture, view: View, lights: NDArray[np.float64], kept: NDArray[np.intp]) -> list[Finding]:
     """Checks of single images under the right table."""
     lit = lit_everywhere(view, lights)
-    found = check_ambient(view, lights) + check_vignetting(view, lit)
+    bent = check_noise_of_levels(capture)
+    if bent:
+        # All that follows compares grey levels as if they were light.
+        return bent
+    found = check_ambient(capture, lights) + check_vignetting(view, lit)
+    blurred = check_focus(capture, kept, view.names)
     if int(lit.sum()) < FEW_LIT:
-        return found
-    bent = check_response(capture, view, lit_everywhere(view, lights, matt=False), lights)
-    found += bent
-    if any(each.severity != "note" for each in bent):
+        return found + blurred
+    veiled = any(each.kind == "ambient" for each in found)
+    curved = [] if veiled else check_response(capture, view, lit_everywhere(view, lights, matt=False), lights)
+    found += curved
+    if any(each.severity != "note" for each in curved):
         return found
     uneven, factors = check_gains(view, moments_by(view, lit, view.tiles, TILES * TILES), lights)
     lights = lights * factors[:, None]
     found += uneven
     windows = cut_windows(capture, view)
     if windows is None or len(kept) != len(capture.rig):
-        return found
+        return found + blurred
     fit = fit_frames(windows, lights)
     if fit is None:
-        return found
+        return found + blurred
     moved = check_motion(fit, lights, view.names)
-    blurred = check_focus(fit, view.names)
-    # A shifted image looks blurred, and the other way round; a blurred one less noisy: the clearer cause is told.
-    if moved and blurred and _excess(blurred[0]) > _excess(moved[0]):
-        moved = []
-    return found + (moved or blurred or check_noise(fit, windows.level, view.names))
-
-
-def _excess(finding: Finding) -> float:
-    return (finding.value or 0.0) / (finding.limit or 1.0)
+    # A blurred image looks shifted, and less noisy; a shifted one is as sharp as the others.
+    return found + (blurred or moved or check_noise(fit, windows.level, view.names))
 
 
 def _renumbered(found: list[Finding], kept: NDArray[np.intp]) -> list[Finding]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from bgars.records.capture import Capture
     from bgars.records.pixels import PixelArray
 
-__all__ = ["TILES", "View", "linear_values", "make_view", "tile_sums"]
+__all__ = ["TILES", "View", "linear_values", "make_view", "tile_sums", "used_scale"]
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -122,15 +122,15 @@ def make_view(capture: Capture) -> View:
     small = _blocks(value * sub_mask, taps) / np.maximum(inside, np.float32(1e-6))
     clipped = np.asarray(_blocks((raw >= capture.saturation).astype(np.float32) * sub_mask, taps) > 0)
     use = (inside > 0.5) & (small.mean(axis=0) > MIN_SIGNAL) & np.isfinite(small).all(axis=0)  # noqa: PLR2004 - half
-    used = _used_scale(capture, raw) / capture.full_scale if np.isfinite(capture.full_scale) else 1.0
+    used = used_scale(capture, raw) / capture.full_scale if np.isfinite(capture.full_scale) else 1.0
     files = [path.name for path in capture.files] or list(capture.rig.files)
     names = tuple(files[index] if index < len(files) else f"image {index}" for index in range(len(raw)))
     return View(np.nan_to_num(small), use, clipped, lights, float(grid), names, used)
 
 
-def linear_values(capture: Capture, raw: PixelArray, dark: PixelArray | None) -> Floats:
+def linear_values(capture: Capture, raw: PixelArray, dark: NDArray[Any] | None) -> Floats:
     """Grey levels as linear light, of full scale, above the dark level."""
-    full = np.float32(_used_scale(capture, raw))
+    full = np.float32(used_scale(capture, raw))
     table = capture.response
     if table is not None and raw.dtype.kind == "u":
         value = table[raw.astype(np.intp)]
@@ -144,7 +144,7 @@ def linear_values(capture: Capture, raw: PixelArray, dark: PixelArray | None) ->
     return linear
 
 
-def _used_scale(capture: Capture, raw: PixelArray) -> float:
+def used_scale(capture: Capture, raw: PixelArray) -> float:
     """Full scale of the bits that are used: cameras write 10 to 14 bits into files of 16."""
     if raw.dtype.kind != "u":
         return capture.full_scale if np.isfinite(capture.full_scale) else max(float(np.nanmax(raw)), 1e-9)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -12,26 +11,27 @@ from typing import Annotated, Any, Literal
 import typer
 
 import bgars
-from bgars.cli.console import (
-    EXIT_BAD_INPUT,
-    activation,
-    fail,
-    notes_to_stderr,
-    print_json,
-    say,
-    shown_path,
-    stage_progress,
-)
+from bgars.cli.console import activation, print_json, say, shown_path, stage_progress
 from bgars.cli.evaluation import choice_in_words, evaluation_table
 from bgars.cli.lazy import LazyGroup
-from bgars.cli.options import ForceOption, MethodOption, StationOption
-from bgars.errors import BgarsError
-from bgars.extras import EXTRA_OF, how_to_install
+from bgars.cli.options import (
+    METHOD_ARGUMENTS,
+    ChannelChoice,
+    DirectxOption,
+    FlattenOption,
+    FolderArgument,
+    ForceOption,
+    JsonOption,
+    MaterialOption,
+    MethodOption,
+    OutOption,
+    StationOption,
+    ThresholdOption,
+)
+from bgars.cli.run import run
 from bgars.normals.methods import DEFAULT_METHOD, METHODS, Method
 
 __all__ = ["main"]
-
-ChannelOption = Literal["luminance", "mean", "red", "green", "blue"]
 
 app = typer.Typer(
     name="bgars",
@@ -43,50 +43,6 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-
-FolderArgument = Annotated[
-    Path,
-    typer.Argument(
-        metavar="FOLDER",
-        help=(
-            "Capture folder: images, and capture.toml, or light_directions.txt (DiLiGenT), one .lp file (RTI), "
-            "or another file about the lights (docs/captures.md)."
-        ),
-        show_default=False,
-    ),
-]
-OutOption = Annotated[
-    Path,
-    typer.Option("--output", "-o", metavar="OUT", help="Folder for the results; made if missing.", show_default=False),
-]
-ThresholdOption = Annotated[
-    float | None,
-    typer.Option(
-        help="Gap of specular-filter, in grey levels of 255, scaled with the bit depth; 50 by default.",
-        show_default=False,
-    ),
-]
-MaterialOption = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FILE",
-        help="Material for reflectance, from 'bgars calibrate material' under the same lights at the same exposure.",
-        show_default=False,
-    ),
-]
-ChannelChoice = Annotated[
-    ChannelOption | None,
-    typer.Option(help="How colour becomes one value (linear); the recipe's choice by default.", show_default=False),
-]
-DirectxOption = Annotated[bool, typer.Option("--directx", help="Write normals.png with green = y down.")]
-FlattenOption = Annotated[
-    Literal["plane", "quadratic"] | None,
-    typer.Option(
-        help="Take one plane, or one quadratic surface, off the heights: so wrong or near lights bend flat parts.",
-        show_default=False,
-    ),
-]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")]
 
 
 @app.callback(invoke_without_command=True)
@@ -185,7 +141,7 @@ def reconstruct(
     def run(capture: bgars.Capture, **options: Any) -> bgars.Reconstruction:  # noqa: ANN401
         surface = _material_from(material, capture)
         return bgars.reconstruct(
-            capture, method=method, threshold=threshold, material=surface, flatten=flatten, **options
+            capture, method=method, threshold=threshold, material=surface, flatten=flatten, check=False, **options
         )
 
     _need_places(folder, output)
@@ -283,6 +239,7 @@ def evaluate(
         typer.Option(
             "--method",
             "-m",
+            **METHOD_ARGUMENTS,
             help=f"Estimator; by default each of {', '.join(METHODS)}. blind is what reflectance uses without balls.",
             show_default=False,
         ),
@@ -325,27 +282,8 @@ def evaluate(
 
 
 def main() -> None:
-    """Run the command; an error becomes one line and exit code 2 (wrong use: 2 too, Ctrl-C: 130)."""
-    notes_to_stderr()
-    try:
-        app()
-    except BgarsError as error:
-        fail(str(error))
-    except ModuleNotFoundError as error:
-        if error.name not in EXTRA_OF:
-            raise
-        fail(f"this command {how_to_install(error.name)}")
-    except MemoryError as error:
-        fail(str(error) or "there is not enough memory for this; use fewer or smaller images")
-    except RecursionError:
-        fail("a file is nested too deeply to be read")
-    except OSError as error:
-        # A disk that is full, a name that is too long: no defect, and nothing that a trace explains.
-        name = "" if error.filename is None else f"{error.filename}: "
-        fail(f"{name}{error.strerror or error}")
-    else:
-        return
-    sys.exit(EXIT_BAD_INPUT)
+    """Run the command."""
+    run(app)
 
 
 def _need_places(folder: Path, output: Path) -> None:

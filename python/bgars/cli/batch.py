@@ -16,8 +16,8 @@ from rich.progress import Progress as Bar
 from bgars.cli.console import error_console, print_json, say
 from bgars.cli.inspect import EXIT_NOT_PASSED
 from bgars.cli.options import LotOption, MethodOption, OperatorOption, StationNameOption
-from bgars.line import Batch, Naming, inspect_many
-from bgars.line.batch import Progress
+from bgars.line.batch import Batch, Progress, inspect_many
+from bgars.line.naming import Naming
 from bgars.normals.methods import DEFAULT_METHOD
 from bgars.records.part_identity import PartIdentity
 from bgars.store import open_store

@@ -13,6 +13,7 @@ from bgars.cli.calibrate_station import register as register_station
 from bgars.cli.console import print_json, say, stage_progress
 from bgars.io.masks import read_mask
 from bgars.io.material_file import material_path
+from bgars.io.own_files import need_new_or_own
 from bgars.pipelines.reconstruct import summarise_fit
 from bgars.records.reflectance_fit import loss_in_words
 
@@ -74,6 +75,7 @@ def material(
     material that explains them; nothing is written then.
     """
     output = material_path(output)
+    need_new_or_own(output, sphere_mask)
     capture = bgars.read_capture(folder)
     anchors = None if sphere_mask is None else read_mask(sphere_mask, (capture.mask.shape[0], capture.mask.shape[1]))
     with stage_progress() as report:

@@ -13,6 +13,7 @@ from bgars.cli.camera_option import CameraOption, seen_by
 from bgars.cli.console import print_json, say, stage_progress, utc_now
 from bgars.errors import InputError
 from bgars.io.capture import read_unlit
+from bgars.io.own_files import need_new_or_own
 from bgars.io.station_file import is_station_file, read_station, write_station
 from bgars.report.figures.station_balls import write_balls
 from bgars.report.html.station_page import write_station_page
@@ -281,6 +282,8 @@ def _raw(folder: Path, known: Station) -> Capture:
 def keep_part(output: Path, parts: dict[str, Any], findings: tuple[Remark, ...], name: str | None = None) -> None:
     """Write the station with its new parts, and its page."""
     known = _existing(output)
+    for beside in (output.with_suffix(".html"), output.with_name(f"{output.stem}.flat.npz")):
+        need_new_or_own(beside)
     codes = {finding.code for finding in findings}
     kept = tuple(finding for finding in known.findings if finding.code not in codes)
     new = replace(known, **parts, calibrated_utc=utc_now(), findings=(*kept, *findings), name=name or known.name)

@@ -13,6 +13,7 @@ from bgars.cli.console import print_json, say
 from bgars.errors import InputError
 from bgars.io.atomic import FolderNames, atomic_file, atomic_folder
 from bgars.io.given_paths import need_folder, need_output
+from bgars.io.own_files import need_new_or_own
 from bgars.report.html.check_page import check_page
 
 if TYPE_CHECKING:
@@ -100,6 +101,7 @@ def _write_page(output: Path, page: str) -> Path:
         with atomic_folder(output, NAMES) as place:
             (place / PAGE_NAME).write_text(page, encoding="utf-8")
         return output / PAGE_NAME
+    need_new_or_own(output)
     output.parent.mkdir(parents=True, exist_ok=True)
     with atomic_file(output) as temporary:
         temporary.write_text(page, encoding="utf-8")

@@ -25,6 +25,8 @@ __all__ = [
     "activation",
     "error_console",
     "fail",
+    "is_command",
+    "may_start_processes",
     "notes_to_stderr",
     "print_json",
     "say",
@@ -36,6 +38,18 @@ __all__ = [
 ]
 
 EXIT_BAD_INPUT = 2
+_process = {"is_command": False}
+
+
+def is_command() -> None:
+    """Say that this process is a command's own, not one that calls it, as tests do."""
+    _process["is_command"] = True
+
+
+def may_start_processes() -> bool:
+    """Whether work may go to a process beside this one: the command's own, on more than one core and thread."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return _process["is_command"] and cores > 1 and os.environ.get("RAYON_NUM_THREADS") != "1"
 
 
 def error_console() -> Console:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import bgars
-from bgars.cli.console import print_json, say, say_files, stage_progress, utc_now, warn
+from bgars.cli.console import may_start_processes, print_json, say, say_files, stage_progress, utc_now, warn
 from bgars.cli.first_check import check_first
 from bgars.cli.options import ForceOption, LotOption, MethodOption, OperatorOption, StationNameOption, StationOption
 from bgars.errors import InputError
@@ -20,13 +21,17 @@ from bgars.io.atomic import FolderNames, atomic_folder
 from bgars.io.given_paths import need_file, need_folder, need_output
 from bgars.line.naming import identity_of
 from bgars.normals.methods import DEFAULT_METHOD
+from bgars.pipelines.check import told_by
 from bgars.records.part_identity import PartIdentity
 from bgars.report.figures.part import PICTURES
 from bgars.report.html.budget import main_causes
-from bgars.report.html.page import REPORT_FILES
+from bgars.report.html.files import REPORT_FILES
 
 if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
     from bgars.records.part_result import PartResult
+    from bgars.report.figures.process import PictureProcess
 
 __all__ = ["EXIT_NOT_PASSED", "register"]
 
@@ -126,21 +131,25 @@ def inspect(
     need_output(output, folder)
     pictures = _is_drawn(pictures, "the pictures are left out: drawing them", "matplotlib")
     page = _is_drawn(page, "report.html is left out: it", "plotly")
-    with stage_progress() as report, atomic_folder(output, NAMES) as place:
+    with stage_progress() as report, atomic_folder(output, NAMES) as place, _painter(wanted=pictures) as painter:
         part = None if recipe is None else bgars.read_part_recipe(recipe)
         capture = bgars.read_capture(folder, station=station)
-        check_first(capture, force=force)
-        result = bgars.inspect(capture, part, method=method, surface=page, progress=report)
+        findings = check_first(capture, force=force)
+        result = bgars.inspect(capture, part, method=method, surface=page, check=False, progress=report)
+        result = replace(result, warnings=(*told_by(findings), *result.warnings))
         named, identity = identity_of(capture, PartIdentity(lot=lot, station=station_name, operator=operator))
         result = replace(result, serial=serial or named, identity=identity, inspected_utc=utc_now())
         files = dict(FILES)
-        if pictures:
+        if painter is not None:
+            painter.start(result, capture, place)
+        elif pictures:
             files |= bgars.write_part_pictures(result, capture, place)
         (place / "result.json").write_text(result.to_json(), encoding="utf-8")
         (place / "balls.csv").write_text(result.to_csv(), encoding="utf-8")
-        if page:
-            pages = bgars.write_report(result, place / "report.html", capture=capture)
-            files = {"report.html": pages.pop("report.html"), **files, **pages}
+        pages = bgars.write_report(result, place / "report.html", capture=capture) if page else {}
+        if painter is not None:
+            files |= painter.finish()
+        files = {name: pages.pop(name) for name in ("report.html",) if page} | files | pages
         if parquet:
             bgars.write_parquet(result, place / PARQUET)
             files[PARQUET] = "the same in full digits, units in the columns' metadata"
@@ -155,6 +164,15 @@ def inspect(
         _tell(result, output, files)
     if result.verdict != "pass":
         raise typer.Exit(EXIT_NOT_PASSED)
+
+
+def _painter(*, wanted: bool) -> AbstractContextManager[PictureProcess | None]:
+    """A process for the pictures, where this one is the command's own and may use more than one core."""
+    if not wanted or not may_start_processes():
+        return nullcontext()
+    from bgars.report.figures.process import PictureProcess  # noqa: PLC0415 - loaded when it is used
+
+    return PictureProcess()
 
 
 def _is_drawn(wanted: bool, words: str, package: str) -> bool:

@@ -9,6 +9,8 @@ import typer
 from typer.core import TyperCommand
 
 from bgars.cli.arguments import CarefulGroup
+from bgars.cli.options import METHOD_METAVAR
+from bgars.normals.methods import TABLE, method_names
 
 __all__ = ["LAZY_COMMANDS", "LazyGroup"]
 
@@ -42,7 +44,6 @@ LAZY_COMMANDS = {
     ),
     "verify": ("bgars.cli.verify", "Compare a station with a part of known sizes: bias, linearity, repeatability."),
     "simulate": ("bgars.cli.simulate", "Photograph a simulated part with known truth."),
-    "experiment": ("bgars.cli.experiment", "Reproduce the paper's figures on simulated captures."),
 }
 """Of each command, in the order of the help: the module whose ``register`` adds it, and its line in the list."""
 
@@ -77,8 +78,24 @@ class _Listed(TyperCommand):
         return self.load().make_context(*args, **settings)
 
 
+def _with_added_methods(command: Any) -> None:  # noqa: ANN401
+    """Let the help of ``--method`` name the methods of installed packages, which are looked for when it is shown."""
+    shown = command.format_help
+
+    def format_help(*arguments: Any) -> None:  # noqa: ANN401
+        added = [name for name in method_names() if name not in TABLE]
+        for option in command.params if added else ():
+            if option.name == "method" and option.metavar == METHOD_METAVAR:
+                option.help = f"{option.help} Added by others: {', '.join(added)}."
+        shown(*arguments)
+
+    command.format_help = format_help
+
+
 def _reflow(command: Any) -> None:  # noqa: ANN401
     """Join the lines of each paragraph of the help, which the terminal's width then breaks."""
     command.help = "\n\n".join(" ".join(text.split()) for text in (command.help or "").split("\n\n"))
+    if any(option.name == "method" for option in getattr(command, "params", ())):
+        _with_added_methods(command)
     for each in getattr(command, "commands", {}).values():
         _reflow(each)

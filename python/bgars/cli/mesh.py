@@ -14,6 +14,7 @@ from bgars.io.height import HEIGHT_SUFFIXES, read_stored_height
 from bgars.io.mesh_files import MESH_SUFFIXES
 from bgars.io.normal_map import holds_normals, read_stored_normals
 from bgars.io.normal_map_pixels import NORMAL_MAP_SUFFIXES
+from bgars.io.own_files import need_new_or_own
 from bgars.pipelines.reconstruct import solver_fraction
 from bgars.records.scalar_checks import check_pitch
 from bgars.surface.integrate import IntegrationMethod, Solver
@@ -96,6 +97,7 @@ def mesh(
     is_normal_map = holds_normals(source) if has_content else source.suffix.lower() not in HEIGHT_SUFFIXES
     options = _integration(source, is_normal_map, {"--method": method, "--k": k, "--solver": solver})
     _check_source(source)
+    need_new_or_own(output, source, mask)
     check_pitch(pixel_pitch_um, "--pixel-pitch-um")
     if not is_normal_map and (mask is not None or directx is not None):
         msg = f"--mask, --directx, --opengl: {source} is a height map; leave them out"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 import imageio.v3 as iio
@@ -32,6 +33,8 @@ RECONSTRUCTION = FolderNames(
     frozenset({MARK}),
     judged=False,
 )
+
+WRITERS = ("write_mesh", "write_normal_map", "write_height")
 
 NORMALS = FolderNames(
     frozenset({"normals.png", "albedo.tif", "confidence.tif", "measured.png", "lights_kept.png"}),
@@ -67,12 +70,14 @@ def write_reconstruction(
         if missing("matplotlib"):
             del files["overview.png"]
             warn(f"overview.png is left out: it {how_to_install('matplotlib')}")
-        else:
-            bgars.write_overview(result, folder / "overview.png")
-        _write_mesh(result, folder / f"mesh.{mesh_format}")
-        bgars.write_normal_map(result.field, folder / "normals.png", directx=directx)
-        bgars.write_height(result.height, folder / "height.tif")
-        bgars.write_height(result.height, folder / "height.npy")
+        for name in WRITERS:
+            getattr(bgars, name)  # loaded by one thread
+        with ThreadPoolExecutor(1) as beside:
+            # Compressing and writing leave the interpreter to the picture.
+            written = beside.submit(_write_files, result, folder, mesh_format, directx)
+            if "overview.png" in files:
+                bgars.write_overview(result, folder / "overview.png")
+            written.result()
         summary = {
             "format": "bgars-reconstruction",
             "bgars": bgars.__version__,
@@ -82,6 +87,14 @@ def write_reconstruction(
         }
         (folder / MARK).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     return summary, files
+
+
+def _write_files(result: Reconstruction, folder: Path, mesh_format: str, directx: bool) -> None:
+    """Write all but the picture."""
+    _write_mesh(result, folder / f"mesh.{mesh_format}")
+    bgars.write_normal_map(result.field, folder / "normals.png", directx=directx)
+    bgars.write_height(result.height, folder / "height.tif")
+    bgars.write_height(result.height, folder / "height.npy")
 
 
 def _write_mesh(result: Reconstruction, path: Path) -> None:

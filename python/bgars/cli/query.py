@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import datetime
 import sys
+from decimal import Decimal
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,6 +13,7 @@ import typer
 
 from bgars.cli.console import print_json, say
 from bgars.errors import InputError
+from bgars.files.csv_cells import harmless
 from bgars.io.result_file import read_result
 from bgars.store import open_store
 from bgars.store.query import VIEWS
@@ -69,8 +71,8 @@ def query(
         print_json({"columns": names, "rows": [dict(zip(names, row, strict=True)) for row in rows]})
     elif as_csv:
         writer = csv.writer(sys.stdout, lineterminator="\n")
-        writer.writerow(names)
-        writer.writerows([["; ".join(v) if isinstance(v, list) else v for v in row] for row in rows])
+        writer.writerow([harmless(name) for name in names])
+        writer.writerows([[_csv_cell(value) for value in row] for row in rows])
     else:
         _say_table(names, rows)
 
@@ -150,6 +152,13 @@ def _say_table(names: list[str], rows: list[list[Any]]) -> None:
     say(f"({len(rows)} rows)" if len(rows) != 1 else "(1 row)")
 
 
+def _csv_cell(value: Any) -> Any:  # noqa: ANN401 - whatever was asked for
+    """Numbers as they are; texts such that no spreadsheet runs them."""
+    if isinstance(value, list):
+        value = "; ".join(map(str, value))
+    return harmless(value) if isinstance(value, str) else value
+
+
 def _cell(value: Any) -> str:  # noqa: ANN401 - whatever was asked for
     if value is None:
         return "-"
@@ -164,6 +173,8 @@ def _plain(value: Any) -> Any:  # noqa: ANN401 - as above
     """What JSON and CSV can hold."""
     if isinstance(value, float):
         return value if value == value and abs(value) != float("inf") else None  # noqa: PLR0124 - NaN
+    if isinstance(value, Decimal):
+        return float(value)
     if isinstance(value, datetime.datetime):
         return value.isoformat(timespec="seconds") + "Z"
     if isinstance(value, list):

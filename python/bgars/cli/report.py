@@ -9,6 +9,7 @@ import typer
 
 from bgars.cli.console import print_json, say
 from bgars.errors import InputError
+from bgars.io.own_files import need_new_or_own
 from bgars.io.result_file import RESULT_NAME
 from bgars.line.lot_page import lot_facts, write_lot_page
 from bgars.line.pages import page_name, write_part_page
@@ -86,6 +87,7 @@ def report(
         msg = f"{result}: is not a store: SERIAL, --lot, --round and --pages go with one"
         raise InputError(msg)
     page = output or (result if result.is_dir() else result.parent) / PAGE
+    need_new_or_own(page, result)
     source = read_page_source(result)
     write_page(source, page)
     if as_json:
@@ -108,6 +110,8 @@ def _report_store(
     as_json: bool,
 ) -> None:
     warnings: list[str] = []
+    if output is not None:
+        need_new_or_own(output)
     if serial is not None:
         page = output or store.folder / PAGES / page_name(serial, round_)
         page.parent.mkdir(exist_ok=True)

@@ -102,9 +102,10 @@ def board_from_normals(field: NormalField, outside: NDArray[np.bool_]) -> Array 
     keep = np.isfinite(slopes)
     coefficients: Array = np.zeros(SHAPE_TERMS)
     for _ in range(ROUNDS):
-        weighted = system * keep[:, None]
-        coefficients = np.linalg.lstsq(weighted.T @ system, weighted.T @ np.where(keep, slopes, 0.0), rcond=None)[0]
-        residuals = np.abs(slopes - system @ coefficients)
+        weighted = system[keep]
+        normal = np.einsum("ni,nj->ij", weighted, weighted)
+        coefficients = np.linalg.lstsq(normal, np.einsum("ni,n->i", weighted, slopes[keep]), rcond=None)[0]
+        residuals = np.abs(slopes - np.einsum("ni,i->n", system, coefficients))
         spread = max(1.4826 * float(np.median(residuals[keep])), 1e-6)
         keep = residuals < TRIM * spread
     in_pixels: Array = coefficients / unit

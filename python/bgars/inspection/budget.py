@@ -119,13 +119,11 @@ def reading_budget(settled: Settled, priors: Priors, by_ball: Array) -> Budget:
         causes.append(SHIFTS)
     shared = np.array(columns).T
     # Mixtures are no normal distributions: where their shares come to more than the whole, they are cut to it.
-    common = np.einsum("nb,mb->nm", with_border, along) + _shifted(by_ball, priors)
-    whole = np.maximum(np.diag(common), 1e-300)
+    moved = by_ball[:, :2] * priors.shifts_px.std(axis=0)  # by which of shifted images are the right ones
+    whole = np.maximum((with_border * along).sum(axis=1) + np.square(moved).sum(axis=1), 1e-300)
     cut = np.sqrt(np.minimum(1.0, MOST_EXPLAINED * whole / np.square(shared).sum(axis=1)))
     shared = shared * cut[:, None]
-    values, vectors = np.linalg.eigh(common - shared @ shared.T)
-    most = np.argsort(-values)[:SCATTER_MODES]
-    scattered = vectors[:, most] * np.sqrt(np.maximum(values[most], 0.0))
+    scattered = _modes([(with_border, along), (moved, moved), (-shared, shared)])
     shared, causes = np.column_stack([shared, scattered]), [*causes, *[SCATTER] * scattered.shape[1]]
     own_q = np.abs(np.einsum("ni,ni->n", by_ball, solution.alone[:, :, 4])) / priors.u_q
     relief = np.sqrt((np.square(by_ball) * solution.relief).sum(axis=1))
@@ -137,8 +135,16 @@ def reading_budget(settled: Settled, priors: Priors, by_ball: Array) -> Budget:
     return Budget(alone, {SCATTER: scatter, OWN_SHAPE: own_q, RELIEF: relief}, shared, tuple(causes))
 
 
-def _shifted(by_ball: Array, priors: Priors) -> Array:
-    """(N, N) covariance of a reading by which of shifted images are the right ones."""
-    moved = by_ball[:, :2] * priors.shifts_px.std(axis=0)
-    covariance: Array = moved @ moved.T
-    return covariance
+def _modes(products: list[tuple[Array, Array]]) -> Array:
+    """(N, SCATTER_MODES) largest modes of the symmetric sum of ``left right^T``, columns of the length of their roots.
+
+    In the space that all columns span: its dimensions are those of lights and board, however many balls there are.
+    """
+    basis = np.linalg.qr(np.concatenate([right for _, right in products], axis=1))[0]
+    inner = np.zeros((basis.shape[1], basis.shape[1]))
+    for left, right in products:
+        inner += np.einsum("ni,nb->ib", basis, left) @ np.einsum("ni,nb->bi", basis, right)
+    values, vectors = np.linalg.eigh(inner)
+    most = np.argsort(-values)[:SCATTER_MODES]
+    modes: Array = (basis @ vectors[:, most]) * np.sqrt(np.maximum(values[most], 0.0))
+    return modes

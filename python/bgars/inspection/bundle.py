@@ -152,7 +152,7 @@ def solve_bundle(
     normal = normal_equations(model, honest / factor[:, None, None], state, priors)
     inverse = np.linalg.inv(normal.balls)
     lever = -inverse @ normal.cross
-    reduced = normal.corner + np.tensordot(normal.cross, lever, axes=((0, 1), (0, 1)))
+    reduced = normal.corner + _of_all_balls(normal.cross, lever)
     relief = _relief(model.residual, edges.u_px, state.vectors)
     return Solution(
         state.balls,
@@ -184,10 +184,19 @@ def _step(normal: NormalEquations) -> tuple[Array, Array]:
     """Steps of the balls (N, 5), within limits, and of the border (B,)."""
     inverse = np.linalg.inv(normal.balls)
     lever = inverse @ normal.cross
-    reduced = normal.corner - np.tensordot(normal.cross, lever, axes=((0, 1), (0, 1)))
-    right = normal.right_border - np.tensordot(lever, normal.right, axes=((0, 1), (0, 1)))
+    reduced = normal.corner - _of_all_balls(normal.cross, lever)
+    right = normal.right_border - _of_all_balls(lever, normal.right[..., None])[:, 0]
     border = _inverse(reduced) @ right
     return np.einsum("nij,nj->ni", inverse, normal.right - normal.cross @ border), border
+
+
+def _of_all_balls(left: Array, right: Array) -> Array:
+    """(B, C) sum over balls of ``left[i]^T right[i]``.
+
+    Ball by ball: one product of all is small enough for one thread and large enough for BLAS to wake up all of them.
+    """
+    total: Array = (left.transpose(0, 2, 1) @ right).sum(axis=0)
+    return total
 
 
 def _inverse(matrix: Array) -> Array:

@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
+from bgars.inspection.normal_distribution import normal_distribution
 from bgars.inspection.shadow_model import Lights, rays
 from bgars.inspection.spread import lamp_gradients
 
@@ -99,7 +99,7 @@ def pixel_step(distance: Array, blur: Array, across_x: Array, across_y: Array) -
     for sign, offset in ((1.0, wide + thin), (-1.0, wide - thin), (-1.0, thin - wide), (1.0, -wide - thin)):
         place = distance + 0.5 * offset
         scaled = place / blur
-        below, density = ndtr(scaled), np.exp(-0.5 * scaled * scaled) / np.sqrt(2.0 * np.pi)
+        below, density = normal_distribution(scaled), np.exp(-0.5 * scaled * scaled) / np.sqrt(2.0 * np.pi)
         # First and second integral of the normal distribution function.
         slope += sign * (place * below + blur * density)
         value += sign * 0.5 * ((place * place + blur * blur) * below + place * blur * density)

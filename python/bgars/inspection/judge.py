@@ -21,6 +21,7 @@ from bgars.inspection.position import GridFit
 from bgars.inspection.to_scale import lens_scale, to_scale
 from bgars.inspection.warpage import board_height_um, board_terms, warpage
 from bgars.records.ball_result import BallResult
+from bgars.records.input_file import InputFile
 from bgars.records.part_result import PartResult
 from bgars.records.seating_result import SeatingResult
 
@@ -52,7 +53,7 @@ def judge_part(
     *,
     name: str = "part",
     pixel_pitch_um: float = math.nan,
-    files: tuple[tuple[str, str], ...] = (),
+    files: Sequence[tuple[str, str]] = (),
     version: str = "",
     light_files: Sequence[str] = (),
     warnings: tuple[str, ...] = (),
@@ -106,13 +107,7 @@ def judge_part(
         verdict, reasons = judge_ball(slot, position, limits, partners, doubts, is_seen=enough)
         ball = _ball(slot, names[slot.name], nominal_um[index], position)
         balls.append(replace(ball, verdict=verdict, reasons=reasons))
-    for row, index in enumerate(rows):
-        if coplanarity.seating:
-            seat_um = float(coplanarity.seating[0].deviations_um[row])
-            balls[index] = replace(balls[index], seating_deviation_um=seat_um)
-        if coplanarity.regression is not None:
-            deviation_um = float(coplanarity.regression.deviations_um[row])
-            balls[index] = replace(balls[index], regression_deviation_um=deviation_um)
+    balls = _with_deviations(balls, rows, coplanarity)
     warpage_um, u_warpage_um = warpage(
         measurement.board_coefficients_um, measurement.board_covariance, finite_centres(slots)
     )
@@ -147,16 +142,7 @@ def judge_part(
         regression_noise_bias_um=coplanarity.regression_bias_um,
         warpage_um=warpage_um,
         u_warpage_um=u_warpage_um,
-        seatings=tuple(
-            SeatingResult(
-                tuple(balls[rows[touching]].name for touching in plane.balls),
-                plane.coplanarity_um,
-                plane.slope_x,
-                plane.slope_y,
-                plane.offset_um,
-            )
-            for plane in coplanarity.seating
-        ),
+        seatings=_seatings(coplanarity, [balls[index].name for index in rows]),
         checks=checks,
         bridges=bridges,
         light_directions=measurement.light_directions,
@@ -167,8 +153,35 @@ def judge_part(
         warnings=(*warnings, *measurement.warnings, *_own_warnings(recipe, fit, coplanarity, balls)),
         recipe=recipe,
         pixel_pitch_um=pixel_pitch_um,
-        files=files,
+        files=tuple(InputFile(*file) for file in files),
         version=version,
+    )
+
+
+def _with_deviations(balls: list[BallResult], rows: Sequence[int], coplanarity: Coplanarity) -> list[BallResult]:
+    """The balls with the distances of their tops below both planes; `rows` are the balls of those planes."""
+    judged = list(balls)
+    for row, index in enumerate(rows):
+        if coplanarity.seating:
+            seat_um = float(coplanarity.seating[0].deviations_um[row])
+            judged[index] = replace(judged[index], seating_deviation_um=seat_um)
+        if coplanarity.regression is not None:
+            deviation_um = float(coplanarity.regression.deviations_um[row])
+            judged[index] = replace(judged[index], regression_deviation_um=deviation_um)
+    return judged
+
+
+def _seatings(coplanarity: Coplanarity, names: list[str]) -> tuple[SeatingResult, ...]:
+    """The planes on which the part comes to rest; `names` are those of their balls."""
+    return tuple(
+        SeatingResult(
+            tuple(names[touching] for touching in plane.balls),
+            plane.coplanarity_um,
+            plane.slope_x,
+            plane.slope_y,
+            plane.offset_um,
+        )
+        for plane in coplanarity.seating
     )
 
 

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from bgars.inspection.edge_fit import Group, fit_stretches
+from bgars.inspection.normal_distribution import normal_distribution
 
 if TYPE_CHECKING:
     from bgars.inspection.radiance import Radiance
@@ -132,7 +132,7 @@ def outline_centres(
 def _profile(distance: Array, spread_px: float, radius: Array) -> list[Array]:
     """Columns of the fit: inside, outside, move, bend of the shading towards the rim."""
     scaled = distance / spread_px
-    outside = ndtr(scaled)
+    outside = normal_distribution(scaled)
     inside = 1.0 - outside
     depth = np.sqrt(np.maximum(1.0 - np.square(1.0 + distance / radius), 0.0))
     return [inside, outside, INV_SQRT_2PI * np.exp(-0.5 * scaled**2) / spread_px, inside * depth]

@@ -13,11 +13,11 @@ fitted edge by about EDGE e s / c with s the spread and c the contrast: the same
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 if TYPE_CHECKING:
     from bgars.inspection.radiance import Radiance
@@ -109,4 +109,4 @@ def _lifted(low: float, noise: float, pedestal: float) -> float:
     if noise <= 0.0:
         return 0.0
     above = (max(low - INV_SQRT_2PI * noise, 0.0) + pedestal) / noise
-    return noise * float(INV_SQRT_2PI * np.exp(-0.5 * above**2) - above * ndtr(-above))
+    return noise * float(INV_SQRT_2PI * np.exp(-0.5 * above**2) - 0.5 * above * math.erfc(above / math.sqrt(2.0)))

@@ -63,6 +63,13 @@ class Usability(NamedTuple):
     contrast_levels: Array
 
 
+class _Told(NamedTuple):
+    """Uncertainties (N,) of a reading, and the same by cause."""
+
+    total: Array
+    by_cause: dict[str, Array]
+
+
 def judge_balls(edges: Edges) -> Usability:
     """Which balls have shadows enough, and contrast enough."""
     known = np.isfinite(edges.u_px)
@@ -84,14 +91,16 @@ def measurement(found: FoundBalls, problem: Problem, fit: Fit | None, flats: Fla
     looked_at = {} if fit is None else {int(ball): place for place, ball in enumerate(fit.index)}
     fitted: dict[int, int] = {}
     budgets: dict[str, Budget] = {}
+    told: dict[str, _Told] = {}
     if fit is not None and solution is not None:
         fitted = {int(ball): place for place, ball in enumerate(fit.index[fit.usability.usable])}
         budgets = _budgets(fit, solution, flats)
+        told = {name: _Told(budget.total(), budget.by_cause()) for name, budget in budgets.items()}
     balls = []
     for index, ball in enumerate(found.balls):
         if index in fitted and fit is not None:
             lights = int(fit.usability.lights[looked_at[index]])
-            balls.append(_measured(ball, fit, fitted[index], lights, flats, budgets, pitch))
+            balls.append(_measured(ball, fit, fitted[index], lights, flats, told, pitch))
         else:
             balls.append(_unmeasured(ball, index, problem, fit, looked_at, pitch))
     warnings = () if fit is None else fit.warnings
@@ -208,14 +217,14 @@ def _measured(
     place: int,
     lights: int,
     flats: FlatTops | None,
-    budgets: dict[str, Budget],
+    told: dict[str, _Told],
     pitch: float,
 ) -> MeasuredBall:
     """A ball with its numbers."""
     solution = fit.solution
     assert solution is not None
     x, y, z, radius, q = solution.balls[place]
-    u = {name: float(budget.total()[place]) for name, budget in budgets.items()}
+    u = {name: float(each.total[place]) for name, each in told.items()}
     top = z + q * radius
     reasons = []
     flat = u_flat = float("nan")
@@ -251,14 +260,14 @@ def _measured(
         lights_used=lights,
         kind=ball.kind,
         reasons=tuple(reasons),
-        budget={name: _causes_um(budgets[name], place, pitch) for name in ("x_um", "y_um", "diameter_um", "top_um")},
+        budget={name: _causes_um(told[name], place, pitch) for name in ("x_um", "y_um", "diameter_um", "top_um")},
     )
 
 
-def _causes_um(budget: Budget, place: int, pitch: float) -> dict[str, float]:
+def _causes_um(told: _Told, place: int, pitch: float) -> dict[str, float]:
     """Causes of one ball's uncertainty, largest first, without those that hardly count."""
-    parts = {name: float(part[place]) * pitch for name, part in budget.by_cause().items()}
-    least = WORTH_TELLING * float(budget.total()[place]) * pitch
+    parts = {name: float(part[place]) * pitch for name, part in told.by_cause.items()}
+    least = WORTH_TELLING * float(told.total[place]) * pitch
     kept = {name: part for name, part in parts.items() if part >= least}
     return dict(sorted(kept.items(), key=lambda pair: -pair[1]))
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from itertools import product
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from bgars.inspection.bundle_model import tangents
 from bgars.inspection.shadow_model import light_derivatives
@@ -30,6 +30,8 @@ FLOOR_PX = 0.03
 ROUNDS = 5
 CAUCHY = 2.0
 """Scale of the Cauchy loss of spreads, in standard deviations."""
+ROWS_OF_BLOCK = 128
+"""Rows that are factorised together."""
 MIN_STRETCHES = 20
 """Stretches of edge that tell their spread by lamp and lens."""
 
@@ -69,7 +71,7 @@ def fit_spread(edges: Edges) -> EdgeSpread:
     weight = 1.0 / u
     part = np.zeros(3)
     for _ in range(ROUNDS):
-        part = nnls(columns * weight[:, None], (spread - floor) * weight)[0] / size
+        part = _nonnegative(columns * weight[:, None], (spread - floor) * weight) / size
         residual = spread - floor - (columns * size) @ part
         scale = max(1.4826 * float(np.median(np.abs(residual / u))), 0.1)
         weight = 1.0 / (u * np.sqrt(1.0 + (residual / (CAUCHY * scale * u)) ** 2))
@@ -77,3 +79,30 @@ def fit_spread(edges: Edges) -> EdgeSpread:
     round_lamp = float((weight**2 * way * by_lamp).sum() / max(float((weight**2 * way * way).sum()), 1e-30))
     sharp, wide, high = np.sqrt([floor + part[0], part[1], part[2]])
     return EdgeSpread(float(sharp), float(np.sqrt(round_lamp)), float(wide), float(high))
+
+
+def _nonnegative(columns: Array, values: Array) -> Array:
+    """Least squares on a few columns, none of the weights below zero: the best of all choices of columns.
+
+    ``scipy.optimize.nnls`` takes longer to import than a small part to measure.
+    """
+    triangle, wanted = _triangle(columns, values)
+    best, least = np.zeros(columns.shape[1]), float(wanted @ wanted)
+    for choice in product((False, True), repeat=columns.shape[1]):
+        chosen = np.flatnonzero(choice)
+        found = np.zeros(columns.shape[1])
+        found[chosen] = np.linalg.lstsq(triangle[:, chosen], wanted, rcond=None)[0] if chosen.size else 0.0
+        loss = float(np.sum(np.square(triangle @ found - wanted)))
+        if loss < least and (found >= 0.0).all():
+            best, least = found, loss
+    return best
+
+
+def _triangle(columns: Array, values: Array) -> tuple[Array, Array]:
+    """Triangle of a QR factorisation and the values turned alike, block by block: no product wakes a second thread."""
+    rows = np.column_stack([columns, values])
+    padding = np.zeros((-len(rows) % ROWS_OF_BLOCK, rows.shape[1]))
+    blocks = np.concatenate([rows, padding]).reshape(-1, ROWS_OF_BLOCK, rows.shape[1])
+    triangles = cast("Array", np.linalg.qr(blocks, mode="r"))
+    triangle = cast("Array", np.linalg.qr(triangles.reshape(-1, rows.shape[1]), mode="r"))
+    return triangle[:, :-1], triangle[:, -1]

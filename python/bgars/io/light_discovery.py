@@ -124,6 +124,30 @@ def _other_file(folder: Path, listing: Listing, notes: list[str]) -> str:
         raise InputError(msg)
     msg = (
         f"{folder}: no description of the lights: expected {RECIPE_NAME} with [lights], {DIRECTIONS}, "
-        f"or one .lp file; seen: {listing.in_words()}"
+        f"or one .lp file; seen: {listing.in_words()}{_hint(folder, listing)}"
     )
     raise InputError(msg)
+
+
+FOREIGN = {
+    ".relight": "is a project of relight, which is not read: export its lights as .lp",
+    ".ptm": "is a finished RTI: the photographs and their .lp file are needed",
+    ".rti": "is a finished RTI: the photographs and their .lp file are needed",
+    ".hsh": "is a finished RTI: the photographs and their .lp file are needed",
+}
+"""Files of other programs, and what to do."""
+
+
+def _hint(folder: Path, listing: Listing) -> str:
+    """What to do about it, as far as the names of files tell."""
+    for name in listing.folders:
+        inner = list_folder(folder / name).others
+        if any(each in {RECIPE_NAME, DIRECTIONS} or is_about_lights(each) for each in inner):
+            return f". {folder / name} seems to be a capture: name that folder"
+    for name in listing.others:
+        if Path(name).suffix.lower() in FOREIGN:
+            return f". {name} {FOREIGN[Path(name).suffix.lower()]}"
+    tables = [name for name in listing.others if Path(name).suffix.lower() in SUFFIXES]
+    if len(tables) == 1:
+        return f". Should {tables[0]} hold the lights: write {RECIPE_NAME} with [lights] and directions = '{tables[0]}'"
+    return ""

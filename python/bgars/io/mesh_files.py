@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bgars import _bgars
 from bgars.errors import InputError
 from bgars.io.atomic import atomic_file
+from bgars.io.own_files import sign
 from bgars.records.height_map import HeightMap
 from bgars.records.scalar_checks import thread_count
 
@@ -105,7 +106,9 @@ def write_mesh(
                 threads=threads,
             )
         else:
-            mesh.export(temporary, file_type=suffix[1:])
+            options = {"tree_postprocessor": _signed} if suffix == ".glb" else {}
+            mesh.export(temporary, file_type=suffix[1:], **options)
+            sign(temporary)
 
 
 def _write_height(height: HeightMap, field: NormalField | None, path: Path, threads: int | None) -> None:
@@ -122,6 +125,11 @@ def _write_height(height: HeightMap, field: NormalField | None, path: Path, thre
             comments=_comments(height.unit),
             threads=threads,
         )
+
+
+def _signed(tree: dict[str, Any]) -> None:
+    """Say in a GLB that bgars wrote it."""
+    tree["asset"] = {**tree.get("asset", {}), "generator": "bgars"}
 
 
 def _comments(unit: str) -> list[str]:

@@ -65,8 +65,12 @@ def write_normal_map(normals: NormalField | FloatArray, path: str | PathLike[str
         msg = f"{path}: a normal map file must end in .png"
         raise InputError(msg)
     signs = np.array([1.0, -1.0 if directx else 1.0, 1.0], dtype=np.float32)
-    codes = np.rint((vectors * signs + 1.0) / 2.0 * FULL)
-    rgb = np.where(np.isfinite(codes), np.clip(codes, 0.0, FULL), 0.0).astype(np.uint16)
+    codes = vectors * signs  # and from here in place: of large maps each copy is felt
+    codes += 1.0
+    codes /= 2.0
+    codes *= FULL
+    np.nan_to_num(codes, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
+    rgb = np.clip(np.rint(codes, out=codes), 0.0, FULL, out=codes).astype(np.uint16)
     with atomic_file(path) as temporary:
         _bgars.write_png16(temporary, rgb)
         sign(temporary)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
+import scipy  # loads its modules when they are used
 
 if TYPE_CHECKING:
     from bgars.records.pixels import BoolArray, FloatArray
@@ -46,7 +46,7 @@ def border_color(values: FloatArray, usable: BoolArray, alike: float) -> BoolArr
     same = usable & (np.abs(values - main) <= alike).all(axis=2)
     if np.count_nonzero(same & frame) <= MOST_OF_BORDER * np.count_nonzero(frame):
         return np.zeros_like(frame)
-    labels, _ = ndimage.label(same)
+    labels, _ = scipy.ndimage.label(same)
     touching = np.unique(labels[frame])
     found: BoolArray = np.isin(labels, touching[touching > 0])
     return found
@@ -58,13 +58,13 @@ def is_cut_out(normals: FloatArray, flat: BoolArray, usable: BoolArray) -> bool:
     Background: the outline is steep, as of a ball in front of something, or what is there rises and falls along its
     outline, where a surface that meets a plane does not.
     """
-    rim = ndimage.binary_dilation(flat, iterations=2) & ~flat & usable
+    rim = scipy.ndimage.binary_dilation(flat, iterations=2) & ~flat & usable
     if not rim.any():
         return False
     n_z = normals[..., 2][rim]
     if float(np.mean(n_z < STEEP_N_Z)) > STEEP_SHARE:
         return True
-    outward = np.gradient(ndimage.gaussian_filter(flat.astype(np.float64), OUTLINE_BLUR_PX))
+    outward = np.gradient(scipy.ndimage.gaussian_filter(flat.astype(np.float64), OUTLINE_BLUR_PX))
     along_x, along_y = outward[0][rim], outward[1][rim]  # across (d/dcol, -d/drow), turned by 90 degrees
     length = np.maximum(np.hypot(along_x, along_y), 1e-9)
     slopes = normals[rim][:, :2] / np.maximum(n_z, STEEP_N_Z)[:, np.newaxis]

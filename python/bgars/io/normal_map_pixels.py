@@ -27,6 +27,7 @@ NORMAL_MAP_SUFFIXES = (*IMAGE_SUFFIXES, ".tif", ".tiff", ".exr", ".npy", ".npz")
 WHAT = "a normal map"
 CHANNELS = (2, 3, 4)
 RGB, RGBA, NDIM = 3, 4, 3
+FIRST_ROWS = 8
 EIGHT_BIT_STEP = 257.0
 """Of 16-bit codes that 8-bit ones were widened to."""
 MAX_ALIKE = 6.0
@@ -85,7 +86,8 @@ def read_pixels(path: Path) -> Pixels:
     except FileFormatError as error:
         msg = f"{' '.join(str(error).split())}; a normal map is an RGB image, R = x, G = y, B = z"
         raise FileFormatError(msg) from None
-    if bits == 2 * 8 and not (values % EIGHT_BIT_STEP).any():
+    # Most files of 16 bits show at their first rows that they are no copies of 8.
+    if bits == 2 * 8 and not any((part % EIGHT_BIT_STEP).any() for part in (values[:FIRST_ROWS], values)):
         values, bits = values / np.float32(EIGHT_BIT_STEP), 8
     return _split(values, bits if bits <= 2 * 8 else 0, MAX_ALIKE if suffix in {".jpg", ".jpeg"} else 0.0)
 

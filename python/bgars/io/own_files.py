@@ -7,13 +7,16 @@ import re
 import struct
 import zlib
 from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from pathlib import Path
+from bgars.errors import InputError
 
-__all__ = ["foreign_files", "is_own", "sign"]
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterable
+
+__all__ = ["foreign_files", "is_own", "need_new_or_own", "sign"]
 
 HEAD_BYTES, TAIL_BYTES = 4096, 1 << 16
 SIGNATURE = b"bgars"
@@ -33,7 +36,10 @@ OWN_TEXT = {
     ".jpg": re.compile(b"\\A" + re.escape(JPEG_START + JPEG_COMMENT)),
     ".stl": re.compile(b"\\A" + SIGNATURE),
     ".parquet": re.compile(SIGNATURE),
-    ".npz": re.compile(rb"ball_height_um\.npy"),
+    ".npz": re.compile(rb"ball_height_um\.npy|coefficients\.npy"),
+    ".toml": re.compile(rb'\A(?:#[^\n]*\n)*(?:format = "bgars-|diffuse_level = )'),
+    ".md": re.compile(rb"(?:Command:|Written by) `bgars experiment "),
+    ".glb": re.compile(rb'"generator":\s*"bgars'),
 }
 OWN_TABLES = (b"name,row,col,present,verdict,reasons,", b"part,placement,repeat,ball,characteristic,value")
 MARKS = ("summary.json", "result.json")
@@ -57,11 +63,33 @@ def is_own(path: Path) -> bool:
         return OWN_JSON.match(head) is not None or _is_message_of_own(path)
     if suffix == ".csv":
         return head.startswith(OWN_TABLES)
-    if suffix in SIBLINGS:
-        return path.name in _listed(path.with_name(SIBLINGS[suffix]))
+    if suffix in SIBLINGS and path.name in _listed(path.with_name(SIBLINGS[suffix])):
+        return True
     known = OWN_TEXT.get(suffix)
     # Descriptions and tables of contents may lie at either end.
     return known is not None and any(known.search(part) for part in (head, tail))
+
+
+def need_new_or_own(output: str | os.PathLike[str], *inputs: str | os.PathLike[str] | None) -> None:
+    """Raise InputError where a file of results would replace an input, or a file that bgars did not write.
+
+    Parameters
+    ----------
+    output : path
+        File to be written; need not exist.
+    inputs : paths or None
+        Files that the command reads.
+    """
+    path = Path(output)
+    if not path.is_file():
+        return
+    for given in inputs:
+        if given is not None and Path(given).is_file() and path.samefile(given):
+            msg = f"{path}: is read by this command, and results never replace inputs; name another file"
+            raise InputError(msg)
+    if not is_own(path):
+        msg = f"{path}: is there already, and bgars did not write it; move it away, or name another file"
+        raise InputError(msg)
 
 
 def foreign_files(folder: Path, names: Iterable[str]) -> list[str]:

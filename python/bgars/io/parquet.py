@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from bgars.errors import InputError
 from bgars.io.atomic import atomic_file
-from bgars.io.result_schema import BallTable, ResultTable
 from bgars.records.ball_result import BallResult
-from bgars.records.part_result import FORMAT, FORMAT_VERSION
+from bgars.records.keys import keys_of
+from bgars.records.part_result import FORMAT, FORMAT_VERSION, PartResult
 
 if TYPE_CHECKING:
     from os import PathLike
 
-    from bgars.records.part_result import PartResult
 
 __all__ = ["need_pyarrow", "write_parquet"]
 
@@ -50,14 +48,12 @@ def write_parquet(result: PartResult, path: str | PathLike[str]) -> None:
     pyarrow, parquet = need_pyarrow()
     columns: list[tuple[str, str, list[Any]]] = []
     for name in PART_COLUMNS:
-        about = str(ResultTable.model_fields[name].description)
+        about = keys_of(PartResult)[name].meaning
         columns.append((PREFIX + name, about, [getattr(result, name)] * len(result.balls)))
     columns.append((LOT, "lot or order of the part", [result.identity.lot] * len(result.balls)))
-    for entry in fields(BallResult):
-        if entry.name == "budget":
-            continue
-        about = str(BallTable.model_fields[entry.name].description)
-        columns.append((entry.name, about, [_cell(getattr(ball, entry.name)) for ball in result.balls]))
+    for name, key in keys_of(BallResult).items():
+        if name != "budget":
+            columns.append((name, key.meaning, [_cell(getattr(ball, name)) for ball in result.balls]))
     schema = pyarrow.schema(
         [
             pyarrow.field(name, _type(pyarrow, name), metadata={"unit": _unit(name), "description": about})

@@ -8,7 +8,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import KDTree
+import scipy  # loads its modules when they are used
 
 from bgars.errors import FileFormatError, InputError
 
@@ -96,7 +96,7 @@ def _refuse_close(path: Path, places: list[tuple[str, float, float]], least_um: 
     points_um = np.array([place[1:] for place in places])
     if len(places) < len(("one", "other")):
         return
-    found = KDTree(points_um).query(points_um, k=2)
+    found = scipy.spatial.KDTree(points_um).query(points_um, k=2)
     distances_um, neighbours = (np.asarray(values) for values in found)
     distances_um = distances_um[:, 1]
     index = int(np.argmin(distances_um))

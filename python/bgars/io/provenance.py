@@ -10,6 +10,7 @@ from bgars.errors import FileFormatError
 from bgars.io.image_listing import list_folder
 from bgars.io.light_discovery import default_recipe
 from bgars.io.recipe import RECIPE_NAME, TableResponse, read_recipe
+from bgars.records.input_file import InputFile
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -45,7 +46,7 @@ def capture_files(capture: Capture) -> tuple[Path, ...]:
     return (*dict.fromkeys(capture.files), *(file for file in others if file.is_file()))
 
 
-def checksums(files: Iterable[Path]) -> tuple[tuple[str, str], ...]:
+def checksums(files: Iterable[Path]) -> tuple[InputFile, ...]:
     """Return name and SHA-256 of each file, in hexadecimal.
 
     Raises
@@ -53,7 +54,7 @@ def checksums(files: Iterable[Path]) -> tuple[tuple[str, str], ...]:
     FileFormatError
         A file is gone or cannot be read.
     """
-    return tuple((path.name, _sha256(path)) for path in files)
+    return tuple(InputFile(path.name, _sha256(path)) for path in files)
 
 
 def _sha256(path: Path) -> str:

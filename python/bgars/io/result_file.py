@@ -2,35 +2,28 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import UnionType
+from typing import TYPE_CHECKING, Any, Union, get_args, get_origin
 
 import numpy as np
 
 from bgars.errors import FileFormatError, InputError
 from bgars.files.safe_files import read_bounded
-from bgars.io.result_schema import Reading, ResultTable
+from bgars.io.result_schema import Table, result_model
 from bgars.io.strict_toml import checked
-from bgars.records.ball_layout import BallLayout
-from bgars.records.ball_result import BallResult
-from bgars.records.part_check import PartCheck
-from bgars.records.part_identity import PartIdentity
-from bgars.records.part_material import MaterialParameter, PartMaterial
-from bgars.records.part_recipe import Limits, PartRecipe
-from bgars.records.part_result import FORMAT, FORMAT_VERSION, PartResult
-from bgars.records.seating_result import SeatingResult
+from bgars.records.keys import keys_of, types_of
+from bgars.records.part_result import FORMAT, FORMAT_VERSION, OLDEST_VERSION, PartResult
 
 if TYPE_CHECKING:
     from os import PathLike
 
-    from bgars.io.result_schema import MaterialTable, RecipeTable, Table
-
 __all__ = ["RESULT_NAME", "parse_result", "read_result"]
 
 RESULT_NAME = "result.json"
-OLDEST_VERSION = 2
 MAX_BYTES = 64_000_000
 READABLE_VERSIONS = range(OLDEST_VERSION, FORMAT_VERSION + 1)
 
@@ -74,15 +67,16 @@ def parse_result(content: bytes, path: Path) -> PartResult:
     values = _json(content, path)
     _check_format(path, values)
     try:
-        table = checked(ResultTable, values, path)
+        table = checked(result_model(), values, path)
         _check_lights(path, table)
-        return _result(table)
+        result: PartResult = _built(PartResult, table)
     except FileFormatError:
         raise
     except InputError as error:  # from the check, which names the file, or from a layout, which cannot
         text = str(error)
         msg = text if text.startswith(str(path)) else f"{path}: recipe: {text}"
         raise FileFormatError(msg) from None
+    return result
 
 
 def _json(content: bytes, path: Path) -> Any:  # noqa: ANN401 - whatever the file holds
@@ -113,7 +107,7 @@ def _check_format(path: Path, values: object) -> None:
         raise FileFormatError(msg)
 
 
-def _check_lights(path: Path, table: ResultTable) -> None:
+def _check_lights(path: Path, table: Any) -> None:  # noqa: ANN401 - a model made of PartResult
     if len(table.light_change_deg) != len(table.light_directions):
         msg = (
             f"{path}: light_change_deg: must have one number for each of the {len(table.light_directions)} "
@@ -122,69 +116,22 @@ def _check_lights(path: Path, table: ResultTable) -> None:
         raise FileFormatError(msg)
 
 
-def _result(table: ResultTable) -> PartResult:
-    values = _fields(table, "format", "format_version")
-    values |= {
-        "balls": tuple(BallResult(**_fields(ball)) for ball in table.balls),
-        "seatings": tuple(SeatingResult(**_fields(seating)) for seating in table.seatings),
-        "checks": tuple(
-            PartCheck(**(_fields(check) | {"lowest_um": check.lowest_um, "highest_um": check.highest_um}))
-            for check in table.checks
-        ),
-        "bridges": tuple((one, two) for one, two in table.bridges),
-        "light_directions": np.array(table.light_directions, dtype=np.float64).reshape(-1, 3),
-        "light_change_deg": np.array(table.light_change_deg, dtype=np.float64),
-        "board_coefficients_um": np.array(table.board_coefficients_um, dtype=np.float64),
-        "recipe": None if table.recipe is None else _recipe(table.recipe),
-        "material": None if table.material is None else _material(table.material),
-        "identity": PartIdentity(**_fields(table.identity)),
-        "files": tuple((file.name, file.sha256) for file in table.files),
-    }
-    return PartResult(**values)
-
-
-def _material(table: MaterialTable) -> PartMaterial:
-    rows = tuple(MaterialParameter(**_fields(row)) for row in table.parameters)
-    return PartMaterial(**(_fields(table) | {"parameters": rows}))
-
-
-def _recipe(table: RecipeTable) -> PartRecipe:
-    limits: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in table.limits}
-    return PartRecipe(
-        name=table.name,
-        layout=BallLayout(
-            table.layout.rows,
-            table.layout.cols,
-            table.layout.pitch_um,
-            tuple(table.layout.depopulated),
-            tuple((name, x_um, y_um) for name, x_um, y_um in table.layout.positions),
-        ),
-        view=table.view,
-        limits=Limits(**limits),
-        diameter_um=table.diameter_um,
-        height_um=table.height_um,
-        gravity_um=None if table.gravity_um is None else (table.gravity_um[0], table.gravity_um[1]),
-        material_file=None if table.material_file is None else Path(table.material_file),
-        file=None if table.file is None else Path(table.file),
-        q=table.q,
-        u_q=table.u_q,
-        pitch_u_um=table.pitch_u_um,
-    )
-
-
-def _fields(table: Table, *left_out: str) -> dict[str, Any]:
-    """The values of a table as a record takes them: NaN for a number that is null, tuples for lists."""
-    values: dict[str, Any] = {}
-    for name, value in table:
-        if name in left_out:
-            continue
-        if value is None and _is_number(table, name):
-            values[name] = math.nan
-        else:
-            values[name] = tuple(value) if isinstance(value, list) else value
-    return values
-
-
-def _is_number(table: Table, name: str) -> bool:
-    """Whether null stands for a number that is not known, and not for a place, a verdict or a recipe."""
-    return type(table).model_fields[name].annotation == Reading
+def _built(hint: Any, value: Any, shape: tuple[int | None, ...] = ()) -> Any:  # noqa: ANN401, PLR0911 - a line a kind
+    """A checked value as its record takes it: NaN for a number that is null, tuples and arrays for lists."""
+    kind, parts = get_origin(hint), get_args(hint)
+    if hint is float:
+        return math.nan if value is None else value
+    if value is None:
+        return None
+    if kind is np.ndarray:
+        return np.array(value, dtype=np.float64).reshape([-1 if size is None else size for size in shape])
+    if kind in {Union, UnionType}:
+        return _built(next(part for part in parts if part is not type(None)), value)
+    if kind is tuple:
+        kinds = itertools.repeat(parts[0]) if parts[-1] is Ellipsis else parts
+        return tuple(_built(part, entry) for part, entry in zip(kinds, value, strict=False))
+    if isinstance(value, Table):
+        keys = keys_of(hint)
+        values = {name: _built(kind, getattr(value, name), keys[name].shape) for name, kind in types_of(hint).items()}
+        return hint(**values)
+    return Path(value) if hint is Path else value

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 import uuid
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bgars.errors import InputError
 from bgars.inspection.decision import decide
-from bgars.records.plain_values import DIGITS
+from bgars.records.keys import DIGITS
 
 if TYPE_CHECKING:
     from bgars.records.ball_result import BallResult, Verdict
     from bgars.records.part_result import PartResult
-
-    CfxReading = tuple[str, float, str, tuple[float | None, float | None], Verdict | None]
 
 __all__ = ["CFX_VERSION", "to_cfx"]
 
@@ -34,6 +32,17 @@ READINGS = {
 """Reading of a ball: its limit, and the code and CFX category of a ball that is outside."""
 MICROMETRE, RATIO = "µm", ""
 NAMESPACE = uuid.uuid5(uuid.NAMESPACE_URL, f"bgars:{MESSAGE}")
+
+
+class _Reading(NamedTuple):
+    """A measured quantity with its limits; None: there is no limit, and no verdict."""
+
+    name: str
+    value: float
+    unit: str
+    lowest: float | None
+    highest: float | None
+    verdict: Verdict | None
 
 
 def to_cfx(result: PartResult, *, transaction_id: str | None = None, source: str | None = None) -> dict[str, Any]:
@@ -134,7 +143,7 @@ def _ball(ball: BallResult, result: PartResult, identity: _Identity) -> dict[str
             verdict, reason = decide(name, value, getattr(ball, f"u_{name}"), allowed)
             if verdict == "fail":
                 outside.setdefault((code, category), []).append(reason)
-        readings.append((name, value, unit, allowed or (None, None), verdict))
+        readings.append(_Reading(name, value, unit, *(allowed or (None, None)), verdict))
     defects = _defects(ball, outside) if ball.verdict == "fail" else {}
     return _inspection(what, ball.verdict, ball.reasons, readings, defects, identity, result.inspected_utc)
 
@@ -154,7 +163,7 @@ def _defects(ball: BallResult, outside: dict[tuple[str, str], list[str]]) -> dic
 def _part(result: PartResult, identity: _Identity) -> dict[str, Any]:
     """The part as a whole: its verdict, its reasons, its own quantities."""
     readings = [
-        (check.name, check.value_um, MICROMETRE, (check.lowest_um, check.highest_um), check.verdict)
+        _Reading(check.name, check.value_um, MICROMETRE, check.lowest_um, check.highest_um, check.verdict)
         for check in result.checks
         if math.isfinite(check.value_um)
     ]
@@ -170,7 +179,7 @@ def _inspection(
     name: str,
     verdict: Verdict,
     reasons: tuple[str, ...],
-    readings: list[CfxReading],
+    readings: list[_Reading],
     defects: dict[tuple[str, str], list[str]],
     identity: _Identity,
     time: str,
@@ -190,15 +199,15 @@ def _inspection(
         "DefectsFound": [_defect(name, code, category, told, identity) for (code, category), told in defects.items()],
         "Symptoms": [],
         "Measurements": [
-            _measurement(reading, number, identity.of(f"{name} {reading[0]}"), time)
+            _measurement(reading, number, identity.of(f"{name} {reading.name}"), time)
             for number, reading in enumerate(readings, 1)
         ],
         "RefNo": None,
     }
 
 
-def _measurement(reading: CfxReading, number: int, unique: str, time: str) -> dict[str, Any]:
-    name, value, unit, (lowest, highest), verdict = reading
+def _measurement(reading: _Reading, number: int, unique: str, time: str) -> dict[str, Any]:
+    name, value, unit, lowest, highest, verdict = reading
     return {
         "$type": "CFX.Structures.NumericMeasurement, CFX",
         "MeasuredValue": {

@@ -16,6 +16,7 @@ from bgars.io.part_recipe import read_part_recipe
 from bgars.io.provenance import capture_files, checksums
 from bgars.line.naming import Naming, last_written_utc
 from bgars.normals.methods import DEFAULT_METHOD, Method
+from bgars.pipelines.check import check, refuse_wrong_geometry, told_by
 from bgars.pipelines.inspect import inspect
 from bgars.store.keys import key_of, part_key
 
@@ -130,12 +131,15 @@ def _inspected(job: Job, folder: Path, recipe_file: str, started: float) -> Outc
     key = key_of(digests, serial=serial, method=job.method, version=version("bgars"))
     if key in job.known:
         return Outcome(job.folder, serial, is_known=True, seconds=time.perf_counter() - started)
-    result = inspect(capture, recipe, method=job.method, threads=job.threads)
+    findings = check(capture)
+    refuse_wrong_geometry(findings, capture.name, way_out="'bgars check' shows it")
+    result = inspect(capture, recipe, method=job.method, threads=job.threads, check=False)
+    result = replace(result, warnings=(*told_by(findings), *result.warnings))
     identity = replace(identity, captured_utc=last_written_utc(capture))
     if recipe is not None and job.content:  # as it is where the folder is seen
         given = Path(job.recipe)
         recipe = replace(recipe, file=given)
-        files = tuple((given.name if name == Path(RECIPE).name else name, d) for name, d in result.files)
+        files = tuple(f._replace(name=given.name) if f.name == Path(RECIPE).name else f for f in result.files)
         result = replace(result, recipe=recipe, files=files)
     result = replace(result, serial=serial, identity=identity)
     if part_key(result) != key:

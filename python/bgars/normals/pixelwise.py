@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from bgars.records.pixels import PixelArray
 
 __all__ = [
+    "PIXELWISE_METHODS",
     "PixelwiseMethod",
     "capture_of",
     "combined_mask",
@@ -33,6 +34,7 @@ __all__ = [
 
 PixelwiseMethod = Literal["lambertian", "specular-filter", "robust-filter", "blind"]
 """What needs nothing but images and lights: ``blind`` fits a material of its own (docs/method.md)."""
+PIXELWISE_METHODS: tuple[PixelwiseMethod, ...] = get_args(PixelwiseMethod)
 DEFAULT_THRESHOLD = 50.0
 STACK_NDIM = 3
 
@@ -41,7 +43,7 @@ def pixelwise_normals(
     capture: Capture,
     *,
     method: PixelwiseMethod,
-    mask: NDArray[np.bool_] | None,
+    mask: NDArray[np.bool_] | None = None,
     threshold: float = DEFAULT_THRESHOLD,
     keep_sets: bool = False,
     out: NormalField | None = None,

@@ -42,7 +42,7 @@ def add_reflectance(
     field : NormalField
         Another method's estimate; its other pixels stay.
     capture : Capture
-        At least 6 lights.
+        At least 4 lights.
     circles_px : (N, 4) float64
         Silhouettes of balls: x right, y up (origin at the image centre), radius, standard uncertainty of the radius.
     mask : (H, W) bool or None

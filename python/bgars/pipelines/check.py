@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bgars.checks.run import check_capture
-from bgars.errors import InputError
+from bgars.errors import CaptureWarning, InputError
 from bgars.io.capture import read_capture
 from bgars.records.capture import Capture
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
     from bgars.records.findings import Findings
 
-__all__ = ["check", "refuse_wrong_geometry"]
+__all__ = ["check", "check_before", "refuse_wrong_geometry", "told_by"]
 
 
 def check(capture: Capture | str | PathLike[str]) -> Findings:
@@ -56,6 +57,38 @@ def check(capture: Capture | str | PathLike[str]) -> Findings:
     Findings(error handedness)
     """
     return check_capture(capture if isinstance(capture, Capture) else read_capture(Path(capture)))
+
+
+def told_by(findings: Findings) -> tuple[str, ...]:
+    """Return warnings and errors as texts, such as a result keeps."""
+    return tuple(f"capture: {each.kind}: {each.message}; {each.advice}" for each in findings.told)
+
+
+def check_before(capture: Capture, *, stacklevel: int = 3) -> tuple[str, ...]:
+    """Check a capture before a number is made of it.
+
+    Parameters
+    ----------
+    capture : Capture
+    stacklevel : int
+        Of the warnings: 3 shows the line that called the caller.
+
+    Returns
+    -------
+    tuple of str
+        What was found, each also a :class:`~bgars.CaptureWarning`.
+
+    Raises
+    ------
+    InputError
+        Where every normal would be wrong.
+    """
+    findings = check_capture(capture)
+    refuse_wrong_geometry(findings, capture.name, way_out="bgars.check shows it; check=False goes on all the same")
+    texts = told_by(findings)
+    for text in texts:
+        warnings.warn(f"{capture.name}: {text.removeprefix('capture: ')}", CaptureWarning, stacklevel=stacklevel)
+    return texts
 
 
 def refuse_wrong_geometry(findings: Findings, name: str, *, way_out: str) -> None:

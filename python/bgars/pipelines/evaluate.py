@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bgars.errors import ConvergenceError, InputError
 from bgars.io.truth import read_truth
+from bgars.normals.given import GIVEN, given_field
 from bgars.normals.methods import DEFAULT_METHOD, Method
 from bgars.pipelines.normals import estimate_normals
 from bgars.records.normal_field import NormalField
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
 __all__ = ["AngularErrors", "Evaluation", "angular_error_deg", "evaluate"]
 
-GIVEN = "normals as given"
 MIN_N_Z = 0.3
 """Balls are judged where the true n_z is above this: nearer the rim a pixel mixes ball and board."""
 
@@ -144,9 +144,10 @@ def evaluate(
         msg = f"truth: has shape {truth.mask.shape}, but the images have {capture.mask.shape}"
         raise InputError(msg)
     if isinstance(method, str):
-        field = estimate_normals(capture, method=cast("Method", method), material=material, progress=progress)
+        field = estimate_normals(capture, method=method, material=material, progress=progress)
     else:
-        field = _given_field(method, capture)
+        name = getattr(method, "__name__", "given") if callable(method) else "given"
+        field = given_field(method(capture) if callable(method) else method, capture, name)
     is_own = field.choice != GIVEN
     judged = truth.mask & capture.mask
     board = None
@@ -168,33 +169,6 @@ def evaluate(
         board=board,
         ball_height_rmse_um=_ball_height_rmse_um(field, truth, judged),
     )
-
-
-def _given_field(
-    given: Callable[[Capture], NormalField | ArrayLike] | NormalField | ArrayLike, capture: Capture
-) -> NormalField:
-    """Normals that somebody else estimated, as a field; raise InputError unless they are as large as the images."""
-    name = getattr(given, "__name__", "given") if callable(given) else "given"
-    found = given(capture) if callable(given) else given
-    if isinstance(found, NormalField):
-        normals, field = found.normals, found
-    else:
-        normals = np.asarray(found)
-        shape = (*capture.mask.shape, 3)
-        if normals.shape != shape or normals.dtype.kind not in "fiu":
-            msg = f"method: normals must be numbers of shape {shape}, got {normals.dtype} of shape {normals.shape}"
-            raise InputError(msg)
-        wide = normals.astype(np.float64)
-        length = np.linalg.norm(wide, axis=2)
-        mask = np.isfinite(length) & (length > 0)
-        unit = np.where(mask[..., None], wide / np.where(mask, length, 1.0)[..., None], np.nan).astype(np.float32)
-        nothing = np.full(mask.shape, np.nan, np.float32)
-        lights = np.zeros(mask.shape, np.uint16)
-        field = NormalField(unit, nothing, mask, nothing, mask, lights, name, capture.pixel_pitch_um, choice=GIVEN)
-    if normals.shape[:2] != capture.mask.shape:
-        msg = f"method: normals have shape {normals.shape[:2]}, but the images have {capture.mask.shape}"
-        raise InputError(msg)
-    return field
 
 
 def angular_error_deg(estimate: FloatArray, truth: FloatArray) -> NDArray[np.float64]:

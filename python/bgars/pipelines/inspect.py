@@ -18,6 +18,7 @@ from bgars.io.material_file import read_material
 from bgars.io.part_recipe import read_part_recipe
 from bgars.io.provenance import capture_files, checksums
 from bgars.normals.methods import DEFAULT_METHOD, Method
+from bgars.pipelines.check import check_before
 from bgars.pipelines.normals import estimate_normals
 from bgars.pipelines.part_surface import part_surface
 from bgars.records.circle_pixels import inside_circles
@@ -52,6 +53,7 @@ def inspect(
     *,
     method: Method = DEFAULT_METHOD,
     surface: bool = False,
+    check: bool = True,
     threads: int | None = None,
     progress: Callable[[InspectionStage, float], object] | None = None,
 ) -> PartResult:
@@ -69,6 +71,9 @@ def inspect(
     surface : bool
         Integrate the normals, too: ``result.surface`` is then the height map that :func:`bgars.write_report` draws. No
         reading depends on it.
+    check : bool
+        Look first whether the images show what the capture says (:func:`bgars.check`): wrong geometry is refused, and
+        what else is found is a :class:`~bgars.CaptureWarning`, kept in ``result.warnings``.
     threads : int, optional
         Most threads to work on; the result does not depend on it.
     progress : callable, optional
@@ -83,7 +88,8 @@ def inspect(
     Raises
     ------
     InputError
-        No pixel pitch, a black or saturated image, a recipe that contradicts itself.
+        No pixel pitch, a black or saturated image, a recipe that contradicts itself; lights in wrong order, mirrored
+        or below the surface, an image twice or turned, a dead lamp (`check`).
     CalibrationError
         Images that do not show what the rig says.
     """
@@ -96,6 +102,7 @@ def inspect(
             progress(stage, fraction)
 
     check_capture(capture)
+    found_first = check_before(capture) if check else ()
     material, warnings = _material(recipe, method, len(capture.rig))
     report("find", 0.0)
     with ThreadPoolExecutor(1) as background:
@@ -116,7 +123,7 @@ def inspect(
         files=checksums(files),
         version=version("bgars"),
         light_files=[path.name for path in capture.files],
-        warnings=warnings,
+        warnings=(*found_first, *warnings),
     )
     report("judge", 1.0)
     fit = None if field is None else field.reflectance

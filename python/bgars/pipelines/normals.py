@@ -2,32 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bgars import _bgars
 from bgars.balls import find_balls
 from bgars.errors import InputError
-from bgars.normals.methods import ALL_METHODS, DEFAULT_METHOD, METHODS, Method
-from bgars.normals.pixelwise import DEFAULT_THRESHOLD, PixelwiseMethod, capture_of, combined_mask, pixelwise_normals
+from bgars.normals.given import given_field
+from bgars.normals.methods import DEFAULT_METHOD, TABLE, Method, added_method
+from bgars.normals.pixelwise import PIXELWISE_METHODS, PixelwiseMethod, capture_of, combined_mask, pixelwise_normals
 from bgars.normals.reflectance import add_reflectance
 from bgars.records.circle_pixels import inside_circles
 from bgars.records.found_balls import FoundBalls
+from bgars.records.normal_field import NormalField
 from bgars.records.plain_arrays import plain, plain_bool
 from bgars.records.scalar_checks import number, thread_count
+from bgars.records.whole_capture import need_whole
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import ArrayLike, NDArray
 
     from bgars.records.capture import Capture
-    from bgars.records.normal_field import NormalField
     from bgars.records.surface_material import SurfaceMaterial
 
-__all__ = ["DEFAULT_METHOD", "METHODS", "Method", "estimate_normals"]
+__all__ = ["RUNNERS", "estimate_normals"]
 
 CIRCLE_VALUES = 3
 RIM_PX = 0.01
@@ -60,16 +62,16 @@ def estimate_normals(
         Fortran-ordered ones (a crop, a transposed stack) and float64 are copied once.
     light_directions : (L, 3) array_like
         Unit vectors from the surface to the light; only with plain arrays.
-    method : {"reflectance", "robust-filter", "specular-filter", "lambertian", "blind"}
+    method : {"reflectance", "robust-filter", "specular-filter", "lambertian", "blind"} or str
         ``reflectance``: on balls, the normal whose brightness under all lights, highlights included, fits the material
         best; the material is fitted on the balls themselves; other pixels are left to ``robust-filter``. Captures
-        with fewer than 6 lights, or with neither balls nor a material, are left to ``blind``: one material is fitted
+        with fewer than 4 lights, or with neither balls nor a material, are left to ``blind``: one material is fitted
         to the whole capture together with normals and albedo of every pixel, and taken where it predicts left-out
         lights better than least squares does (some 20 us a pixel; at least 5 lights). `NormalField.choice` says what
         was done. The other three solve ``I_k = rho l_k . n`` by least squares (Woodham 1980) over the lights they keep
         at a pixel: ``lambertian`` all; ``specular-filter``, as published: sort the values, cut at the first gap over
         `threshold` with at least 3 values kept; ``robust-filter`` the window of sorted values that a Lambertian facet
-        explains best (docs/method.md).
+        explains best (docs/method.md). Further names: :func:`bgars.register_method`.
     mask : (H, W) array_like of bool, optional
         True = use; combined with the capture's own mask.
     light_intensities : (L,) array_like, optional
@@ -123,48 +125,63 @@ def estimate_normals(
     1.0
     """
     threads = thread_count(threads)
-    if method not in ALL_METHODS:
-        msg = f"method: must be one of {', '.join(ALL_METHODS)}; got {method!r}"
-        raise InputError(msg)
-    for name, value, user in (
-        ("threshold", threshold, "specular-filter"),
-        ("anchors", anchors, "reflectance"),
-        ("material", material, "reflectance"),
-    ):
-        if value is not None and method != user:
-            msg = f"{name}: only the method {user} uses it, got method {method!r}"
-            raise InputError(msg)
+    is_own = isinstance(method, str) and method in RUNNERS
+    run = RUNNERS[method] if is_own else added_method(method)
+    if is_own:
+        _refuse_idle(method, {"threshold": threshold, "anchors": anchors, "material": material})
     threshold = None if threshold is None else number("threshold", threshold)
     saturation = None if saturation is None else number("saturation", saturation)
+    needs_full_scale = not is_own or method == "reflectance"
     capture = capture_of(
-        images, light_directions, light_intensities, saturation, threads, needs_full_scale=method == "reflectance"
+        images, light_directions, light_intensities, saturation, threads, needs_full_scale=needs_full_scale
     )
+    need_whole(capture)
     use = combined_mask(capture, mask)
-    if method == "reflectance":
-        return _by_reflectance(capture, use, anchors, material, keep_sets, out, threads, progress)
-    return pixelwise_normals(
-        capture,
-        method=method,
-        mask=use,
-        threshold=DEFAULT_THRESHOLD if threshold is None else threshold,
-        keep_sets=keep_sets,
-        out=out,
-        threads=threads,
-        progress=progress,
+    options = {
+        **{"mask": use, "threshold": threshold, "anchors": anchors, "material": material},
+        **{"keep_sets": keep_sets or None, "out": out, "threads": threads, "progress": progress},
+    }
+    found = run(capture, **{name: value for name, value in options.items() if value is not None})
+    return found if is_own else _within(replace(given_field(found, capture, method), method=method), use)
+
+
+def _refuse_idle(method: Method, given: dict[str, object]) -> None:
+    """Raise InputError where an option is given that the method has no use for."""
+    for option, value in given.items():
+        if value is not None and option not in TABLE[method].options:
+            users = [name for name, entry in TABLE.items() if option in entry.options]
+            msg = f"{option}: only the method {' or '.join(users)} uses it, got method {method!r}"
+            raise InputError(msg)
+
+
+def _within(field: NormalField, use: NDArray[np.bool_] | None) -> NormalField:
+    """The field without what lies outside the mask, where a method did not see to it itself."""
+    if use is None or not (field.mask & ~use).any():
+        return field
+    return replace(
+        field,
+        normals=np.where(use[..., None], field.normals, np.float32(np.nan)),
+        albedo=np.where(use, field.albedo, np.float32(np.nan)),
+        mask=field.mask & use,
+        confidence=np.where(use, field.confidence, np.float32(0)),
+        measured=field.measured & use,
+        lights_kept=np.where(use, field.lights_kept, np.uint16(0)),
     )
 
 
 def _by_reflectance(
     capture: Capture,
-    use: NDArray[np.bool_] | None,
-    anchors: FoundBalls | ArrayLike | None,
-    material: SurfaceMaterial | None,
-    keep_sets: bool,
-    out: NormalField | None,
-    threads: int | None,
-    progress: Callable[[float], object] | None,
+    *,
+    mask: NDArray[np.bool_] | None = None,
+    anchors: FoundBalls | ArrayLike | None = None,
+    material: SurfaceMaterial | None = None,
+    keep_sets: bool = False,
+    out: NormalField | None = None,
+    threads: int | None = None,
+    progress: Callable[[float], object] | None = None,
 ) -> NormalField:
     """Method ``reflectance`` where it can work, else what stands in for it."""
+    use = mask
 
     def part(start: float, end: float) -> Callable[[float], object] | None:
         if progress is None:
@@ -220,6 +237,13 @@ def _by_reflectance(
     shape = "" if fit is None else fit.shape_in_words
     checked = f"loss {0.0 if fit is None else fit.loss:.3f}" if balls else "no balls to check it by"
     return replace(field, choice=f"reflectance {where}: material {source}{shape}, {checked}")
+
+
+RUNNERS: dict[Method, Callable[..., Any]] = {
+    **{name: partial(pixelwise_normals, method=name) for name in PIXELWISE_METHODS},
+    "reflectance": _by_reflectance,
+}
+"""Of each method of the table the function: called with the capture and, by name, with the options that were given."""
 
 
 def _because(field: NormalField, reason: str) -> NormalField:

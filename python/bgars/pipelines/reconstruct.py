@@ -10,6 +10,7 @@ import numpy as np
 
 from bgars.normals.methods import DEFAULT_METHOD, Method
 from bgars.normals.noise_floor import without_background
+from bgars.pipelines.check import check_before
 from bgars.pipelines.normals import estimate_normals
 from bgars.records.scalar_checks import thread_count
 from bgars.surface.flatten import Bow, Flatten, find_bow, flattened
@@ -106,6 +107,7 @@ def reconstruct(
     difference: Difference = "trapezoid",
     weights: Literal["confidence"] | None = None,
     flatten: Flatten | None = None,
+    check: bool = True,
     threads: int | None = None,
     progress: Callable[[Stage, float], object] | None = None,
 ) -> Reconstruction:
@@ -121,6 +123,9 @@ def reconstruct(
         See :func:`bgars.integrate_normals`.
     flatten : {"plane", "quadratic"}, optional
         Take one plane, or one quadratic surface, off all heights: what near or wrong lights bend a flat part to.
+    check : bool
+        Look first whether the images show what the capture says (:func:`bgars.check`): wrong geometry is refused, and
+        what else is found is a :class:`~bgars.CaptureWarning`.
     threads : int, optional
         Most threads to work on; see :func:`bgars.estimate_normals`.
     progress : callable, optional
@@ -129,7 +134,8 @@ def reconstruct(
     Raises
     ------
     InputError
-        See the stages.
+        See the stages; lights in wrong order, mirrored or below the surface, an image twice or turned, a dead lamp
+        (`check`).
     ConvergenceError
         The integration did not reach its tolerance.
 
@@ -146,6 +152,8 @@ def reconstruct(
         if progress is not None:
             progress(stage, fraction)
 
+    if check:
+        check_before(capture)
     report("normals", 0.0)
     field = estimate_normals(
         capture,

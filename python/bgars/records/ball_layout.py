@@ -5,11 +5,23 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Annotated, NamedTuple
 
 from bgars.errors import InputError
 from bgars.records.ball_names import ball_name
+from bgars.records.keys import Key
 
-__all__ = ["BallLayout"]
+__all__ = ["BallLayout", "LayoutPlace"]
+
+
+class LayoutPlace(NamedTuple):
+    """A place with a ball: rows from the top, columns from the left, both from 0."""
+
+    name: str
+    row: int
+    col: int
+    x_um: float
+    y_um: float
 
 
 @dataclass(frozen=True)
@@ -35,14 +47,14 @@ class BallLayout:
     Examples
     --------
     >>> BallLayout(rows=2, cols=3, pitch_um=800.0, depopulated=("B2",)).places()[3]
-    ('B1', 1, 0, 0.0, -800.0)
+    LayoutPlace(name='B1', row=1, col=0, x_um=0.0, y_um=-800.0)
     """
 
-    rows: int | None = None
-    cols: int | None = None
-    pitch_um: float | None = None
-    depopulated: tuple[str, ...] = ()
-    positions: tuple[tuple[str, float, float], ...] = ()
+    rows: Annotated[int | None, Key("rows of the grid; null with a list of positions")] = None
+    cols: Annotated[int | None, Key("columns of the grid; null with a list of positions")] = None
+    pitch_um: Annotated[float | None, Key("distance of neighbours, in um; null with a list of positions")] = None
+    depopulated: Annotated[tuple[str, ...], Key("names of places without a ball")] = ()
+    positions: Annotated[tuple[tuple[str, float, float], ...], Key("name, x and y in um of each place, or empty")] = ()
 
     def __post_init__(self) -> None:
         if self.positions:
@@ -70,24 +82,26 @@ class BallLayout:
             msg = f"layout.{field_name}: names must differ, got {twice[0]!r} more than once"
             raise InputError(msg)
 
-    def places(self) -> tuple[tuple[str, int, int, float, float], ...]:
+    def places(self) -> tuple[LayoutPlace, ...]:
         """Name, row, column, x and y in micrometres of every place with a ball; rows count downward."""
         if self.positions:
             return _listed_places(self.positions)
         pitch_um = self.pitch_um or 0.0
         return tuple(
-            (ball_name(row, col), row, col, col * pitch_um, -row * pitch_um)
+            LayoutPlace(ball_name(row, col), row, col, col * pitch_um, -row * pitch_um)
             for row in range(self.rows or 0)
             for col in range(self.cols or 0)
             if ball_name(row, col) not in self.depopulated
         )
 
 
-def _listed_places(positions: tuple[tuple[str, float, float], ...]) -> tuple[tuple[str, int, int, float, float], ...]:
+def _listed_places(positions: tuple[tuple[str, float, float], ...]) -> tuple[LayoutPlace, ...]:
     """Listed places with rows and columns: the distinct y from the top, the distinct x from the left."""
     rows = _ranks([-y_um for _, _, y_um in positions])
     cols = _ranks([x_um for _, x_um, _ in positions])
-    return tuple((name, row, col, x, y) for (name, x, y), row, col in zip(positions, rows, cols, strict=True))
+    return tuple(
+        LayoutPlace(name, row, col, x, y) for (name, x, y), row, col in zip(positions, rows, cols, strict=True)
+    )
 
 
 def _ranks(values: list[float]) -> list[int]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
-from typing import Any, Literal
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Literal
 
 from bgars.records.found_balls import BallKind
-from bgars.records.plain_values import DIGITS, _plain
+from bgars.records.keys import Key, as_plain
 
 __all__ = ["BallResult", "Verdict"]
 
@@ -16,7 +16,9 @@ Verdict = Literal["pass", "fail", "undecided"]
 
 @dataclass(frozen=True, repr=False)
 class BallResult:
-    """One ball, or a place that should have one; NaN = not measured. ``u_..`` are standard uncertainties (k = 1).
+    """One ball, or a place that should have one.
+
+    NaN = not measured; ``u_..`` are standard uncertainties (k = 1).
 
     Attributes
     ----------
@@ -47,35 +49,42 @@ class BallResult:
         Of ``x_um y_um diameter_um top_um``: standard uncertainty by cause, um, largest first.
     """
 
-    name: str
-    row: int | None
-    col: int | None
-    present: bool
-    verdict: Verdict
-    reasons: tuple[str, ...]
-    kind: BallKind = "ball"
-    x_um: float = math.nan
-    u_x_um: float = math.nan
-    y_um: float = math.nan
-    u_y_um: float = math.nan
-    x_nominal_um: float = math.nan
-    y_nominal_um: float = math.nan
-    true_position_um: float = math.nan
-    u_true_position_um: float = math.nan
-    diameter_um: float = math.nan
-    u_diameter_um: float = math.nan
-    centre_z_um: float = math.nan
-    u_centre_z_um: float = math.nan
-    top_um: float = math.nan
-    u_top_um: float = math.nan
-    q: float = math.nan
-    u_q: float = math.nan
-    flat_um: float = math.nan
-    u_flat_um: float = math.nan
-    seating_deviation_um: float = math.nan
-    regression_deviation_um: float = math.nan
-    lights_used: int = 0
-    budget: dict[str, dict[str, float]] = field(default_factory=dict)
+    name: Annotated[str, Key("name of the ball in the recipe's view, such as B7")]
+    row: Annotated[int | None, Key("row from 0 at the top of the image; null off the lattice")]
+    col: Annotated[int | None, Key("column from 0 at the left of the image; null off the lattice")]
+    present: Annotated[bool, Key("false: a ball is missing here")]
+    verdict: Annotated[Verdict, Key("of this ball")]
+    reasons: Annotated[tuple[str, ...], Key("why the verdict is not pass")]
+    kind: Annotated[BallKind, Key("ball; extra: where none should be; bridged: joined to a neighbour")] = "ball"
+    x_um: Annotated[float, Key("centre, to the right of the image's centre, in um")] = math.nan
+    u_x_um: Annotated[float, Key("standard uncertainty (k = 1) of x_um, in um")] = math.nan
+    y_um: Annotated[float, Key("centre, above the image's centre, in um")] = math.nan
+    u_y_um: Annotated[float, Key("standard uncertainty (k = 1) of y_um, in um")] = math.nan
+    x_nominal_um: Annotated[float, Key("its place in the best-fitting grid, in um")] = math.nan
+    y_nominal_um: Annotated[float, Key("its place in the best-fitting grid, in um")] = math.nan
+    true_position_um: Annotated[float, Key("distance of the centre from that place (a radius), in um")] = math.nan
+    u_true_position_um: Annotated[float, Key("standard uncertainty (k = 1) of true_position_um, in um")] = math.nan
+    diameter_um: Annotated[float, Key("horizontal diameter, in um")] = math.nan
+    u_diameter_um: Annotated[float, Key("standard uncertainty (k = 1) of diameter_um, in um")] = math.nan
+    centre_z_um: Annotated[float, Key("height of the centre above the local board, in um")] = math.nan
+    u_centre_z_um: Annotated[float, Key("standard uncertainty (k = 1) of centre_z_um, in um")] = math.nan
+    top_um: Annotated[float, Key("height of the top above the local board, in um")] = math.nan
+    u_top_um: Annotated[float, Key("standard uncertainty (k = 1) of top_um, in um")] = math.nan
+    q: Annotated[float, Key("vertical over horizontal radius, a ratio; 1 = sphere")] = math.nan
+    u_q: Annotated[float, Key("standard uncertainty (k = 1) of q, a ratio")] = math.nan
+    flat_um: Annotated[float, Key("height that a flat top lacks, in um")] = math.nan
+    u_flat_um: Annotated[float, Key("standard uncertainty (k = 1) of flat_um, in um")] = math.nan
+    seating_deviation_um: Annotated[float, Key("distance of the top below the seating plane, in um")] = math.nan
+    regression_deviation_um: Annotated[float, Key("distance of the top below the regression plane, in um")] = math.nan
+    lights_used: Annotated[int, Key("lights whose shadow of this ball was usable", ge=0)] = 0
+    budget: Annotated[
+        dict[str, dict[str, float]],
+        Key(
+            "standard uncertainty (k = 1) of readings by cause, in um, largest first",
+            names=("x_um", "y_um", "diameter_um", "top_um"),
+            is_late=True,
+        ),
+    ] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Name, verdict and the readings that are asked for first."""
@@ -85,4 +94,4 @@ class BallResult:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the record as plain Python values; None where something was not measured."""
-        return {entry.name: _plain(getattr(self, entry.name), DIGITS) for entry in fields(self)}
+        return as_plain(self)

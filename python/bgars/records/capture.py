@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bgars.errors import InputError
 from bgars.records.pixels import BoolArray, FloatArray, PixelArray
 from bgars.records.plain_arrays import (
     keep,
@@ -74,6 +75,9 @@ class Capture(ShownCapture):
         """Bring the arrays into the layout of the kernels; what a numpy masked stack hides is not used."""
         hidden = masked_pixels(self.images)
         mask = plain_bool("mask", self.mask)
+        if hidden is not None and hidden.shape != mask.shape:
+            msg = f"mask: must have shape {hidden.shape}, that of the images, got {mask.shape}"
+            raise InputError(msg)
         arrays: dict[str, Any] = {
             "images": pixel_array("images", self.images),
             "mask": mask if hidden is None else mask & ~hidden,

@@ -20,7 +20,7 @@ class FlatField:
     ----------
     coefficients : (L, T) float64
         Of Legendre polynomials P_i(x) P_j(y), i + j <= degree, x and y from -1 to 1 across the image, y up; the order
-        is that of :func:`bgars.records.station_apply.legendre_terms`. Levels are those of the flat board, 255 = full scale.
+        is that of ``station_apply.legendre_terms``. Levels are those of the flat board, 255 = full scale.
     degree : int
         Of the polynomials.
     size_px : (int, int)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 from bgars.records.ball_result import Verdict
+from bgars.records.keys import Key
 
 __all__ = ["PartCheck"]
 
@@ -27,11 +29,11 @@ class PartCheck:
         In words.
     """
 
-    name: str
-    value_um: float
-    u_um: float
-    bias_um: float
-    lowest_um: float | None
-    highest_um: float | None
-    verdict: Verdict | None
-    reason: str
+    name: Annotated[str, Key("quantity, with its unit, such as seating_coplanarity_um")]
+    value_um: Annotated[float, Key("reading, in um")]
+    u_um: Annotated[float, Key("standard uncertainty (k = 1) of the reading, in um")]
+    bias_um: Annotated[float, Key("by how much noise makes the reading too large on average, in um")]
+    lowest_um: Annotated[float | None, Key("lowest allowed value, in um; null = no limit")]
+    highest_um: Annotated[float | None, Key("highest allowed value, in um; null = no limit")]
+    verdict: Annotated[Verdict | None, Key("null: there is no limit")]
+    reason: Annotated[str, Key("the verdict in words")]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, fields
+from typing import Annotated
 
 from bgars.errors import InputError
+from bgars.records.keys import Key
 
 __all__ = ["PartIdentity"]
 
@@ -41,12 +43,12 @@ class PartIdentity:
     {'lot': 'L7', 'position': '3,7'}
     """
 
-    lot: str = ""
-    substrate: str = ""
-    position: str = ""
-    station: str = ""
-    operator: str = ""
-    captured_utc: str = ""
+    lot: Annotated[str, Key("lot or order")] = ""
+    substrate: Annotated[str, Key("strip, tray or panel that carries the part")] = ""
+    position: Annotated[str, Key("place on the substrate")] = ""
+    station: Annotated[str, Key("machine that took the images")] = ""
+    operator: Annotated[str, Key("who ran the machine")] = ""
+    captured_utc: Annotated[str, Key("when the last image was written: ISO 8601, UTC")] = ""
 
     def __post_init__(self) -> None:
         """Refuse what would not stay one line in a log, a name of a file or a cell of a table."""

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
 
 if TYPE_CHECKING:
     from bgars.records.reflectance_fit import ReflectanceFit
+from bgars.records.keys import Key
 
 __all__ = ["GREY_LEVELS", "MaterialParameter", "PartMaterial", "part_material"]
 
-GREY_LEVELS = "grey levels of 255"
-RATIO = "ratio"
+Unit = Literal["grey levels of 255", "ratio"]
+Masking = Literal["smith", "cook-torrance"]
+GREY_LEVELS: Unit = "grey levels of 255"
+RATIO: Unit = "ratio"
 
 
 @dataclass(frozen=True)
@@ -29,10 +32,10 @@ class MaterialParameter:
         "grey levels of 255" or "ratio".
     """
 
-    name: str
-    value: float
-    standard_error: float
-    unit: str
+    name: Annotated[str, Key("as in a material file: diffuse_level, roughness_1, gain_0, ...")]
+    value: Annotated[float, Key("the number, in `unit`")]
+    standard_error: Annotated[float, Key("standard error (k = 1) in `unit`; null = the number was not fitted")]
+    unit: Annotated[Unit, Key("unit of value and standard error")]
 
 
 @dataclass(frozen=True)
@@ -56,13 +59,21 @@ class PartMaterial:
         Whether each ball was corrected by what the others show beyond the material.
     """
 
-    parameters: tuple[MaterialParameter, ...]
-    masking: str
-    loss: float
-    accepted: bool
-    from_file: bool
-    own_material_balls: int
-    residuals_learnt: bool
+    parameters: Annotated[
+        tuple[MaterialParameter, ...], Key("diffuse light, one or two lobes, brightness of each light")
+    ]
+    masking: Annotated[Masking, Key("attenuation of the lobes that explains more")]
+    loss: Annotated[
+        float,
+        Key(
+            "mean of log(1 + (r / 3)^2) over pixels and lights, r in grey levels: below 0.1 explained very "
+            "well, above 2 not at all"
+        ),
+    ]
+    accepted: Annotated[bool, Key("false: the fit was too bad, normals are another estimator's")]
+    from_file: Annotated[bool, Key("true: the recipe brought the material, nothing was fitted")]
+    own_material_balls: Annotated[int, Key("balls that were given a material of their own", ge=0)]
+    residuals_learnt: Annotated[bool, Key("whether balls were corrected by what the others show beyond it")]
 
 
 def part_material(fit: ReflectanceFit, *, from_file: bool) -> PartMaterial:
@@ -78,7 +89,7 @@ def part_material(fit: ReflectanceFit, *, from_file: bool) -> PartMaterial:
     ['diffuse_level', 'grazing', 'ambient_level', 'strength_1_level', 'roughness_1']
     """
     material = fit.material
-    values = [
+    values: list[tuple[str, float, Unit]] = [
         ("diffuse", material.diffuse_level, GREY_LEVELS),
         ("grazing", material.grazing, RATIO),
         ("ambient", material.ambient_level, GREY_LEVELS),

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from bgars.errors import InputError
 from bgars.records.ball_layout import BallLayout
 from bgars.records.ball_names import ball_name, mirrored_name
+from bgars.records.keys import Key
 
 __all__ = ["BALL_LIMITS", "PART_LIMITS", "BallPlace", "Limits", "PartRecipe", "View", "layout_places"]
 
@@ -25,7 +26,7 @@ DEFAULT_U_Q = 0.01
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of a part; None = not judged. A pair is lowest and highest, a single number the highest.
+    """Limits; a pair is lowest and highest, a single number the highest, what has none is not judged.
 
     Attributes
     ----------
@@ -45,15 +46,15 @@ class Limits:
         Highest less lowest point of the board under the balls, against its least-squares plane.
     """
 
-    true_position_um: float | None = None
-    diameter_um: Range | None = None
-    height_um: Range | None = None
-    q: Range | None = None
-    flat_um: float | None = None
-    pitch_um: Range | None = None
-    seating_coplanarity_um: float | None = None
-    regression_coplanarity_um: float | None = None
-    warpage_um: float | None = None
+    true_position_um: Annotated[float | None, Key("of each ball, in um")] = None
+    diameter_um: Annotated[Range | None, Key("of each ball, in um")] = None
+    height_um: Annotated[Range | None, Key("of each ball's top_um, in um")] = None
+    q: Annotated[Range | None, Key("of each ball, a ratio")] = None
+    flat_um: Annotated[float | None, Key("of each ball, in um")] = None
+    pitch_um: Annotated[Range | None, Key("of the best-fitting grid, in um")] = None
+    seating_coplanarity_um: Annotated[float | None, Key("of the part, in um")] = None
+    regression_coplanarity_um: Annotated[float | None, Key("of the part, in um")] = None
+    warpage_um: Annotated[float | None, Key("of the part, in um")] = None
 
     def __bool__(self) -> bool:
         """True when there is any limit."""
@@ -154,18 +155,27 @@ class PartRecipe:
     0.01
     """
 
-    name: str
-    layout: BallLayout
-    view: View = "bottom"
-    limits: Limits = field(default_factory=Limits)
-    diameter_um: float | None = None
-    height_um: float | None = None
-    gravity_um: tuple[float, float] | None = None
-    material_file: Path | None = None
-    file: Path | None = None
-    q: float | None = None
-    u_q: float | None = None
-    pitch_u_um: float | None = None
+    name: Annotated[str, Key("name of the part")]
+    layout: Annotated[BallLayout, Key("where its balls should be, in `view`")]
+    view: Annotated[View, Key("side that names and positions refer to")] = "bottom"
+    limits: Annotated[Limits, Key("what was judged")] = field(default_factory=Limits)
+    diameter_um: Annotated[float | None, Key("nominal horizontal diameter, in um")] = None
+    height_um: Annotated[float | None, Key("nominal height of the tops, in um")] = None
+    gravity_um: Annotated[
+        tuple[float, float] | None, Key("centre of gravity, in um; null = the mean of the places")
+    ] = None
+    material_file: Annotated[Path | None, Key("file of a material fitted earlier")] = None
+    file: Annotated[Path | None, Key("file that the recipe was read from")] = None
+    q: Annotated[
+        float | None,
+        Key("vertical over horizontal radius that all balls share, a ratio; null = not stated", is_late=True),
+    ] = None
+    u_q: Annotated[float | None, Key("standard uncertainty (k = 1) of q, a ratio; null = not stated", is_late=True)] = (
+        None
+    )
+    pitch_u_um: Annotated[
+        float | None, Key("standard uncertainty (k = 1) of the grid's pitch, in um; null = not stated", is_late=True)
+    ] = None
 
     def __post_init__(self) -> None:
         """Complete q by its uncertainty or the other way round, and check them."""

@@ -62,7 +62,11 @@ def plain_bool(name: str, values: ArrayLike) -> NDArray[np.bool_]:
     InputError
         Other values than bools.
     """
-    given = np.asarray(without_mask(values, False))
+    try:
+        given = np.asarray(without_mask(values, False))
+    except (TypeError, ValueError) as error:
+        msg = f"{name}: must be bool ({' '.join(str(error).split())})"
+        raise InputError(msg) from error
     if given.dtype != np.bool_:
         msg = f"{name}: must be bool, got {given.dtype}"
         raise InputError(msg)

@@ -268,7 +268,7 @@ class LightRig:
 
 def directions_from_angles(angles_deg: ArrayLike) -> NDArray[np.float64]:
     """Return (L, 3) unit vectors of (L, 2) pairs (azimuth, elevation) in degrees."""
-    angles = np.asarray(angles_deg, dtype=np.float64)
+    angles = plain("angles_deg", angles_deg, np.float64)
     if angles.ndim != 2 or angles.shape[1] != 2:  # noqa: PLR2004 - a pair
         msg = f"angles_deg: must have shape (L, 2) = azimuth, elevation, got {angles.shape}"
         raise InputError(msg)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
+
+from bgars.records.keys import Key
 
 __all__ = ["SeatingResult"]
 
@@ -19,8 +22,8 @@ class SeatingResult:
         Largest distance of an apex below it.
     """
 
-    balls: tuple[str, ...]
-    coplanarity_um: float
-    slope_x: float
-    slope_y: float
-    offset_um: float
+    balls: Annotated[tuple[str, ...], Key("balls that touch it")]
+    coplanarity_um: Annotated[float, Key("largest distance of a top below it, in um")]
+    slope_x: Annotated[float, Key("rise to the right, um a um")]
+    slope_y: Annotated[float, Key("rise upward in the image, um a um")]
+    offset_um: Annotated[float, Key("height at the image's centre, in um")]

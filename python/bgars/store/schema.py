@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bgars.io.parquet import need_pyarrow
-from bgars.io.result_schema import BallTable, CheckTable, ResultTable
 from bgars.records.ball_result import BallResult
+from bgars.records.keys import keys_of
 from bgars.records.part_check import PartCheck
+from bgars.records.part_result import PartResult
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -51,14 +51,10 @@ def _kind(name: str) -> str:
     return {"present": "truth", "reasons": "texts"}.get(name, "real")
 
 
-def _meaning(table: Any, name: str) -> str:  # noqa: ANN401 - a pydantic model
-    return str(table.model_fields[name].description)
-
-
-def _of_record(record: Any, table: Any) -> Iterable[Column]:  # noqa: ANN401 - a dataclass and its model
-    for entry in fields(record):
-        if entry.name != "budget":
-            yield Column(entry.name, _kind(entry.name), _meaning(table, entry.name))
+def _of_record(record: type) -> Iterable[Column]:
+    for name, key in keys_of(record).items():
+        if name != "budget":
+            yield Column(name, _kind(name), key.meaning)
 
 
 PARTS = (
@@ -79,7 +75,7 @@ PARTS = (
     Column("reason", "text", "the first reason why it is not pass"),
     Column("reasons", "texts", "every reason"),
     Column("defects", "texts", "what fails, each once: missing, bridged, extra, or the name of the reading"),
-    *(Column(name, "real", _meaning(ResultTable, name)) for name in READINGS),
+    *(Column(name, "real", keys_of(PartResult)[name].meaning) for name in READINGS),
     Column("balls", "whole", "places and balls"),
     Column("balls_pass", "whole", "of them, those that pass"),
     Column("balls_fail", "whole", "those that fail"),
@@ -97,10 +93,10 @@ PARTS = (
 )
 BALLS = (
     Column("part_key", "text", KEY_MEANING),
-    *_of_record(BallResult, BallTable),
+    *_of_record(BallResult),
     Column("defects", "texts", "what fails: missing, bridged, extra, or the name of the reading"),
 )
-CHECKS = (Column("part_key", "text", KEY_MEANING), *_of_record(PartCheck, CheckTable))
+CHECKS = (Column("part_key", "text", KEY_MEANING), *_of_record(PartCheck))
 BUDGETS = (
     Column("part_key", "text", KEY_MEANING),
     Column("ball", "text", "ball; null = of the part"),

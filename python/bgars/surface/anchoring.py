@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy  # loads its modules when they are used
 
 from bgars.errors import InputError
 
@@ -75,5 +74,17 @@ def _smoothed(
     density, lack = np.zeros(known.shape), np.zeros(known.shape)
     density[known], lack[known] = trust, trust * lack_px
     top = max(float(trust.max()), FEW)
-    mean: NDArray[np.float64] = scipy.ndimage.gaussian_filter(lack * inside, reach_px, mode="constant")
-    return mean / (scipy.ndimage.gaussian_filter(density * inside, reach_px, mode="constant") + FEW * top)
+    mean: NDArray[np.float64] = _blurred(lack * inside, reach_px)
+    return mean / (_blurred(density * inside, reach_px) + FEW * top)
+
+
+def _blurred(values: NDArray[np.float64], sigma_px: float) -> NDArray[np.float64]:
+    """Convolve with a Gaussian, cut off at four standard deviations, zeros outside; by Fourier along each axis."""
+    reach = int(4.0 * sigma_px + 0.5)
+    weight = np.exp(-0.5 * np.square(np.arange(-reach, reach + 1) / sigma_px))
+    for axis, size in enumerate(values.shape):
+        length = size + 2 * reach
+        along = np.fft.rfft(weight / weight.sum(), length).reshape((-1, 1) if axis == 0 else (1, -1))
+        whole = np.fft.irfft(np.fft.rfft(values, length, axis=axis) * along, length, axis=axis)
+        values = np.take(whole, range(reach, reach + size), axis=axis)
+    return values

@@ -16,6 +16,7 @@ mod key;
 pub mod lights;
 mod median;
 pub mod mesh;
+pub mod normal_distribution;
 pub mod normals;
 pub mod pixel;
 pub mod radiometry;

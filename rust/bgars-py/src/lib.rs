@@ -59,6 +59,8 @@ mod _bgars {
     use crate::shadows::draw_shadows;
     #[pymodule_export]
     use crate::shadows::measure_edges;
+    #[pymodule_export]
+    use crate::shadows::normal_distribution;
 
     #[pymodule_export]
     const REFLECTANCE_MIN_LIGHTS: usize = bgars_core::reflectance::MIN_LIGHTS;

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use bgars_core::normals::{Method, NormalMapMut, RobustParams, estimate_into};
+use bgars_core::normals::{Method, NormalMapMut, estimate_into};
 use bgars_core::{ImageStack, Lights, Pixel, Radiometry, blind};
 use numpy::{PyReadonlyArray2, PyReadwriteArray2, PyReadwriteArray3};
 use pyo3::prelude::*;
@@ -96,7 +96,7 @@ pub fn estimate_normals<'py>(
     let method = match method {
         "lambertian" => Estimator::LeastSquares(Method::Lambertian),
         "specular-filter" => Estimator::LeastSquares(Method::SpecularFilter { threshold }),
-        "robust-filter" => Estimator::LeastSquares(Method::RobustFilter(RobustParams::default())),
+        "robust-filter" => Estimator::LeastSquares(Method::RobustFilter),
         "blind" => Estimator::Blind,
         _ => return Err(InputError::new_err(format!("method: unknown method {method:?}"))),
     };

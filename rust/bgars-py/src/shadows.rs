@@ -1,10 +1,10 @@
-//! `draw_shadows`, `measure_edges`.
+//! `draw_shadows`, `measure_edges`, `normal_distribution`.
 
 use std::ops::ControlFlow;
 
 use bgars_core::shadows::model::{Ball, Board, Lamp};
 use bgars_core::shadows::{EdgeSettings, Edges, Margins, STRETCH_FIELDS, Silhouettes};
-use bgars_core::{ImageStack, Lights, Pixel, Radiometry, shadows};
+use bgars_core::{ImageStack, Lights, Pixel, Radiometry, normal_distribution as distribution, shadows};
 use numpy::{PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArray4, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
@@ -131,6 +131,20 @@ pub fn measure_edges<'py>(
     let numbers = edges.stretches.iter().flat_map(shadows::Stretch::numbers).collect();
     let shape = [balls_count, lights * sectors, STRETCH_FIELDS];
     Ok((array3(py, numbers, shape)?, array2(py, edges.noise, [balls_count, lights])?))
+}
+
+#[pyfunction]
+#[pyo3(signature = (values, *, threads))]
+#[allow(clippy::needless_pass_by_value)]
+pub fn normal_distribution<'py>(
+    py: Python<'py>,
+    values: PyReadonlyArray2<'py, f64>,
+    threads: Option<i64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let [rows, cols] = [values.shape()[0], values.shape()[1]];
+    let values = slice2(&values, "values")?;
+    let shares = on_threads(py, threads, || Ok(distribution::normal_distribution(values)))?;
+    array2(py, shares, [rows, cols])
 }
 
 /// Everything but the images; the lights are those of the casters, as refined so far.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from bgars.errors import FileFormatError
+from bgars.files.light_formats.angles import read_angle_table
 from bgars.files.light_formats.columns import AXES, Line, Row, Style, as_number, data_lines, find_style, parse_row
 from bgars.files.light_formats.table import MAX_LIGHTS, LightTable, checked_vectors
 from bgars.files.safe_files import read_text
@@ -97,11 +98,16 @@ def read_lp_table(path: Path) -> LightTable:
 def read_text_table(path: Path, *, names_needed: bool = False) -> LightTable:
     """Read lights from lines ``[file] x y z [intensity | red green blue]``, or from three lines of L numbers.
 
+    Also read: azimuth and elevation, or slant and tilt, under a header that names them.
+
     Raises
     ------
     FileFormatError
         Other lines, a zero vector, or a count that does not fit.
     """
+    of_angles = read_angle_table(path)
+    if of_angles is not None:
+        return of_angles
     parsed = read_rows(path, named=names_needed)
     notes = list(parsed.notes)
     rows = _without_index(parsed.rows, notes)

@@ -62,7 +62,7 @@ def part_figure(result: PartResult, capture: Capture) -> Figure:
     figure.suptitle(part_title(result), fontsize=14, color=_title_color(result))
     axes.set_title("\n".join(reasons), fontsize=9, loc="left")
     axes.imshow(
-        np.sqrt(shown_image(capture, _mean_image(capture))),
+        np.sqrt(shown_image(_mean_image(capture))),
         extent=image_extent_um(capture),
         cmap="gray",
         vmin=0.0,

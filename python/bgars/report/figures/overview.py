@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib import style as matplotlib_style
@@ -14,7 +14,8 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 from bgars.files.light_names import light_name
 from bgars.io.atomic import atomic_file
 from bgars.report.color_ramp import cividis
-from bgars.report.figures.prior import prior_label, prior_pixels, show_prior, stripes
+from bgars.report.figure_file import write_png
+from bgars.report.figures.prior import prior_label, prior_overlay, prior_pixels, show_prior, stripes
 from bgars.report.figures.relief import relief
 
 if TYPE_CHECKING:
@@ -27,12 +28,12 @@ if TYPE_CHECKING:
     from bgars.pipelines.reconstruct import Reconstruction
     from bgars.records.height_map import HeightMap
 
+    Overlay = NDArray[np.uint8] | None
+
 __all__ = ["write_overview"]
 
 MAX_SURFACE_POINTS = 240
 SURFACE_PX = 760
-COMPRESSION = 3
-"""Of PNG: a tenth larger than the usual 6, in half its time."""
 MAX_PICTURE_PX = 1600
 DPI = 140
 FLAT_PROFILE = 0.2
@@ -69,7 +70,7 @@ def write_overview(result: Reconstruction, path: str | PathLike[str]) -> None:
     with matplotlib_style.context({"axes.titley": 1.0}):  # measured titles cost a third of the drawing
         figure = _drawn(result)
         with atomic_file(path) as temporary:
-            figure.savefig(temporary, format="png", pil_kwargs={"compress_level": COMPRESSION})
+            write_png(figure, temporary)
 
 
 def _drawn(result: Reconstruction) -> Figure:
@@ -80,13 +81,14 @@ def _drawn(result: Reconstruction) -> Figure:
     axes = figure.subplot_mosaic([["input", "normals", "kept"], ["height", "surface", "profile"]])
     figure.subplots_adjust(left=0.055, right=0.925, bottom=0.085, top=0.89, wspace=0.52, hspace=0.34)
     row = _profile_row(height)
+    overlay = prior_overlay(result.field)
     _show_input(figure, axes["input"], result)
-    _show_normals(axes["normals"], result)
+    _show_normals(axes["normals"], result, overlay)
     if result.field.method in WEIGHING_METHODS:
-        _show_standard_error(figure, axes["kept"], result)
+        _show_standard_error(figure, axes["kept"], result, overlay)
     else:
         _show_kept_lights(figure, axes["kept"], result)
-    _show_height(figure, axes["height"], result, row)
+    _show_height(figure, axes["height"], result, row, overlay)
     _show_surface(axes["surface"], result)
     _show_profile(axes["profile"], result, row)
     return figure
@@ -125,9 +127,8 @@ def _picture(
     cmap: str | None = None,
     span: tuple[float, float] = (0.0, 1.0),
 ) -> AxesImage:
-    step = max(1, int(np.ceil(max(height.mask.shape) / MAX_PICTURE_PX)))
     picture = axes.imshow(
-        values[::step, ::step],
+        values,
         extent=_extent(height),
         interpolation="nearest",
         cmap=cmap,
@@ -142,6 +143,12 @@ def _picture(
     return picture
 
 
+def _thinned(values: NDArray[Any], height: HeightMap) -> NDArray[Any]:
+    """As many pixels as a picture shows: thinned before anything is made of them."""
+    step = max(1, int(np.ceil(max(height.mask.shape) / MAX_PICTURE_PX)))
+    return values[::step, ::step]
+
+
 def _beside(axes: Axes) -> Axes:
     """Room for a colour bar as high as the picture."""
     return axes.inset_axes((1.04, 0.0, 0.045, 1.0))
@@ -149,8 +156,9 @@ def _beside(axes: Axes) -> Axes:
 
 def _show_input(figure: Figure, axes: Axes, result: Reconstruction) -> None:
     capture = result.capture
-    image = np.asarray(capture.images[0], dtype=np.float32)
-    top = float(np.percentile(image[capture.mask], 99.8))
+    image = _thinned(capture.images[0], result.height).astype(np.float32)
+    inside = image[_thinned(capture.mask, result.height)]
+    top = float(np.percentile(inside if inside.size else image, 99.8))
     rig = capture.rig
     place = f"azimuth {rig.azimuths_deg[0]:.0f}°, elevation {rig.elevations_deg[0]:.0f}°"
     title = f"Input: {light_name(0, capture.files)} of {len(rig)}\n{place}"
@@ -158,24 +166,26 @@ def _show_input(figure: Figure, axes: Axes, result: Reconstruction) -> None:
     figure.colorbar(picture, cax=_beside(axes), label="grey level")
 
 
-def _show_normals(axes: Axes, result: Reconstruction) -> None:
-    normals = result.field.normals
+def _show_normals(axes: Axes, result: Reconstruction, overlay: Overlay) -> None:
+    normals = _thinned(result.field.normals, result.height)
     colors = np.where(np.isfinite(normals), (normals + 1.0) / 2.0, 1.0)
     _picture(axes, colors, result.height, "Normals: red = x right, green = y up, blue = z to the camera")
-    show_prior(axes, result.field, _extent(result.height), legend=True)
+    show_prior(axes, result.field, _extent(result.height), legend=True, overlay=overlay)
 
 
 def _show_kept_lights(figure: Figure, axes: Axes, result: Reconstruction) -> None:
     most = float(len(result.capture.rig))
-    kept = np.where(result.field.mask, result.field.lights_kept, np.nan)
+    mask, lights_kept = (_thinned(each, result.height) for each in (result.field.mask, result.field.lights_kept))
+    kept = np.where(mask, lights_kept, np.nan)
     title = "Lights kept in the fit (white: no normal)"
     picture = _picture(axes, kept, result.height, title, cmap="viridis", span=(min(3.0, most - 1.0), most))
     figure.colorbar(picture, cax=_beside(axes), label="lights", ticks=MaxNLocator(6, integer=True))
 
 
-def _show_standard_error(figure: Figure, axes: Axes, result: Reconstruction) -> None:
+def _show_standard_error(figure: Figure, axes: Axes, result: Reconstruction, overlay: Overlay) -> None:
     field = result.field
-    error_deg = np.where(field.mask, np.maximum(field.standard_error_deg, ERROR_LIMITS_DEG[0]), np.nan)
+    mask, error_deg = (_thinned(each, result.height) for each in (field.mask, field.standard_error_deg))
+    error_deg = np.where(mask, np.maximum(error_deg, ERROR_LIMITS_DEG[0]), np.nan)
     picture = _picture(
         axes, error_deg, result.height, "Standard error of the normals (white: no normal)", cmap="viridis_r"
     )
@@ -183,18 +193,19 @@ def _show_standard_error(figure: Figure, axes: Axes, result: Reconstruction) -> 
     bar = figure.colorbar(picture, cax=_beside(axes), label="standard error (°)", ticks=ERROR_TICKS_DEG)
     bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     bar.ax.yaxis.set_minor_formatter(NullFormatter())
-    show_prior(axes, field, _extent(result.height), legend=False)
+    show_prior(axes, field, _extent(result.height), legend=False, overlay=overlay)
 
 
-def _show_height(figure: Figure, axes: Axes, result: Reconstruction, row: int) -> None:
+def _show_height(figure: Figure, axes: Axes, result: Reconstruction, row: int, overlay: Overlay) -> None:
     height = result.height
-    values = height.height
-    low, high = (float(level) for level in np.nanpercentile(values, [0.5, 99.5]))
+    values = _thinned(height.height, height)
+    known = values[np.isfinite(values)]
+    low, high = (float(level) for level in np.percentile(known if known.size else height.height_px, [0.5, 99.5]))
     title = "Height" if len(height.components) == 1 else "Height (each connected part has mean 0)"
     picture = _picture(axes, values, height, title, cmap="cividis", span=(low, high))
     figure.colorbar(picture, cax=_beside(axes), label=f"height ({_unit(height)})")
     y = (height.mask.shape[0] / 2 - row - 0.5) * (height.pixel_pitch_um or 1.0)
-    show_prior(axes, result.field, _extent(height), legend=False)
+    show_prior(axes, result.field, _extent(height), legend=False, overlay=overlay)
     axes.axhline(y, color=MARK_COLOR, linewidth=1.2, linestyle="--")
 
 

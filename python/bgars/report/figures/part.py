@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
 
 from bgars.errors import InputError
 from bgars.io.atomic import atomic_file
@@ -13,8 +17,12 @@ if TYPE_CHECKING:
 
     from bgars.records.capture import Capture
     from bgars.records.part_result import PartResult
+    from bgars.records.pixels import PixelArray
 
-__all__ = ["PICTURES", "write_part_pictures"]
+__all__ = ["PICTURES", "check_pictures", "draw_part_pictures", "thinned", "write_part_pictures"]
+
+MAX_PICTURE_PX = 1100
+"""Longer sides are thinned."""
 
 PICTURES = {
     "part.png": "the picture to look at first: every ball outlined, named, coloured by its deviation",
@@ -48,12 +56,37 @@ def write_part_pictures(result: PartResult, capture: Capture, folder: str | Path
     FileFormatError
         A file cannot be written.
     """
+    check_pictures(result, capture)
+    draw_part_pictures(result, thinned(capture), Path(folder))
+    return dict(PICTURES)
+
+
+def check_pictures(result: PartResult, capture: Capture) -> None:
+    """Raise InputError for a capture that pictures of the result cannot be drawn from."""
     if capture.pixel_pitch_um is None:
         msg = "capture.pixel_pitch_um: needed for pictures in um, got none"
         raise InputError(msg)
     if len(result.light_directions) != len(capture.images):
         msg = f"capture: must have the {len(result.light_directions)} lights of the result, got {len(capture.images)}"
         raise InputError(msg)
+
+
+def thinned(capture: Capture) -> Capture:
+    """The capture with as many pixels as pictures show, and nothing that they do not need."""
+    step = max(1, math.ceil(max(capture.mask.shape) / MAX_PICTURE_PX))
+    images = np.ascontiguousarray(capture.images[:, ::step, ::step])
+    return replace(
+        capture,
+        images=cast("PixelArray", images),
+        mask=np.ascontiguousarray(capture.mask[::step, ::step]),
+        pixel_pitch_um=step * (capture.pixel_pitch_um or 1.0),
+        dark=None,
+        response=None,
+    )
+
+
+def draw_part_pictures(result: PartResult, capture: Capture, folder: Path) -> None:
+    """Draw and write them, from a thinned capture."""
     # Imported here: the names of the pictures are wanted where matplotlib is not.
     from bgars.report.figures.balls import part_figure  # noqa: PLC0415
     from bgars.report.figures.histograms import histogram_figure  # noqa: PLC0415
@@ -62,7 +95,7 @@ def write_part_pictures(result: PartResult, capture: Capture, folder: str | Path
     from bgars.report.figures.style import figure_style, save  # noqa: PLC0415
     from bgars.report.identity import identity_line  # noqa: PLC0415
 
-    folder = Path(folder)
+    line = identity_line(result.to_dict())
     with figure_style():
         figures = {
             "part.png": part_figure(result, capture),
@@ -70,9 +103,7 @@ def write_part_pictures(result: PartResult, capture: Capture, folder: str | Path
             "deviations.png": deviation_figure(result),
             "histograms.png": histogram_figure(result),
         }
-        line = identity_line(result.to_dict())
         for name, figure in figures.items():
             figure.text(0.995, 0.997, line, ha="right", va="top", fontsize=6, color="0.35", parse_math=False)
             with atomic_file(folder / name) as temporary:
                 save(figure, temporary)
-    return dict(PICTURES)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from bgars.records.normal_field import NormalField
 
-__all__ = ["STRIPE_COLOR", "prior_label", "prior_pixels", "prior_share", "show_prior", "stripes"]
+__all__ = ["STRIPE_COLOR", "prior_label", "prior_overlay", "prior_pixels", "prior_share", "show_prior", "stripes"]
 
 STRIPE_COLOR = (0.08, 0.08, 0.08)
 STRIPE_ALPHA = 0.75
@@ -49,17 +49,35 @@ def stripes(prior: NDArray[np.bool_], count: float = STRIPES) -> NDArray[np.floa
     return opacity
 
 
-def show_prior(axes: Axes, field: NormalField, extent: tuple[float, float, float, float], *, legend: bool) -> None:
-    """Lay stripes over a picture where its normals are a prior, and say so below it; nothing where none are."""
+def prior_overlay(field: NormalField) -> NDArray[np.uint8] | None:
+    """Stripes over all that is a prior, as an image with transparency; None where nothing is."""
     prior = prior_pixels(field)
     if not prior.any():
-        return
+        return None
     step = max(1, -(-max(prior.shape) // OVERLAY_PX))
     enlarge = max(1, OVERLAY_PX // max(prior.shape))
     shown = prior[::step, ::step].repeat(enlarge, axis=0).repeat(enlarge, axis=1)
-    overlay = np.zeros((*shown.shape, 4))
-    overlay[..., :3] = STRIPE_COLOR
-    overlay[..., 3] = stripes(shown)
+    overlay = np.zeros((*shown.shape, 4), np.uint8)
+    overlay[..., :3] = np.rint(255.0 * np.array(STRIPE_COLOR))
+    overlay[..., 3] = np.rint(255.0 * stripes(shown))
+    return overlay
+
+
+def show_prior(
+    axes: Axes,
+    field: NormalField,
+    extent: tuple[float, float, float, float],
+    *,
+    legend: bool,
+    overlay: NDArray[np.uint8] | None = None,
+) -> None:
+    """Lay stripes over a picture where its normals are a prior, and say so below it; nothing where none are.
+
+    `overlay` is what :func:`prior_overlay` returns, where several pictures share it.
+    """
+    overlay = prior_overlay(field) if overlay is None else overlay
+    if overlay is None:
+        return
     axes.imshow(overlay, extent=extent, interpolation="antialiased")
     if legend:
         patch = Patch(facecolor="white", edgecolor=STRIPE_COLOR, hatch="//////", linewidth=0.8)

@@ -88,7 +88,7 @@ def shadow_figure(result: PartResult, capture: Capture) -> Figure:
 
 
 def _show_light(axes: Axes, capture: Capture, result: PartResult, light: int) -> None:
-    shown = shown_image(capture, capture.images[light])
+    shown = shown_image(capture.images[light])
     axes.imshow(np.sqrt(shown), extent=image_extent_um(capture), cmap="gray", vmin=0.0, vmax=1.0)
     is_flagged = light in flagged_lights(result)
     axes.set_title(

@@ -20,6 +20,7 @@ from bgars.records.part_result import PartResult
 from bgars.report.html.budget import BUDGET_COLUMNS, budget_table
 from bgars.report.html.charts import coplanarity_chart, histogram_charts
 from bgars.report.html.chosen import chosen_marks
+from bgars.report.html.files import REPORT_FILES
 from bgars.report.html.material import material_facts, material_rows
 from bgars.report.html.photograph import side_files
 from bgars.report.html.picture import part_picture
@@ -49,12 +50,6 @@ if TYPE_CHECKING:
 
 __all__ = ["REPORT_FILES", "write_page", "write_report"]
 
-REPORT_FILES = {
-    "report.html": "open in a browser: verdict, balls, charts and a 3-D view on one page that needs no network",
-    "photograph.jpg": "the part as the camera saw it, for `bgars report`",
-    "report.json": "where the photograph lies, and the lights, for `bgars report`",
-    "surface.npz": "height map of the part, for the 3-D view of `bgars report`",
-}
 TEMPLATES = Path(__file__).parent / "template"
 SEATS_TOLD = 3
 SHARED_PLOTLY = "plotly.min.js"
@@ -277,7 +272,7 @@ def plotly_script() -> Markup:
         msg = f"report.html {how_to_install('plotly')}"
         raise InputError(msg)
     path = Path(found.submodule_search_locations[0]) / "package_data" / "plotly.min.js"
-    return _script(path.read_text(encoding="utf-8"))
+    return _script(path.read_bytes().decode("utf-8"))
 
 
 def _file(name: str) -> str:
@@ -286,8 +281,11 @@ def _file(name: str) -> str:
 
 def _script(text: str) -> Markup:
     """Our own or plotly's script or style, marked safe; none may end its own element."""
-    text = text.replace("\r\n", "\n").replace("\r", "\n")
-    if "</script" in text.lower() or "</style" in text.lower() or "<!--" in text:
+    if "\r" in text:
+        text = text.replace("\r\n", "\n").replace("\r", "\n")
+    # Not text.lower(): plotly.js has five million letters.
+    ends = (part[:6].lower() for part in text.split("</")[1:])
+    if "<!--" in text or any(end.startswith(("script", "style")) for end in ends):
         msg = "a script of the report: must not hold the end of its element"
         raise InputError(msg)
     return _markup(text)

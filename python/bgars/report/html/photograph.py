@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 from base64 import b64encode
@@ -9,8 +10,8 @@ from dataclasses import asdict, dataclass
 from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
-import imageio.v3 as iio
 import numpy as np
+from PIL import Image
 
 from bgars.errors import FileFormatError
 from bgars.files.light_names import light_name
@@ -94,8 +95,9 @@ def photograph_of(capture: Capture) -> Photograph:
     meaning = f"mean of the {len(capture.images)} images, square root of the grey levels"
     if step > 1:
         meaning += f", every {step}th pixel"
-    jpeg = iio.imwrite("<bytes>", _stretched(total), extension=".jpg", quality=QUALITY)
-    return Photograph(bytes(jpeg), left_um, left_um + wide_um, top_um - high_um, top_um, meaning)
+    jpeg = io.BytesIO()
+    Image.fromarray(_stretched(total)).save(jpeg, "jpeg", quality=QUALITY)
+    return Photograph(jpeg.getvalue(), left_um, left_um + wide_um, top_um - high_um, top_um, meaning)
 
 
 def _stretched(values: NDArray[np.float32]) -> NDArray[np.uint8]:
@@ -154,7 +156,7 @@ def read_side_files(path: Path) -> tuple[Photograph | None, tuple[Lamp, ...], Pa
         )
         surface = values.get("surface")
         digest = None if surface is None else str(surface["sha256"])
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         msg = f"{path}: is not what `bgars inspect` writes beside its result ({error!r}); remove it to do without"
         raise FileFormatError(msg) from error
     photograph = _read_jpeg(path.with_name(PHOTOGRAPH_FILE), (left_um, right_um, bottom_um, top_um), meaning)

@@ -73,7 +73,8 @@ def write_station_page(station: Station, path: str | PathLike[str]) -> None:
         "</ul>",
     ]
     page = (
-        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{html.escape(station.name)}</title>'
+        '<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="generator" content="bgars">'
+        f"<title>{html.escape(station.name)}</title>"
         f"<style>{STYLE}</style></head><body>{''.join(parts)}</body></html>\n"
     )
     with atomic_file(path) as place:

@@ -7,7 +7,7 @@ use super::facet;
 use super::lobe::Material;
 use super::material::Specimen;
 use super::observation::{Kind, Observation, SCALE};
-use crate::normals::{RobustParams, robust_filter};
+use crate::normals::robust_filter;
 
 /// Most lights that are left out in turn at a pixel.
 const MAX_LEFT_OUT: usize = 8;
@@ -53,7 +53,7 @@ fn of_pixel(specimen: &Specimen, material: &Material) -> ([f64; 3], f64) {
         let values: Vec<f32> = rest.values.iter().map(|&value| value as f32).collect();
         let clipped: Vec<bool> = rest.kinds.iter().map(|&kind| kind == Kind::Clipped).collect();
         let directions: Vec<[f64; 3]> = rest.lights.iter().map(|light| light.direction.into()).collect();
-        let kept = robust_filter(&values, &clipped, &directions, 1.0, RobustParams::DEFAULT);
+        let kept = robust_filter(&values, &clipped, &directions, 1.0);
         let all = least_squares(&rest, &vec![true; values.len()]);
         let robust = least_squares(&rest, &kept);
         let lambertian = |scaled: &Vector3<f64>| scaled.dot(&light.direction).max(0.0);

@@ -2,21 +2,19 @@
 
 use nalgebra::Vector3;
 
+use crate::reflectance::Lobe;
+
 /// Lowest cosine between normal and half vector at which the lobe is computed; far outside any lobe.
 const MIN_HALF_COSINE: f64 = 0.05;
 
 /// Lowest `n_z` that the lobe is divided by.
 const MIN_N_Z: f64 = 0.02;
 
-/// Tails below this are Beckmann's.
-const MIN_TAIL: f64 = 1e-3;
-
 /// A material relative to its diffuse albedo.
 ///
 /// `I / (rho E) = n.l + s D G / n_z`, the Torrance-Sparrow form of Cook and Torrance (1982, eq. for R_s) with the Fresnel
 /// factor and `1 / (pi m^2)` folded into the strength `s`, and V-cavities
-/// `G = min(1, 2 n.h n.v / v.h, 2 n.h n.l / v.h)`. The lobe is a Student-like family over `t = tan^2 a / m^2`,
-/// `D = (1 + u t)^-(1 + 1/u) / cos^4 a`: `u -> 0` is Beckmann, `u = 1` GGX (Walter et al. 2007, eqs. 25, 33).
+/// `G = min(1, 2 n.h n.v / v.h, 2 n.h n.l / v.h)`; `D` is that of a [`Lobe`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
     /// Peak of the lobe over the diffuse albedo, `s`; 0 is a Lambertian surface.
@@ -61,16 +59,8 @@ impl Material {
             return (toward_light, light.direction);
         }
         let n_z = normal.z.max(MIN_N_Z);
-        let inverse_variance = 1.0 / (self.roughness * self.roughness);
-        let squared = cosine * cosine;
-        let t = (1.0 - squared) / squared * inverse_variance;
-        // D without its 1 / cos^4, and d ln D / dt.
-        let (facets, log_slope) = if self.tail < MIN_TAIL {
-            ((-t).exp(), -1.0)
-        } else {
-            let base = 1.0 + self.tail * t;
-            (base.powf(-(1.0 + 1.0 / self.tail)), -(1.0 + self.tail) / base)
-        };
+        let lobe = Lobe { strength: self.strength, roughness: self.roughness, tail: self.tail };
+        let [facets, log_slope] = lobe.distribution_by_cosine(cosine);
         let view_half = light.half.z;
         let (toward_view, away) = (2.0 * cosine * n_z / view_half, 2.0 * cosine * toward_light / view_half);
         // ln G over the cosine of the half vector, n_z and n.l.
@@ -81,10 +71,8 @@ impl Material {
         } else {
             (away, 1.0 / cosine, 0.0, 1.0 / toward_light)
         };
-        let lobe = self.strength * facets * masking / (squared * squared * n_z);
-        let t_slope = -2.0 * inverse_variance / (squared * cosine);
-        let mut slope = light.half * (lobe * (log_slope * t_slope - 4.0 / cosine + over_cosine))
-            + light.direction * (1.0 + lobe * over_light);
+        let lobe = self.strength * facets * masking / n_z;
+        let mut slope = light.half * (lobe * (log_slope + over_cosine)) + light.direction * (1.0 + lobe * over_light);
         if normal.z > MIN_N_Z {
             slope.z += lobe * (over_n_z - 1.0 / n_z);
         }

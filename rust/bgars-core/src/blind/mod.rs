@@ -20,7 +20,7 @@ use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
-use crate::normals::{self, Method, NormalMap, NormalMapMut, RobustParams};
+use crate::normals::{self, Method, NormalMap, NormalMapMut};
 use crate::{ImageStack, Lights, Pixel, Radiometry, Result};
 
 pub use judge::{MIN_LIGHTS, Predictions};
@@ -162,10 +162,17 @@ pub fn estimate_into<P: Pixel>(
     mut out: NormalMapMut<'_>,
 ) -> Result<Report> {
     out.check_with_measured(stack.pixels(), stack.lights())?;
-    let robust = Method::RobustFilter(RobustParams::DEFAULT);
     let half = AFTER_CLASSICAL / 2.0;
     // The robust filter's result is the output already: what is chosen otherwise overwrites it.
-    normals::estimate_into(stack, lights, radiometry, mask, robust, &mut |done| progress(done * half), out.reborrow())?;
+    normals::estimate_into(
+        stack,
+        lights,
+        radiometry,
+        mask,
+        Method::RobustFilter,
+        &mut |done| progress(done * half),
+        out.reborrow(),
+    )?;
     let without = Report { choice: Choice::RobustFilter, predictions: None, material: None, pixels: [0; 3] };
     if stack.lights() < MIN_LIGHTS {
         return Ok(without);
@@ -219,7 +226,7 @@ pub fn predict<P: Pixel>(
     if stack.lights() < MIN_LIGHTS {
         return Ok(None);
     }
-    let [lambertian, filtered] = [Method::Lambertian, Method::RobustFilter(RobustParams::DEFAULT)].map(|method| {
+    let [lambertian, filtered] = [Method::Lambertian, Method::RobustFilter].map(|method| {
         normals::estimate(stack, lights, radiometry, mask, method, false, &mut |_| ControlFlow::Continue(()))
     });
     let (lambertian, filtered) = (lambertian?, filtered?);

@@ -4,12 +4,12 @@ use std::ops::Range;
 
 use multiversion::{multiversion, target::target_cfg_f};
 
+use super::NormalMapMut;
 use super::cutoff::cutoffs;
 use super::fit::{Equations, Fit, Results};
 use super::lanes::{LANES, Lanes};
 use super::source::{AsTheyAre, Images, Linearised, Source};
 use super::windows::{Memory, WindowFilter};
-use super::{NormalMap, NormalMapMut};
 use crate::{Lights, Pixel};
 
 /// Which lights a block keeps.
@@ -131,7 +131,6 @@ impl<'a, K: Pixel> Work<'a, K> {
         let mut left = Left { finite: true, careful: Vec::new() };
         let set_lights = out.set_lights();
         let mut out = out.reborrow();
-        let mut spare = NormalMap::zeros(LANES, set_lights);
         let end = pixels.end;
         for first in pixels.step_by(LANES) {
             let block = first..end.min(first + LANES);
@@ -139,6 +138,16 @@ impl<'a, K: Pixel> Work<'a, K> {
             let mut part = out.take(block.len(), set_lights);
             if used.is_some_and(|used| !used.contains(&true)) {
                 part.clear(0..block.len());
+                continue;
+            }
+            if block.len() < LANES {
+                for (lane, pixel) in block.enumerate() {
+                    if used.is_none_or(|used| used[lane]) {
+                        left.careful.push(pixel);
+                    } else {
+                        part.clear(lane..lane + 1);
+                    }
+                }
                 continue;
             }
             self.load(&block);
@@ -150,12 +159,7 @@ impl<'a, K: Pixel> Work<'a, K> {
             }
             left.finite &= K::CODES.is_some() || self.fit.is_finite();
             let mut careful = Lanes::of(false);
-            if block.len() == LANES {
-                self.write::<FMA>(keep_all, &mut part, &mut careful);
-            } else {
-                self.write::<FMA>(keep_all, &mut spare.as_mut(), &mut careful);
-                part.copy_from(&spare);
-            }
+            self.write::<FMA>(keep_all, &mut part, &mut careful);
             for (lane, _) in used.unwrap_or_default().iter().enumerate().filter(|(_, used)| !**used) {
                 part.clear(lane..lane + 1);
                 (careful[lane], self.close[lane]) = (false, false);

@@ -29,7 +29,7 @@ pub(super) fn check<P: Pixel>(
         return Err(Error::EmptyMask);
     }
     match method {
-        Method::Lambertian => {}
+        Method::Lambertian | Method::RobustFilter => {}
         Method::SpecularFilter { threshold } => {
             if !(threshold.is_finite() && threshold > 0.0) {
                 return Err(Error::OutOfRange {
@@ -39,7 +39,6 @@ pub(super) fn check<P: Pixel>(
                 });
             }
         }
-        Method::RobustFilter(params) => params.check()?,
     }
     Ok(())
 }

@@ -8,8 +8,9 @@ use rayon::prelude::*;
 use super::blocks::{self, BlockSolver, Choice, Left, value_scale};
 use super::checks::{check, check_finite};
 use super::confidence::confidence;
+use super::lanes::LANES;
 use super::robust::{self, RobustFilter, RobustScratch};
-use super::solve::{Solution, SubsetSolver};
+use super::solve::{Solution, solve};
 use super::source::Images;
 use super::specular::specular_filter;
 use super::windows::WindowFilter;
@@ -18,6 +19,9 @@ use crate::{Error, ImageStack, Lights, Pixel, Radiometry, Result};
 
 /// Pixels of one task. What comes out is the same for any number.
 const TASK_PIXELS: usize = 1 << 13;
+
+/// Tasks with one pixel in so many to estimate, or fewer, have these gathered.
+const SPARSE: usize = 4;
 
 /// Pixels between two calls of the progress callback.
 const BAND_PIXELS: usize = 1 << 19;
@@ -122,7 +126,6 @@ struct Kernel<'a, P> {
     mask: Option<&'a [bool]>,
     method: Method,
     robust: Option<RobustFilter>,
-    solver: SubsetSolver,
     /// The fast kernel, where it can serve.
     blocks: Option<BlockSolver>,
     /// Full scale in the unit of the scaled values: its mean over the lights.
@@ -161,14 +164,7 @@ impl<'a, P: Pixel> Kernel<'a, P> {
         mask: Option<&'a [bool]>,
         method: Method,
     ) -> Self {
-        let solver = match lights {
-            Lights::Directional(directions) => SubsetSolver::with_table(directions),
-            Lights::Near { .. } => SubsetSolver::without_table(),
-        };
-        let robust = match method {
-            Method::RobustFilter(params) => Some(RobustFilter::new(params, lights.len())),
-            _ => None,
-        };
+        let robust = (method == Method::RobustFilter).then(|| RobustFilter::new(lights.len()));
         let full_scale = radiometry.full_scale_of(stack);
         let scales: Vec<f32> = radiometry.intensities.iter().map(|intensity| (1.0 / intensity) as f32).collect();
         let mean_scale = scales.iter().map(|&scale| f64::from(scale)).sum::<f64>() / scales.len() as f64;
@@ -184,16 +180,21 @@ impl<'a, P: Pixel> Kernel<'a, P> {
         let blocks = BlockSolver::new(lights, full_scale, choice);
         let planes = (0..stack.lights()).map(|light| stack.plane(light)).collect();
         let images = Images { planes, radiometry, scales };
-        Self { stack, lights, images, full_scale, mask, method, robust, solver, blocks, scaled_full_scale }
+        Self { stack, lights, images, full_scale, mask, method, robust, blocks, scaled_full_scale }
     }
 
     /// The pixels of `out`, of which `first` is the first one's number; false where something that was read is not finite.
     fn task(&self, first: usize, out: &mut NormalMapMut<'_>, scratch: &mut Scratch) -> bool {
         let pixels = first..first + out.albedo.len();
         if let Some(solver) = &self.blocks {
-            let Left { finite, careful } = blocks::run(solver, &self.images, self.mask, pixels, out);
+            let used: Vec<usize> = pixels.clone().filter(|&pixel| self.mask.is_some_and(|mask| mask[pixel])).collect();
+            if self.mask.is_some() && SPARSE * used.len() <= pixels.len() {
+                return self.few(solver, first, used, out, scratch);
+            }
+            let Left { mut finite, careful } = blocks::run(solver, &self.images, self.mask, pixels, out);
             for pixel in careful {
                 self.pixel(pixel, pixel - first, out, scratch);
+                finite &= scratch.values.iter().all(|value| value.is_finite());
             }
             return finite;
         }
@@ -205,6 +206,38 @@ impl<'a, P: Pixel> Kernel<'a, P> {
             } else {
                 out.clear(pixel - first..pixel - first + 1);
             }
+        }
+        finite
+    }
+
+    /// Few pixels of a task: gathered, so that no block is worked on for the sake of one of them.
+    fn few(
+        &self,
+        solver: &BlockSolver,
+        first: usize,
+        mut used: Vec<usize>,
+        out: &mut NormalMapMut<'_>,
+        scratch: &mut Scratch,
+    ) -> bool {
+        out.clear(0..out.albedo.len());
+        let Some(&last) = used.last() else { return true };
+        used.resize(used.len().next_multiple_of(LANES), last);
+        let gather = |plane: &[P]| -> Vec<P> { used.iter().map(|&pixel| plane[pixel]).collect() };
+        let planes: Vec<Vec<P>> = self.images.planes.iter().map(|plane| gather(plane)).collect();
+        let dark = self.images.radiometry.dark.map(gather);
+        let radiometry = Radiometry { dark: dark.as_deref(), ..self.images.radiometry.clone() };
+        let images = Images {
+            planes: planes.iter().map(Vec::as_slice).collect(),
+            radiometry: &radiometry,
+            scales: self.images.scales.clone(),
+        };
+        let mut map = NormalMap::zeros(used.len(), out.set_lights());
+        let Left { finite, careful } = blocks::run(solver, &images, None, 0..used.len(), &mut map.as_mut());
+        for (index, &pixel) in used.iter().enumerate() {
+            out.copy_pixel(pixel - first, &map, index);
+        }
+        for index in careful {
+            self.pixel(used[index], used[index] - first, out, scratch);
         }
         finite
     }
@@ -226,7 +259,7 @@ impl<'a, P: Pixel> Kernel<'a, P> {
             let albedo = solution.scaled_normal.norm();
             albedo.is_finite() && albedo > 0.0 && solution.scaled_normal.z > 0.0
         };
-        let solution = self.solver.solve(&scratch.values, &scratch.directions, &scratch.kept).filter(facing);
+        let solution = solve(&scratch.values, &scratch.directions, &scratch.kept).filter(facing);
         let Some(solution) = solution else {
             out.reject(at..at + 1);
             return;
@@ -274,14 +307,14 @@ impl<'a, P: Pixel> Kernel<'a, P> {
                 let gap = gap(threshold, self.full_scale);
                 specular_filter(&scratch.values, gap, &mut scratch.order, &mut scratch.kept);
             }
-            (Method::RobustFilter(_), Some(filter)) => {
+            (Method::RobustFilter, Some(filter)) => {
                 let pixel = robust::Pixel {
                     values: &scratch.values,
                     clipped: &scratch.clipped,
                     directions: &scratch.directions,
                     full_scale: self.scaled_full_scale,
                 };
-                filter.choose(&pixel, &self.solver, &mut scratch.robust, &mut scratch.kept);
+                filter.choose(&pixel, &mut scratch.robust, &mut scratch.kept);
             }
             _ => scratch.kept.fill(true),
         }

@@ -45,7 +45,7 @@ pub(super) const GROUP: usize = 4;
 
 /// `sum + a b`, in one rounding where the processor has an instruction for it; without one, `mul_add` would be a call.
 #[inline(always)]
-pub(super) fn add_product<const FMA: bool>(sum: f32, a: f32, b: f32) -> f32 {
+pub(crate) fn add_product<const FMA: bool>(sum: f32, a: f32, b: f32) -> f32 {
     if FMA { a.mul_add(b, sum) } else { sum + a * b }
 }
 

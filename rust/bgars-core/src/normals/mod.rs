@@ -26,7 +26,8 @@ use crate::{Error, Result};
 pub(crate) use checks::check_finite;
 pub(crate) use confidence::{confidence_of, misfit_freedom};
 pub use estimate::{estimate, estimate_into};
-pub use robust::{RobustParams, robust_filter};
+pub(crate) use lanes::add_product;
+pub use robust::robust_filter;
 pub use specular::specular_filter;
 
 /// Which lights of a pixel enter its least squares.
@@ -40,7 +41,7 @@ pub enum Method {
         threshold: f32,
     },
     /// The best window of sorted values; see [`robust_filter`].
-    RobustFilter(RobustParams),
+    RobustFilter,
 }
 
 /// What [`estimate`] found; every array is row-major over `height * width` pixels.
@@ -143,18 +144,19 @@ impl<'a> NormalMapMut<'a> {
         }
     }
 
-    /// Takes over as much as there is room for.
-    fn copy_from(&mut self, from: &NormalMap) {
-        fn copy<T: Copy>(to: &mut [T], from: &[T]) {
-            to.copy_from_slice(&from[..to.len()]);
+    /// Takes over a pixel of another map.
+    fn copy_pixel(&mut self, to: usize, from: &NormalMap, index: usize) {
+        let lights = self.set_lights();
+        self.normals[3 * to..3 * to + 3].copy_from_slice(&from.normals[3 * index..3 * index + 3]);
+        self.albedo[to] = from.albedo[index];
+        self.mask[to] = from.mask[index];
+        self.confidence[to] = from.confidence[index];
+        self.lights_kept[to] = from.lights_kept[index];
+        self.kept_sets[to * lights..(to + 1) * lights]
+            .copy_from_slice(&from.kept_sets[index * lights..(index + 1) * lights]);
+        if let Some(measured) = self.measured.get_mut(to) {
+            *measured = from.measured[index];
         }
-        copy(self.normals, &from.normals);
-        copy(self.albedo, &from.albedo);
-        copy(self.mask, &from.mask);
-        copy(self.confidence, &from.confidence);
-        copy(self.measured, &from.measured);
-        copy(self.lights_kept, &from.lights_kept);
-        copy(self.kept_sets, &from.kept_sets);
     }
 
     /// Marks pixels as not asked for.

@@ -2,9 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::{Error, Result};
-
-use super::solve::{Gram, SubsetSolver};
+use super::solve::Gram;
 use super::specular::sort_lights;
 
 /// Most steps that the sorted values are cut into: up to 8 lights every window is tried, beyond that every eighth part.
@@ -25,34 +23,11 @@ pub(super) const DROPPED_WEIGHT: f64 = 0.1;
 /// Fits that the noise level is worth: keeps a fit of three lights, which has no residual, from looking perfect.
 const PRIOR_FITS: f64 = 0.7;
 
+/// Standard deviation of a value, of full scale: one grey level of 255.
+pub(super) const NOISE: f64 = 1.0 / 255.0;
+
 /// Power of (all lights / kept lights): what dropping a light costs.
 const DROPPING_POWER: i32 = 4;
-
-/// Settings of the robust filter.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RobustParams {
-    /// Standard deviation of a value, in grey levels of 255.
-    pub noise_level: f32,
-}
-
-impl RobustParams {
-    /// One grey level of 255.
-    pub const DEFAULT: Self = Self { noise_level: 1.0 };
-
-    pub(super) fn check(self) -> Result<()> {
-        if self.noise_level.is_finite() && self.noise_level > 0.0 {
-            return Ok(());
-        }
-        let value = f64::from(self.noise_level);
-        Err(Error::OutOfRange { argument: "noise_level", rule: "finite and above 0 (grey levels of 255)", value })
-    }
-}
-
-impl Default for RobustParams {
-    fn default() -> Self {
-        Self::DEFAULT
-    }
-}
 
 /// Marks the lights that the robust filter keeps at one pixel.
 ///
@@ -79,30 +54,23 @@ impl Default for RobustParams {
 ///
 /// # Examples
 /// ```
-/// use bgars_core::normals::{RobustParams, robust_filter};
+/// use bgars_core::normals::robust_filter;
 /// let s = 0.5f64.sqrt();
 /// let ring = [[s, 0.0, s], [0.5, 0.5, s], [0.0, s, s], [-0.5, 0.5, s], [-s, 0.0, s], [-0.5, -0.5, s]];
 /// // A facet toward the camera of 100 grey levels; light 1 makes a highlight, light 3 is in a cast shadow.
 /// let values = [70.7, 180.0, 70.7, 0.0, 70.7, 70.7];
-/// let kept = robust_filter(&values, &[false; 6], &ring, 255.0, RobustParams::DEFAULT);
+/// let kept = robust_filter(&values, &[false; 6], &ring, 255.0);
 /// assert_eq!(kept, [true, false, true, false, true, true]);
 /// ```
 ///
 /// # Cost
 /// At most 21 windows of O(L) each, after a sort.
 #[must_use]
-pub fn robust_filter(
-    values: &[f32],
-    clipped: &[bool],
-    directions: &[[f64; 3]],
-    full_scale: f32,
-    params: RobustParams,
-) -> Vec<bool> {
+pub fn robust_filter(values: &[f32], clipped: &[bool], directions: &[[f64; 3]], full_scale: f32) -> Vec<bool> {
     let directions: Vec<Vector3<f64>> = directions.iter().map(|&direction| Vector3::from(direction)).collect();
     let pixel = Pixel { values, clipped, directions: &directions, full_scale: f64::from(full_scale) };
     let mut kept = vec![true; values.len()];
-    let solver = SubsetSolver::without_table();
-    RobustFilter::new(params, values.len()).choose(&pixel, &solver, &mut RobustScratch::default(), &mut kept);
+    RobustFilter::new(values.len()).choose(&pixel, &mut RobustScratch::default(), &mut kept);
     kept
 }
 
@@ -139,13 +107,12 @@ struct Ranked {
 #[derive(Debug)]
 pub(super) struct RobustFilter {
     windows: Vec<(usize, usize)>,
-    noise_level: f64,
 }
 
 impl RobustFilter {
     /// A filter for `lights` lights.
-    pub fn new(params: RobustParams, lights: usize) -> Self {
-        Self { windows: windows(lights), noise_level: f64::from(params.noise_level) / 255.0 }
+    pub fn new(lights: usize) -> Self {
+        Self { windows: windows(lights) }
     }
 
     /// First and one-past-last rank of each window, the larger windows first.
@@ -153,21 +120,16 @@ impl RobustFilter {
         &self.windows
     }
 
-    /// Standard deviation of a value at this full scale.
-    pub fn noise(&self, full_scale: f64) -> f64 {
-        self.noise_level * full_scale
-    }
-
     /// Writes the kept lights of a pixel to `kept`; see [`robust_filter`].
-    pub fn choose(&self, pixel: &Pixel<'_>, solver: &SubsetSolver, scratch: &mut RobustScratch, kept: &mut [bool]) {
+    pub fn choose(&self, pixel: &Pixel<'_>, scratch: &mut RobustScratch, kept: &mut [bool]) {
         sort_lights(pixel.values, &mut scratch.order);
         let median = median(pixel.values, &scratch.order);
         put_clipped_last(pixel.clipped, &mut scratch.order);
         rank(pixel, scratch);
-        let noise = self.noise(pixel.full_scale);
+        let noise = NOISE * pixel.full_scale;
         let mut best: Option<(bool, f64, (usize, usize))> = None;
         for &window in &self.windows {
-            let Some(facet) = fit(window, solver, scratch) else { continue };
+            let Some(facet) = fit(window, scratch) else { continue };
             let brightness = facet.norm();
             if !(facet.z > 0.0 && brightness.is_finite()) {
                 continue;
@@ -187,10 +149,9 @@ impl RobustFilter {
 }
 
 /// `rho n` of a window by least squares; `None` where its lights do not fix a normal.
-fn fit((first, end): (usize, usize), solver: &SubsetSolver, scratch: &RobustScratch) -> Option<Vector3<f64>> {
+fn fit((first, end): (usize, usize), scratch: &RobustScratch) -> Option<Vector3<f64>> {
     let (below, through) = (&scratch.sums[first], &scratch.sums[end]);
-    let subset = || scratch.order[first..end].iter().fold(0, |subset, light| subset | 1 << light);
-    let gram = solver.tabulated(subset).unwrap_or_else(|| Gram::new(&(through.0 - below.0)));
+    let gram = Gram::new(&(through.0 - below.0));
     if gram.determinant > MIN_DETERMINANT { Some(gram.inverse? * (through.1 - below.1)) } else { None }
 }
 

@@ -49,7 +49,7 @@ impl<P: Pixel> Images<'_, P> {
 impl<P: Pixel> Source<P> for AsTheyAre<'_, P> {
     fn keys(&self, pixels: &Range<usize>, keys: &mut [Lanes<P>]) {
         for (key, plane) in keys.iter_mut().zip(&self.0.planes) {
-            take(key, &plane[pixels.clone()]);
+            key.copy_from_slice(&plane[pixels.clone()]);
         }
     }
 
@@ -84,15 +84,5 @@ impl<P: Pixel> Source<f32> for Linearised<'_, P> {
 
     fn offset(&self, _: &Range<usize>, _: &mut Lanes<f32>) -> bool {
         false
-    }
-}
-
-/// Reads a block, or as much of it as there is.
-#[inline(always)]
-fn take<T: Copy, const N: usize>(block: &mut [T; N], from: &[T]) {
-    if let Ok(from) = from.try_into() {
-        *block = from;
-    } else {
-        block[..from.len()].copy_from_slice(from);
     }
 }

@@ -149,7 +149,7 @@ impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
         let (group, lane) = (light / GROUP, light % GROUP);
         scratch.seen.weight[group][lane] = 0.0;
         let best = self.minimum_of_seen(Search::Deepest, scratch);
-        self.table.at(best.point, group).value[lane]
+        self.table.at::<false>(best.point, group).value[lane]
     }
 
     fn minimum(&self, pixel: usize, search: Search, scratch: &mut Scratch) -> Minimum {
@@ -199,9 +199,12 @@ impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
             let point = if inside > 0.0 { flat.point } else { circle_point };
             return [Some(if inside.abs() < edge { Expected::Unseen(point) } else { Expected::At(point) }), None];
         }
-        let shift: Option<[f32; 2]> = (self.ball.odd.as_ref())
-            .map(|odd| std::array::from_fn(|axis| odd.at(circle_point.map(f64::from), axis).0))
-            .filter(|[a, b]| a.hypot(*b) > 0.0);
+        let shift_of = |odd: &CellTable| {
+            let mut shift = [0.0; 3];
+            odd.add_middle(circle_point.map(f64::from), &mut shift);
+            [shift[0], shift[1]]
+        };
+        let shift = self.ball.odd.as_ref().map(shift_of).filter(|[a, b]| *a != 0.0 || *b != 0.0);
         let moved = |shift: [f32; 2]| Expected::At(std::array::from_fn(|axis| circle_point[axis] + shift[axis]));
         [Some(Expected::At(circle_point)), shift.map(moved)]
     }
@@ -209,23 +212,20 @@ impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
     fn observe(&self, pixel: usize, scratch: &mut Scratch) {
         let lights = self.reader.lights();
         let seen = &mut scratch.seen;
-        self.reader.read(pixel, &mut seen.bent.as_flattened_mut()[..lights]);
+        let [bent, weight, clip] =
+            [&mut seen.bent, &mut seen.weight, &mut seen.clip].map(|of| &mut of.as_flattened_mut()[..lights]);
+        self.reader.read(pixel, bent);
+        clip.copy_from_slice(self.clip);
         for light in 0..lights {
-            let (group, lane) = (light / GROUP, light % GROUP);
-            let clip = self.clip[light];
-            let bent = seen.bent[group][lane].min(clip);
-            let variance = self.spread.at(bent).powi(2) + self.known_variance(scratch.anchor, light);
-            seen.bent[group][lane] = bent;
-            seen.weight[group][lane] = variance.sqrt().recip();
-            seen.clip[group][lane] = clip;
+            bent[light] = bent[light].min(clip[light]);
+            weight[light] = self.spread.at(bent[light]).powi(2);
         }
-    }
-
-    /// Variance of a bent level from ball to ball, where it was learnt.
-    fn known_variance(&self, expected: Option<[f32; 2]>, light: usize) -> f32 {
-        match (&self.ball.correction, expected) {
-            (Some(correction), Some(point)) => correction.at(point.map(f64::from), light).1.powi(2),
-            _ => 0.0,
+        // What differs from ball to ball, where it was learnt.
+        if let (Some(correction), Some(point)) = (&self.ball.correction, scratch.anchor) {
+            correction.add_variance(point.map(f64::from), weight);
+        }
+        for variance in weight {
+            *variance = variance.sqrt().recip();
         }
     }
 
@@ -236,7 +236,7 @@ impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
         let (haa, hbb) = (haa + best.prior_information, hbb + best.prior_information);
         let determinant = (haa * hbb - hab * hab).max(1e-12);
         for group in 0..self.table.groups() {
-            let signature = self.table.at(best.point, group);
+            let signature = self.table.at::<false>(best.point, group);
             for lane in 0..GROUP.min(self.reader.lights() - group * GROUP) {
                 let (bent, clip) = (scratch.seen.bent[group][lane], scratch.seen.clip[group][lane]);
                 if bent >= clip || signature.value[lane] >= clip {

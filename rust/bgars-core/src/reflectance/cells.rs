@@ -161,21 +161,30 @@ pub struct CellTable {
 }
 
 impl CellTable {
-    /// Middle and spread at a place of the disc, bilinear.
-    pub fn at(&self, point: [f64; 2], channel: usize) -> (f32, f32) {
+    /// Adds the medians of all channels at a place of the disc, bilinear, to `values`.
+    #[inline]
+    pub fn add_middle(&self, point: [f64; 2], values: &mut [f32]) {
+        self.blend(&self.middle, point, |channel, middle| values[channel] += middle);
+    }
+
+    /// Adds the squares of the spreads of all channels.
+    #[inline]
+    pub fn add_variance(&self, point: [f64; 2], values: &mut [f32]) {
+        self.blend(&self.sigma, point, |channel, sigma| values[channel] += sigma * sigma);
+    }
+
+    #[inline(always)]
+    fn blend(&self, table: &[f32], point: [f64; 2], mut add: impl FnMut(usize, f32)) {
         let position = |v: f64| ((v + 1.0) * 0.5 * (SIDE - 1) as f64).clamp(0.0, (SIDE - 1) as f64 - 1e-6);
         let (col, row) = (position(point[0]), position(point[1]));
         let (c, r) = (col as usize, row as usize);
-        let (fc, fr) = ((col - c as f64) as f32, (row - r as f64) as f32);
-        let mut sums = (0.0, 0.0);
-        for (dr, wr) in [(0, 1.0 - fr), (1, fr)] {
-            for (dc, wc) in [(0, 1.0 - fc), (1, fc)] {
-                let cell = ((r + dr) * SIDE + c + dc) * self.channels + channel;
-                sums.0 += wr * wc * self.middle[cell];
-                sums.1 += wr * wc * self.sigma[cell];
-            }
+        let (right, below) = ((col - c as f64) as f32, (row - r as f64) as f32);
+        let cell = |row: usize, col: usize| &table[(row * SIDE + col) * self.channels..][..self.channels];
+        let corners = cell(r, c).iter().zip(cell(r, c + 1)).zip(cell(r + 1, c).iter().zip(cell(r + 1, c + 1)));
+        for (channel, ((a, b), (c, d))) in corners.enumerate() {
+            let (above, under) = (a + right * (b - a), c + right * (d - c));
+            add(channel, above + below * (under - above));
         }
-        sums
     }
 }
 

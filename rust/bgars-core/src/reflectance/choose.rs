@@ -18,15 +18,22 @@ const FINAL_STEPS: usize = 60;
 /// The best material of balls of known shape, no more complicated than the observations demand.
 #[must_use]
 pub fn best_material(samples: &Samples) -> MaterialFit {
+    let some = samples.thinned((samples.len() / RACE_PIXELS).max(1));
     let simple = Free { grazing: false, tails: true, gains: true };
-    let one = raced(samples, &starts(samples), simple);
     let grazing = Free { grazing: true, ..simple };
+    let one = fit_from(samples, &winner(&some, &starts(samples), simple).material, simple, FINAL_STEPS);
+    let of_one = fit_from(&some, &one.material, simple, 0).cost;
     let mut best = one.clone();
-    let second = raced(samples, &with_second_lobe(&one.material), simple);
-    for (fit, free) in [(second, grazing), (fit_from(samples, &one.material, grazing, FINAL_STEPS), grazing)] {
+    for (starts, free) in [(with_second_lobe(&one.material), simple), (vec![one.material.clone()], grazing)] {
+        let start = winner(&some, &starts, free);
+        // What is far from enough on some of the pixels is not enough on all.
+        if start.cost > (1.0 - EVIDENCE / 2.0) * of_one {
+            continue;
+        }
+        let fit = fit_from(samples, &start.material, free, FINAL_STEPS);
         if fit.cost < (1.0 - EVIDENCE) * best.cost {
             best = fit;
-            let more = fit_from(samples, &best.material, free, FINAL_STEPS);
+            let more = fit_from(samples, &best.material, grazing, FINAL_STEPS);
             if more.cost < (1.0 - EVIDENCE) * best.cost {
                 best = more;
             }
@@ -35,18 +42,16 @@ pub fn best_material(samples: &Samples) -> MaterialFit {
     best
 }
 
-/// The best of some starts: all of them on some pixels, the winner on all.
-fn raced(samples: &Samples, starts: &[Material], free: Free) -> MaterialFit {
-    let some = samples.thinned((samples.len() / RACE_PIXELS).max(1));
-    let mut best: Option<MaterialFit> = None;
-    for start in starts {
-        let fit = fit_from(&some, start, free, RACE_STEPS);
-        if best.as_ref().is_none_or(|best| fit.cost < best.cost) {
-            best = Some(fit);
+/// The best fit from some starts.
+fn winner(samples: &Samples, starts: &[Material], free: Free) -> MaterialFit {
+    let mut best = fit_from(samples, &starts[0], free, RACE_STEPS);
+    for start in &starts[1..] {
+        let fit = fit_from(samples, start, free, RACE_STEPS);
+        if fit.cost < best.cost {
+            best = fit;
         }
     }
-    let start = best.map_or_else(|| starts[0].clone(), |best| best.material);
-    fit_from(samples, &start, free, FINAL_STEPS)
+    best
 }
 
 /// One lobe: roughness x share of diffuse light x geometric attenuation.

@@ -13,7 +13,7 @@ use super::material::Material;
 use super::observe::Reader;
 use super::regions::{Region, Regions};
 use super::residuals::learnt_corrections;
-use super::samples::FIT_MIN_N_Z;
+use super::samples::{FIT_MIN_N_Z, Samples};
 use super::scale::bend;
 use super::shape::{CommonShape, EVIDENCE, PRIOR, common_shape};
 use super::spread::Spread;
@@ -21,8 +21,8 @@ use super::variation::ball_materials;
 use crate::normals::{NormalMapMut, check_finite};
 use crate::{Error, ImageStack, Lights, Pixel, Radiometry, Result};
 
-/// Fewest lights: two unknowns, and enough beyond them to see that a light is wrong.
-pub const MIN_LIGHTS: usize = 6;
+/// Fewest lights: two unknowns of a normal and its brightness, and one value beyond them.
+pub const MIN_LIGHTS: usize = 4;
 
 /// Pixels that a material is fitted on, in all and at least of each ball.
 const FIT_PIXELS: usize = 3000;
@@ -181,37 +181,10 @@ pub fn estimate_into<P: Pixel>(
         .collect();
     let core = core_of(request.circles, &inside, reader.size());
     let balls = request.circles.len();
-    let of_each = (FIT_PIXELS / balls.max(1)).max(FIT_PIXELS_OF_BALL);
-    let sampled = |circles: &[Circle], count: usize, min_n_z: f64| {
-        samples(&reader, lights, circles, &inside, &clip, count, min_n_z)
+    let sampled = |circles: &[Circle], pixels: &[Vec<usize>], count: usize, min_n_z: f64| {
+        samples(&reader, lights, circles, pixels, &clip, count, min_n_z)
     };
-    let mut circles = request.circles.to_vec();
-    let mut some = sampled(&circles, of_each, FIT_MIN_N_Z);
-    let mut fit = (request.material.is_none() && balls > 0).then(|| best_material(&some));
-    let mut shape = CommonShape { shape: Shape::SPHERE, u_ratio: 0.0 };
-    if let Some(of_spheres) = &fit {
-        let count = (SHAPE_PIXELS / balls).max(FIT_PIXELS_OF_BALL);
-        let pairs: Vec<Vec<usize>> = core.iter().map(|pixels| paired(pixels, count / 2)).collect();
-        let shaped = |shape: Shape| {
-            let circles = with_shape(request.circles, CommonShape { shape, u_ratio: 0.0 });
-            samples(&reader, lights, &circles, &pairs, &clip, usize::MAX, f64::NEG_INFINITY)
-        };
-        let squares = request.circles.iter().map(|circle| (circle.u_radius_px / circle.radius_px).powi(2));
-        let u_radius = (squares.sum::<f64>() / balls as f64).sqrt();
-        shape = common_shape(&shaped, &of_spheres.material, u_radius);
-        circles = with_shape(request.circles, shape);
-        if shape.shape != Shape::SPHERE {
-            let shaped = sampled(&circles, of_each, FIT_MIN_N_Z);
-            let of_shape = best_material(&shaped);
-            // To the rim, too.
-            if of_shape.cost < (1.0 - EVIDENCE) * of_spheres.cost {
-                (some, fit) = (shaped, Some(of_shape));
-            } else {
-                shape = CommonShape { shape: Shape::SPHERE, u_ratio: PRIOR.hypot(u_radius) };
-                circles = with_shape(request.circles, shape);
-            }
-        }
-    }
+    let Fitted { some, fit, shape, circles } = fitted(&request, &inside, &core, &sampled);
     let material = request.material.or(fit.as_ref().map(|fit| &fit.material)).cloned().ok_or(Error::NoMaterial)?;
     let loss = fit_from(&some, &material, Free::NOTHING, 0).cost;
     if loss > MAX_LOSS {
@@ -219,7 +192,7 @@ pub fn estimate_into<P: Pixel>(
     }
     report(0.2)?;
     let (least, most) = RESIDUAL_PIXELS_OF_BALL;
-    let many = sampled(&circles, (RESIDUAL_PIXELS / balls.max(1)).clamp(least, most), RESIDUAL_MIN_N_Z);
+    let many = sampled(&circles, &inside, (RESIDUAL_PIXELS / balls.max(1)).clamp(least, most), RESIDUAL_MIN_N_Z);
     let materials = if fit.is_some() { ball_materials(&many, &material, balls) } else { vec![material.clone(); balls] };
     let corrections = learnt_corrections(&many, &materials);
     let residuals_learnt = corrections.is_some();
@@ -262,6 +235,50 @@ pub fn estimate_into<P: Pixel>(
     })
 }
 
+/// Material and shape of the balls, and the pixels that tell the material.
+struct Fitted {
+    some: Samples,
+    /// `None` where the material is given, or no ball is.
+    fit: Option<MaterialFit>,
+    shape: CommonShape,
+    circles: Vec<Circle>,
+}
+
+/// Reads samples of circles: of some of these pixels, about so many of each, with at least this n_z.
+type Sampler<'a> = dyn Fn(&[Circle], &[Vec<usize>], usize, f64) -> Samples + 'a;
+
+/// Fits the material, as spheres and as the shape under which it explains the balls best.
+fn fitted(request: &Request<'_>, inside: &[Vec<usize>], core: &[Vec<usize>], sampled: &Sampler<'_>) -> Fitted {
+    let balls = request.circles.len();
+    let of_each = (FIT_PIXELS / balls.max(1)).max(FIT_PIXELS_OF_BALL);
+    let to_fit = |circles: &[Circle]| sampled(circles, inside, of_each, FIT_MIN_N_Z);
+    let of = |shape: Shape, u_ratio: f64| CommonShape { shape, u_ratio };
+    let some = to_fit(request.circles);
+    if request.material.is_some() || balls == 0 {
+        return Fitted { some, fit: None, shape: of(Shape::SPHERE, 0.0), circles: request.circles.to_vec() };
+    }
+    let of_spheres = best_material(&some);
+    let count = (SHAPE_PIXELS / balls).max(FIT_PIXELS_OF_BALL);
+    let pairs: Vec<Vec<usize>> = core.iter().map(|pixels| paired(pixels, count / 2)).collect();
+    let shaped =
+        |shape: Shape| sampled(&with_shape(request.circles, of(shape, 0.0)), &pairs, usize::MAX, f64::NEG_INFINITY);
+    let squares = request.circles.iter().map(|circle| (circle.u_radius_px / circle.radius_px).powi(2));
+    let u_radius = (squares.sum::<f64>() / balls as f64).sqrt();
+    let shape = common_shape(&shaped, &of_spheres.material, u_radius);
+    let circles = with_shape(request.circles, shape);
+    if shape.shape == Shape::SPHERE {
+        return Fitted { some, fit: Some(of_spheres), shape, circles };
+    }
+    let some_shaped = to_fit(&circles);
+    let of_shape = best_material(&some_shaped);
+    // To the rim, too.
+    if of_shape.cost < (1.0 - EVIDENCE) * of_spheres.cost {
+        return Fitted { some: some_shaped, fit: Some(of_shape), shape, circles };
+    }
+    let shape = of(Shape::SPHERE, PRIOR.hypot(u_radius));
+    Fitted { some, fit: Some(of_spheres), shape, circles: with_shape(request.circles, shape) }
+}
+
 fn check<P: Pixel>(
     stack: &ImageStack<'_, P>,
     lights: &Lights,
@@ -274,7 +291,7 @@ fn check<P: Pixel>(
     if lights.len() < MIN_LIGHTS {
         return Err(Error::OutOfRange {
             argument: "lights",
-            rule: "at least 6 for the reflectance estimator",
+            rule: "at least 4 for the reflectance estimator",
             value: lights.len() as f64,
         });
     }

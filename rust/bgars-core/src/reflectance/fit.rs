@@ -79,18 +79,63 @@ struct Normal {
     matrix: DMatrix<f64>,
     vector: DVector<f64>,
     loss: f64,
+}
+
+/// What observations add up to, light by light: each light has its own gain, and no part in those of the others.
+struct Sums {
+    /// Of each light the weighted products of a row with itself; see [`Sums::row`].
+    products: Vec<Vec<f64>>,
+    /// Derivatives by what all lights have in common, by the light's gain, and the residual.
+    row: Vec<f64>,
+    loss: f64,
     /// Product of the `1 + (r / 3)^2` that are not in `loss` yet: one logarithm for many.
     factor: f64,
 }
 
-impl Normal {
-    fn zeros(size: usize) -> Self {
-        Self { matrix: DMatrix::zeros(size, size), vector: DVector::zeros(size), loss: 0.0, factor: 1.0 }
+impl Sums {
+    fn new(common: usize, lights: usize) -> Self {
+        let width = common + 2;
+        Self { products: vec![vec![0.0; width * width]; lights], row: vec![0.0; width], loss: 0.0, factor: 1.0 }
     }
 
     fn close(&mut self) {
         self.loss += self.factor.ln();
         self.factor = 1.0;
+    }
+
+    /// Adds the row, so weighted, to the products of a light.
+    fn add_row(&mut self, light: usize, weight: f64) {
+        let width = self.row.len();
+        for (products, &left) in self.products[light].chunks_exact_mut(width).zip(&self.row) {
+            let left = left * weight;
+            for (product, &right) in products.iter_mut().zip(&self.row) {
+                *product += left * right;
+            }
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        for (sum, more) in self.products.iter_mut().flatten().zip(other.products.iter().flatten()) {
+            *sum += more;
+        }
+        self.loss += other.loss;
+    }
+
+    fn normal(&self) -> Normal {
+        let width = self.row.len();
+        let common = width - 2;
+        let size = common + self.products.len();
+        let mut normal = Normal { matrix: DMatrix::zeros(size, size), vector: DVector::zeros(size), loss: self.loss };
+        for (light, products) in self.products.iter().enumerate() {
+            let place = |index: usize| if index < common { index } else { common + light };
+            for i in 0..=common {
+                for j in 0..=i {
+                    normal.matrix[(place(i), place(j))] += products[i * width + j];
+                }
+                normal.vector[place(i)] += products[i * width + width - 1];
+            }
+        }
+        normal
     }
 }
 
@@ -139,48 +184,39 @@ fn total(normal: &Normal, material: &Material) -> f64 {
 }
 
 fn normal_equations(samples: &Samples, material: &Material) -> Normal {
-    let size = FIRST_LOBE + PER_LOBE * material.lobes.len() + samples.lights;
-    let chunks: Vec<Normal> = (0..samples.len().div_ceil(CHUNK))
+    let zeros = || Sums::new(FIRST_LOBE + PER_LOBE * material.lobes.len(), samples.lights);
+    let chunks: Vec<Sums> = (0..samples.len().div_ceil(CHUNK))
         .into_par_iter()
         .map(|chunk| {
-            let mut sum = Normal::zeros(size);
-            let mut row = vec![0.0; size - samples.lights];
+            let mut sums = zeros();
             for pixel in chunk * CHUNK..((chunk + 1) * CHUNK).min(samples.len()) {
                 for light in 0..samples.lights {
-                    add_observation(samples, material, pixel * samples.lights + light, light, &mut row, &mut sum);
+                    add_observation(samples, material, pixel * samples.lights + light, light, &mut sums);
                 }
             }
-            sum.close();
-            sum
+            sums.close();
+            sums
         })
         .collect();
-    let mut sum = Normal::zeros(size);
-    for chunk in chunks {
-        sum.matrix += chunk.matrix;
-        sum.vector += chunk.vector;
-        sum.loss += chunk.loss;
+    let mut sums = zeros();
+    for chunk in &chunks {
+        sums.add(chunk);
     }
-    sum
+    sums.normal()
 }
 
-fn add_observation(
-    samples: &Samples,
-    material: &Material,
-    index: usize,
-    light: usize,
-    row: &mut [f64],
-    sum: &mut Normal,
-) {
+fn add_observation(samples: &Samples, material: &Material, index: usize, light: usize, sums: &mut Sums) {
     let facet = &samples.facets[index];
     let scale = material.gains[light] * samples.irradiance[index];
     let lambert = material.diffuse * facet.n_dot_l.max(0.0);
     let grazing = facet.grazing() - 1.0;
     let diffuse = lambert * (1.0 + material.grazing * grazing);
-    row[DIFFUSE] = scale * diffuse;
-    row[GRAZING] = scale * lambert * grazing;
-    row[AMBIENT] = 1.0;
+    let common = sums.row.len() - 2;
+    sums.row[DIFFUSE] = scale * diffuse;
+    sums.row[GRAZING] = scale * lambert * grazing;
+    sums.row[AMBIENT] = 1.0;
     let mut sum_of_parts = diffuse;
-    for (lobe, row) in material.lobes.iter().zip(row[FIRST_LOBE..].chunks_exact_mut(PER_LOBE)) {
+    for (lobe, row) in material.lobes.iter().zip(sums.row[FIRST_LOBE..common].chunks_exact_mut(PER_LOBE)) {
         // By the logarithm of the strength the derivative is the value.
         let slopes = facet.specular_slopes(lobe, material.masking).map(|slope| lobe.strength * slope);
         row.copy_from_slice(&slopes.map(|slope| scale * slope));
@@ -188,30 +224,22 @@ fn add_observation(
     }
     let level = scale * sum_of_parts + material.ambient;
     let bent = super::scale::bend(level);
-    let clipped = bent >= samples.clip[light];
     let residual = samples.values[index] - bent.min(samples.clip[light]);
     let ratio = (residual / LOSS_SCALE).powi(2);
-    sum.factor *= 1.0 + ratio;
-    if sum.factor > LARGE {
-        sum.close();
+    sums.factor *= 1.0 + ratio;
+    if sums.factor > LARGE {
+        sums.close();
     }
-    if clipped {
+    if bent >= samples.clip[light] {
         return;
     }
-    let weight = 1.0 / (LOSS_SCALE * LOSS_SCALE * (1.0 + ratio));
     let slope = bend_slope(level);
-    let gain = row.len() + light;
-    let gain_slope = slope * (level - material.ambient);
-    for (i, &left) in row.iter().enumerate() {
-        let left = slope * left * weight;
-        sum.vector[i] += left * residual;
-        for (j, &right) in row.iter().enumerate().take(i + 1) {
-            sum.matrix[(i, j)] += left * slope * right;
-        }
-        sum.matrix[(gain, i)] += left * gain_slope;
+    sums.row[common] = level - material.ambient;
+    for derivative in &mut sums.row[..=common] {
+        *derivative *= slope;
     }
-    sum.vector[gain] += weight * gain_slope * residual;
-    sum.matrix[(gain, gain)] += weight * gain_slope * gain_slope;
+    sums.row[common + 1] = residual;
+    sums.add_row(light, 1.0 / (LOSS_SCALE * LOSS_SCALE * (1.0 + ratio)));
 }
 
 /// True for the parameters that are fitted, in their order.

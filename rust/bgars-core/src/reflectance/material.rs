@@ -8,6 +8,9 @@ pub const MIN_N_Z: f64 = 0.02;
 /// Products of tail and `tan^2 a / m^2` below which the distribution is Beckmann's by its series.
 const SERIES: f64 = 1e-4;
 
+/// Exponents of a distribution below which it is 0.
+const NOTHING_LEFT: f64 = -30.0;
+
 /// Which geometric attenuation of the microfacets is used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Masking {
@@ -28,6 +31,17 @@ pub struct Lobe {
     pub tail: f64,
 }
 
+/// `ln(D cos^4 a)` of a lobe at a half vector, and what it is computed from.
+struct AtAngle {
+    /// Squared cosine.
+    cos2: f64,
+    /// `tan^2 a / m^2`
+    t: f64,
+    /// `ln(1 + u t)`
+    log: f64,
+    exponent: f64,
+}
+
 impl Lobe {
     /// Distribution of microfacets, 1 at its peak, `t = tan^2 a / m^2`:
     /// `D = (1 + u t)^-(1 + 1/u) / cos^4 a`: Beckmann (Cook and Torrance 1982, eq. 4) for u = 0, GGX (Walter et al. 2007, eq. 33)
@@ -35,33 +49,45 @@ impl Lobe {
     #[must_use]
     #[inline]
     pub fn distribution(&self, cos_half: f64) -> f64 {
-        if cos_half <= 1e-3 {
-            return 0.0;
-        }
-        let cos2 = cos_half * cos_half;
-        let t = (1.0 - cos2).max(0.0) / (cos2 * self.roughness * self.roughness);
-        let u = self.tail;
-        let exponent = if u * t < SERIES { -t * (1.0 + u) } else { -(1.0 + 1.0 / u) * (u * t).ln_1p() };
-        // Below e^-30 nothing is left.
-        if exponent < -30.0 { 0.0 } else { exponent.exp() / (cos2 * cos2) }
+        self.exponent(cos_half).map_or(0.0, |at| at.exponent.exp() / at.cos2.powi(2))
+    }
+
+    /// [`Self::distribution`] and the derivative of its logarithm by the cosine.
+    #[must_use]
+    #[inline]
+    pub fn distribution_by_cosine(&self, cos_half: f64) -> [f64; 2] {
+        let Some(at) = self.exponent(cos_half) else { return [0.0; 2] };
+        let by_t = -(1.0 + self.tail) / (1.0 + self.tail * at.t);
+        let t_by_cosine = -2.0 / (self.roughness.powi(2) * at.cos2 * cos_half);
+        [at.exponent.exp() / at.cos2.powi(2), by_t * t_by_cosine - 4.0 / cos_half]
     }
 
     /// [`Self::distribution`], its derivative by the logarithm of the roughness, and that by the tail.
     #[must_use]
     #[inline]
     pub fn distribution_slopes(&self, cos_half: f64) -> [f64; 3] {
-        let value = self.distribution(cos_half);
-        if value == 0.0 {
-            return [0.0; 3];
+        let Some(at) = self.exponent(cos_half) else { return [0.0; 3] };
+        let AtAngle { cos2, t, log, exponent } = at;
+        let u = self.tail;
+        let bulge = 1.0 + u * t;
+        // The exponent's derivative by u; its limit where u t is small.
+        let by_tail = if u * t < SERIES { t * (0.5 * t - 1.0) } else { log / (u * u) - (1.0 + 1.0 / u) * t / bulge };
+        let value = exponent.exp() / (cos2 * cos2);
+        [value, value * 2.0 * t * (1.0 + u) / bulge, value * by_tail]
+    }
+
+    /// What the distribution is made of; `None` where nothing is left of it.
+    #[inline]
+    fn exponent(&self, cos_half: f64) -> Option<AtAngle> {
+        if cos_half <= 1e-3 {
+            return None;
         }
         let cos2 = cos_half * cos_half;
         let t = (1.0 - cos2).max(0.0) / (cos2 * self.roughness * self.roughness);
         let u = self.tail;
-        let bulge = 1.0 + u * t;
-        // The exponent's derivative by u; its limit where u t is small.
-        let by_tail =
-            if u * t < SERIES { t * (0.5 * t - 1.0) } else { bulge.ln() / (u * u) - (1.0 + 1.0 / u) * t / bulge };
-        [value, value * 2.0 * t * (1.0 + u) / bulge, value * by_tail]
+        let log = (u * t).ln_1p();
+        let exponent = if u * t < SERIES { -t * (1.0 + u) } else { -(1.0 + 1.0 / u) * log };
+        (exponent >= NOTHING_LEFT).then_some(AtAngle { cos2, t, log, exponent })
     }
 
     /// Shadowing of one direction at cosine `cos` to the normal: between Beckmann's (rational form) and GGX's, by the tail.

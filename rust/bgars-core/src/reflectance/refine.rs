@@ -1,8 +1,9 @@
 //! The normal of one pixel from its signature.
 
-use multiversion::multiversion;
+use multiversion::{multiversion, target::target_cfg_f};
 
 use super::table::{GROUP, Group, Signatures};
+use crate::normals::add_product;
 
 /// Steps of the minimisation at most.
 const MAX_STEPS: usize = 12;
@@ -21,6 +22,10 @@ const VALLEY: f32 = 0.15;
 
 /// Bent grey levels at which a light counts no more in the search: coarse nodes are some levels apart.
 const SEARCH_CLIP: f32 = 30.0;
+
+/// Products of losses' arguments are turned into a logarithm before they overflow: one more group of lights stays below the
+/// largest number.
+const LARGE: f64 = 1e100;
 
 /// Largest radius on the disc: n_z = 0.03.
 const MAX_RADIUS: f32 = 0.985;
@@ -71,53 +76,82 @@ impl Minimum {
 /// Cost and its derivatives at one place.
 #[derive(Clone, Copy)]
 struct State {
-    data_cost: f32,
-    prior_cost: f32,
+    /// The data's part of the cost is `9 log` of this: places are compared without logarithms.
+    factor: f64,
+    /// What is not in `factor` any more, so that it stays small.
+    log: f64,
+    /// The prior's part.
+    prior_factor: f32,
     gradient: [f32; 2],
     information: [f32; 3],
     prior_information: f32,
 }
 
 impl State {
+    fn data_cost(&self) -> f32 {
+        LOSS_SCALE * LOSS_SCALE * (self.log + self.factor.ln()) as f32
+    }
+
     fn cost(&self) -> f32 {
-        self.data_cost + self.prior_cost
+        self.data_cost() + LOSS_SCALE * LOSS_SCALE * self.prior_factor.ln()
+    }
+
+    /// True where the cost is below that of another place.
+    #[inline(always)]
+    fn is_below(&self, other: &Self) -> bool {
+        if self.log == 0.0 && other.log == 0.0 {
+            self.factor * f64::from(self.prior_factor) < other.factor * f64::from(other.prior_factor)
+        } else {
+            self.cost() < other.cost()
+        }
     }
 }
 
+/// The sum of eight numbers, in pairs: three steps of a vector instead of eight of a number.
 #[inline(always)]
-fn evaluate(table: &Signatures, pixel: &Observation, prior: Prior, point: [f32; 2]) -> State {
+fn sum([a, b, c, d, e, f, g, h]: Group) -> f32 {
+    ((a + e) + (c + g)) + ((b + f) + (d + h))
+}
+
+#[inline(always)]
+fn evaluate<const FMA: bool>(table: &Signatures, pixel: &Observation, prior: Prior, point: [f32; 2]) -> State {
     let scale2 = LOSS_SCALE * LOSS_SCALE;
     let mut sums = [[0.0f32; GROUP]; 5];
-    let mut log_sum = 0.0f64;
+    let (mut factor, mut log) = (1.0, 0.0);
     for group in 0..table.groups() {
-        let signature = table.at(point, group);
+        let signature = table.at::<FMA>(point, group);
         let (bent, weight, clip) = (&pixel.bent[group], &pixel.weight[group], &pixel.clip[group]);
         let mut factors = [0.0f32; GROUP];
         for k in 0..GROUP {
             let inside = if signature.value[k] < clip[k] { 1.0 } else { 0.0 };
-            let predicted = signature.value[k].min(clip[k]);
+            let predicted = if signature.value[k] < clip[k] { signature.value[k] } else { clip[k] };
             let r = (bent[k] - predicted) * weight[k];
-            let factor = 1.0 + r * r / scale2;
-            factors[k] = factor;
-            let u = inside * weight[k] / factor;
+            factors[k] = add_product::<FMA>(1.0, r * r, 1.0 / scale2);
+            let u = inside * weight[k] / factors[k];
+            let (ua, ub) = (u * signature.along_a[k], u * signature.along_b[k]);
             let (ja, jb) = (signature.along_a[k] * weight[k], signature.along_b[k] * weight[k]);
-            sums[0][k] += u * signature.along_a[k] * r;
-            sums[1][k] += u * signature.along_b[k] * r;
-            sums[2][k] += u * signature.along_a[k] * ja;
-            sums[3][k] += u * signature.along_a[k] * jb;
-            sums[4][k] += u * signature.along_b[k] * jb;
+            sums[0][k] = add_product::<FMA>(sums[0][k], ua, r);
+            sums[1][k] = add_product::<FMA>(sums[1][k], ub, r);
+            sums[2][k] = add_product::<FMA>(sums[2][k], ua, ja);
+            sums[3][k] = add_product::<FMA>(sums[3][k], ua, jb);
+            sums[4][k] = add_product::<FMA>(sums[4][k], ub, jb);
         }
-        log_sum += factors.iter().map(|&factor| f64::from(factor)).product::<f64>().ln();
+        let [a, b, c, d, e, f, g, h] = factors.map(f64::from);
+        factor *= ((a * e) * (c * g)) * ((b * f) * (d * h));
+        if factor > LARGE {
+            log += factor.ln();
+            factor = 1.0;
+        }
     }
-    let total = sums.map(|lanes| lanes.iter().sum::<f32>());
     let (da, db) = (prior.point[0] - point[0], prior.point[1] - point[1]);
-    let ratio = 1.0 + (da * da + db * db) * prior.weight * prior.weight / scale2;
-    let pull = prior.weight * prior.weight / ratio;
+    let prior_factor = 1.0 + (da * da + db * db) * prior.weight * prior.weight / scale2;
+    let pull = prior.weight * prior.weight / prior_factor;
     State {
-        data_cost: scale2 * log_sum as f32,
-        prior_cost: scale2 * ratio.ln(),
-        gradient: [total[0] + pull * da, total[1] + pull * db],
-        information: [total[2], total[3], total[4]],
+        factor,
+        log,
+        prior_factor,
+        gradient: [sum(sums[0]) + pull * da, sum(sums[1]) + pull * db],
+        information: [sum(sums[2]), sum(sums[3]), sum(sums[4])],
         prior_information: pull,
     }
 }
@@ -132,12 +166,32 @@ pub fn deepest(
     prior: Prior,
     distances: &mut Vec<f32>,
 ) -> Minimum {
-    let mut best = minimise(table, pixel, prior, prior.point);
+    if target_cfg_f!(target_feature = "fma") {
+        deepest_by::<true>(table, pixel, lights, prior, distances)
+    } else {
+        deepest_by::<false>(table, pixel, lights, prior, distances)
+    }
+}
+
+/// The minimum nearest to the expected normal.
+pub fn nearest(table: &Signatures, pixel: &Observation, prior: Prior) -> Minimum {
+    minimise::<false>(table, pixel, prior, prior.point)
+}
+
+#[inline(always)]
+fn deepest_by<const FMA: bool>(
+    table: &Signatures,
+    pixel: &Observation,
+    lights: usize,
+    prior: Prior,
+    distances: &mut Vec<f32>,
+) -> Minimum {
+    let mut best = minimise::<FMA>(table, pixel, prior, prior.point);
     if best.cost < GOOD_COST * lights as f32 {
         return best;
     }
     for start in candidates(table, pixel, lights, distances) {
-        let other = minimise(table, pixel, prior, start);
+        let other = minimise::<FMA>(table, pixel, prior, start);
         if other.cost < best.cost {
             best = other;
         }
@@ -145,17 +199,11 @@ pub fn deepest(
     best
 }
 
-/// The minimum nearest to the expected normal.
-#[multiversion(targets("x86_64+avx2+fma"))]
-pub fn nearest(table: &Signatures, pixel: &Observation, prior: Prior) -> Minimum {
-    minimise(table, pixel, prior, prior.point)
-}
-
 /// Levenberg-Marquardt from one start.
 #[inline(always)]
-fn minimise(table: &Signatures, pixel: &Observation, prior: Prior, start: [f32; 2]) -> Minimum {
+fn minimise<const FMA: bool>(table: &Signatures, pixel: &Observation, prior: Prior, start: [f32; 2]) -> Minimum {
     let mut point = into_disc(start);
-    let mut state = evaluate(table, pixel, prior, point);
+    let mut state = evaluate::<FMA>(table, pixel, prior, point);
     let mut damping = 1e-2f32;
     for _ in 0..MAX_STEPS {
         let [haa, hab, hbb] = state.information;
@@ -173,8 +221,8 @@ fn minimise(table: &Signatures, pixel: &Observation, prior: Prior, start: [f32; 
         }
         let shorten = (0.2 / length.max(1e-12)).min(1.0);
         let next = into_disc([point[0] + shorten * step[0], point[1] + shorten * step[1]]);
-        let next_state = evaluate(table, pixel, prior, next);
-        if next_state.cost() < state.cost() {
+        let next_state = evaluate::<FMA>(table, pixel, prior, next);
+        if next_state.is_below(&state) {
             point = next;
             state = next_state;
             damping *= 0.2;
@@ -191,7 +239,7 @@ fn minimise(table: &Signatures, pixel: &Observation, prior: Prior, start: [f32; 
     Minimum {
         point,
         cost: state.cost(),
-        data_cost: state.data_cost,
+        data_cost: state.data_cost(),
         information: state.information,
         prior_information: state.prior_information,
     }

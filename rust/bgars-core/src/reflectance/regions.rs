@@ -99,7 +99,9 @@ impl<'a, 'b, 'c, P: Pixel> Regions<'a, 'b, 'c, P> {
             .par_iter()
             .zip(&base_of)
             .map(|(region, &base)| match &region.ball.correction {
-                Some(correction) => bases[base].corrected(lights.len(), |place, light| correction.at(place, light).0),
+                Some(correction) => {
+                    bases[base].corrected(lights.len(), |place, levels| correction.add_middle(place, levels))
+                }
                 None => bases[base].clone(),
             })
             .collect();

@@ -24,17 +24,20 @@ pub fn learnt_corrections(samples: &Samples, materials: &[Material]) -> Option<V
         (0..balls).into_par_iter().map(|ball| ball_residuals(samples, ball, &materials[ball])).collect();
     let corrections = Population::new(samples.lights, &tables).left_out();
     let (mut without, mut with) = (0.0, 0.0);
+    let mut shifts = vec![0.0; samples.lights];
     for pixel in (0..samples.len()).step_by((samples.len() / JUDGED_PIXELS).max(1)) {
         let ball = samples.balls[pixel];
         let point = to_disc(&samples.normals[pixel]);
-        for light in 0..samples.lights {
+        shifts.fill(0.0);
+        corrections[ball].add_middle(point, &mut shifts);
+        for (light, &shift) in shifts.iter().enumerate() {
             let index = pixel * samples.lights + light;
             let predicted = bend(samples.brightness(index, light, &materials[ball]));
             let loss = |predicted: f64| {
                 ((samples.values[index] - predicted.min(samples.clip[light])) / LOSS_SCALE).powi(2).ln_1p()
             };
             without += loss(predicted);
-            with += loss(predicted + f64::from(corrections[ball].at(point, light).0));
+            with += loss(predicted + f64::from(shift));
         }
     }
     (with < (1.0 - EVIDENCE) * without).then_some(corrections)

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::disc::from_disc;
 use super::material::MIN_N_Z;
+use crate::normals::add_product;
 
 /// Lights of one group: what a vector register holds.
 pub const GROUP: usize = 8;
@@ -90,17 +91,14 @@ impl Signatures {
         table
     }
 
-    /// The same with a correction added: `correction(place, light)` in bent levels.
+    /// The same, corrected: `correct(place, levels)`, bent levels of all lights.
     #[must_use]
-    pub fn corrected(&self, lights: usize, correction: impl Fn([f64; 2], usize) -> f32 + Sync) -> Self {
+    pub fn corrected(&self, lights: usize, correct: impl Fn([f64; 2], &mut [f32]) + Sync) -> Self {
         let groups = self.groups;
         let mut nodes = self.nodes.clone();
         nodes.par_chunks_mut(FULL_SIDE * groups).enumerate().for_each(|(row, nodes)| {
             for (col, node) in nodes.chunks_exact_mut(groups).enumerate() {
-                let place = node_place(node_point(row, col));
-                for (light, level) in node.as_flattened_mut()[..lights].iter_mut().enumerate() {
-                    *level += correction(place, light);
-                }
+                correct(node_place(node_point(row, col)), &mut node.as_flattened_mut()[..lights]);
             }
         });
         let mut table = Self { groups, nodes, coarse: Coarse::default() };
@@ -144,7 +142,7 @@ impl Signatures {
     #[must_use]
     #[inline(always)]
     #[allow(clippy::manual_clamp)]
-    pub fn at(&self, [a, b]: [f32; 2], group: usize) -> Signature {
+    pub fn at<const FMA: bool>(&self, [a, b]: [f32; 2], group: usize) -> Signature {
         let limit = (FULL_SIDE - 3) as f32;
         // Not `clamp`, which would let a NaN through, to a node that does not exist.
         let inside = |position: f32| position.max(1.0).min(limit);
@@ -160,14 +158,14 @@ impl Signatures {
             for j in 0..4 {
                 let node = &self.nodes[start + j * self.groups];
                 for k in 0..GROUP {
-                    across[k] += wa[j] * node[k];
-                    slope[k] += da[j] * node[k];
+                    across[k] = add_product::<FMA>(across[k], wa[j], node[k]);
+                    slope[k] = add_product::<FMA>(slope[k], da[j], node[k]);
                 }
             }
             for k in 0..GROUP {
-                signature.value[k] += wb[i] * across[k];
-                signature.along_a[k] += wb[i] * slope[k];
-                signature.along_b[k] += db[i] * across[k];
+                signature.value[k] = add_product::<FMA>(signature.value[k], wb[i], across[k]);
+                signature.along_a[k] = add_product::<FMA>(signature.along_a[k], wb[i], slope[k]);
+                signature.along_b[k] = add_product::<FMA>(signature.along_b[k], db[i], across[k]);
             }
         }
         for k in 0..GROUP {
@@ -196,7 +194,7 @@ mod tests {
     fn a_place_that_is_not_a_number_is_no_place_outside_the_table() {
         let table = Signatures::tabulate(3, |normal, levels| levels.fill(normal.z as f32));
         for place in [[f32::NAN, 0.0], [0.0, f32::NAN], [f32::INFINITY, f32::NEG_INFINITY]] {
-            let _ = table.at(place, 0);
+            let _ = table.at::<false>(place, 0);
         }
     }
 
@@ -212,7 +210,7 @@ mod tests {
             (n.x * (light as f64 + 1.0) + n.y * n.z).sin()
         };
         for (a, b) in [(0.123, -0.456), (0.0, 0.0), (-0.7, 0.3)] {
-            let signature = table.at([a as f32, b as f32], 0);
+            let signature = table.at::<false>([a as f32, b as f32], 0);
             for light in 0..3 {
                 approx::assert_abs_diff_eq!(f64::from(signature.value[light]), exact(a, b, light), epsilon = 2e-5);
                 let slope = (exact(a + 1e-6, b, light) - exact(a - 1e-6, b, light)) / 2e-6;

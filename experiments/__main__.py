@@ -1,35 +1,30 @@
-"""The command ``bgars experiment``."""
+"""The command ``python -m experiments``."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 import bgars
+import typer
 from bgars.cli.console import print_json, say, stage_progress
+from bgars.cli.run import run
+
 from experiments import EXPERIMENTS, write_experiments
 from experiments.write import DEFAULT_RADIUS_PX
 
-__all__ = ["register"]
+app = typer.Typer(name="python -m experiments", pretty_exceptions_enable=False)
+LINES = "\n\n".join(f"{name}: {experiment.summary}" for name, experiment in EXPERIMENTS.items())
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command; its help lists the experiments."""
-    lines = "\n\n".join(f"{name}: {experiment.summary}" for name, experiment in EXPERIMENTS.items())
-    app.command(
-        "experiment",
-        help=(
-            "Reproduce the paper's figures on simulated captures: pictures, a CSV table, and a page that says what "
-            "agrees and what does not.\n\n"
-            "The base scene is a hemisphere of 90 pixels radius under 8 lights; every method that bgars has is judged. "
-            "'all' runs every experiment; one by one there are:\n\n"
-            f"{lines}"
-        ),
-    )(experiment)
-
-
+@app.command(
+    help=(
+        "Reproduce the paper's figures on simulated captures: pictures, a CSV table, and a page that says what "
+        "agrees and what does not.\n\n"
+        "The base scene is a hemisphere of 90 pixels radius under 8 lights; every method that bgars has is judged. "
+        f"'all' runs every experiment; one by one there are:\n\n{LINES}"
+    )
+)
 def experiment(
     name: Annotated[str, typer.Argument(metavar="NAME", help="A name from the list, or all.", show_default=False)],
     output: Annotated[
@@ -63,3 +58,7 @@ def experiment(
             say(f"  does not: {sentence}")
     say()
     say(f"{len(summary['files'])} files in {output}; read {summary['page']}")
+
+
+if __name__ == "__main__":
+    run(app)

@@ -1,0 +1,149 @@
+"""Methods that others add: registered in a program, or by a package's entry point."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import bgars
+import numpy as np
+import pytest
+from bgars.io import formats
+from bgars.normals import methods
+from bgars.normals.methods import ALL_METHODS, METHODS, TABLE
+from bgars.pipelines.normals import RUNNERS
+
+MODULE = """
+import numpy as np
+
+def upward(capture, *, mask, progress=None):
+    return np.tile(np.float32([0, 0, 2]), (*capture.mask.shape, 1))
+"""
+
+
+@pytest.fixture
+def registered(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(methods, "_registered", {})
+
+
+@pytest.fixture(scope="module")
+def capture() -> bgars.Capture:
+    return bgars.read_capture(bgars.sample_capture())
+
+
+def upward(capture: bgars.Capture) -> np.ndarray[Any, Any]:
+    return np.tile(np.float32([0, 0, 2]), (*capture.mask.shape, 1))
+
+
+def test_each_method_of_the_table_has_a_function() -> None:
+    assert set(RUNNERS) == set(TABLE) == set(ALL_METHODS) > set(METHODS)
+
+
+@pytest.mark.usefixtures("registered")
+def test_a_registered_function_is_a_method_like_others(capture: bgars.Capture) -> None:
+    bgars.register_method("upward", upward)
+    mask = np.zeros(capture.mask.shape, bool)
+    mask[10:40, 10:40] = True
+    field = bgars.estimate_normals(capture, method="upward", mask=mask)
+    assert field.method == "upward"
+    assert field.mask.sum() == (mask & capture.mask).sum(), "pixels outside the mask are taken off"
+    assert np.allclose(field.normals[field.mask], [0, 0, 1])
+    assert bgars.evaluate(capture, method="upward").method == "upward"
+    result = bgars.reconstruct(capture, method="upward")
+    assert np.ptp(result.height.height[result.height.mask]) < 1e-3
+    assert bgars.inspect(capture, method="upward").method == "upward"
+
+
+@pytest.mark.usefixtures("registered")
+def test_a_function_is_given_the_options_that_it_names(capture: bgars.Capture) -> None:
+    told: dict[str, Any] = {}
+
+    def curious(capture: bgars.Capture, *, threshold: float = 3.0, threads: int | None = None, **rest: object) -> Any:  # noqa: ANN401
+        told.update(threshold=threshold, threads=threads, **rest)
+        return bgars.estimate_normals(capture, method="robust-filter")
+
+    bgars.register_method("curious", curious)
+    field = bgars.estimate_normals(capture, method="curious", threshold=7, threads=1, keep_sets=True)
+    assert field.method == "curious"
+    assert (told["threshold"], told["threads"], told["keep_sets"]) == (7.0, 1, True)
+    bgars.register_method("upward", upward)
+    with pytest.raises(bgars.InputError, match="threshold: the method upward does not take it"):
+        bgars.estimate_normals(capture, method="upward", threshold=7)
+
+
+@pytest.mark.usefixtures("registered")
+@pytest.mark.parametrize(
+    ("name", "function", "words"),
+    [
+        ("reflectance", upward, "name: reflectance is a method of bgars"),
+        ("My Method", upward, "made of lower-case letters, digits and hyphens, got 'My Method'"),
+        ("mine", 3, "function: must be callable, got int"),
+    ],
+)
+def test_what_cannot_be_registered_is_refused(name: str, function: Any, words: str) -> None:  # noqa: ANN401
+    with pytest.raises(bgars.InputError, match=words):
+        bgars.register_method(name, function)
+
+
+@pytest.mark.usefixtures("registered")
+def test_an_unknown_name_is_answered_with_all_names(capture: bgars.Capture) -> None:
+    bgars.register_method("upward", upward)
+    with pytest.raises(bgars.InputError, match="reflectance, blind, upward; got 'upwards'"):
+        bgars.estimate_normals(capture, method="upwards")
+    bgars.register_method("upward", lambda _: np.zeros((3, 3, 3)))
+    with pytest.raises(bgars.InputError, match=r"method: normals must be numbers of shape .* got float64"):
+        bgars.estimate_normals(capture, method="upward")
+
+
+def command(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "bgars", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | {"PYTHONPATH": str(folder), "COLUMNS": "200"},
+    )
+
+
+def test_a_package_adds_a_method_to_the_command_line(tmp_path: Path) -> None:
+    (tmp_path / "theirs.py").write_text(MODULE, encoding="utf-8")
+    info = tmp_path / "theirs-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1.0\n", encoding="utf-8")
+    points = "[bgars.methods]\nupward = theirs:upward\nbroken = theirs:nothing\nblind = theirs:upward\n"
+    (info / "entry_points.txt").write_text(points, encoding="utf-8")
+    run = command(tmp_path, "normals", bgars.sample_capture(), "-o", tmp_path / "out", "--method", "upward", "--json")
+    assert run.returncode == 0, run.stderr
+    assert '"method": "upward"' in run.stdout
+    run = command(tmp_path, "inspect", "--help")
+    assert "Added by others: broken, upward." in " ".join(run.stdout.replace("│", " ").split())
+    run = command(tmp_path, "normals", bgars.sample_capture(), "-o", tmp_path / "b", "-m", "broken")
+    assert run.returncode == 2
+    assert "method: broken (theirs:nothing) cannot be loaded" in run.stderr
+    run = command(tmp_path, "normals", bgars.sample_capture(), "-o", tmp_path / "b", "-m", "magic")
+    assert run.returncode == 2
+    assert "blind, broken, upward; got 'magic'" in " ".join(run.stderr.replace("│", " ").split())
+    assert not (tmp_path / "b").exists()
+
+
+def test_a_line_of_each_table_is_a_method(capture: bgars.Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(TABLE, "median-filter", methods.NormalsMethod("median-filter", "as CONTRIBUTING.md has it."))
+    monkeypatch.setitem(RUNNERS, "median-filter", lambda capture, **_: bgars.estimate_normals(capture, method="blind"))
+    assert bgars.estimate_normals(capture, method="median-filter").method == "blind"
+    with pytest.raises(bgars.InputError, match="threshold: only the method specular-filter uses it"):
+        bgars.estimate_normals(capture, method="median-filter", threshold=3)
+
+
+def test_a_line_of_the_table_is_a_file_format(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def write(_: object, normals: Any, path: Path) -> None:  # noqa: ANN401
+        np.savetxt(path, normals.reshape(-1, 3), delimiter=",")
+
+    normals = np.float32([[[0.6, 0.0, 0.8], [0.0, 0.0, 1.0]]])
+    with pytest.raises(bgars.InputError):
+        bgars.write_normals(normals, tmp_path / "n.csv")
+    monkeypatch.setitem(formats.NORMAL_FORMATS, ".csv", write)
+    bgars.write_normals(normals, tmp_path / "n.csv")
+    assert np.allclose(np.loadtxt(tmp_path / "n.csv", delimiter=","), normals[0])
