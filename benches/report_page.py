@@ -111,7 +111,7 @@ def true_fields(truth: bgars.SimulatedTruth) -> tuple[bgars.NormalField, bgars.N
     counts = {"lights_kept": np.full(shape, 8, np.uint16), "method": "truth", "pixel_pitch_um": 12.0}
     ball, board = ((truth.ball_ids > 0), (truth.ball_ids == 0))
     normals = np.ascontiguousarray(truth.normals, np.float32)
-    one, two = (bgars.NormalField(normals, mask=mask, measured=mask, **levels, **counts) for mask in (ball, board))
+    one, two = (bgars.NormalField(normals, mask=mask, is_measured=mask, **levels, **counts) for mask in (ball, board))
     return one, two
 
 

@@ -170,7 +170,7 @@ def fitted(part: Part) -> bgars.records.reflectance_fit.ReflectanceFit:
     """What the estimator learnt of a part."""
     fit = part.field.reflectance
     if fit is None or not fit.accepted:
-        sys.exit(f"no material was fitted: {part.field.choice}")
+        sys.exit(f"no material was fitted: {part.field.method_reason}")
     return fit
 
 
@@ -238,7 +238,7 @@ def measured_prior() -> None:
         pitch = part.capture.pixel_pitch_um or 1.0
         extent = (-width / 2 * pitch, width / 2 * pitch, -height / 2 * pitch, height / 2 * pitch)
         stated = np.where(part.truth.mask, part.field.standard_error_deg, np.nan)
-        measured = part.truth.mask & part.field.measured
+        measured = part.truth.mask & part.field.is_measured
         error = part.error_deg()
         prior = part.truth.mask & part.field.mask & ~measured
         inside = (error <= part.field.standard_error_deg)[measured].mean()
@@ -260,7 +260,7 @@ def measured_prior() -> None:
             axes.set(xlabel="x (µm)", ylabel="y (µm)", title=title, xlim=(-900, 900), ylim=(-900, 900))
         bar = figure.colorbar(picture, ax=line, label="angle (°)", shrink=0.85, ticks=(0.02, 0.1, 0.5, 2, 10))
         bar.ax.set_yticklabels(["0.02", "0.1", "0.5", "2", "10"])
-        say("prior", name, prior_share(part.field), inside, inside_prior, part.field.choice)
+        say("prior", name, prior_share(part.field), inside, inside_prior, part.field.method_reason)
     save(figure, FOLDER / "measured_prior.png")
 
 

@@ -52,7 +52,7 @@ def failure() -> None:
                     fit.loss if fit else np.nan,
                 )
             )
-            say("failure", name, found[-1], part.field.choice)
+            say("failure", name, found[-1], part.field.method_reason)
         q_values = [entry.q for entry in found]
         left.plot(
             q_values, [entry.error_deg for entry in found], marker=marker, color=color, label=f"true error, {name}"

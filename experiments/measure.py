@@ -122,7 +122,7 @@ def measure(
         p95_deg_nz03=float(np.percentile(judged, 95)),
         mean_deg_nz01=float(wider.mean()),
         height_rmse_px=float(difference_px.std()),
-        measured_percent_nz03=100.0 * float(field.measured[truth.mask & (n_z > 0.3)].mean()),  # noqa: PLR2004
+        measured_percent_nz03=100.0 * float(field.is_measured[truth.mask & (n_z > 0.3)].mean()),  # noqa: PLR2004
         unsolved=int((truth.mask & ~field.mask).sum()),
         height_px=height_px - np.nanmin(height_px),
     )

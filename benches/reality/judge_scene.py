@@ -146,9 +146,9 @@ def _normals_record(
     normals = np.where(length > 1e-9, normals / np.maximum(length, 1e-12), (0, 0, 1.0))
     error_deg = np.degrees(np.arccos(np.clip((normals * true).sum(-1), -1, 1)))
     mean_deg = float(error_deg[on_balls].mean())
-    if not stated or getattr(field, "measured", None) is None:
+    if not stated or getattr(field, "is_measured", None) is None:
         return NormalsRecord(mean_deg)
-    measured = on_balls & np.asarray(field.measured)
+    measured = on_balls & np.asarray(field.is_measured)
     share = float(measured.sum() / on_balls.sum())
     if not measured.any():
         return NormalsRecord(mean_deg, share)

@@ -12,7 +12,6 @@ from bgars.inspection.shadow_edges import Lines
 from bgars.inspection.shadow_map import Casters
 from bgars.normals.kernel_outputs import KernelOutputs
 from bgars.records.kernel_capture import KernelCapture
-from bgars.records.normal_field import NormalField
 from bgars.records.surface_material import SurfaceMaterial
 
 __all__ = [
@@ -98,7 +97,7 @@ def estimate_reflectance(
     material: SurfaceMaterial | None,
     threads: int | None,
     progress: Callable[[float], object] | None,
-    out: NormalField,
+    out: KernelOutputs,
 ) -> dict[str, Any]: ...
 def usable_normals(normals: NDArray[np.float32], *, threads: int | None) -> NDArray[np.bool_]: ...
 def unit_directions(directions: NDArray[np.float64]) -> NDArray[np.float64]: ...

@@ -50,7 +50,7 @@ def test_stated_errors_hold_what_the_model_misses(data_folder: Path, name: str, 
     folder = data_folder / "real" / name
     capture = bgars.read_capture(folder, images=read_filenames(folder / images) if images else None)
     truth, field = bgars.read_truth(folder), bgars.estimate_normals(capture)
-    judged = truth.mask & field.measured
+    judged = truth.mask & field.is_measured
     assert judged.sum() > 0.9 * truth.mask.sum()
     error_deg = bgars.angular_error_deg(field.normals[judged], truth.normals[judged])
     assert WITHIN[0] < (error_deg <= field.standard_error_deg[judged]).mean() < WITHIN[1]

@@ -54,7 +54,7 @@ def test_scenes(data_folder: Path, name: str) -> None:
     result = bgars.evaluate(
         bgars.read_capture(data_folder / "scenes" / name), truth=bgars.read_truth(data_folder / "scenes" / name)
     )
-    assert result.choice.startswith("reflectance on balls")
+    assert result.method_reason.startswith("reflectance on balls")
     assert result.normals.mean_deg <= LIMITS[name]
     if name in MEASURED_LIMITS:
         assert result.measured is not None

@@ -119,7 +119,7 @@ def careful_estimate(
         parts.append(bgars.estimate_normals(part, method=method, keep_sets=keep_sets))
     arrays = {
         name: np.concatenate([getattr(part, name) for part in parts], axis=1)
-        for name in ("normals", "albedo", "mask", "confidence", "measured", "lights_kept", "kept_sets")
+        for name in ("normals", "albedo", "mask", "confidence", "is_measured", "lights_kept", "kept_sets")
         if getattr(parts[0], name) is not None
     }
     return replace(parts[0], **arrays)
@@ -168,7 +168,7 @@ def test_both_kernels_read_a_capture_alike(method: bgars.normals.Method, kind: s
         capture = replace(capture, mask=mask)
     fast = bgars.estimate_normals(capture, method=method, keep_sets=True)
     careful = careful_estimate(capture, method, keep_sets=True)
-    for name in ("mask", "measured", "lights_kept", "kept_sets"):
+    for name in ("mask", "is_measured", "lights_kept", "kept_sets"):
         np.testing.assert_array_equal(getattr(fast, name), getattr(careful, name), err_msg=name)
     assert fast.mask.sum() > 300
     np.testing.assert_allclose(fast.normals, careful.normals, rtol=0, atol=1e-5)
@@ -190,7 +190,7 @@ def test_counts_are_those_of_the_sets_where_blocks_that_keep_all_lie_among_other
     np.testing.assert_array_equal(field.lights_kept, np.where(images[3] == 1.0, 7, 8))
     np.testing.assert_array_equal(field.kept_sets.sum(axis=-1), field.lights_kept)
     assert field.mask.all()
-    assert field.measured.all()
+    assert field.is_measured.all()
 
 
 @pytest.mark.parametrize("masked", [False, True])
@@ -215,6 +215,6 @@ def test_full_scale_of_plain_floats_is_their_largest_value(
     given_mask = mask if masked else np.ones(size, np.bool_)
     told = bgars.Capture(images, rig, given_mask, full_scale=float(images.max()))
     expected = bgars.estimate_normals(told, method=method)
-    for name in ("normals", "albedo", "mask", "confidence", "measured", "lights_kept"):
+    for name in ("normals", "albedo", "mask", "confidence", "is_measured", "lights_kept"):
         np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), err_msg=name)
-    assert found.choice == expected.choice
+    assert found.method_reason == expected.method_reason

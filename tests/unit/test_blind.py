@@ -133,9 +133,9 @@ def test_the_choice_is_told() -> None:
     directions = bgars.LightRig.ring(8, elevation_deg=50.0).directions
     images = photograph(truth, directions, strength=0.5, roughness=0.35)
     field = bgars.estimate_normals(images, directions, method="blind", mask=mask)
-    assert field.choice.startswith("reflectance fitted blind: mean cost of a left-out light")
+    assert field.method_reason.startswith("reflectance fitted blind: mean cost of a left-out light")
     other = bgars.estimate_normals(images, directions, method="robust-filter", mask=mask)
-    assert other.choice == "robust-filter, as asked"
+    assert other.method_reason == "robust-filter, as asked"
 
 
 def test_four_lights_get_the_robust_filter() -> None:
@@ -145,7 +145,7 @@ def test_four_lights_get_the_robust_filter() -> None:
     blind = bgars.estimate_normals(images, directions, method="blind", mask=mask)
     robust = bgars.estimate_normals(images, directions, method="robust-filter", mask=mask)
     np.testing.assert_array_equal(blind.normals, robust.normals)
-    assert "fewer than 5 lights" in blind.choice
+    assert "fewer than 5 lights" in blind.method_reason
 
 
 def test_the_same_bits_for_any_number_of_threads() -> None:
@@ -167,7 +167,7 @@ def test_fields_keep_their_promises() -> None:
     assert field.mask[mask].all()
     assert not field.mask[~mask].any()
     assert np.isnan(field.normals[~mask]).all()
-    assert not field.measured[~mask].any()
+    assert not field.is_measured[~mask].any()
     np.testing.assert_allclose(np.linalg.norm(field.normals[mask], axis=-1), 1.0, atol=1e-6)
     assert (field.normals[mask][:, 2] > 0).all()
     assert ((field.confidence[mask] > 0) & (field.confidence[mask] <= 1)).all()
@@ -218,13 +218,13 @@ def test_memory_of_an_earlier_result_is_used_again_by_a_method_that_fills_nothin
     images = photograph(truth, directions, strength=0.5, roughness=0.35)
     images[2:, 14:17, 14:17] = 0  # two lights fix no normal
     expected = bgars.estimate_normals(images, directions, method="blind", mask=mask)
-    assert (expected.measured != expected.mask).any()
+    assert (expected.is_measured != expected.mask).any()
     least_squares = bgars.estimate_normals(images, directions, method="lambertian")
     blind = bgars.estimate_normals(images, directions, method="blind", mask=mask, out=least_squares)
     assert blind.normals is least_squares.normals
-    np.testing.assert_array_equal(blind.measured, expected.measured)
+    np.testing.assert_array_equal(blind.is_measured, expected.is_measured)
     back = bgars.estimate_normals(images, directions, method="lambertian", out=blind)
-    np.testing.assert_array_equal(back.measured, back.mask)
+    np.testing.assert_array_equal(back.is_measured, back.mask)
 
 
 def test_memory_of_an_earlier_result_is_used_again() -> None:

@@ -281,5 +281,5 @@ def test_black_background_is_not_measured(relief: bgars.Capture) -> None:
     images[:, :, :80] = np.random.default_rng(0).integers(0, 3, (8, 200, 80))
     capture = replace(relief, images=images)
     field = without_background(bgars.estimate_normals(capture, method="lambertian"), capture)
-    assert field.measured[:, :80].mean() < 0.05
-    assert field.measured[:, 82:].mean() > 0.99
+    assert field.is_measured[:, :80].mean() < 0.05
+    assert field.is_measured[:, 82:].mean() > 0.99

@@ -59,7 +59,7 @@ def test_balls_flattened_alike_are_no_worse_than_by_a_simple_method(ratio: float
     elif fit.accepted:
         assert fit.shape == "ellipsoid"
         assert fit.shape_ratio == pytest.approx(ratio, abs=0.02)
-        assert "times as high as half balls" in field.choice
+        assert "times as high as half balls" in field.method_reason
 
 
 def test_caps_are_no_worse_than_by_a_simple_method() -> None:
@@ -91,7 +91,7 @@ def test_a_circle_where_no_ball_is_is_dropped() -> None:
     images, directions, normals = waves(8)
     options = {"images": images, "light_directions": directions}
     field = bgars.estimate_normals(**options, anchors=[[-10.0, 5.0, 24.0]])
-    assert "without circles" in field.choice or "does not explain the balls" in field.choice
+    assert "without circles" in field.method_reason or "does not explain the balls" in field.method_reason
     default, *simple = (
         bgars.angular_error_deg(found.normals, normals.astype(np.float32)).mean()
         for found in (field, *(bgars.estimate_normals(**options, method=method) for method in SIMPLE))
@@ -130,4 +130,4 @@ def test_over_exposed_captures_give_normals_or_a_reason(factor: float, hardness:
     circles = [[v / 14.0 for v in (ball.x_um, ball.y_um, ball.diameter_um / 2)] for ball in truth.balls]
     field = bgars.estimate_normals(replace(capture, images=bright), anchors=circles)
     assert np.isfinite(field.normals[field.mask]).all()
-    assert field.choice
+    assert field.method_reason

@@ -142,7 +142,7 @@ def test_anchors_may_be_circles_a_mask_or_found_balls() -> None:
     found = bgars.find_balls(capture)
     for anchors, words in ((truth.mask, "1 ball given"), (found, "1 ball given"), (None, "1 ball found")):
         field = bgars.estimate_normals(capture, anchors=anchors)
-        assert words in field.choice
+        assert words in field.method_reason
         assert mean_deg(field, truth) <= 0.25
         difference = bgars.angular_error_deg(field.normals[judged(truth)], circle.normals[judged(truth)])
         assert difference.mean() < 0.2
@@ -153,7 +153,7 @@ def test_a_material_is_used_again_on_noisier_and_on_odd_parts() -> None:
     assert fit is not None
     capture, truth = hemisphere(read_noise_levels=2.0, seed=5)
     field = anchored(capture, material=fit.material)
-    assert "material given" in field.choice
+    assert "material given" in field.method_reason
     assert field.reflectance is not None
     assert field.reflectance.material == fit.material
     assert mean_deg(field, truth) <= 0.8
@@ -168,7 +168,9 @@ def test_a_material_without_balls_is_used_where_it_explains_the_pixel() -> None:
     fit = anchored(capture).reflectance
     assert fit is not None
     field = bgars.estimate_normals(capture, anchors=np.zeros((0, 3)), material=fit.material)
-    assert field.choice.startswith("reflectance where it explains the pixel, robust-filter elsewhere: material given")
+    assert field.method_reason.startswith(
+        "reflectance where it explains the pixel, robust-filter elsewhere: material given"
+    )
     robust = bgars.estimate_normals(capture, method="robust-filter")
     assert mean_deg(field, truth) < 0.5 * mean_deg(robust, truth)
 
@@ -209,7 +211,7 @@ def choice_of(case: str) -> bgars.NormalField:
 )
 def test_the_choice_says_what_was_used_and_why(case: str, method: str, words: str) -> None:
     field = choice_of(case)
-    assert words in field.choice
+    assert words in field.method_reason
     assert field.method == method
 
 
@@ -253,7 +255,7 @@ def test_standard_errors_cover_68_percent_of_the_errors() -> None:
     for seed, (noise, i_d) in enumerate(((0.0, 0.5), (0.5, 0.25), (1.0, 1.0), (2.0, 0.5), (3.0, 0.25), (2.0, 0.1))):
         capture, truth = hemisphere(replace(SOLDER, i_d=i_d), read_noise_levels=noise, seed=seed)
         field = anchored(capture)
-        measured = judged(truth) & field.measured
+        measured = judged(truth) & field.is_measured
         error_deg = bgars.angular_error_deg(field.normals[measured], truth.normals[measured])
         within.append(error_deg <= field.standard_error_deg[measured])
     assert np.concatenate(within).mean() == pytest.approx(0.68, abs=0.05)
@@ -274,7 +276,7 @@ def test_standard_errors_of_found_balls_hold_their_circles_errors() -> None:
         )
         capture, truth = bgars.simulate(bgars.Scene.ball_array(3, 3), rig, material, camera, seed=seed)
         field = bgars.estimate_normals(capture)
-        measured = judged(truth) & inside_circles(circles_px(capture, truth), truth.mask.shape) & field.measured
+        measured = judged(truth) & inside_circles(circles_px(capture, truth), truth.mask.shape) & field.is_measured
         error_deg = bgars.angular_error_deg(field.normals[measured], truth.normals[measured])
         within.append((error_deg <= field.standard_error_deg[measured]).mean())
     assert np.mean(within) == pytest.approx(0.68, abs=0.05)
@@ -284,11 +286,11 @@ def test_without_diffuse_light_pixels_between_the_highlights_are_not_measured() 
     capture, truth = hemisphere(replace(SOLDER, i_d=0.0))
     field = anchored(capture)
     assert field.mask[judged(truth)].all()
-    assert 0.2 < field.measured[judged(truth)].mean() < 0.9
+    assert 0.2 < field.is_measured[judged(truth)].mean() < 0.9
     # Highlights of h = 40 are gone 35 degrees away: near the rim on the axes of the lights nothing shines.
     brightest = capture.images.max(axis=0)
-    assert not field.measured[truth.mask & (brightest == 0)].any()
-    assert not (field.measured & ~field.mask).any()
+    assert not field.is_measured[truth.mask & (brightest == 0)].any()
+    assert not (field.is_measured & ~field.mask).any()
 
 
 def test_the_board_is_left_to_the_robust_filter() -> None:
@@ -303,7 +305,7 @@ def test_pixels_outside_the_mask_stay_invalid() -> None:
     mask[:, : mask.shape[1] // 2] = False
     field = anchored(capture, mask=mask)
     assert np.isnan(field.normals[~mask]).all()
-    assert not (field.mask | field.measured)[~mask].any()
+    assert not (field.mask | field.is_measured)[~mask].any()
     assert mean_deg(field, truth, judged(truth) & mask) <= 0.2
 
 
@@ -315,7 +317,7 @@ def test_bits_do_not_depend_on_threads_or_on_reused_memory() -> None:
     kept = bgars.estimate_normals(capture, method="lambertian")
     reused = bgars.estimate_normals(capture, anchors=circles, out=kept)
     assert reused.normals is kept.normals
-    for name in ("normals", "albedo", "mask", "confidence", "measured"):
+    for name in ("normals", "albedo", "mask", "confidence", "is_measured"):
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
         np.testing.assert_array_equal(getattr(one, name), getattr(reused, name))
 

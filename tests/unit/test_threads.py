@@ -161,7 +161,7 @@ def test_results_go_into_the_memory_of_an_earlier_field() -> None:
     again = bgars.estimate_normals(second, directions, keep_sets=True, out=field)
     assert again.normals is field.normals
     assert again.method == expected.method
-    for name in ("normals", "albedo", "mask", "confidence", "measured", "lights_kept", "kept_sets"):
+    for name in ("normals", "albedo", "mask", "confidence", "is_measured", "lights_kept", "kept_sets"):
         np.testing.assert_array_equal(getattr(again, name), getattr(expected, name), err_msg=name)
 
 
@@ -174,25 +174,25 @@ def test_what_least_squares_measure_is_a_read_only_view_of_the_mask(method: Meth
         field = bgars.estimate_normals(stack, directions, method=method, mask=pixels)
         again = bgars.estimate_normals(stack[::-1].copy(), directions, method=method, out=field)
         for each in (field, again):
-            assert np.shares_memory(each.measured, each.mask)
-            np.testing.assert_array_equal(each.measured, each.mask)
+            assert np.shares_memory(each.is_measured, each.mask)
+            np.testing.assert_array_equal(each.is_measured, each.mask)
             with pytest.raises(ValueError, match="read-only"):
-                each.measured[0, 0] = False
+                each.is_measured[0, 0] = False
 
 
 def test_measured_is_written_where_an_earlier_result_brings_its_own() -> None:
     directions = bgars.LightRig.ring(8).directions
     fresh = bgars.estimate_normals(noisy_stack(50), directions, method="lambertian")
-    own = replace(fresh, measured=np.zeros_like(fresh.measured))
+    own = replace(fresh, is_measured=np.zeros_like(fresh.is_measured))
     again = bgars.estimate_normals(noisy_stack(50), directions, method="lambertian", out=own)
-    assert again.measured is own.measured
-    np.testing.assert_array_equal(again.measured, again.mask)
+    assert again.is_measured is own.is_measured
+    np.testing.assert_array_equal(again.is_measured, again.mask)
 
 
 def test_a_read_only_array_of_an_earlier_result_is_named() -> None:
     directions = bgars.LightRig.ring(8).directions
     field = bgars.estimate_normals(noisy_stack(50), directions, method="lambertian")
-    for name in ("albedo", "measured"):
+    for name in ("albedo", "is_measured"):
         held = np.zeros_like(getattr(field, name))
         held.setflags(write=False)
         with pytest.raises(bgars.InputError, match=f"out: its arrays are overwritten, but {name} is read-only"):

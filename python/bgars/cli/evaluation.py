@@ -23,7 +23,7 @@ def choice_in_words(normals: dict[str, Any]) -> str:
         trust = f"Trust: the images determine {share:.1%} of the normals; the others are filled in, and marked."
     else:
         trust = f"Do not trust the surface as a whole: the images determine only {share:.1%} of its normals."
-    return f"{trust}\nMethod: {normals['choice']}."
+    return f"{trust}\nMethod: {normals['method_reason']}."
 
 
 def evaluation_table(results: Sequence[Evaluation], lights: int) -> Iterator[str]:
@@ -37,8 +37,8 @@ def evaluation_table(results: Sequence[Evaluation], lights: int) -> Iterator[str
         cells = [f"{value:>{width}}" for value, width in zip(values, widths[1:], strict=True)]
         yield "  ".join([f"{name:<{widths[0]}}", *cells])
     for result in results:
-        if result.choice != f"{result.method}, as asked":
-            yield f"{result.method} used: {result.choice}"
+        if result.method_reason != f"{result.method}, as asked":
+            yield f"{result.method} used: {result.method_reason}"
 
 
 def _cell(of: Callable[[Evaluation], str | None], result: Evaluation) -> str:

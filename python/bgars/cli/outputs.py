@@ -122,6 +122,6 @@ def write_normals(field: NormalField, output: Path, *, directx: bool) -> tuple[d
         bgars.write_normal_map(field, folder / "normals.png", directx=directx)
         write_described(folder / "albedo.tif", field.albedo, "albedo")
         write_described(folder / "confidence.tif", field.confidence, "confidence")
-        iio.imwrite(folder / "measured.png", np.where(field.measured, 255, 0).astype(np.uint8))
+        iio.imwrite(folder / "measured.png", np.where(field.is_measured, 255, 0).astype(np.uint8))
         iio.imwrite(folder / "lights_kept.png", np.minimum(field.lights_kept, 255).astype(np.uint8))
     return {**summarise_field(field), "files": list(files)}, files

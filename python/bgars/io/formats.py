@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -131,9 +131,12 @@ def _normals_tiff(_field: object, normals: NDArray[np.float32], path: Path) -> N
 
 
 def _normals_npz(field: object, normals: NDArray[np.float32], path: Path) -> None:
-    names = ("albedo", "mask", "confidence", "measured") if isinstance(field, NormalField) else ()
+    others: dict[str, Any] = {}
+    if isinstance(field, NormalField):
+        others = {"albedo": field.albedo, "mask": field.mask, "confidence": field.confidence}
+        others |= {"measured": field.is_measured}
     with path.open("wb") as file:
-        np.savez_compressed(file, normals=normals, **{name: getattr(field, name) for name in names})
+        np.savez_compressed(file, normals=normals, **others)
 
 
 def _points_xyz(columns: dict[str, NDArray[np.floating]], _unit: str, path: Path) -> None:

@@ -35,7 +35,9 @@ def given_field(given: NormalField | ArrayLike, capture: Capture, name: str) -> 
         if given.mask.shape != capture.mask.shape:
             msg = f"method: normals have shape {given.mask.shape}, but the images have {capture.mask.shape}"
             raise InputError(msg)
-        return given if given.choice != "" or name == "given" else replace(given, choice=f"{name}, as asked")
+        return (
+            given if given.method_reason != "" or name == "given" else replace(given, method_reason=f"{name}, as asked")
+        )
     normals = np.asarray(given)
     shape = (*capture.mask.shape, 3)
     if normals.shape != shape or normals.dtype.kind not in "fiu":
@@ -47,4 +49,4 @@ def given_field(given: NormalField | ArrayLike, capture: Capture, name: str) -> 
     unit = np.where(mask[..., None], wide / np.where(mask, length, 1.0)[..., None], np.nan).astype(np.float32)
     nothing = np.full(mask.shape, np.nan, np.float32)
     lights, unsure = np.zeros(mask.shape, np.uint16), np.zeros(mask.shape, np.float32)
-    return NormalField(unit, nothing, mask, unsure, mask, lights, name, capture.pixel_pitch_um, choice=GIVEN)
+    return NormalField(unit, nothing, mask, unsure, mask, lights, name, capture.pixel_pitch_um, method_reason=GIVEN)

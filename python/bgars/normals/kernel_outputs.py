@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from bgars.records.normal_field import NormalField
     from bgars.records.pixels import BoolArray, FloatArray
 
-__all__ = ["KernelOutputs", "fresh_outputs", "measured_by", "outputs_of"]
+__all__ = ["KernelOutputs", "fresh_outputs", "kernel_view", "measured_by", "outputs_of"]
 
 
 class KernelOutputs(NamedTuple):
-    """Attributes of :class:`bgars.NormalField`, but that `measured` is None where it would be the mask again."""
+    """Attributes of :class:`bgars.NormalField`; `measured`, there `is_measured`, is None where it would be the mask."""
 
     normals: FloatArray
     albedo: FloatArray
@@ -61,19 +61,33 @@ def outputs_of(field: NormalField, shape: tuple[int, int], set_lights: int, *, f
     if (None if field.kept_sets is None else field.kept_sets.shape) != sets_shape:
         msg = "out: must have kept sets, for the same number of lights, exactly when keep_sets is asked for"
         raise InputError(msg)
-    measured: BoolArray | None = field.measured
-    if _shows(field.measured, field.mask):
+    measured: BoolArray | None = field.is_measured
+    if _shows(field.is_measured, field.mask):
         measured = np.zeros(shape, np.bool_) if fills else None
     outputs = KernelOutputs(
         field.normals, field.albedo, field.mask, field.confidence, measured, field.lights_kept, field.kept_sets
     )
     for name, array in zip(KernelOutputs._fields, outputs, strict=True):
         if array is not None and not array.flags.writeable:
-            msg = f"out: its arrays are overwritten, but {name} is read-only"
+            told = "is_measured" if name == "measured" else name
+            msg = f"out: its arrays are overwritten, but {told} is read-only"
             raise InputError(msg)
         if array is not None and array.dtype == np.bool_ and (levels := array.view(np.uint8)).max(initial=0) > 1:
             np.not_equal(levels, 0, out=array)  # no value of bool, which the kernels would take it for
     return outputs
+
+
+def kernel_view(field: NormalField) -> KernelOutputs:
+    """The arrays of a field under the names by which the kernels know them."""
+    return KernelOutputs(
+        field.normals,
+        field.albedo,
+        field.mask,
+        field.confidence,
+        field.is_measured,
+        field.lights_kept,
+        field.kept_sets,
+    )
 
 
 def measured_by(outputs: KernelOutputs) -> BoolArray:

@@ -44,4 +44,4 @@ def without_background(field: NormalField, capture: Capture) -> NormalField:
     if capture.images.dtype.kind != "u":
         return field
     dark = field.mask & (field.albedo < albedo_floor(capture))
-    return replace(field, measured=field.measured & ~dark) if dark.any() else field
+    return replace(field, is_measured=field.is_measured & ~dark) if dark.any() else field

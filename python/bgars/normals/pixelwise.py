@@ -77,12 +77,12 @@ def pixelwise_normals(
         albedo=outputs.albedo,
         mask=outputs.mask,
         confidence=outputs.confidence,
-        measured=measured_by(outputs),
+        is_measured=measured_by(outputs),
         lights_kept=outputs.lights_kept,
         method=method,
         pixel_pitch_um=capture.pixel_pitch_um,
         kept_sets=outputs.kept_sets,
-        choice=choice or f"{method}, as asked",
+        method_reason=choice or f"{method}, as asked",
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from bgars import _bgars
 from bgars.normals.choice import contest
+from bgars.normals.kernel_outputs import kernel_view
 from bgars.records.kernel_capture import kernel_capture
 from bgars.records.reflectance_fit import ReflectanceFit
 from bgars.records.surface_material import SurfaceLobe, SurfaceMaterial
@@ -67,7 +68,7 @@ def add_reflectance(
         material=material,
         threads=threads,
         progress=progress,
-        out=field,
+        out=kernel_view(field),
     )
     fitted = material or SurfaceMaterial(
         diffuse_level=found["diffuse_level"],

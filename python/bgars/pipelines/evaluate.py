@@ -13,6 +13,7 @@ from bgars.normals.given import GIVEN, given_field
 from bgars.normals.methods import DEFAULT_METHOD, Method
 from bgars.pipelines.normals import estimate_normals
 from bgars.records.normal_field import NormalField
+from bgars.records.renamed import renamed
 from bgars.surface.integrate import integrate_normals
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ class AngularErrors:
     invalid: int
 
 
+@renamed(choice="method_reason")
 @dataclass(frozen=True)
 class Evaluation:
     """Result of :func:`evaluate`.
@@ -62,7 +64,7 @@ class Evaluation:
         Capture and estimator.
     region : str
         What was judged: "balls, n_z > 0.3" of a scene, "mask" of a photograph.
-    choice : str
+    method_reason : str
         What the estimator used, and why.
     normals : AngularErrors
         Over that region.
@@ -80,7 +82,7 @@ class Evaluation:
     name: str
     method: str
     region: str
-    choice: str
+    method_reason: str
     normals: AngularErrors
     measured: AngularErrors | None
     coverage: float | None
@@ -89,7 +91,7 @@ class Evaluation:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain Python values, for JSON."""
-        return asdict(self)
+        return asdict(self) | {"choice": self.method_reason}  # its old name too, for one release
 
 
 def evaluate(
@@ -148,7 +150,7 @@ def evaluate(
     else:
         name = getattr(method, "__name__", "given") if callable(method) else "given"
         field = given_field(method(capture) if callable(method) else method, capture, name)
-    is_own = field.choice != GIVEN
+    is_own = field.method_reason != GIVEN
     judged = truth.mask & capture.mask
     board = None
     if truth.ball_ids is not None:
@@ -162,10 +164,10 @@ def evaluate(
         name=capture.name,
         method=field.method,
         region=f"balls, n_z > {MIN_N_Z}" if truth.ball_ids is not None else "mask",
-        choice=field.choice,
+        method_reason=field.method_reason,
         normals=errors,
-        measured=_errors(field, truth.normals, judged & field.measured) if is_own else None,
-        coverage=_coverage(field, truth.normals, judged & field.measured) if is_own else None,
+        measured=_errors(field, truth.normals, judged & field.is_measured) if is_own else None,
+        coverage=_coverage(field, truth.normals, judged & field.is_measured) if is_own else None,
         board=board,
         ball_height_rmse_um=_ball_height_rmse_um(field, truth, judged),
     )

@@ -130,7 +130,7 @@ def inspect(
     result = replace(
         result,
         method=method,
-        normals_choice="" if field is None else field.choice,
+        normals_choice="" if field is None else field.method_reason,
         material=None if fit is None else part_material(fit, from_file=material is not None),
         capture=capture.name,
     )

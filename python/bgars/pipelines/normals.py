@@ -67,11 +67,11 @@ def estimate_normals(
         best; the material is fitted on the balls themselves; other pixels are left to ``robust-filter``. Captures
         with fewer than 4 lights, or with neither balls nor a material, are left to ``blind``: one material is fitted
         to the whole capture together with normals and albedo of every pixel, and taken where it predicts left-out
-        lights better than least squares does (some 20 us a pixel; at least 5 lights). `NormalField.choice` says what
-        was done. The other three solve ``I_k = rho l_k . n`` by least squares (Woodham 1980) over the lights they keep
-        at a pixel: ``lambertian`` all; ``specular-filter``, as published: sort the values, cut at the first gap over
-        `threshold` with at least 3 values kept; ``robust-filter`` the window of sorted values that a Lambertian facet
-        explains best (docs/method.md). Further names: :func:`bgars.register_method`.
+        lights better than least squares does (some 20 us a pixel; at least 5 lights). `NormalField.method_reason` says
+        what was done. The other three solve ``I_k = rho l_k . n`` by least squares (Woodham 1980) over the lights they
+        keep at a pixel: ``lambertian`` all; ``specular-filter``, as published: sort the values, cut at the first gap
+        over `threshold` with at least 3 values kept; ``robust-filter`` the window of sorted values that a Lambertian
+        facet explains best (docs/method.md). Further names: :func:`bgars.register_method`.
     mask : (H, W) array_like of bool, optional
         True = use; combined with the capture's own mask.
     light_intensities : (L,) array_like, optional
@@ -103,7 +103,7 @@ def estimate_normals(
     NormalField
         A pixel whose kept lights are coplanar or nearly so (27 det / tr^3 of ``L^T L`` below 1e-6), whose solution is
         zero or faces away from the camera is invalid: NaN, mask False. A ball's pixel whose light alone does not fix
-        the normal to 2 degrees is drawn to the sphere of its circle: `measured` is False there.
+        the normal to 2 degrees is drawn to the sphere of its circle: `is_measured` is False there.
 
     Raises
     ------
@@ -164,7 +164,7 @@ def _within(field: NormalField, use: NDArray[np.bool_] | None) -> NormalField:
         albedo=np.where(use, field.albedo, np.float32(np.nan)),
         mask=field.mask & use,
         confidence=np.where(use, field.confidence, np.float32(0)),
-        measured=field.measured & use,
+        is_measured=field.is_measured & use,
         lights_kept=np.where(use, field.lights_kept, np.uint16(0)),
     )
 
@@ -236,7 +236,7 @@ def _by_reflectance(
     where = "on balls, robust-filter elsewhere" if balls else "where it explains the pixel, robust-filter elsewhere"
     shape = "" if fit is None else fit.shape_in_words
     checked = f"loss {0.0 if fit is None else fit.loss:.3f}" if balls else "no balls to check it by"
-    return replace(field, choice=f"reflectance {where}: material {source}{shape}, {checked}")
+    return replace(field, method_reason=f"reflectance {where}: material {source}{shape}, {checked}")
 
 
 RUNNERS: dict[Method, Callable[..., Any]] = {
@@ -248,7 +248,7 @@ RUNNERS: dict[Method, Callable[..., Any]] = {
 
 def _because(field: NormalField, reason: str) -> NormalField:
     """The field with the reason why its method stands in for reflectance."""
-    return replace(field, choice=f"{field.choice.removesuffix(', as asked')}; {reason}")
+    return replace(field, method_reason=f"{field.method_reason.removesuffix(', as asked')}; {reason}")
 
 
 def _circles(anchors: FoundBalls | ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:

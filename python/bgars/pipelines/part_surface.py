@@ -69,7 +69,7 @@ def part_surface(
         ball_step_px=step,
         board_step_px=board_step_px,
         ball_height_um=_rounded(height_um[::step, ::step]),
-        ball_measured=(balls.measured & np.isfinite(height_um))[::step, ::step].copy(),
+        ball_measured=(balls.is_measured & np.isfinite(height_um))[::step, ::step].copy(),
         board_height_um=_board(known, regions, board, board_step_px, pitch_um, threads),
     )
 

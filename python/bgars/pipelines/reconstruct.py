@@ -77,9 +77,10 @@ def summarise_field(field: NormalField) -> dict[str, Any]:
     valid = int(field.mask.sum())
     return {
         "method": field.method,
-        "choice": field.choice,
+        "method_reason": field.method_reason,
+        "choice": field.method_reason,  # its old name, for one release
         "valid_pixels": valid,
-        "measured_share": float((field.measured & field.mask).sum() / valid) if valid else 0.0,
+        "measured_share": float((field.is_measured & field.mask).sum() / valid) if valid else 0.0,
         "mean_confidence": float(field.confidence[field.mask].mean()) if field.mask.any() else 0.0,
         "mean_lights_kept": float(field.lights_kept[field.mask].mean()) if field.mask.any() else 0.0,
         "reflectance": None if field.reflectance is None else summarise_fit(field.reflectance),

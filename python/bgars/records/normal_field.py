@@ -13,6 +13,7 @@ from bgars.records.plain_arrays import (
     keep,
     plain_fields,
 )
+from bgars.records.renamed import renamed
 from bgars.records.shown import ShownField
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ PERCENTILE_PIXELS = 1 << 16
 """Pixels that a percentile for display is taken from, about."""
 
 
+@renamed(measured="is_measured", choice="method_reason")
 @dataclass(frozen=True, eq=False, repr=False)
 class NormalField(ShownField):
     """Estimated normals.
@@ -41,7 +43,7 @@ class NormalField(ShownField):
         True where the normal is valid.
     confidence : (H, W) float32
         ``1 / (1 + (s / 5 deg)^2)`` with s the standard error of the direction; 0 where invalid.
-    measured : (H, W) bool
+    is_measured : (H, W) bool
         False where a normal is a prior fill or invalid; of methods that fill nothing in, a read-only view of `mask`.
     lights_kept : (H, W) uint16
         Number of lights that entered the pixel's least squares.
@@ -51,7 +53,7 @@ class NormalField(ShownField):
         Size of a pixel on the board.
     kept_sets : (H, W, L) bool or None
         The lights themselves, where asked for.
-    choice : str
+    method_reason : str
         What was used, and why, in one line.
     reflectance : ReflectanceFit or None
         What the reflectance estimator learnt, where it ran.
@@ -61,25 +63,25 @@ class NormalField(ShownField):
     albedo: FloatArray
     mask: BoolArray
     confidence: FloatArray
-    measured: BoolArray
+    is_measured: BoolArray
     lights_kept: NDArray[np.uint16]
     method: str
     pixel_pitch_um: float | None = None
     kept_sets: BoolArray | None = field(default=None, repr=False)
-    choice: str = ""
+    method_reason: str = ""
     reflectance: ReflectanceFit | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         """Bring the arrays into the layout of the kernels."""
-        shows_mask = isinstance(self.measured, np.ndarray) and self.measured.base is self.mask
+        shows_mask = isinstance(self.is_measured, np.ndarray) and self.is_measured.base is self.mask
         types = {"normals": np.float32, "albedo": np.float32, "mask": np.bool_, "confidence": np.float32}
-        types |= {"measured": np.bool_, "lights_kept": np.uint16, "kept_sets": np.bool_}
+        types |= {"is_measured": np.bool_, "lights_kept": np.uint16, "kept_sets": np.bool_}
         mask = self.mask
         plain_fields(self, types)
         if shows_mask and self.mask is not mask:
             measured = self.mask.view()
-            measured.flags.writeable = self.measured.flags.writeable
-            keep(self, {"measured": measured})
+            measured.flags.writeable = self.is_measured.flags.writeable
+            keep(self, {"is_measured": measured})
 
     @property
     def standard_error_deg(self) -> FloatArray:

@@ -86,7 +86,7 @@ class ShownField(Shown):
         field: Any = self
         height, width = field.mask.shape
         valid = int(np.count_nonzero(field.mask))
-        measured = int(np.count_nonzero(field.measured & field.mask))
+        measured = int(np.count_nonzero(field.is_measured & field.mask))
         return {
             "size": f"{width} x {height} px",
             "method": repr(field.method),

@@ -103,7 +103,7 @@ def _title(result: Reconstruction) -> str:
         f"{scale}; "
         f"method {result.field.method}; {parts} connected part{'s' if parts != 1 else ''}"
     )
-    choice = textwrap.wrap(f"Normals: {result.field.choice}", TITLE_WIDTH) if result.field.choice else []
+    choice = textwrap.wrap(f"Normals: {result.field.method_reason}", TITLE_WIDTH) if result.field.method_reason else []
     return "\n".join([title, *choice])
 
 

@@ -28,7 +28,7 @@ SMALL_SHARE = 0.001
 
 def prior_pixels(field: NormalField) -> NDArray[np.bool_]:
     """(H, W) True where a normal is valid but not measured."""
-    return field.mask & ~field.measured
+    return field.mask & ~field.is_measured
 
 
 def prior_label(field: NormalField) -> str:

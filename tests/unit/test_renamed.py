@@ -1,0 +1,35 @@
+"""Old names of fields work for one release, and say so."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bgars
+import numpy as np
+import pytest
+
+
+@pytest.fixture(scope="module")
+def field() -> bgars.NormalField:
+    images = np.full((4, 2, 3), 100, np.uint8)
+    return bgars.estimate_normals(images, bgars.LightRig.ring(4).directions, method="lambertian")
+
+
+def test_old_names_are_read_with_a_warning(field: bgars.NormalField) -> None:
+    with pytest.warns(DeprecationWarning, match="NormalField.choice is called method_reason now"):
+        assert field.choice == field.method_reason  # type: ignore[attr-defined]
+    with pytest.warns(DeprecationWarning, match="NormalField.measured is called is_measured now") as told:
+        assert field.measured is field.is_measured  # type: ignore[attr-defined]
+    assert told[0].filename == __file__, "the warning names the line that is to be changed"
+
+
+def test_old_names_are_taken_with_a_warning(field: bgars.NormalField) -> None:
+    with pytest.warns(DeprecationWarning, match="choice") as told:
+        changed = replace(field, choice="mine")  # type: ignore[call-arg]
+    assert changed.method_reason == "mine"
+    assert len(told) == 1
+
+
+def test_summaries_hold_both_names() -> None:
+    result = bgars.evaluate(bgars.read_capture(bgars.sample_capture()), method="lambertian").to_dict()
+    assert result["choice"] == result["method_reason"] == "lambertian, as asked"
