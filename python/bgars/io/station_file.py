@@ -47,9 +47,7 @@ class LightsTable(Strict):
     intensities: list[Positive] = Field(description="relative, mean 1")
     u_deg: list[Positive] = Field(description="standard uncertainty of each direction, on either axis across it")
     u_own_deg: list[NotNegative] = Field(description="its part of each light alone")
-    u_common_deg: list[NotNegative] = Field(
-        description="its part that moves all lights together: outlines of the balls"
-    )
+    u_common_deg: list[NotNegative] = Field(description="its part that moves all lights together: balls' outlines")
     u_lens_deg: list[NotNegative] | None = Field(
         None, description="its part by a camera of which nothing was stated; absent: it was"
     )

@@ -170,13 +170,12 @@ def _solve(
             # No camera stands behind the board: the sign of its inverse distance has no meaning.
             lens = 1.0 / max(u_lens * abs(float(values[rest_of])), 1e-9)
             views = u_views[:, None] * values[rest_of + 1 :].reshape(balls, 2)
-        fitted = np.array(
+        rest: Array = places - np.array(
             [
                 image_of(_turned(directions, view), nearness, sphere_of_outline(circle, lens), lens)
                 for circle, view in zip(circles, views, strict=True)
             ]
         )
-        rest: Array = places - fitted
         return rest
 
     def residuals(values: Array) -> Array:
