@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import re
+import shutil
+import subprocess
 import xml.etree.ElementTree as ET
 import zipfile
 from pathlib import Path
@@ -89,6 +91,25 @@ def test_another_program_reads_the_same_surface(height: bgars.HeightMap, tmp_pat
     surface = surfalize.Surface.load(tmp_path / f"h{suffix}")
     np.testing.assert_allclose(surface.data, UP_M * 1e6, atol=1e-4)
     assert surface.step_x == pytest.approx(PITCH_UM)
+
+
+@pytest.mark.skipif(shutil.which("gwyddion") is None, reason="Gwyddion is not installed (apt-get install gwyddion)")
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("suffix", AREAL_PACKAGES)
+def test_gwyddion_opens_it(height: bgars.HeightMap, tmp_path: Path, suffix: str) -> None:
+    gwyfile = pytest.importorskip("gwyfile")
+    pytest.importorskip(AREAL_PACKAGES[suffix])
+    bgars.write_height(height, tmp_path / f"h{suffix}")
+    converted = tmp_path / "h.gwy"
+    subprocess.run(["gwyddion", f"--convert-to-gwy={converted}", tmp_path / f"h{suffix}"], check=True)
+    opened = gwyfile.load(str(converted))
+    # It has the first row at the top always, though SDF and X3P have y upward: docs/files.md says so.
+    expected = HEIGHTS_UM * np.float32(1e-6) if suffix == ".gsf" else UP_M
+    invalid = np.isnan(expected)
+    np.testing.assert_array_equal(opened["/0/mask"].data > 0, invalid)
+    np.testing.assert_allclose(opened["/0/data"].data[~invalid], expected[~invalid], atol=1e-11)
+    assert opened["/0/data"].xreal == pytest.approx(30 * 5e-6)
+    assert opened["/0/data"].yreal == pytest.approx(20 * 5e-6)
 
 
 @pytest.mark.parametrize("suffix", AREAL_PACKAGES)

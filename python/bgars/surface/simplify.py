@@ -110,7 +110,7 @@ def simplified_mesh(
         kept_log2 = (good_log2 + bad_log2) / 2.0
         target = max(1, int(len(faces) * 2.0**kept_log2))
         tried = fast_simplification.simplify(vertices, faces, target_count=target, preserve_border=True)
-        error_px = float(height_errors_px(*tried, expected).max())
+        error_px = float(height_errors_px(tried[0], tried[1], expected).max())
         if error_px * pitch_um <= max_error_um:
             good_log2 = kept_log2
             if len(tried[1]) < len(best[1]):
@@ -119,7 +119,10 @@ def simplified_mesh(
             bad_log2 = kept_log2
         if progress is not None:
             progress((number + 1) / TRIES)
-    wide_vertices, wide_faces = np.ascontiguousarray(best[0]) * pitch_um, np.ascontiguousarray(best[1], np.int64)
+    wide_vertices, wide_faces = (
+        np.ascontiguousarray(best[0], np.float64) * pitch_um,
+        np.ascontiguousarray(best[1], np.int64),
+    )
     normals = _bgars.vertex_normals(wide_vertices, wide_faces, threads=threads)
     mesh = trimesh.Trimesh(
         wide_vertices, wide_faces, vertex_normals=normals, process=False, metadata={"unit": height.unit}
