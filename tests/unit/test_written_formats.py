@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import bgars
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 import tifffile
 from bgars.cli.app import app
+from bgars.io import formats
 from bgars.io.own_files import is_own
 from typer.testing import CliRunner
 
@@ -74,3 +76,24 @@ def test_reconstruct_writes_heights_for_metrology(tmp_path: Path, name: str, pac
     assert is_own(path)
     command("reconstruct", "-o", tmp_path, "--method", "lambertian")
     assert not path.exists(), "of an earlier run"
+
+
+def test_metres_need_a_pitch_before_any_work(tmp_path: Path) -> None:
+    pytest.importorskip("gsffile")
+    capture = shutil.copytree(bgars.sample_capture(), tmp_path / "capture")
+    recipe = capture / "capture.toml"
+    kept = [line for line in recipe.read_text(encoding="utf-8").splitlines() if not line.startswith("pixel_pitch")]
+    recipe.write_text("\n".join(kept), encoding="utf-8")
+    out = tmp_path / "out"
+    run = CliRunner().invoke(app, ["reconstruct", str(capture), "-o", str(out), "--height-format", "gsf"])
+    assert str(run.exception).endswith(
+        "height.gsf: .gsf holds metres, which need a pixel pitch (pixel_pitch_um); these heights are in pixels"
+    )
+    assert not out.exists()
+
+
+def test_exr_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(formats, "missing", lambda *names: names)
+    text, _ = command("normals", "-o", tmp_path / "n.exr")
+    assert text.startswith(f"{tmp_path / 'n.exr'}: .exr needs OpenEXR: pip install 'bgars[exr]'")
+    assert not list(tmp_path.iterdir())

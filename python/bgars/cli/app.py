@@ -127,7 +127,7 @@ def reconstruct(
     mesh_format: Annotated[Literal["ply", "obj", "stl", "glb"], typer.Option(help="Format of the mesh file.")] = "ply",
     height_format: Annotated[
         Literal["gsf", "sdf", "x3p"] | None,
-        typer.Option(help="Heights also for metrology programs, in metres (bgars[areal]).", show_default=False),
+        typer.Option(help="Heights also for metrology programs, in metres; needs the extra areal.", show_default=False),
     ] = None,
     flatten: FlattenOption = None,
     directx: DirectxOption = False,

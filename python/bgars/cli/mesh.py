@@ -78,7 +78,7 @@ def mesh(
         float | None,
         typer.Option(
             metavar="UM",
-            help="Write as few triangles as keep every pixel within this height error (bgars[simplify]).",
+            help="Write as few triangles as keep every pixel within this height error; needs the extra simplify.",
             show_default=False,
         ),
     ] = None,
