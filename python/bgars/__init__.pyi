@@ -111,4 +111,6 @@ from .surface.mesh import mesh_from_height as mesh_from_height
 from .surface.part_anchors import anchors_from_part as anchors_from_part
 from .surface.shape_images import ShapeImages as ShapeImages
 from .surface.shape_images import shape_images as shape_images
+from .surface.simplify import SimplifiedMesh as SimplifiedMesh
+from .surface.simplify import simplified_mesh as simplified_mesh
 from .version import __version__ as __version__

@@ -6,7 +6,16 @@ from importlib.util import find_spec
 
 __all__ = ["EXTRA_OF", "how_to_install", "missing"]
 
-EXTRA_OF = {"matplotlib": "report", "plotly": "report", "pyarrow": "parquet"}
+EXTRA_OF = {
+    "matplotlib": "report",
+    "plotly": "report",
+    "pyarrow": "parquet",
+    "OpenEXR": "exr",
+    "gsffile": "areal",
+    "sdfio": "areal",
+    "x3pio": "areal",
+    "fast_simplification": "simplify",
+}
 
 
 def missing(*packages: str) -> tuple[str, ...]:

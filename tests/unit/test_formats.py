@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import bgars
@@ -20,17 +21,40 @@ def field() -> bgars.NormalField:
 def test_normals_are_read_back_by_others(field: bgars.NormalField, tmp_path: Path) -> None:
     for suffix in NORMAL_FORMATS:
         bgars.write_normals(field, tmp_path / f"n{suffix}")
-    np.testing.assert_array_equal(tifffile.imread(tmp_path / "n.tif"), field.normals)
+    for suffix in (".tif", ".tiff"):
+        np.testing.assert_array_equal(tifffile.imread(tmp_path / f"n{suffix}"), field.normals)
+    np.testing.assert_array_equal(np.load(tmp_path / "n.npy"), field.normals)
     with np.load(tmp_path / "n.npz") as stored:
         np.testing.assert_array_equal(stored["normals"], field.normals)
         np.testing.assert_array_equal(stored["mask"], field.mask)
     png = bgars.read_normal_map(tmp_path / "n.png")
     assert bgars.angular_error_deg(png, field.normals)[field.mask].max() < 0.01
-    with pytest.raises(bgars.InputError, match=r"n\.exr: a file of normals must end in \.png, \.tif, \.npz"):
-        bgars.write_normals(field, tmp_path / "n.exr")
+    words = ", ".join(NORMAL_FORMATS)
+    with pytest.raises(
+        bgars.InputError, match=rf"n\.bmp: a file of normals must end in {re.escape(words)}; got '\.bmp'"
+    ):
+        bgars.write_normals(field, tmp_path / "n.bmp")
     with pytest.raises(bgars.InputError, match=r"must have shape \(H, W, 3\)"):
         bgars.write_normals(field.albedo, tmp_path / "n.tif")
     assert len(list(tmp_path.iterdir())) == len(NORMAL_FORMATS)
+
+
+def test_normals_as_exr_have_alpha_where_there_is_one(field: bgars.NormalField, tmp_path: Path) -> None:
+    openexr = pytest.importorskip("OpenEXR")
+    normals = field.normals.copy()
+    normals[:20, :30] = np.nan
+    valid = np.isfinite(normals[..., 0])
+    bgars.write_normals(normals, tmp_path / "n.exr")
+    with openexr.File(str(tmp_path / "n.exr"), separate_channels=True) as file:
+        channels = {name: channel.pixels for name, channel in file.channels().items()}
+    assert set(channels) == set("RGBA")
+    assert channels["R"].dtype == np.float32
+    np.testing.assert_array_equal(channels["A"], valid)
+    stored = np.stack([channels[name] for name in "RGB"], axis=-1)
+    np.testing.assert_array_equal(stored, np.where(valid[..., None], normals, 0.0))
+    again = bgars.read_normal_map(tmp_path / "n.exr")
+    np.testing.assert_array_equal(np.isfinite(again[..., 0]), valid)
+    assert bgars.angular_error_deg(again, normals)[valid].max() < 0.05
 
 
 def test_points_lie_where_the_vertices_of_the_mesh_lie(field: bgars.NormalField, tmp_path: Path) -> None:

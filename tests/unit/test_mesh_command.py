@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import bgars
@@ -103,3 +104,47 @@ def test_what_is_no_map_is_told_what_is() -> None:
     assert mesh("notes.txt") == f"notes.txt: ends in '.txt'; {taken}"
     assert mesh("empty.npy") == f"empty.npy: is empty (0 bytes); {taken}"
     assert mesh("grey.png").endswith("; a normal map is an RGB image, R = x, G = y, B = z")
+
+
+def command(*arguments: object) -> str:
+    """Run the command with an output of its own; return what it says, or its error."""
+    run = CliRunner().invoke(app, ["mesh", *map(str, arguments)])
+    if isinstance(run.exception, bgars.BgarsError):
+        return str(run.exception)
+    assert run.exit_code == 0, run.output
+    return run.output.strip()
+
+
+def test_the_ending_chooses_what_is_written() -> None:
+    assert command("um.tif", "-o", "p.xyz") == "p.xyz: 12 points, in um"
+    assert np.loadtxt("p.xyz").shape == (12, 3)
+    assert command("um.tif", "-o", "h.npy") == "h.npy: 12 heights of 4 x 3 pixels, in um"
+    np.testing.assert_array_equal(np.load("h.npy"), tifffile.imread("um.tif"))
+    gsffile = pytest.importorskip("gsffile")
+    assert command("um.tif", "-o", "h.gsf") == "h.gsf: 12 heights of 4 x 3 pixels, in m"
+    np.testing.assert_allclose(gsffile.read_gsf(Path("h.gsf"))[0], tifffile.imread("um.tif") * 1e-6, rtol=1e-6)
+    for arguments in (("px.tif", "-o", "q.gsf"), ("normals.png", "-o", "q.gsf")):
+        assert command(*arguments).startswith("--pixel-pitch-um: must be given, .gsf needs heights in um or m")
+    assert "; mesh writes meshes (.ply, .obj, .stl, .glb), points (.xyz) and heights (.tif," in command(
+        "um.tif", "-o", "m.dxf"
+    )
+    assert not list(Path().glob("q.*"))
+
+
+def test_a_simplified_mesh_states_its_error() -> None:
+    pytest.importorskip("fast_simplification")
+    row, col = np.mgrid[:40, :50]
+    heights = (0.02 * (row - 20) ** 2 + 0.3 * np.sin(col)).astype(np.float32)
+    bgars.write_height(bgars.HeightMap.from_array(heights, pixel_pitch_um=2.0), "bowl.tif")
+    text = command("bowl.tif", "-o", "m.ply", "--simplify", 1.0)
+    found = re.fullmatch(
+        r"m\.ply: (\d+) vertices, (\d+) faces of 3822, heights within (\S+) um at every pixel, in um", text
+    )
+    assert found is not None, text
+    assert len(trimesh.load_mesh("m.ply").faces) == int(found[2]) < 2500
+    assert 0 < float(found[3]) <= 1.0
+    assert command("bowl.tif", "-o", "m.xyz", "--simplify", 1) == (
+        "--simplify: only meshes have triangles (.ply, .obj, .stl, .glb); m.xyz does not"
+    )
+    assert command("bowl.tif", "-o", "m.ply", "--simplify", 0) == "--simplify: must be finite and above 0, got 0"
+    assert command("normals.png", "-o", "n.ply", "--simplify", 1).startswith("--pixel-pitch-um: must be given, --simpl")

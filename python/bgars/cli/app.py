@@ -24,6 +24,7 @@ from bgars.cli.options import (
     JsonOption,
     MaterialOption,
     MethodOption,
+    NormalsOutOption,
     OutOption,
     StationOption,
     ThresholdOption,
@@ -124,6 +125,10 @@ def reconstruct(
     channel: ChannelChoice = None,
     station: StationOption = None,
     mesh_format: Annotated[Literal["ply", "obj", "stl", "glb"], typer.Option(help="Format of the mesh file.")] = "ply",
+    height_format: Annotated[
+        Literal["gsf", "sdf", "x3p"] | None,
+        typer.Option(help="Heights also for metrology programs, in metres; needs the extra areal.", show_default=False),
+    ] = None,
     flatten: FlattenOption = None,
     directx: DirectxOption = False,
     force: ForceOption = False,
@@ -146,10 +151,13 @@ def reconstruct(
 
     _need_places(folder, output)
     capture = bgars.read_capture(folder, channel=channel, station=station)
+    if height_format is not None:
+        from bgars.io.height import check_height_file  # noqa: PLC0415 - loaded when it runs
+
+        check_height_file(output / f"height.{height_format}", has_pitch=capture.pixel_pitch_um is not None)
     findings = check_first(capture, force=force)
-    summary, files = _reconstruct_to(
-        capture, output, run, mesh_format=mesh_format, directx=directx, checked=findings.to_dict()
-    )
+    formats = {"mesh_format": mesh_format, "height_format": height_format}
+    summary, files = _reconstruct_to(capture, output, run, **formats, directx=directx, checked=findings.to_dict())
     if as_json:
         print_json(summary)
         return
@@ -171,7 +179,7 @@ def reconstruct(
 @app.command()
 def normals(
     folder: FolderArgument,
-    output: OutOption,
+    output: NormalsOutOption,
     method: MethodOption = DEFAULT_METHOD,
     threshold: ThresholdOption = None,
     material: MaterialOption = None,
@@ -183,14 +191,16 @@ def normals(
 ) -> None:
     """Estimate the normals only: normals.png (16 bit), albedo.tif, confidence.tif, measured.png, lights_kept.png.
 
+    With '-o FILE', such as normals.exr, only the normals, in the format that the ending says.
+
     The capture is checked first ('bgars check'): where its lights and images do not fit, nothing is written (exit code
     2) unless --force says so. Black background is not measured.
     """
     from bgars.cli.first_check import check_first  # noqa: PLC0415 - loaded when it runs
-    from bgars.cli.outputs import write_normals  # noqa: PLC0415
+    from bgars.cli.outputs import need_normals_place, write_normals  # noqa: PLC0415
     from bgars.normals.noise_floor import without_background  # noqa: PLC0415
 
-    _need_places(folder, output)
+    need_normals_place(output, folder, directx=directx)
     capture = bgars.read_capture(folder, channel=channel, station=station)
     findings = check_first(capture, force=force)
     surface = _material_from(material, capture)
@@ -214,7 +224,7 @@ def normals(
         f"average, mean confidence {summary['mean_confidence']:.2f}."
     )
     say(method_line)
-    _list_files(output, files)
+    _list_files(output if output.is_dir() else output.parent, files)
 
 
 @app.command()
@@ -298,21 +308,12 @@ def _reconstruct_to(
     capture: bgars.Capture,
     output: Path,
     run: Callable[..., bgars.Reconstruction],
-    *,
-    mesh_format: str,
-    directx: bool,
-    checked: dict[str, Any] | None = None,
+    **options: Any,  # noqa: ANN401 - those of write_reconstruction
 ) -> tuple[dict[str, Any], dict[str, str]]:
     from bgars.cli.outputs import write_reconstruction  # noqa: PLC0415 - loaded when it runs
 
     with stage_progress() as report:
-        return write_reconstruction(
-            lambda: run(capture, progress=report),
-            output,
-            mesh_format=mesh_format,
-            directx=directx,
-            checked=checked,
-        )
+        return write_reconstruction(lambda: run(capture, progress=report), output, **options)
 
 
 def _material_from(path: Path | None, capture: bgars.Capture) -> bgars.SurfaceMaterial | None:

@@ -1,4 +1,4 @@
-"""`bgars mesh`: a normal map or a height map becomes a mesh."""
+"""`bgars mesh`: a normal map or a height map becomes a mesh, points, or heights for another program."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import typer
 
 import bgars
 from bgars.cli.console import print_json, say, stage_progress
+from bgars.cli.surface_files import POINTS, check_surface_file, need_pitch, surface_in_words, write_surface
 from bgars.errors import FileFormatError, InputError
-from bgars.io.height import HEIGHT_SUFFIXES, read_stored_height
+from bgars.io.height import HEIGHT_FORMATS, HEIGHT_SUFFIXES, read_stored_height
 from bgars.io.mesh_files import MESH_SUFFIXES
 from bgars.io.normal_map import holds_normals, read_stored_normals
 from bgars.io.normal_map_pixels import NORMAL_MAP_SUFFIXES
@@ -44,7 +45,12 @@ def mesh(
     output: Annotated[
         Path,
         typer.Option(
-            "--output", "-o", metavar="MESH", help=f"Mesh file: {', '.join(MESH_SUFFIXES)}.", show_default=False
+            "--output",
+            "-o",
+            metavar="MESH",
+            help=f"File to write, by its ending a mesh ({', '.join(MESH_SUFFIXES)}), points ({POINTS}), or heights "
+            f"({', '.join(HEIGHT_FORMATS)}).",
+            show_default=False,
         ),
     ],
     pixel_pitch_um: Annotated[
@@ -66,6 +72,14 @@ def mesh(
         Path | None,
         typer.Option(
             help="Image, white = use, for a normal map; by default alpha and a background of one colour are left out.",
+            show_default=False,
+        ),
+    ] = None,
+    simplify: Annotated[
+        float | None,
+        typer.Option(
+            metavar="UM",
+            help="Write as few triangles as keep every pixel within this height error; needs the extra simplify.",
             show_default=False,
         ),
     ] = None,
@@ -92,7 +106,8 @@ def mesh(
         bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
     ] = False,
 ) -> None:
-    """Turn a normal map or a height map into a mesh."""
+    """Turn a normal map or a height map into a mesh, a point cloud, or heights for another program."""
+    check_surface_file(output, simplify)
     has_content = source.is_file() and source.stat().st_size > 0
     is_normal_map = holds_normals(source) if has_content else source.suffix.lower() not in HEIGHT_SUFFIXES
     options = _integration(source, is_normal_map, {"--method": method, "--k": k, "--solver": solver})
@@ -105,15 +120,14 @@ def mesh(
     notes: tuple[str, ...] = ()
     with stage_progress() as report:
         if is_normal_map:
+            need_pitch(pixel_pitch_um, output, simplify)
             normals = read_stored_normals(source, directx=directx, mask=mask)
             notes = normals.notes
             height = _integrated(normals.vectors, pixel_pitch_um, options, report)
         else:
             height = _stored_height(source, pixel_pitch_um)
-    surface = bgars.mesh_from_height(height)
-    bgars.write_mesh(surface, output)
-    summary: dict[str, Any] = {"vertices": len(surface.vertices), "faces": len(surface.faces), "unit": height.unit}
-    summary |= {"file": str(output), "notes": list(notes)}
+        written = write_surface(height, output, simplify_um=simplify, report=report)
+    summary: dict[str, Any] = {**written, "file": str(output), "notes": list(notes)}
     if height.bilateral is not None:
         summary["reweightings"] = len(height.bilateral.energies)
         summary["converged"] = height.bilateral.converged
@@ -122,7 +136,7 @@ def mesh(
         return
     for note in notes:
         say(f"note: {note}")
-    say(f"{output}: {summary['vertices']} vertices, {summary['faces']} faces, in {height.unit}")
+    say(f"{output}: {surface_in_words(written)}")
     if height.bilateral is not None and not height.bilateral.converged:
         say(f"The energy still moved after {summary['reweightings']} re-weightings.")
 

@@ -21,6 +21,7 @@ __all__ = [
     "LotOption",
     "MaterialOption",
     "MethodOption",
+    "NormalsOutOption",
     "OperatorOption",
     "OutOption",
     "StationNameOption",
@@ -86,6 +87,16 @@ FolderArgument = Annotated[
 OutOption = Annotated[
     Path,
     typer.Option("--output", "-o", metavar="OUT", help="Folder for the results; made if missing.", show_default=False),
+]
+NormalsOutOption = Annotated[
+    Path,
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="OUT",
+        help="Folder for the results, made if missing; or one file of normals: .png, .tif, .exr, .npy, .npz.",
+        show_default=False,
+    ),
 ]
 ThresholdOption = Annotated[
     float | None,

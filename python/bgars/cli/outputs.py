@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from concurrent.futures import ThreadPoolExecutor
+import re
 from typing import TYPE_CHECKING, Any
 
 import imageio.v3 as iio
@@ -11,9 +12,13 @@ import numpy as np
 
 import bgars
 from bgars.cli.console import warn
+from bgars.errors import FileFormatError, InputError
 from bgars.extras import how_to_install, missing
+from bgars.io.areal_files import AREAL_PACKAGES
 from bgars.io.atomic import FolderNames, atomic_folder
 from bgars.io.described_tiff import write_described
+from bgars.io.formats import check_normals_file
+from bgars.io.given_paths import need_folder, need_output
 from bgars.io.mesh_files import MESH_SUFFIXES, NATIVE_SUFFIXES
 from bgars.pipelines.reconstruct import summarise_field
 
@@ -24,12 +29,13 @@ if TYPE_CHECKING:
     from bgars.pipelines.reconstruct import Reconstruction
     from bgars.records.normal_field import NormalField
 
-__all__ = ["write_normals", "write_reconstruction"]
+__all__ = ["need_normals_place", "write_normals", "write_reconstruction"]
 
 MARK = "summary.json"
 RECONSTRUCTION = FolderNames(
     frozenset({"overview.png", "normals.png", "height.tif", "height.npy", MARK})
-    | {f"mesh{suffix}" for suffix in MESH_SUFFIXES},
+    | {f"mesh{suffix}" for suffix in MESH_SUFFIXES}
+    | {f"height{suffix}" for suffix in AREAL_PACKAGES},
     frozenset({MARK}),
     judged=False,
 )
@@ -42,6 +48,9 @@ NORMALS = FolderNames(
     judged=False,
 )
 
+FILE_ENDING = re.compile(r"\.(x3p|[a-z]{3,5})")
+"""What follows the dot of out.v2 or lot.2026 is part of a folder's name."""
+
 
 def write_reconstruction(
     run: Callable[[], Reconstruction],
@@ -49,12 +58,14 @@ def write_reconstruction(
     *,
     mesh_format: str,
     directx: bool,
+    height_format: str | None = None,
     checked: dict[str, Any] | None = None,
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Run a reconstruction and write its results; return its summary and what each file is.
 
     The output folder is tried first, so that no work is lost to an unwritable one. What an earlier reconstruction left
-    there goes when the new files come. `checked`: what the check of the capture found.
+    there goes when the new files come. `height_format`: gsf, sdf or x3p, besides. `checked`: what the check of the
+    capture found.
     """
     with atomic_folder(output, RECONSTRUCTION) as folder:
         result = run()
@@ -65,6 +76,7 @@ def write_reconstruction(
             "normals.png": _normals_meaning(directx),
             "height.tif": f"heights, float32, in {unit}",
             "height.npy": "the same for numpy",
+            **({f"height.{height_format}": "the same for surface metrology, in m"} if height_format else {}),
             MARK: "the numbers of this run",
         }
         if missing("matplotlib"):
@@ -74,7 +86,7 @@ def write_reconstruction(
             getattr(bgars, name)  # loaded by one thread
         with ThreadPoolExecutor(1) as beside:
             # Compressing and writing leave the interpreter to the picture.
-            written = beside.submit(_write_files, result, folder, mesh_format, directx)
+            written = beside.submit(_write_files, result, folder, mesh_format, directx, height_format)
             if "overview.png" in files:
                 bgars.write_overview(result, folder / "overview.png")
             written.result()
@@ -89,12 +101,14 @@ def write_reconstruction(
     return summary, files
 
 
-def _write_files(result: Reconstruction, folder: Path, mesh_format: str, directx: bool) -> None:
+def _write_files(
+    result: Reconstruction, folder: Path, mesh_format: str, directx: bool, height_format: str | None
+) -> None:
     """Write all but the picture."""
     _write_mesh(result, folder / f"mesh.{mesh_format}")
     bgars.write_normal_map(result.field, folder / "normals.png", directx=directx)
-    bgars.write_height(result.height, folder / "height.tif")
-    bgars.write_height(result.height, folder / "height.npy")
+    for ending in ("tif", "npy", *([height_format] if height_format else [])):
+        bgars.write_height(result.height, folder / f"height.{ending}")
 
 
 def _write_mesh(result: Reconstruction, path: Path) -> None:
@@ -109,8 +123,36 @@ def _normals_meaning(directx: bool) -> str:
     return "normals, 16 bit, DirectX (green = y down)" if directx else "normals, 16 bit, OpenGL (green = y up)"
 
 
+def need_normals_place(output: Path, capture: Path, *, directx: bool) -> None:
+    """Raise where the normals of a capture could not be written as a folder or a file, before the work."""
+    need_folder(capture)
+    if not _is_named_file(output):
+        need_output(output, capture)
+        return
+    try:
+        check_normals_file(output)
+    except InputError as error:
+        msg = f"{error}; for results in a folder of this name, make it first"
+        raise InputError(msg) from None
+    if directx and output.suffix.lower() != ".png":
+        msg = f"--directx: only a .png says which way its green points; leave it out for {output}"
+        raise InputError(msg)
+    if not output.parent.is_dir():
+        msg = f"{output}: cannot be written (no such folder)"
+        raise FileFormatError(msg)
+    need_output(output.parent, capture)
+
+
 def write_normals(field: NormalField, output: Path, *, directx: bool) -> tuple[dict[str, Any], dict[str, str]]:
-    """Write a normal field as pictures; return its summary and what each file is."""
+    """Write a normal field as pictures, or as the one file that is named; return its summary and what each file is."""
+    if _is_named_file(output):
+        is_picture = output.suffix.lower() == ".png"
+        files = {output.name: _normals_meaning(directx) if is_picture else "normals, float32, x right, y up"}
+        if is_picture:
+            bgars.write_normal_map(field, output, directx=directx)
+        else:
+            bgars.write_normals(field, output)
+        return {**summarise_field(field), "files": list(files)}, files
     files = {
         "normals.png": _normals_meaning(directx),
         "albedo.tif": "diffuse reflectance times light, float32, 1 = full scale",
@@ -125,3 +167,8 @@ def write_normals(field: NormalField, output: Path, *, directx: bool) -> tuple[d
         iio.imwrite(folder / "measured.png", np.where(field.is_measured, 255, 0).astype(np.uint8))
         iio.imwrite(folder / "lights_kept.png", np.minimum(field.lights_kept, 255).astype(np.uint8))
     return {**summarise_field(field), "files": list(files)}, files
+
+
+def _is_named_file(output: Path) -> bool:
+    """Whether a place for results is meant as one file: it ends as files do, and there is no such folder."""
+    return FILE_ENDING.fullmatch(output.suffix.lower()) is not None and not output.is_dir()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bgars.errors import InputError
+from bgars.extras import how_to_install, missing
 from bgars.io.atomic import atomic_file
 from bgars.io.described_tiff import write_described
 from bgars.io.normal_map import write_normal_map
@@ -21,15 +22,16 @@ if TYPE_CHECKING:
 
     from bgars.records.height_map import HeightMap
 
-__all__ = ["NORMAL_FORMATS", "POINT_FORMATS", "write_normals", "write_points"]
+__all__ = ["NORMAL_FORMATS", "POINT_FORMATS", "check_normals_file", "write_normals", "write_points"]
 
 
 def write_normals(field: NormalField | NDArray[np.floating], path: str | PathLike[str]) -> None:
     """Write normals; the suffix chooses the format.
 
     ``.png`` is a normal map of 16 bits (:func:`bgars.write_normal_map`); ``.tif`` has three channels of float32, x, y,
-    z, NaN where there is no normal; ``.npz`` has the arrays ``normals``, and of a field ``albedo``, ``mask``,
-    ``confidence`` and ``measured``, for :func:`numpy.load`. The file appears whole or not at all.
+    z, NaN where there is no normal; ``.exr`` has R, G, B = x, y, z of float32 and A = 1, all 0 where there is no normal
+    (``pip install 'bgars[exr]'``); ``.npy`` is the array; ``.npz`` has the arrays ``normals``, and of a field
+    ``albedo``, ``mask``, ``confidence`` and ``measured``, for :func:`numpy.load`. The file appears whole or not at all.
 
     Parameters
     ----------
@@ -41,7 +43,7 @@ def write_normals(field: NormalField | NDArray[np.floating], path: str | PathLik
     Raises
     ------
     InputError
-        An unknown suffix, or an array of another shape.
+        An unknown suffix, an array of another shape, a package that is not installed.
     FileFormatError
         The file cannot be written.
 
@@ -58,9 +60,18 @@ def write_normals(field: NormalField | NDArray[np.floating], path: str | PathLik
     if normals.ndim != len(("row", "col", "axis")) or normals.shape[2] != len("xyz"):
         msg = f"normals: must have shape (H, W, 3), got {normals.shape}"
         raise InputError(msg)
-    write, path = _writer(NORMAL_FORMATS, path, "normals")
+    write, path = check_normals_file(path)
     with atomic_file(path) as temporary:
         write(field, normals, temporary)
+
+
+def check_normals_file(path: str | PathLike[str]) -> tuple[Callable[..., None], Path]:
+    """The writer of a file of normals and its path; InputError where there is none: before long work."""
+    write, place = _writer(NORMAL_FORMATS, path, "normals")
+    if write is _normals_exr and missing("OpenEXR"):
+        msg = f"{place}: .exr {how_to_install('OpenEXR')}"
+        raise InputError(msg)
+    return write, place
 
 
 def write_points(height: HeightMap, path: str | PathLike[str], *, field: NormalField | None = None) -> None:
@@ -130,6 +141,28 @@ def _normals_tiff(_field: object, normals: NDArray[np.float32], path: Path) -> N
     write_described(path, normals, "normals", channels=["x right", "y up", "z toward the camera"])
 
 
+def _normals_exr(_field: object, normals: NDArray[np.float32], path: Path) -> None:
+    import OpenEXR  # noqa: PLC0415 - optional
+
+    # Alpha is premultiplied in EXR: nothing is 0 in all channels. NaN would spread through filters of compositors.
+    rgba = np.zeros((*normals.shape[:2], 4), np.float32)
+    valid = np.isfinite(normals).all(axis=2)
+    rgba[valid, :3] = normals[valid]
+    rgba[valid, 3] = 1.0
+    header = {
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "type": OpenEXR.scanlineimage,
+        "comments": "bgars normals, R = x right, G = y up, B = z toward the camera",
+    }
+    with OpenEXR.File(header, {"RGBA": rgba}) as file:
+        file.write(str(path))
+
+
+def _normals_npy(_field: object, normals: NDArray[np.float32], path: Path) -> None:
+    with path.open("wb") as file:
+        np.save(file, np.ascontiguousarray(normals), allow_pickle=False)
+
+
 def _normals_npz(field: object, normals: NDArray[np.float32], path: Path) -> None:
     others: dict[str, Any] = {}
     if isinstance(field, NormalField):
@@ -163,6 +196,9 @@ def _points_ply(columns: dict[str, NDArray[np.floating]], unit: str, path: Path)
 NORMAL_FORMATS: dict[str, Callable[..., None]] = {
     ".png": _normals_png,
     ".tif": _normals_tiff,
+    ".tiff": _normals_tiff,
+    ".exr": _normals_exr,
+    ".npy": _normals_npy,
     ".npz": _normals_npz,
 }
 """Writer of normals by suffix: it is given the field (or array), the array, and the file."""

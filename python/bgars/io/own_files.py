@@ -36,6 +36,8 @@ OWN_TEXT = {
     ".jpg": re.compile(b"\\A" + re.escape(JPEG_START + JPEG_COMMENT)),
     ".stl": re.compile(b"\\A" + SIGNATURE),
     ".parquet": re.compile(SIGNATURE),
+    ".gsf": re.compile(rb"\nTitle = bgars "),
+    ".sdf": re.compile(rb"\AbISO-1\.0bgars"),
     ".npz": re.compile(rb"ball_height_um\.npy|coefficients\.npy"),
     ".toml": re.compile(rb'\A(?:#[^\n]*\n)*(?:format = "bgars-|diffuse_level = )'),
     ".md": re.compile(rb"(?:Command:|Written by) `bgars experiment "),
@@ -44,8 +46,8 @@ OWN_TEXT = {
 OWN_TABLES = (b"name,row,col,present,verdict,reasons,", b"part,placement,repeat,ball,characteristic,value")
 MARKS = ("summary.json", "result.json")
 """Each says, in its own content, whose run its folder holds."""
-SIBLINGS = {".npy": "summary.json", ".glb": "summary.json"}
-"""Kinds that hold no text: own where the run that lies beside them lists them."""
+SIBLINGS = {".npy": "summary.json", ".glb": "summary.json", ".x3p": "summary.json"}
+"""Kinds that hold no text, or only packed: own where the run that lies beside them lists them."""
 
 
 def is_own(path: Path) -> bool:
