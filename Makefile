@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral simulator experiments method check-faults kills line schema constants studies performance bench fuzz clean
+.PHONY: demo docs test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral simulator experiments method check-faults kills line schema constants studies performance bench fuzz clean
 
 demo: $(VENV)/.run-time ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
@@ -73,6 +73,10 @@ schema: $(VENV)/.installed ## Write docs/result.schema.json, the JSON Schema of 
 
 constants: $(VENV)/.installed ## Write docs/constants.md, the registry of constants, again
 	$(BIN)/python docs/make_constants.py
+
+docs: $(VENV)/.installed ## Build the documentation site into site/ (warnings are errors; 1 to 3 minutes)
+	$(BIN)/python -m pip install --quiet $$($(BIN)/python .ci/extra-requirements docs)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet
 
 bench: $(VENV)/.run-time ## CPU seconds, wall time and memory of whole commands, into docs/performance.md
 	$(BIN)/python benches/commands.py --docs
