@@ -81,10 +81,17 @@ def _page(group: Group, names: list[str]) -> str:
 
 
 def _index(names: dict[str, list[str]]) -> str:
-    text = ["# API reference", f"All {len(PUBLIC)} public names of `import bgars`; each is loaded when it is first used."]
+    text = [
+        "# API reference",
+        f"All {len(PUBLIC)} public names of `import bgars`; each is loaded when it is first used.",
+    ]
     for page, group in GROUPS.items():
         rows = [f"| [`{name}`][bgars.{name}] | {_summary(name)} |" for name in names[page]]
-        text += [f"## [{group.title}]({page}.md)", group.purpose, "\n".join(["| name | what |", "| --- | --- |", *rows])]
+        text += [
+            f"## [{group.title}]({page}.md)",
+            group.purpose,
+            "\n".join(["| name | what |", "| --- | --- |", *rows]),
+        ]
     return "\n\n".join(text)
 
 

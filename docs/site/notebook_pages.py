@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import posixpath
+import base64
 from pathlib import Path
 
 import jupytext
 import nbformat
 from nbclient import NotebookClient
-from nbconvert import MarkdownExporter
-from traitlets.config import Config
 
 FOLDER = Path(__file__).parents[2] / "examples" / "notebooks"
 ORDER = ("first_capture", "inspect_part", "compare_methods", "own_setup")
@@ -36,14 +34,17 @@ def notebook_pages(work_folder: Path) -> dict[str, str | bytes]:
         files |= {f"notebooks/{picture}": content for picture, content in pictures.items()}
         title, purpose = _title(notebook)
         rows.append(f"| [{title}]({name}.md) | {purpose} | [ipynb]({name}.ipynb) |")
-    files["notebooks/index.md"] = "\n".join([INTRODUCTION, "| notebook | what it shows | file |", "| --- | --- | --- |", *rows])
+    files["notebooks/index.md"] = "\n".join(
+        [INTRODUCTION, "| notebook | what it shows | file |", "| --- | --- | --- |", *rows]
+    )
     return files
 
 
 INTRODUCTION = """# Notebooks
 
-Each runs in seconds to a minute and needs no data of yours. The pages show what building this site has put out. To run one yourself:
-`pip install '.[report]' jupyterlab jupytext`, then open a file of `examples/notebooks` as a notebook, or take an .ipynb file from here.
+Each runs in seconds and needs no data of yours. The pages show what came out when this site was built. To run one
+yourself: `pip install '.[report]' jupyterlab jupytext`, then open a file of `examples/notebooks` as a notebook, or take
+an .ipynb file from here.
 """
 
 
@@ -55,15 +56,27 @@ def _title(notebook: nbformat.NotebookNode) -> tuple[str, str]:
 
 def _markdown(notebook: nbformat.NotebookNode, name: str) -> tuple[str, dict[str, bytes]]:
     """Code in fences, outputs in boxes; pictures apart, by their file names."""
+    text: list[str] = []
+    pictures: dict[str, bytes] = {}
     for cell in notebook.cells:
-        for output in cell.get("outputs", []):
-            # Of several forms of one output the best for a page: a picture, then HTML, then text.
-            data = output.get("data", {})
-            if "image/png" in data:
-                data.pop("text/plain", None)
-    settings = Config()
-    settings.NbConvertBase.display_data_priority = ["image/png", "text/html", "text/markdown", "text/plain"]
-    settings.ExtractOutputPreprocessor.output_filename_template = name + "_{cell_index}_{index}{extension}"
-    body, resources = MarkdownExporter(config=settings).from_notebook_node(notebook)
-    pictures = {posixpath.basename(picture): content for picture, content in resources.get("outputs", {}).items()}
-    return body, pictures
+        if cell.cell_type == "markdown":
+            text.append(cell.source)
+            continue
+        text.append(f"```python\n{cell.source}\n```")
+        for output in cell.outputs:
+            picture = f"{name}_{len(pictures) + 1}.png"
+            shown, content = _shown(output, picture)
+            text.append(f'<div class="output" markdown>\n\n{shown}\n\n</div>')
+            if content is not None:
+                pictures[picture] = content
+    return "\n\n".join(text), pictures
+
+
+def _shown(output: nbformat.NotebookNode, picture: str) -> tuple[str, bytes | None]:
+    """Of several forms of one output the best for a page: a picture, HTML, or text."""
+    data = output.get("data", {})
+    if "image/png" in data:
+        return f"![output of the cell above]({picture})", base64.b64decode(data["image/png"])
+    if "text/html" in data:
+        return data["text/html"].replace("\n", " "), None
+    return f"```text\n{output.get('text', data.get('text/plain', '')).rstrip()}\n```", None

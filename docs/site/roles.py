@@ -8,6 +8,7 @@ from typing import Any
 import griffe
 from api_pages import PUBLIC
 
+PAGE = re.compile(r"\bdocs/(\w+)\.md\b")
 ROLE = re.compile(r":(?:class|func|meth|attr|mod|data):`~?([\w.]+)`")
 
 
@@ -17,7 +18,8 @@ class Roles(griffe.Extension):
     def on_object(self, *, obj: griffe.Object, **_: Any) -> None:  # noqa: ANN401 - griffe's own call
         """Link public names, leave the others as code."""
         if obj.docstring is not None:
-            obj.docstring.value = ROLE.sub(_link, obj.docstring.value)
+            text = ROLE.sub(_link, obj.docstring.value)
+            obj.docstring.value = PAGE.sub(r"[\1](../\1.md)", text)
 
 
 def _link(role: re.Match[str]) -> str:

@@ -31,12 +31,13 @@ capture, truth = bgars.simulate(
     bgars.Camera(pixel_pitch_um=6, bit_depth=12),
     seed=1,
 )
-capture.plot(0);
+_ = capture.plot(0)
 
 # %% [markdown]
 # ## A method of your own
 #
-# Any function of a capture that returns normals can take part. This one solves for the three darkest lights, as naive as it sounds: shadows count as data.
+# Any function of a capture that returns normals can take part. This one solves for the three darkest lights, as naive
+# as it sounds: shadows count as data.
 
 
 # %%
@@ -66,12 +67,12 @@ for method, panel in zip(METHODS[:4], axes, strict=True):
     error_deg = bgars.angular_error_deg(field.normals, truth.normals)
     picture = panel.imshow(error_deg, vmin=0, vmax=20, cmap="magma")
     panel.set(title=method, xticks=[], yticks=[])
-figure.colorbar(picture, ax=axes, label="angular error in degrees");
-
+_ = figure.colorbar(picture, ax=axes, label="angular error in degrees")
 # %% [markdown]
 # ## A photograph
 #
-# Of the DiLiGenT benchmark (Shi et al., 2016), where the environment variable `BGARS_DATA` names a folder that has it. The object scatters light on itself and
+# Of the DiLiGenT benchmark (Shi et al., 2016), where the environment variable `BGARS_DATA` names a folder that has
+# it. The object scatters light on itself and
 # no model fits wholly: errors are larger than in any simulation.
 
 # %%

@@ -9,15 +9,15 @@
 #
 # Every ball of a BGA measured and judged against limits, with an uncertainty for every number.
 #
-# The part is simulated: 25 balls, some of them defective on purpose. With your own part, `capture = bgars.read_capture("FOLDER")`.
+# The part is simulated: 25 balls, some of them defective on purpose. With your own part:
+# `capture = bgars.read_capture("FOLDER")`.
 
 # %%
 import bgars
 
 setup = bgars.read_scene("defects-5x5")
 capture, truth = bgars.simulate(setup.scene, setup.rig, setup.material, setup.camera, seed=setup.seed)
-capture.plot(0);
-
+_ = capture.plot(0)
 # %% [markdown]
 # A recipe says what the part should be: layout, nominal sizes, limits. It is a TOML file; this one comes with bgars.
 
@@ -30,8 +30,7 @@ result = bgars.inspect(capture, bgars.read_part_recipe(recipe_path))
 result
 
 # %%
-result.plot();
-
+_ = result.plot()
 # %% [markdown]
 # ## Why it failed
 #

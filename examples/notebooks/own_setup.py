@@ -67,5 +67,6 @@ for elevation_deg, pixel_pitch_um in ((30, 15), (45, 15), (60, 15), (45, 10)):
     print(f"{elevation_deg:5} deg {pixel_pitch_um:5} um {len(measured):14} of 9 {u_um:14.2f} {rms_um:14.2f}")
 
 # %% [markdown]
-# Stated uncertainties hold what a simulation leaves out, such as a rig that is not quite where you think: they are larger than the errors here, and should be.
+# Stated uncertainties hold what a simulation leaves out, such as a rig that is not quite where you think: they are
+# larger than the errors here, and should be.
 # A [calibrated station](https://github.com/bgars/bgars/blob/main/docs/station.md) makes them smaller.
