@@ -34,7 +34,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:  # noqa: ARG001
     """Point links that leave docs/ at the repository."""
-    return OUTSIDE.sub(rf"]({config.repo_url}/blob/main/\1)", markdown)
+    return OUTSIDE.sub(rf"]({config.extra['repository']}/blob/main/\1)", markdown)
 
 
 def _changes() -> str:

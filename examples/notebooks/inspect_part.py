@@ -39,7 +39,7 @@ _ = result.plot()
 # %%
 for ball in result.balls:
     if ball.verdict != "pass":
-        print(ball.name, ball.verdict, "; ".join(ball.reasons))
+        print(f"{ball.name} {ball.verdict}", *ball.reasons, sep="\n    ")
 
 # %% [markdown]
 # ## Measured against the truth
