@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral station station-balls simulator experiments method check-faults kills line schema constants studies performance bench fuzz clean
+.PHONY: demo docs wheel api test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral station station-balls simulator experiments method check-faults kills line schema constants studies performance bench fuzz clean
 
 demo: $(VENV)/.run-time ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
@@ -75,11 +75,24 @@ studies: $(VENV)/.installed ## Run the gauge studies of docs/studies.md again (1
 check-faults: data $(VENV)/.installed ## Judge bgars check on captures with one fault each, rewrite the gallery of docs/captures.md (5 minutes; needs BGARS_DATA; BGARS_RENDERED: other rendered parts)
 	$(BIN)/python docs/make_captures.py
 
+api: $(VENV)/.run-time ## Write tests/unit/public_api.txt, the public names and signatures, again
+	$(BIN)/python tests/unit/public_api.py
+
 schema: $(VENV)/.installed ## Write docs/result.schema.json, the JSON Schema of result.json, again
 	$(BIN)/python docs/make_result_schema.py
 
 constants: $(VENV)/.installed ## Write docs/constants.md, the registry of constants, again
 	$(BIN)/python docs/make_constants.py
+
+docs: $(VENV)/.installed ## Build the documentation site into site/ (warnings are errors; 1 to 3 minutes)
+	$(BIN)/python -m pip install --quiet $$($(BIN)/python .ci/extra-requirements docs)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet
+
+wheel: $(VENV)/.installed ## Build a manylinux wheel into dist/ and try it in a clean environment (minutes; Linux, needs cargo)
+	$(BIN)/python -m pip install --quiet 'maturin[zig]>=1.9,<2'
+	rm -rf dist
+	PATH="$(CURDIR)/$(BIN):$$PATH" maturin build --release --locked --zig --compatibility manylinux2014 --out dist
+	$(BIN)/python .ci/try-wheel dist
 
 bench: $(VENV)/.run-time ## CPU seconds, wall time and memory of whole commands, into docs/performance.md
 	$(BIN)/python benches/commands.py --docs
