@@ -84,11 +84,12 @@ schema: $(VENV)/.installed ## Write docs/result.schema.json, the JSON Schema of 
 constants: $(VENV)/.installed ## Write docs/constants.md, the registry of constants, again
 	$(BIN)/python docs/make_constants.py
 
-docs: $(VENV)/.installed ## Build the documentation site into site/ (warnings are errors; 1 to 3 minutes)
+docs: $(VENV)/.run-time ## Build the documentation site into site/ (warnings are errors; 1 to 3 minutes)
 	$(BIN)/python -m pip install --quiet $$($(BIN)/python .ci/extra-requirements docs)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet
 
-wheel: $(VENV)/.installed ## Build a manylinux wheel into dist/ and try it in a clean environment (minutes; Linux, needs cargo)
+wheel: ## Build a manylinux wheel into dist/ and try it in a clean environment (minutes; Linux, needs cargo)
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet 'maturin[zig]>=1.9,<2'
 	rm -rf dist
 	PATH="$(CURDIR)/$(BIN):$$PATH" maturin build --release --locked --zig --compatibility manylinux2014 --out dist
