@@ -44,7 +44,7 @@ print(bgars.check(capture))
 
 # %%
 field = bgars.estimate_normals(capture)
-print(field.choice)
+print(field.method_reason)
 field
 
 # %%
@@ -56,10 +56,10 @@ _ = figure.colorbar(error, ax=axes[1], label="degrees")
 
 # %% [markdown]
 # A normal that the pixel's own light does not fix is drawn to the sphere of its ball: a *prior*, not a measurement.
-# `field.measured` tells them apart.
+# `field.is_measured` tells them apart.
 
 # %%
-print(f"{field.measured[field.mask].mean():.1%} of the normals are measured")
+print(f"{field.is_measured[field.mask].mean():.1%} of the normals are measured")
 
 # %% [markdown]
 # ## Height and mesh
