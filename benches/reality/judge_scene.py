@@ -7,6 +7,7 @@ import json
 import math
 import os
 import time
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -39,7 +40,10 @@ def judge_scene(folder: Path, *, normals: bool = True) -> SceneRecord:
         if normals:
             record["normals"] = _judge_normals(capture, folder)
         start = time.monotonic()
-        result = bgars.inspect(capture, folder / "part.toml")
+        with warnings.catch_warnings():
+            # Kept in the result, too.
+            warnings.simplefilter("ignore", bgars.CaptureWarning)
+            result = bgars.inspect(capture, folder / "part.toml")
         record |= _beside_truth(result, scene, folder)
     except (bgars.InputError, bgars.CalibrationError) as error:
         record["refused"] = _said(error, folder)

@@ -18,12 +18,14 @@ DIRECTIONS = bgars.LightRig.ring(8, elevation_deg=50.0, azimuth0_deg=10.0).direc
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """Eight images of a gentle bump, without their lights."""
+    part = tmp_path / "part"
+    part.mkdir()
     row, col = np.mgrid[:40, :44]
     slope = np.stack([np.sin(col / 9.0) / 3, np.cos(row / 7.0) / 3, np.ones((40, 44))])
     normals = slope / np.linalg.norm(slope, axis=0)
     for index, light in enumerate(np.maximum(np.tensordot(DIRECTIONS, normals, axes=(1, 0)), 0.0)):
-        iio.imwrite(tmp_path / f"img_{index}.png", np.rint(200.0 * light).astype(np.uint8))
-    return tmp_path
+        iio.imwrite(part / f"img_{index}.png", np.rint(200.0 * light).astype(np.uint8))
+    return part
 
 
 def angle_lines(first: np.ndarray, second: np.ndarray, named: bool = False) -> str:

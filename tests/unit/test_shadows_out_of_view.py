@@ -51,7 +51,7 @@ def test_swapped_images_are_named_by_what_is_left_of_their_shadows(
 ) -> None:
     images = sample.images.copy()
     images[list(pair)] = images[list(pair[::-1])]
-    assert accused(bgars.inspect(replace(sample, images=images))) == set(pair)
+    assert accused(bgars.inspect(replace(sample, images=images), check=False)) == set(pair)
 
 
 def test_a_lamp_turned_by_nine_degrees_is_caught_on_a_part() -> None:

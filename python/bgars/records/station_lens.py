@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -51,6 +50,8 @@ def straightened(capture: Capture, distortion: float) -> Capture:
     half = 0.5 * math.hypot(height, width)
     if abs(distortion) * half < LEAST_PX:
         return capture
+    from scipy.ndimage import map_coordinates  # noqa: PLC0415 - takes as long as a small part
+
     rows, cols = np.mgrid[:height, :width].astype(np.float64)
     down, right = rows - (height - 1) / 2.0, cols - (width - 1) / 2.0
     bend = distortion * (down**2 + right**2) / half**2
@@ -72,14 +73,14 @@ def straightened(capture: Capture, distortion: float) -> Capture:
     images = np.zeros(capture.images.shape, np.float32)
     for picture, into in zip(capture.images, images, strict=True):
         clipped = picture >= capture.saturation
-        into[:] = ndimage.map_coordinates(linear(picture) - dark, places, order=3, mode="nearest")
+        into[:] = map_coordinates(linear(picture) - dark, places, order=3, mode="nearest")
         np.maximum(into, 0.0, out=into)
         # What is beside a clipped pixel and takes a share of it is clipped; all others are below.
-        touched = ndimage.map_coordinates(clipped.astype(np.float32), places, order=1, mode="nearest") > TOUCHED
+        touched = map_coordinates(clipped.astype(np.float32), places, order=1, mode="nearest") > TOUCHED
         into[~touched] = np.minimum(into[~touched], np.nextafter(top, np.float32(0.0)))
         into[touched] = top
     inside = (places[0] >= 0) & (places[0] <= height - 1) & (places[1] >= 0) & (places[1] <= width - 1)
-    mask = ndimage.map_coordinates(capture.mask.astype(np.float32), places, order=1, mode="nearest") > 1.0 - TOUCHED
+    mask = map_coordinates(capture.mask.astype(np.float32), places, order=1, mode="nearest") > 1.0 - TOUCHED
     return replace(
         capture,
         images=images,

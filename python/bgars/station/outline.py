@@ -45,7 +45,7 @@ PLAIN_ARC = 0.7
 """Share of an outline that makes it plain: of several plain circles around one centre the ball is the largest."""
 ALIKE = 2.0
 """Pictures whose outline is so many times as uncertain have no say."""
-MOVED_SHARE = 1.0
+MOVED_SHARE = 0.5
 """Uncertainty of what shading beside an edge moves it by, of that."""
 SMOOTH_PX = 0.7
 """Width of the filter that takes slopes."""
