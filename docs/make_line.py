@@ -123,7 +123,7 @@ def bound(rates: dict[str, float]) -> tuple[str, float]:
 def append_time(folder: Path, capture: Path) -> float:
     """Median seconds of an append."""
     store = bgars.open_store(folder / "appended", create=True)
-    outcome = run_job(Job(str(capture)))
+    (outcome,) = run_job(Job(str(capture)))
     assert outcome.result is not None
     seconds = []
     for number in range(30):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -13,17 +12,17 @@ import typer
 import bgars
 from bgars.cli.console import print_json, say, say_files, stage_progress, utc_now, warn
 from bgars.cli.first_check import check_first
+from bgars.cli.inspect_files import NAMES, Wanted, clear_places, write_result
+from bgars.cli.inspect_strip import inspect_strip, tell_strip
 from bgars.cli.options import ForceOption, LotOption, MethodOption, OperatorOption, StationNameOption, StationOption
 from bgars.errors import InputError
 from bgars.extras import how_to_install, missing
-from bgars.io.atomic import FolderNames, atomic_folder
+from bgars.io.atomic import atomic_folder
 from bgars.io.given_paths import need_file, need_folder, need_output
 from bgars.line.naming import identity_of
 from bgars.normals.methods import DEFAULT_METHOD
 from bgars.records.part_identity import PartIdentity
-from bgars.report.figures.part import PICTURES
 from bgars.report.html.budget import main_causes
-from bgars.report.html.page import REPORT_FILES
 
 if TYPE_CHECKING:
     from bgars.records.part_result import PartResult
@@ -32,15 +31,6 @@ __all__ = ["EXIT_NOT_PASSED", "register"]
 
 EXIT_NOT_PASSED = 1
 MAX_ROWS = 30
-FILES = {
-    "result.json": "everything: readings, uncertainties, limits, verdicts, reasons, checksums of the input",
-    "balls.csv": "one row per ball, for a spreadsheet",
-}
-PARQUET = "balls.parquet"
-CFX = "cfx.json"
-NAMES = FolderNames(
-    frozenset({*FILES, *PICTURES, *REPORT_FILES, PARQUET, CFX}), frozenset({"result.json", PARQUET, CFX})
-)
 
 
 def register(app: typer.Typer) -> None:
@@ -108,6 +98,10 @@ def inspect(
     earlier inspection left in OUT are removed before FOLDER is read: where it cannot be measured, no verdict is left.
     Files of others are never touched: OUT may not hold a capture, nor files of these names that bgars did not write.
 
+    Where the recipe has a strip, FOLDER shows many parts: each gets a folder of its own in OUT, named after its place
+    (R1C1: first row and column of the image), and strip.html and parts.csv are the overview. --json and --log tell
+    a row a part.
+
     The capture is checked first ('bgars check'): where its lights and images do not fit, there is no verdict.
 
     Exit code 0: the part passes. 1: it fails, or is undecided because something is too near its limit, was not
@@ -126,34 +120,32 @@ def inspect(
     need_output(output, folder)
     pictures = _is_drawn(pictures, "the pictures are left out: drawing them", "matplotlib")
     page = _is_drawn(page, "report.html is left out: it", "plotly")
+    wanted = Wanted(pictures=pictures, page=page, parquet=parquet, cfx=cfx)
     with stage_progress() as report, atomic_folder(output, NAMES) as place:
+        clear_places(output)
         part = None if recipe is None else bgars.read_part_recipe(recipe)
         capture = bgars.read_capture(folder, station=station)
         check_first(capture, force=force)
-        result = bgars.inspect(capture, part, method=method, surface=page, progress=report)
         named, identity = identity_of(capture, PartIdentity(lot=lot, station=station_name, operator=operator))
-        result = replace(result, serial=serial or named, identity=identity, inspected_utc=utc_now())
-        files = dict(FILES)
-        if pictures:
-            files |= bgars.write_part_pictures(result, capture, place)
-        (place / "result.json").write_text(result.to_json(), encoding="utf-8")
-        (place / "balls.csv").write_text(result.to_csv(), encoding="utf-8")
-        if page:
-            pages = bgars.write_report(result, place / "report.html", capture=capture)
-            files = {"report.html": pages.pop("report.html"), **files, **pages}
-        if parquet:
-            bgars.write_parquet(result, place / PARQUET)
-            files[PARQUET] = "the same in full digits, units in the columns' metadata"
-        if cfx:
-            (place / CFX).write_text(json.dumps(bgars.to_cfx(result), indent=2) + "\n", encoding="utf-8")
-            files[CFX] = "IPC-CFX message UnitsInspected"
-    if as_json:
-        print_json({**result.to_dict(), "output": list(files)})
-    elif log_line:
-        say(result.summary_line())
+        serial = serial or named
+        if part is not None and part.strip is not None:
+            rows = inspect_strip(capture, part, part.strip, output, place, wanted, method, serial, identity, report)
+        else:
+            result = bgars.inspect(capture, part, method=method, surface=page, progress=report)
+            result = replace(result, serial=serial, identity=identity, inspected_utc=utc_now())
+            files = write_result(result, capture, place, wanted)
+    if part is not None and part.strip is not None:
+        tell_strip(rows, output, as_json=as_json, log_line=log_line)
+        verdicts = {row.verdict for row in rows}
     else:
-        _tell(result, output, files)
-    if result.verdict != "pass":
+        verdicts = {result.verdict}
+        if as_json:
+            print_json({**result.to_dict(), "output": list(files)})
+        elif log_line:
+            say(result.summary_line())
+        else:
+            _tell(result, output, files)
+    if verdicts != {"pass"}:
         raise typer.Exit(EXIT_NOT_PASSED)
 
 

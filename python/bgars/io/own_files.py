@@ -35,7 +35,11 @@ OWN_TEXT = {
     ".parquet": re.compile(SIGNATURE),
     ".npz": re.compile(rb"ball_height_um\.npy"),
 }
-OWN_TABLES = (b"name,row,col,present,verdict,reasons,", b"part,placement,repeat,ball,characteristic,value")
+OWN_TABLES = (
+    b"name,row,col,present,verdict,reasons,",
+    b"part,placement,repeat,ball,characteristic,value",
+    b"strip,place,serial,verdict,reason,",
+)
 MARKS = ("summary.json", "result.json")
 """Each says, in its own content, whose run its folder holds."""
 SIBLINGS = {".npy": "summary.json", ".glb": "summary.json"}

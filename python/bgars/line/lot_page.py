@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from bgars.errors import InputError
 from bgars.io.atomic import atomic_file
 from bgars.line.pages import page_name
+from bgars.line.strip_page import PLACE, strip_cells, template
 
 if TYPE_CHECKING:
     from bgars.store import Store
@@ -54,16 +55,11 @@ def write_lot_page(store: Store, page: Path, *, lot: str | None = None) -> dict[
     FileFormatError
         The page cannot be written.
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined  # noqa: PLC0415 - only where a page is written
-
     facts = lot_facts(store, lot)
     for row in facts["last"]:
         name = page_name(row["serial"])
         row["page"] = name if (page.parent / name).is_file() else ""
-    environment = Environment(
-        loader=PackageLoader("bgars.line", "template"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
-    )
-    text = environment.get_template("lot.html.j2").render(facts=facts, store=store.folder.name, titles=TITLES)
+    text = template("lot.html.j2").render(facts=facts, store=store.folder.name, titles=TITLES)
     with atomic_file(page) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return facts
@@ -111,6 +107,7 @@ def lot_facts(store: Store, lot: str | None = None) -> dict[str, Any]:
         ),
         "defects": defects,
         "places": _places(store, chosen),
+        "strip": _strip(store, chosen),
         "drifts": [chart for name, title in DRIFTS.items() if (chart := _drift(drift, name, title)) is not None],
         "last": last,
         "failures": _rows(store, f"select serial, capture_folder, reason from failures {chosen} limit {LAST_PARTS}"),
@@ -150,6 +147,24 @@ def _places(store: Store, chosen: str) -> dict[str, Any] | None:
     ]
     height = round(60.0 + (max(ys) - min(ys)) * scale, 1)
     return {"marks": marks, "radius": round(radius, 1), "most": most, "width": MAP_SIZE, "height": height}
+
+
+def _strip(store: Store, chosen: str) -> list[list[dict[str, Any]]]:
+    """Share of parts that pass by their place on the strip, as cells; empty where parts come one by one."""
+    rows = _rows(
+        store,
+        f"select position, count(*) n, count(*) filter (verdict = 'pass') passed from parts {chosen} group by position",
+    )
+    told = {
+        row["position"]: {
+            "style": "pass" if row["passed"] == row["n"] else "fail",
+            "words": f"{100 * row['passed'] / row['n']:.0f} % of {row['n']}",
+            "link": "",
+        }
+        for row in rows
+        if PLACE.fullmatch(row["position"])
+    }
+    return strip_cells(told) if told else []
 
 
 def _drift(rows: list[dict[str, Any]], name: str, title: str) -> dict[str, Any] | None:

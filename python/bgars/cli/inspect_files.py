@@ -1,0 +1,75 @@
+"""The files of an inspection in its folder."""
+
+from __future__ import annotations
+
+import json
+from contextlib import suppress
+from typing import TYPE_CHECKING, NamedTuple
+
+import bgars
+from bgars.io.atomic import FolderNames, atomic_folder
+from bgars.line.strip_page import PLACE
+from bgars.report.figures.part import PICTURES
+from bgars.report.html.page import REPORT_FILES
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from bgars.records.capture import Capture
+    from bgars.records.part_result import PartResult
+
+__all__ = ["NAMES", "STRIP_FILES", "Wanted", "clear_places", "write_result"]
+
+FILES = {
+    "result.json": "everything: readings, uncertainties, limits, verdicts, reasons, checksums of the input",
+    "balls.csv": "one row per ball, for a spreadsheet",
+}
+STRIP_FILES = {
+    "strip.html": "the overview: every place with its verdict, and links to the parts",
+    "parts.csv": "one row per part, for a spreadsheet",
+}
+PARQUET = "balls.parquet"
+CFX = "cfx.json"
+NAMES = FolderNames(
+    frozenset({*FILES, *STRIP_FILES, *PICTURES, *REPORT_FILES, PARQUET, CFX}), frozenset({"result.json", PARQUET, CFX})
+)
+
+
+class Wanted(NamedTuple):
+    """What is written beside result.json and balls.csv."""
+
+    pictures: bool
+    page: bool
+    parquet: bool
+    cfx: bool
+
+
+def write_result(result: PartResult, capture: Capture, place: Path, wanted: Wanted) -> dict[str, str]:
+    """Write the files of a part into a folder; return their names and what they are."""
+    files = dict(FILES)
+    if wanted.pictures:
+        files |= bgars.write_part_pictures(result, capture, place)
+    (place / "result.json").write_text(result.to_json(), encoding="utf-8")
+    (place / "balls.csv").write_text(result.to_csv(), encoding="utf-8")
+    if wanted.page:
+        pages = bgars.write_report(result, place / "report.html", capture=capture)
+        files = {"report.html": pages.pop("report.html"), **files, **pages}
+    if wanted.parquet:
+        bgars.write_parquet(result, place / PARQUET)
+        files[PARQUET] = "the same in full digits, units in the columns' metadata"
+    if wanted.cfx:
+        (place / CFX).write_text(json.dumps(bgars.to_cfx(result), indent=2) + "\n", encoding="utf-8")
+        files[CFX] = "IPC-CFX message UnitsInspected"
+    return files
+
+
+def clear_places(output: Path) -> None:
+    """Remove what an earlier run on a strip left in the folders of its places: no verdict of it may stay."""
+    if not output.is_dir():
+        return
+    for folder in sorted(output.iterdir()):
+        if folder.is_dir() and PLACE.fullmatch(folder.name):
+            with atomic_folder(folder, NAMES):
+                pass
+            with suppress(OSError):  # something of somebody else is in it
+                folder.rmdir()
