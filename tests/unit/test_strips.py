@@ -117,6 +117,15 @@ def test_inspect_writes_a_folder_a_part_and_an_overview(tmp_path: Path) -> None:
     assert not (out / "strip.html").exists()
 
 
+def test_a_file_of_somebody_else_in_the_folder_of_a_place_is_never_touched(tmp_path: Path) -> None:
+    recipe, folder, out = write_recipe(tmp_path), write_strip(tmp_path / "STRIP7"), tmp_path / "out"
+    (out / "R1C1").mkdir(parents=True)
+    (out / "R1C1" / "part.png").write_bytes(b"a holiday")
+    run = CliRunner().invoke(app, ["inspect", str(folder), "-r", str(recipe), "-o", str(out)])
+    assert "R1C1: holds part.png, which bgars did not write" in str(run.exception)
+    assert [path.name for path in out.rglob("*")] == ["R1C1", "part.png"]
+
+
 def test_the_command_for_one_part_refuses_a_strip(tmp_path: Path) -> None:
     with pytest.raises(bgars.InputError, match="inspect_place"):
         bgars.inspect(strip_capture(), write_recipe(tmp_path))

@@ -12,7 +12,7 @@ import typer
 import bgars
 from bgars.cli.console import print_json, say, say_files, stage_progress, utc_now, warn
 from bgars.cli.first_check import check_first
-from bgars.cli.inspect_files import NAMES, Wanted, clear_places, write_result
+from bgars.cli.inspect_files import NAMES, Wanted, clear_places, refuse_foreign_places, write_result
 from bgars.cli.inspect_strip import inspect_strip, tell_strip
 from bgars.cli.options import ForceOption, LotOption, MethodOption, OperatorOption, StationNameOption, StationOption
 from bgars.errors import InputError
@@ -118,6 +118,7 @@ def inspect(
     need_file(station)
     need_folder(folder)
     need_output(output, folder)
+    refuse_foreign_places(output)
     pictures = _is_drawn(pictures, "the pictures are left out: drawing them", "matplotlib")
     page = _is_drawn(page, "report.html is left out: it", "plotly")
     wanted = Wanted(pictures=pictures, page=page, parquet=parquet, cfx=cfx)

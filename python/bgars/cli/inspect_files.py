@@ -7,7 +7,9 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, NamedTuple
 
 import bgars
+from bgars.errors import FileFormatError
 from bgars.io.atomic import FolderNames, atomic_folder
+from bgars.io.own_files import foreign_files
 from bgars.line.strip_page import PLACE
 from bgars.report.figures.part import PICTURES
 from bgars.report.html.page import REPORT_FILES
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
     from bgars.records.capture import Capture
     from bgars.records.part_result import PartResult
 
-__all__ = ["NAMES", "STRIP_FILES", "Wanted", "clear_places", "write_result"]
+__all__ = ["NAMES", "STRIP_FILES", "Wanted", "clear_places", "refuse_foreign_places", "write_result"]
 
 FILES = {
     "result.json": "everything: readings, uncertainties, limits, verdicts, reasons, checksums of the input",
@@ -63,13 +65,34 @@ def write_result(result: PartResult, capture: Capture, place: Path, wanted: Want
     return files
 
 
+def refuse_foreign_places(output: Path) -> None:
+    """Refuse folders of places that hold files of these names which bgars did not write, before anything is touched.
+
+    Raises
+    ------
+    FileFormatError
+        There is one.
+    """
+    for folder in _places(output):
+        found = foreign_files(folder, NAMES.written)
+        if found:
+            msg = (
+                f"{folder}: holds {', '.join(found)}, which bgars did not write: nothing of it is overwritten; "
+                "name another folder with -o, or move what is there"
+            )
+            raise FileFormatError(msg)
+
+
 def clear_places(output: Path) -> None:
     """Remove what an earlier run on a strip left in the folders of its places: no verdict of it may stay."""
+    for folder in _places(output):
+        with atomic_folder(folder, NAMES):
+            pass
+        with suppress(OSError):  # something of somebody else is in it
+            folder.rmdir()
+
+
+def _places(output: Path) -> list[Path]:
     if not output.is_dir():
-        return
-    for folder in sorted(output.iterdir()):
-        if folder.is_dir() and PLACE.fullmatch(folder.name):
-            with atomic_folder(folder, NAMES):
-                pass
-            with suppress(OSError):  # something of somebody else is in it
-                folder.rmdir()
+        return []
+    return sorted(folder for folder in output.iterdir() if folder.is_dir() and PLACE.fullmatch(folder.name))
