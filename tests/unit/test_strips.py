@@ -11,9 +11,11 @@ import bgars
 import numpy as np
 import pytest
 from bgars.cli.app import app
+from bgars.line.inbox import Inbox
 from bgars.line.lot_page import write_lot_page
 from bgars.line.pages import write_part_page
 from bgars.line.strip_page import strip_cells, strip_csv
+from bgars.line.watch import Watch
 from bgars.pipelines.strip import part_of_strip, places_of_strip
 from bgars.records.strip_layout import StripLayout
 from strip_captures import PITCH_UM, SHAPE, STRIP, strip_capture, write_recipe, write_strip
@@ -168,3 +170,27 @@ def test_the_overview_keeps_the_form_of_the_strip() -> None:
     cells = strip_cells({"R2C1": {"style": "pass", "words": "pass", "link": ""}}, 2, 2)
     assert [[cell["name"] for cell in row] for row in cells] == [["R1C1", "R1C2"], ["R2C1", "R2C2"]]
     assert strip_csv("=1+1", []).startswith("strip,place,serial")
+
+
+def test_a_watch_takes_every_part_of_a_strip(tmp_path: Path) -> None:
+    recipe = write_recipe(tmp_path, 'empty = ["R1C1", "R1C2", "R1C3", "R2C1"]\n')
+    inbox = tmp_path / "inbox"
+    write_strip(inbox / "STRIP8")
+    (inbox / "STRIP8" / "ready").touch()
+    told: list[str] = []
+    store = bgars.open_store(tmp_path / "store", create=True)
+    watching = Watch(
+        Inbox(inbox, count=None, trigger="ready", settle_s=0.0),
+        store,
+        recipe,
+        None,
+        inbox / "_done",
+        inbox / "_failed",
+        say=told.append,
+    )
+    assert watching.step()
+    assert [path.name for path in inbox.glob("_done/*/*")] == ["STRIP8"]
+    rows = store.query("select serial, capture_folder from parts order by serial").to_pylist()
+    assert [row["serial"] for row in rows] == ["STRIP8-R2C2", "STRIP8-R2C3"]
+    assert all(Path(row["capture_folder"]).is_dir() for row in rows)
+    assert ["STRIP8-R2C2" in told[0], "STRIP8-R2C3" in told[1], len(told)] == [True, True, 2]

@@ -14,7 +14,15 @@ from bgars.cli.console import print_json, say, say_files, stage_progress, utc_no
 from bgars.cli.first_check import check_first
 from bgars.cli.inspect_files import NAMES, Wanted, clear_places, refuse_foreign_places, write_result
 from bgars.cli.inspect_strip import inspect_strip, tell_strip
-from bgars.cli.options import ForceOption, LotOption, MethodOption, OperatorOption, StationNameOption, StationOption
+from bgars.cli.options import (
+    ForceOption,
+    JsonOption,
+    LotOption,
+    MethodOption,
+    OperatorOption,
+    StationNameOption,
+    StationOption,
+)
 from bgars.errors import InputError
 from bgars.extras import how_to_install, missing
 from bgars.io.atomic import atomic_folder
@@ -88,9 +96,7 @@ def inspect(
     log_line: Annotated[
         bool, typer.Option("--log", help="Print one line of key=value pairs for a log instead of text.")
     ] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
-    ] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Find, measure and judge the solder balls of a part.
 

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from bgars.cli.console import print_json, say
+from bgars.cli.options import JsonOption
 from bgars.errors import InputError
 from bgars.io.result_file import read_result
 from bgars.store import open_store
@@ -22,7 +23,6 @@ MOST_WIDE = 60
 StoreArgument = Annotated[
     Path, typer.Argument(metavar="STORE", help="Store that bgars batch or bgars watch wrote.", show_default=False)
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")]
 
 
 def register(app: typer.Typer) -> None:

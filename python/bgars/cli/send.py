@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import signal
 from pathlib import Path
-from types import FrameType
 from typing import Annotated
 
 import typer
 
 from bgars.cli.console import print_json, say
+from bgars.cli.options import JsonOption
+from bgars.cli.stopping import ended_by_signals
 from bgars.errors import InputError
 from bgars.line.amqp import Amqp
 from bgars.line.send import Mqtt, Sender
@@ -48,9 +48,7 @@ def send(
     follow: Annotated[
         bool, typer.Option("--follow", help="Go on as parts come, over restarts of the broker, until it is ended.")
     ] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
-    ] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Send the results of a store to a broker, by MQTT or AMQP 1.0: at least once, in order.
 
@@ -66,16 +64,8 @@ def send(
         msg = "--mqtt and --amqp: give one of them"
         raise InputError(msg)
     sender = Sender(open_store(store), Mqtt(mqtt) if mqtt else Amqp(amqp), cfx, say=say)
-
-    def stop(_signal: int, _frame: FrameType | None) -> None:
-        sender.is_stopping = True
-
-    earlier = [(number, signal.signal(number, stop)) for number in (signal.SIGTERM, signal.SIGINT)]
-    try:
+    with ended_by_signals(sender):
         sender.run(follow=follow)
-    finally:
-        for number, handler in earlier:
-            signal.signal(number, handler)
     if as_json:
         print_json({"sent": sender.sent, "to": sender.channel.name})
     else:
