@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import bgars
@@ -16,7 +17,7 @@ from bgars.line.lot_page import write_lot_page
 from bgars.line.pages import write_part_page
 from bgars.line.strip_page import strip_cells, strip_csv
 from bgars.line.watch import Watch
-from bgars.pipelines.strip import part_of_strip, places_of_strip
+from bgars.pipelines.strip import inspect_place, part_of_strip, places_of_strip
 from bgars.records.strip_layout import StripLayout
 from strip_captures import PITCH_UM, SHAPE, STRIP, strip_capture, write_recipe, write_strip
 from typer.testing import CliRunner
@@ -194,3 +195,11 @@ def test_a_watch_takes_every_part_of_a_strip(tmp_path: Path) -> None:
     assert [row["serial"] for row in rows] == ["STRIP8-R2C2", "STRIP8-R2C3"]
     assert all(Path(row["capture_folder"]).is_dir() for row in rows)
     assert ["STRIP8-R2C2" in told[0], "STRIP8-R2C3" in told[1], len(told)] == [True, True, 2]
+
+
+def test_a_part_may_lie_off_its_place_by_less_than_half_the_margin(tmp_path: Path) -> None:
+    recipe = bgars.read_part_recipe(write_recipe(tmp_path))
+    for offset_um, is_whole in ((700.0, True), (1500.0, False)):
+        moved = replace(recipe, strip=replace(STRIP, offset_um=(offset_um, 0.0), empty=("R1C3", "R2C3")))
+        result = inspect_place(strip_capture(), moved, "R1C2")
+        assert (result.verdict == "pass") == is_whole, "a part that is cut off is never good"
