@@ -41,6 +41,7 @@ from .pipelines.reconstruct import reconstruct as reconstruct
 from .pipelines.scene_recipes import named_recipes as named_recipes
 from .pipelines.scene_recipes import read_scene as read_scene
 from .pipelines.scene_recipes import write_simulation as write_simulation
+from .pipelines.strip import inspect_place as inspect_place
 from .records.anchors import Anchors as Anchors
 from .records.ball_layout import BallLayout as BallLayout
 from .records.ball_result import BallResult as BallResult

@@ -90,7 +90,7 @@ def test_files_that_change_meanwhile_give_no_result(tmp_path: Path, monkeypatch:
         return bgars.inspect(*arguments, **options)
 
     monkeypatch.setattr(job, "inspect", meddling)
-    outcome = job.run_job(job.Job(str(folder)))
+    (outcome,) = job.run_job(job.Job(str(folder)))
     assert outcome.result is None
     assert "changed while they were read" in outcome.reason
 

@@ -68,3 +68,9 @@ def test_wrong_use_gets_one_line(tmp_path: Path) -> None:
             camera_of(name)
     with pytest.raises(bgars.InputError, match="light: must be 0 to 7, got 8"):
         FolderCamera(bgars.sample_capture()).grab(8)
+
+
+def test_what_a_driver_raises_is_one_line_that_names_the_light(tmp_path: Path) -> None:
+    with pytest.raises(bgars.BgarsError, match=r"camera: grab\(1\) gave no image \(IndexError: tuple index"):
+        take_capture(Broken(np.zeros((4, 4), np.uint8)), tmp_path / "part", lights=2)
+    assert not (tmp_path / "part").exists()

@@ -203,7 +203,8 @@ def test_the_documentation_lists_every_key() -> None:
 
 def test_the_recipe_of_the_documentation_is_one(tmp_path: Path) -> None:
     page = (ROOT / "docs" / "inspection.md").read_text(encoding="utf-8")
-    (text,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    text, strip = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     recipe = bgars.read_part_recipe(write(tmp_path, text))
+    assert bgars.read_part_recipe(write(tmp_path, text + strip)).strip is not None
     assert recipe.limits.seating_coplanarity_um == 80.0
     assert recipe.layout == bgars.read_part_recipe(bgars.sample_part_recipe()).layout, "of the part of its name"

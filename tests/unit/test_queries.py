@@ -6,12 +6,13 @@ import csv
 import io
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import bgars
 import pytest
 from bgars.cli.app import app
-from stored_parts import filled_store
+from stored_parts import filled_store, part
 from typer.testing import CliRunner
 
 PAGE = Path(__file__).parents[2] / "docs" / "queries.md"
@@ -29,8 +30,8 @@ def rows(store: bgars.Store, number: int) -> list[dict]:
     return store.query(QUESTIONS[number - 1]).to_pylist()
 
 
-def test_the_page_has_ten_questions_and_one_more() -> None:
-    assert len(QUESTIONS) == 11
+def test_the_page_has_ten_questions_and_three_more() -> None:
+    assert len(QUESTIONS) == 13
 
 
 @pytest.mark.parametrize("number", range(1, 12))
@@ -92,3 +93,28 @@ def test_a_question_that_is_none_gets_one_line(store: bgars.Store, sql: str, wor
         store.query(sql)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_what_rework_mended_and_what_it_did_not(tmp_path: Path) -> None:
+    store = filled_store(tmp_path / "store", 6)
+    for number, serial in ((2, "SN0003"), (5, "SN0003")):
+        again = replace(part(number), serial=serial, inspected_utc=f"2026-02-0{number}T10:00:00Z")
+        assert store.append(again)
+    (question,) = [text for text in QUESTIONS if "is_left" in text]
+    told = store.query(question).to_pylist()
+    assert [(row["round"], row["before_it"], row["after_it"]) for row in told] == [
+        (2, "fail", "pass"),
+        (3, "pass", "fail"),
+    ]
+    assert "missing: B2" in told[0]["was"]
+    assert "missing: A1" in told[1]["is_left"]
+
+
+def test_the_yield_by_place_on_the_strip(tmp_path: Path) -> None:
+    store = filled_store(tmp_path / "store", 1)
+    for number, position in ((2, "R1C1"), (3, "R1C1"), (4, "R1C2")):
+        store.append(replace(part(number), identity=bgars.PartIdentity(position=position)))
+    assert store.query(QUESTIONS[-1]).to_pylist() == [
+        {"position": "R1C1", "parts": 2, "yield_percent": 50.0},
+        {"position": "R1C2", "parts": 1, "yield_percent": 100.0},
+    ]

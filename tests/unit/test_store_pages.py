@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import bgars
@@ -11,7 +12,7 @@ import pytest
 from bgars.cli.app import app
 from bgars.line.lot_page import lot_facts
 from line_captures import copy_capture
-from stored_parts import filled_store
+from stored_parts import filled_store, part
 from typer.testing import CliRunner
 
 
@@ -50,9 +51,22 @@ def test_the_overview_counts_and_links(tmp_path: Path) -> None:
     told = run(store.folder, "--lot", "L1", "--pages")
     text = Path(told["output"]).read_text(encoding="utf-8")
     links = re.findall(r'href="(SN\d+\.html)"', text)
-    assert links == ["SN0007.html", "SN0005.html", "SN0003.html", "SN0001.html"]
+    assert links == ["SN0005.html", "SN0003.html", "SN0007.html", "SN0005.html", "SN0003.html", "SN0001.html"], (
+        "those that do not pass, then the last ones"
+    )
     assert all((store.folder / "pages" / link).is_file() for link in links)
     assert "50.0 % pass" in text
+
+
+def test_a_part_that_was_reworked_counts_once_as_it_was_found_last(tmp_path: Path) -> None:
+    store = filled_store(tmp_path / "store", 4)
+    good = part(2)
+    assert store.append(replace(good, serial="SN0003", inspected_utc="2026-01-09T10:00:00Z"))
+    facts = lot_facts(store)
+    assert (facts["total"], facts["yield_percent"], facts["not_passed"]) == (4, 100.0, [])
+    assert [(row["round"], row["n"], row["percent"]) for row in facts["rework"]] == [(1, 4, 75.0), (2, 1, 100.0)]
+    text = Path(run(store.folder)["output"]).read_text(encoding="utf-8")
+    assert "first: 75.0 % of 4 pass; round 2: 100.0 % of 1 pass" in text
 
 
 def test_texts_of_a_part_cannot_write_into_the_page(tmp_path: Path) -> None:

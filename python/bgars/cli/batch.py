@@ -15,30 +15,27 @@ from rich.progress import Progress as Bar
 
 from bgars.cli.console import error_console, print_json, say
 from bgars.cli.inspect import EXIT_NOT_PASSED
-from bgars.cli.options import LotOption, MethodOption, OperatorOption, StationNameOption
+from bgars.cli.options import (
+    JsonOption,
+    LotOption,
+    MethodOption,
+    OperatorOption,
+    RecipeOption,
+    SerialFrom,
+    StationNameOption,
+    StoreOption,
+)
 from bgars.line.batch import Batch, Progress, inspect_many
 from bgars.line.naming import Naming
 from bgars.normals.methods import DEFAULT_METHOD
 from bgars.records.part_identity import PartIdentity
 from bgars.store import open_store
 
-__all__ = ["SerialFrom", "StoreOption", "register"]
+__all__ = ["register"]
 
 MOST_FAILURES = 10
 LINE_EVERY_S = 10.0
 """Between two lines of progress where there is no terminal."""
-StoreOption = Annotated[
-    Path, typer.Option("--output", "-o", metavar="STORE", help="Store; made if missing.", show_default=False)
-]
-SerialFrom = Annotated[
-    str,
-    typer.Option(
-        metavar="PATTERN",
-        help="Where serial numbers come from: a pattern of the folder's name with {serial}, {lot}, {substrate}, "
-        "{position}, {station}, {operator}, such as '{lot}/{serial}_{position}'; or 'code', the DataMatrix in the "
-        r"images. A \[part] table in capture.toml goes first.",
-    ),
-]
 
 
 def register(app: typer.Typer) -> None:
@@ -56,10 +53,7 @@ def batch(
         ),
     ],
     output: StoreOption,
-    recipe: Annotated[
-        Path | None,
-        typer.Option("--recipe", "-r", metavar="PART.toml", help="Layout and limits of the part.", show_default=False),
-    ] = None,
+    recipe: RecipeOption = None,
     method: MethodOption = DEFAULT_METHOD,
     processes: Annotated[
         int | None,
@@ -83,9 +77,7 @@ def batch(
     lot: LotOption = "",
     station_name: StationNameOption = "",
     operator: OperatorOption = "",
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
-    ] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Inspect many captures into one store: all cores, failures kept with their reason, killed runs taken up again.
 

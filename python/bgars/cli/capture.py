@@ -11,6 +11,7 @@ import bgars
 from bgars.cli.console import print_json, say, stage_progress
 from bgars.cli.describe import describe, describe_in_words
 from bgars.cli.first_check import warn
+from bgars.cli.options import JsonOption
 from bgars.io.given_paths import need_file
 from bgars.line.camera import camera_of, take_capture
 
@@ -40,9 +41,7 @@ def capture(
         Path | None,
         typer.Option(metavar="capture.toml", help="Description of the rig, copied into it.", show_default=False),
     ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
-    ] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Take an image under each light with a camera, write a capture folder, read it again and say what is in it.
 

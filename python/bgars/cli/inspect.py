@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from contextlib import nullcontext
 from dataclasses import replace
@@ -14,18 +13,26 @@ import typer
 import bgars
 from bgars.cli.console import may_start_processes, print_json, say, say_files, stage_progress, utc_now, warn
 from bgars.cli.first_check import check_first
-from bgars.cli.options import ForceOption, LotOption, MethodOption, OperatorOption, StationNameOption, StationOption
+from bgars.cli.inspect_files import NAMES, Wanted, clear_places, refuse_foreign_places, write_result
+from bgars.cli.inspect_strip import inspect_strip, tell_strip
+from bgars.cli.options import (
+    ForceOption,
+    JsonOption,
+    LotOption,
+    MethodOption,
+    OperatorOption,
+    StationNameOption,
+    StationOption,
+)
 from bgars.errors import InputError
 from bgars.extras import how_to_install, missing
-from bgars.io.atomic import FolderNames, atomic_folder
+from bgars.io.atomic import atomic_folder
 from bgars.io.given_paths import need_file, need_folder, need_output
 from bgars.line.naming import identity_of
 from bgars.normals.methods import DEFAULT_METHOD
 from bgars.pipelines.check import told_by
 from bgars.records.part_identity import PartIdentity
-from bgars.report.figures.part import PICTURES
 from bgars.report.html.budget import main_causes
-from bgars.report.html.files import REPORT_FILES
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
@@ -37,15 +44,6 @@ __all__ = ["EXIT_NOT_PASSED", "register"]
 
 EXIT_NOT_PASSED = 1
 MAX_ROWS = 30
-FILES = {
-    "result.json": "everything: readings, uncertainties, limits, verdicts, reasons, checksums of the input",
-    "balls.csv": "one row per ball, for a spreadsheet",
-}
-PARQUET = "balls.parquet"
-CFX = "cfx.json"
-NAMES = FolderNames(
-    frozenset({*FILES, *PICTURES, *REPORT_FILES, PARQUET, CFX}), frozenset({"result.json", PARQUET, CFX})
-)
 
 
 def register(app: typer.Typer) -> None:
@@ -103,15 +101,17 @@ def inspect(
     log_line: Annotated[
         bool, typer.Option("--log", help="Print one line of key=value pairs for a log instead of text.")
     ] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
-    ] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Find, measure and judge the solder balls of a part.
 
     Writes report.html, which is the page to look at first, result.json, balls.csv and four pictures. Files that an
     earlier inspection left in OUT are removed before FOLDER is read: where it cannot be measured, no verdict is left.
     Files of others are never touched: OUT may not hold a capture, nor files of these names that bgars did not write.
+
+    Where the recipe has a strip, FOLDER shows many parts: each gets a folder of its own in OUT, named after its place
+    (R1C1: first row and column of the image), and strip.html and parts.csv are the overview. --json and --log tell
+    a row a part.
 
     The capture is checked first ('bgars check'): where its lights and images do not fit, there is no verdict.
 
@@ -129,40 +129,38 @@ def inspect(
     need_file(station)
     need_folder(folder)
     need_output(output, folder)
+    refuse_foreign_places(output)
     pictures = _is_drawn(pictures, "the pictures are left out: drawing them", "matplotlib")
     page = _is_drawn(page, "report.html is left out: it", "plotly")
+    wanted = Wanted(pictures=pictures, page=page, parquet=parquet, cfx=cfx)
     with stage_progress() as report, atomic_folder(output, NAMES) as place, _painter(wanted=pictures) as painter:
+        clear_places(output)
         part = None if recipe is None else bgars.read_part_recipe(recipe)
         capture = bgars.read_capture(folder, station=station)
-        findings = check_first(capture, force=force)
-        result = bgars.inspect(capture, part, method=method, surface=page, check=False, progress=report)
-        result = replace(result, warnings=(*told_by(findings), *result.warnings))
+        told = told_by(check_first(capture, force=force))
         named, identity = identity_of(capture, PartIdentity(lot=lot, station=station_name, operator=operator))
-        result = replace(result, serial=serial or named, identity=identity, inspected_utc=utc_now())
-        files = dict(FILES)
-        if painter is not None:
-            painter.start(result, capture, place)
-        elif pictures:
-            files |= bgars.write_part_pictures(result, capture, place)
-        (place / "result.json").write_text(result.to_json(), encoding="utf-8")
-        (place / "balls.csv").write_text(result.to_csv(), encoding="utf-8")
-        pages = bgars.write_report(result, place / "report.html", capture=capture) if page else {}
-        if painter is not None:
-            files |= painter.finish()
-        files = {name: pages.pop(name) for name in ("report.html",) if page} | files | pages
-        if parquet:
-            bgars.write_parquet(result, place / PARQUET)
-            files[PARQUET] = "the same in full digits, units in the columns' metadata"
-        if cfx:
-            (place / CFX).write_text(json.dumps(bgars.to_cfx(result), indent=2) + "\n", encoding="utf-8")
-            files[CFX] = "IPC-CFX message UnitsInspected"
-    if as_json:
-        print_json({**result.to_dict(), "output": list(files)})
-    elif log_line:
-        say(result.summary_line())
+        serial = serial or named
+        if part is not None and part.strip is not None:
+            rows = inspect_strip(
+                capture, part, part.strip, output, place, wanted, method, serial, identity, told, report
+            )
+        else:
+            result = bgars.inspect(capture, part, method=method, surface=page, check=False, progress=report)
+            result = replace(result, serial=serial, identity=identity, inspected_utc=utc_now())
+            result = replace(result, warnings=(*told, *result.warnings))
+            files = write_result(result, capture, place, wanted, painter)
+    if part is not None and part.strip is not None:
+        tell_strip(rows, output, as_json=as_json, log_line=log_line)
+        verdicts = {row.verdict for row in rows}
     else:
-        _tell(result, output, files)
-    if result.verdict != "pass":
+        verdicts = {result.verdict}
+        if as_json:
+            print_json({**result.to_dict(), "output": list(files)})
+        elif log_line:
+            say(result.summary_line())
+        else:
+            _tell(result, output, files)
+    if verdicts != {"pass"}:
         raise typer.Exit(EXIT_NOT_PASSED)
 
 

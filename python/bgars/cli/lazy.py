@@ -27,7 +27,10 @@ LAZY_COMMANDS = {
     "report": ("bgars.cli.report", "Write the page of an inspection again, from its result.json."),
     "query": ("bgars.cli.query", "Ask a store of results, in SQL."),
     "store": ("bgars.cli.query", "Look after a store of results."),
-    "send": ("bgars.cli.send", "Send the results of a store to an MQTT broker: at least once, in order."),
+    "send": (
+        "bgars.cli.send",
+        "Send the results of a store to a broker, by MQTT or AMQP 1.0: at least once, in order.",
+    ),
     "grr": ("bgars.cli.grr", "Say how well the gauge repeats: gauge R&R by analysis of variance."),
     "spc": (
         "bgars.cli.spc",

@@ -24,8 +24,11 @@ __all__ = [
     "NormalsOutOption",
     "OperatorOption",
     "OutOption",
+    "RecipeOption",
+    "SerialFrom",
     "StationNameOption",
     "StationOption",
+    "StoreOption",
     "ThresholdOption",
 ]
 
@@ -65,6 +68,22 @@ StationNameOption = Annotated[
     str, typer.Option(metavar="NAME", help="Name of the station that took the images.", show_default=False)
 ]
 OperatorOption = Annotated[str, typer.Option(metavar="NAME", help="Who runs it.", show_default=False)]
+StoreOption = Annotated[
+    Path, typer.Option("--output", "-o", metavar="STORE", help="Store; made if missing.", show_default=False)
+]
+RecipeOption = Annotated[
+    Path | None,
+    typer.Option("--recipe", "-r", metavar="PART.toml", help="Layout and limits of the part.", show_default=False),
+]
+SerialFrom = Annotated[
+    str,
+    typer.Option(
+        metavar="PATTERN",
+        help="Where serial numbers come from: a pattern of the folder's name with {serial}, {lot}, {substrate}, "
+        "{position}, {station}, {operator}, such as '{lot}/{serial}_{position}'; or 'code', the DataMatrix in the "
+        r"images. A \[part] table in capture.toml goes first.",
+    ),
+]
 StationOption = Annotated[
     Path | None,
     typer.Option(

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from bgars.cli.console import print_json, say
+from bgars.cli.options import JsonOption
 from bgars.errors import InputError
 from bgars.files.csv_cells import harmless
 from bgars.io.result_file import read_result
@@ -24,7 +25,6 @@ MOST_WIDE = 60
 StoreArgument = Annotated[
     Path, typer.Argument(metavar="STORE", help="Store that bgars batch or bgars watch wrote.", show_default=False)
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")]
 
 
 def register(app: typer.Typer) -> None:

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from bgars.cli.console import print_json, say
+from bgars.cli.options import JsonOption
 from bgars.errors import InputError
 from bgars.io.own_files import need_new_or_own
 from bgars.io.result_file import RESULT_NAME
@@ -65,9 +66,7 @@ def report(
     pages: Annotated[
         bool, typer.Option("--pages", help="With the overview, write the pages of its last parts, too.")
     ] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
-    ] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Write the page of an inspection again, from its result.json, or pages of a store.
 

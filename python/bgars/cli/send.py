@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import signal
 from pathlib import Path
-from types import FrameType
 from typing import Annotated
 
 import typer
 
 from bgars.cli.console import print_json, say
+from bgars.cli.options import JsonOption
+from bgars.cli.stopping import ended_by_signals
+from bgars.errors import InputError
+from bgars.line.amqp import Amqp
 from bgars.line.send import Mqtt, Sender
 from bgars.store import open_store
 
@@ -29,36 +31,41 @@ def send(
         str,
         typer.Option(
             metavar="mqtt://HOST/TOPIC",
-            help="Broker and topic; mqtts:// for TLS. User and password: BGARS_MQTT_USER, BGARS_MQTT_PASSWORD.",
+            help="MQTT broker and topic; mqtts:// for TLS. User and password: BGARS_MQTT_USER, BGARS_MQTT_PASSWORD.",
             show_default=False,
         ),
-    ],
+    ] = "",
+    amqp: Annotated[
+        str,
+        typer.Option(
+            metavar="amqp://HOST/NODE",
+            help="AMQP 1.0 broker and its queue, topic or exchange; amqps:// for TLS. User and password: "
+            "BGARS_AMQP_USER, BGARS_AMQP_PASSWORD.",
+            show_default=False,
+        ),
+    ] = "",
     cfx: Annotated[bool, typer.Option("--cfx", help="Send IPC-CFX UnitsInspected, not the short message.")] = False,
     follow: Annotated[
         bool, typer.Option("--follow", help="Go on as parts come, over restarts of the broker, until it is ended.")
     ] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
-    ] = False,
+    as_json: JsonOption = False,
 ) -> None:
-    """Send the results of a store to an MQTT broker: at least once, in order.
+    """Send the results of a store to a broker, by MQTT or AMQP 1.0: at least once, in order.
 
     The store is the outbox. What the broker has is remembered beside it (STORE/sent), each part when it was
     acknowledged; what it could not take is sent when it answers again, with growing pauses of a minute at most.
 
+    Passwords are read from the environment, or from the file that BGARS_MQTT_PASSWORD_FILE or BGARS_AMQP_PASSWORD_FILE
+    names. TLS trusts the system's authorities; BGARS_AMQP_CA_FILE names another file of them.
+
     Exit code 0: everything was sent, or --follow was ended. 2: wrong use, or the broker does not answer.
     """
-    sender = Sender(open_store(store), Mqtt(mqtt), cfx, say=say)
-
-    def stop(_signal: int, _frame: FrameType | None) -> None:
-        sender.is_stopping = True
-
-    earlier = [(number, signal.signal(number, stop)) for number in (signal.SIGTERM, signal.SIGINT)]
-    try:
+    if bool(mqtt) == bool(amqp):
+        msg = "--mqtt and --amqp: give one of them"
+        raise InputError(msg)
+    sender = Sender(open_store(store), Mqtt(mqtt) if mqtt else Amqp(amqp), cfx, say=say)
+    with ended_by_signals(sender):
         sender.run(follow=follow)
-    finally:
-        for number, handler in earlier:
-            signal.signal(number, handler)
     if as_json:
         print_json({"sent": sender.sent, "to": sender.channel.name})
     else:

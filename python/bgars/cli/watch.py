@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from pathlib import Path
-from types import FrameType
 from typing import Annotated
 
 import typer
 
-from bgars.cli.batch import SerialFrom, StoreOption
-from bgars.cli.options import LotOption, MethodOption, OperatorOption, StationNameOption
+from bgars.cli.options import (
+    LotOption,
+    MethodOption,
+    OperatorOption,
+    RecipeOption,
+    SerialFrom,
+    StationNameOption,
+    StoreOption,
+)
+from bgars.cli.stopping import ended_by_signals
 from bgars.io.given_paths import need_path
 from bgars.line.inbox import Inbox
 from bgars.line.naming import Naming
@@ -39,10 +45,7 @@ def watch(
         ),
     ],
     output: StoreOption,
-    recipe: Annotated[
-        Path | None,
-        typer.Option("--recipe", "-r", metavar="PART.toml", help="Layout and limits of the part.", show_default=False),
-    ] = None,
+    recipe: RecipeOption = None,
     rig: Annotated[
         Path | None,
         typer.Option(
@@ -133,16 +136,8 @@ def watch(
             poll_s=poll,
             say=_say,
         )
-
-        def stop(_signal: int, _frame: FrameType | None) -> None:
-            watching.is_stopping = True
-
-        earlier = [(number, signal.signal(number, stop)) for number in (signal.SIGTERM, signal.SIGINT)]
-        try:
+        with ended_by_signals(watching):
             watching.run(most=most)
-        finally:
-            for number, handler in earlier:
-                signal.signal(number, handler)
 
 
 def _say(line: str) -> None:

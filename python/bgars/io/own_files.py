@@ -40,10 +40,14 @@ OWN_TEXT = {
     ".sdf": re.compile(rb"\AbISO-1\.0bgars"),
     ".npz": re.compile(rb"ball_height_um\.npy|coefficients\.npy"),
     ".toml": re.compile(rb'\A(?:#[^\n]*\n)*(?:format = "bgars-|diffuse_level = )'),
-    ".md": re.compile(rb"(?:Command:|Written by) `bgars experiment "),
+    ".md": re.compile(rb"(?:Command:|Written by) `(?:bgars experiment|python -m experiments) "),
     ".glb": re.compile(rb'"generator":\s*"bgars'),
 }
-OWN_TABLES = (b"name,row,col,present,verdict,reasons,", b"part,placement,repeat,ball,characteristic,value")
+OWN_TABLES = (
+    b"name,row,col,present,verdict,reasons,",
+    b"part,placement,repeat,ball,characteristic,value",
+    b"strip,place,serial,verdict,reason,",
+)
 MARKS = ("summary.json", "result.json")
 """Each says, in its own content, whose run its folder holds."""
 SIBLINGS = {".npy": "summary.json", ".glb": "summary.json", ".x3p": "summary.json"}

@@ -14,6 +14,7 @@ from bgars.io.strict_toml import Strict, checked, read_values
 from bgars.records.ball_layout import BallLayout
 from bgars.records.ball_names import ball_name, ball_place
 from bgars.records.part_recipe import BALL_LIMITS, PART_LIMITS, Limits, PartRecipe, View
+from bgars.records.strip_layout import StripLayout
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -75,6 +76,39 @@ class MaterialTable(StrictNumbers):
     file: str = Field(description="material fitted on an earlier capture of the same part and rig")
 
 
+class StripTable(StrictNumbers):
+    """The ``[strip]`` table."""
+
+    rows: Annotated[int, Field(ge=1)] = Field(description="rows of parts in the image")
+    cols: Annotated[int, Field(ge=1)] = Field(description="columns of parts in the image")
+    pitch_x_um: Positive = Field(description="distance of neighbouring columns of parts")
+    pitch_y_um: Positive = Field(description="distance of neighbouring rows of parts")
+    offset_um: list[Number] | None = Field(
+        None, description="[x, y] of the array's middle against the image's middle (x right, y up); [0, 0] by default"
+    )
+    window_um: list[Positive] | None = Field(
+        None, description="[width, height] around a place that belong to its part alone; the pitches by default"
+    )
+    empty: list[str] | None = Field(None, description='places without a part, such as ["R1C3"]')
+
+    @model_validator(mode="after")
+    def _pairs(self) -> StripTable:
+        for name in ("offset_um", "window_um"):
+            value = getattr(self, name)
+            if value is not None and len(value) != len("xy"):
+                msg = f"{name}: must be two numbers, got {value}"
+                raise ValueError(msg)
+        return self
+
+    def layout(self) -> StripLayout:
+        """Return the record."""
+        given = self.model_dump(exclude_none=True)
+        values: dict[str, Any] = {
+            name: tuple(value) if isinstance(value, list) else value for name, value in given.items()
+        }
+        return StripLayout(**values)
+
+
 class PartTable(StrictNumbers):
     """The whole of ``part.toml``; file names are relative to its folder."""
 
@@ -106,6 +140,7 @@ class PartTable(StrictNumbers):
     )
     limits: LimitsTable = Field(default_factory=lambda: LimitsTable.model_validate({}), description="what is judged")
     material: MaterialTable | None = Field(None, description="a known material")
+    strip: StripTable | None = Field(None, description="one image shows many parts")
 
     @model_validator(mode="after")
     def _one_layout(self) -> PartTable:
@@ -164,6 +199,7 @@ def read_part_recipe(path: str | PathLike[str]) -> PartRecipe:
             q=table.q,
             u_q=table.u_q,
             pitch_u_um=table.pitch_u_um,
+            strip=None if table.strip is None else table.strip.layout(),
             file=path,
         )
         _check_sizes(table, recipe.q)
@@ -181,6 +217,8 @@ def recipe_keys() -> Iterator[tuple[str, str]]:
             yield from ((f"limits.{key}", str(part.description)) for key, part in LimitsTable.model_fields.items())
         elif name == "material":
             yield from ((f"material.{key}", str(part.description)) for key, part in MaterialTable.model_fields.items())
+        elif name == "strip":
+            yield from ((f"strip.{key}", str(part.description)) for key, part in StripTable.model_fields.items())
         else:
             yield name, str(entry.description)
 

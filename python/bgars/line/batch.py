@@ -12,7 +12,7 @@ from bgars.errors import InputError
 from bgars.io.part_recipe import read_part_recipe
 from bgars.line.dask_pool import run_on_cluster
 from bgars.line.folders import capture_folders
-from bgars.line.job import Job, Outcome, with_content
+from bgars.line.job import Job, Outcome, place_serial, with_content
 from bgars.line.local_pool import run_local, share_cores, thread_environment
 from bgars.line.naming import Naming
 from bgars.normals.methods import DEFAULT_METHOD, Method
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from os import PathLike
 
     from bgars.records.part_result import PartResult
+    from bgars.records.strip_layout import StripLayout
 
 __all__ = ["Batch", "Progress", "inspect_many", "store_outcome"]
 
@@ -172,21 +173,21 @@ def inspect_many(
     used = share_cores(len(captures), processes, threads) if scheduler is None else (0, threads or 1)
     batch = Batch(len(captures), processes=used[0], threads=used[1])
     template = Job("", "" if recipe is None else str(recipe), method, naming or Naming(), threads=used[1])
-    jobs = _jobs(captures, template, opened, send=send_images)
+    jobs = _jobs(captures, template, opened, None if part is None else part.strip, send=send_images)
     started = time.monotonic()
-    results: dict[str, PartResult] = {}
-    for outcome in _run(jobs, used, scheduler):
-        stamped = store_outcome(
-            outcome, opened, recipe="" if part is None else part.name, lot=template.naming.common.lot
-        )
-        _count(batch, outcome, is_new=stamped is not None)
-        if opened is None and stamped is not None:
-            results[outcome.folder] = stamped
+    results: dict[str, list[PartResult]] = {}
+    for done, outcomes in enumerate(_run(jobs, used, scheduler), 1):
+        for outcome in outcomes:
+            stamped = store_outcome(
+                outcome, opened, recipe="" if part is None else part.name, lot=template.naming.common.lot
+            )
+            _count(batch, outcome, is_new=stamped is not None)
+            if opened is None and stamped is not None:
+                results.setdefault(outcome.folder, []).append(stamped)
         batch.seconds = time.monotonic() - started
         if progress is not None:
-            done = batch.inspected + batch.known + len(batch.failures)
             progress(Progress(done, batch.total, len(batch.failures), batch.seconds))
-    batch.results = [results[str(folder)] for folder in captures if str(folder) in results]
+    batch.results = [result for folder in captures for result in results.get(str(folder), ())]
     if opened is not None and batch.inspected >= COMPACT_FROM:
         opened.compact()
     return batch
@@ -218,7 +219,9 @@ def store_outcome(
     return result
 
 
-def _jobs(captures: list[Path], template: Job, store: Store | None, *, send: bool) -> Iterator[Job]:
+def _jobs(
+    captures: list[Path], template: Job, store: Store | None, strip: StripLayout | None, *, send: bool
+) -> Iterator[Job]:
     known = frozenset() if store is None else frozenset(store.known())
     by_serial: dict[str, set[str]] = {}
     for key, serial in ({} if store is None else store.known()).items():
@@ -230,11 +233,15 @@ def _jobs(captures: list[Path], template: Job, store: Store | None, *, send: boo
         except (InputError, OSError):
             serial = ""
         # A job takes only the keys that can be its own: there may be millions.
-        job = replace(job, known=frozenset(by_serial.get(serial, ())) if serial else known)
+        names = [serial] if strip is None else [place_serial(serial, place.name) for place in strip.places()]
+        own = frozenset[str]().union(*(by_serial.get(name, ()) for name in names))
+        job = replace(job, known=own if serial else known)
         yield with_content(job) if send else job
 
 
-def _run(jobs: Iterator[Job], used: tuple[int, int], scheduler: str | None) -> Generator[Outcome, None, None]:
+def _run(
+    jobs: Iterator[Job], used: tuple[int, int], scheduler: str | None
+) -> Generator[tuple[Outcome, ...], None, None]:
     if scheduler is not None:
         yield from run_on_cluster(jobs, scheduler)
         return

@@ -74,6 +74,8 @@ def camera_of(name: str) -> Camera:
     ------
     InputError
         No such module or callable, or what it returns cannot grab.
+    BgarsError
+        The camera cannot be opened.
     """
     kind, _, rest = name.partition(":")
     if kind == "folder" and rest:
@@ -88,7 +90,13 @@ def camera_of(name: str) -> Camera:
     except (ImportError, AttributeError) as error:
         msg = f"camera: {name!r} cannot be imported ({error})"
         raise InputError(msg) from None
-    made: Camera = make()
+    try:
+        made: Camera = make()
+    except BgarsError:
+        raise
+    except Exception as error:
+        msg = f"camera: {name!r} cannot be opened ({_told(error)})"
+        raise BgarsError(msg) from error
     if not callable(getattr(made, "grab", None)):
         msg = f"camera: what {name!r} returns must have grab(light), got {type(made).__name__}"
         raise InputError(msg)
@@ -125,6 +133,8 @@ def take_capture(
     ------
     InputError
         The folder is there, no lights, or the camera returned no image or one of another shape.
+    BgarsError
+        The camera failed.
     FileFormatError
         It cannot be written.
     """
@@ -166,7 +176,13 @@ def take_capture(
 
 
 def _grabbed(camera: Camera, light: int, first: NDArray[Any] | None) -> NDArray[Any]:
-    image = np.asarray(camera.grab(light))
+    try:
+        image = np.asarray(camera.grab(light))
+    except BgarsError:
+        raise
+    except Exception as error:
+        msg = f"camera: grab({light}) gave no image ({_told(error)})"
+        raise BgarsError(msg) from error
     is_image = image.ndim == GREY or (image.ndim == COLOUR and image.shape[2] == COLOUR)
     if not is_image or image.dtype not in (np.uint8, np.uint16) or image.size == 0:
         msg = (
@@ -178,3 +194,8 @@ def _grabbed(camera: Camera, light: int, first: NDArray[Any] | None) -> NDArray[
         msg = f"camera: grab({light}) must be like the first image {told}"
         raise InputError(msg)
     return image
+
+
+def _told(error: Exception) -> str:
+    """An error of somebody's library in one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())

@@ -26,8 +26,8 @@ AHEAD = 2
 RETRIES = 2
 
 
-def run_on_cluster(jobs: Iterator[Job], address: str) -> Generator[Outcome, None, None]:
-    """Yield the outcome of every job, as they come.
+def run_on_cluster(jobs: Iterator[Job], address: str) -> Generator[tuple[Outcome, ...], None, None]:
+    """Yield the outcomes of every job, as they come.
 
     A job whose worker is killed is done by another one (three times at most). Jobs that a scheduler forgot, because it
     was started anew at its address, are handed out again.
@@ -55,7 +55,7 @@ def run_on_cluster(jobs: Iterator[Job], address: str) -> Generator[Outcome, None
         client.close(timeout=2)
 
 
-def _outcomes(client: Any, jobs: Iterator[Job], address: str) -> Generator[Outcome, None, None]:  # noqa: ANN401
+def _outcomes(client: Any, jobs: Iterator[Job], address: str) -> Generator[tuple[Outcome, ...], None, None]:  # noqa: ANN401
     running: dict[Any, Job] = {}
     again: list[Job] = []
     away_since: float | None = None
@@ -84,14 +84,14 @@ def _outcomes(client: Any, jobs: Iterator[Job], address: str) -> Generator[Outco
             elif future.status == "error":
                 error = future.exception()
                 reason = " ".join(f"{type(error).__name__}: {error}".split())
-                yield Outcome(job.folder, reason=f"on the cluster: {reason}", is_input=False)
+                yield (Outcome(job.folder, reason=f"on the cluster: {reason}", is_input=False),)
             else:  # cancelled or lost: forgotten by a scheduler that was started anew
                 again.append(job)
         if not done:
             time.sleep(POLL_S)
 
 
-def _result(future: Any, job: Job, again: list[Job]) -> Generator[Outcome, None, None]:  # noqa: ANN401 - no types
+def _result(future: Any, job: Job, again: list[Job]) -> Generator[tuple[Outcome, ...], None, None]:  # noqa: ANN401 - no types
     try:
         yield future.result(timeout=60)
     except Exception:

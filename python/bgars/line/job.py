@@ -6,6 +6,7 @@ import os
 import tempfile
 import time
 from dataclasses import dataclass, field, replace
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,12 +19,18 @@ from bgars.line.naming import Naming, last_written_utc
 from bgars.normals.methods import DEFAULT_METHOD, Method
 from bgars.pipelines.check import check, refuse_wrong_geometry, told_by
 from bgars.pipelines.inspect import inspect
+from bgars.pipelines.strip import inspect_place, places_of_strip
 from bgars.store.keys import key_of, part_key
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from bgars.records.capture import Capture
+    from bgars.records.part_identity import PartIdentity
+    from bgars.records.part_recipe import PartRecipe
     from bgars.records.part_result import PartResult
 
-__all__ = ["Job", "Outcome", "run_job", "with_content"]
+__all__ = ["Job", "Outcome", "place_serial", "run_job", "with_content"]
 
 
 @dataclass(frozen=True)
@@ -57,7 +64,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a job.
+    """What became of a part.
 
     Attributes
     ----------
@@ -104,43 +111,91 @@ def with_content(job: Job) -> Job:
     return replace(job, content=tuple(files))
 
 
-def run_job(job: Job) -> Outcome:
-    """Inspect a capture; every failure is an outcome."""
+def run_job(job: Job) -> tuple[Outcome, ...]:
+    """Inspect a capture; every failure is an outcome. A strip has an outcome a part, any other capture one."""
     started = time.perf_counter()
-    serial = ""
     try:
         if job.content:
             with tempfile.TemporaryDirectory(prefix="bgars-job-") as place:
                 return _inspected(job, *_unpacked(job, Path(place)), started)
         return _inspected(job, Path(job.folder), job.recipe, started)
-    except (BgarsError, OSError) as error:
-        reason, is_input = str(error), isinstance(error, BgarsError)
     except Exception as error:
-        reason, is_input = f"unexpected {type(error).__name__}: {error}", False
-    serial = _serial(job)
+        return (_failed(job, _serial(job), error, started),)
+
+
+def place_serial(serial: str, place: str) -> str:
+    """Serial number of a part of a strip, made of that of the strip.
+
+    Examples
+    --------
+    >>> place_serial("STRIP7", "R1C2")
+    'STRIP7-R1C2'
+    """
+    return f"{serial}-{place}" if serial else ""
+
+
+def _failed(job: Job, serial: str, error: Exception, started: float) -> Outcome:
+    is_told = isinstance(error, BgarsError | OSError)
+    reason = " ".join((str(error) if is_told else f"unexpected {type(error).__name__}: {error}").split())
     seconds = time.perf_counter() - started
-    return Outcome(job.folder, serial, reason=" ".join(reason.split()), seconds=seconds, is_input=is_input)
+    return Outcome(job.folder, serial, reason=reason, seconds=seconds, is_input=isinstance(error, BgarsError))
 
 
-def _inspected(job: Job, folder: Path, recipe_file: str, started: float) -> Outcome:
+def _inspected(job: Job, folder: Path, recipe_file: str, started: float) -> tuple[Outcome, ...]:
     serial, identity = job.naming.of_name(Path(job.folder), side=folder)
     recipe = read_part_recipe(recipe_file) if recipe_file else None
     capture = read_capture(folder, threads=job.threads)
     serial = job.naming.of_capture(folder, capture, serial)
     digests = [digest for _, digest in checksums((*capture_files(capture), *([Path(recipe_file)] if recipe else [])))]
+    identity = replace(identity, captured_utc=last_written_utc(capture))
+    told = cache(lambda: _checked(capture))  # at most once, and not where the store has all
+    if recipe is None or recipe.strip is None:
+        return (_part(job, capture, recipe, "", serial, identity, digests, told, started),)
+    places = places_of_strip(capture, recipe)
+    carrier = replace(identity, substrate=identity.substrate or serial)
+    outcomes = []
+    for place in places:
+        name, own = place_serial(serial, place.name), replace(carrier, position=place.name)
+        try:
+            outcomes.append(_part(job, capture, recipe, place.name, name, own, digests, told, started))
+        except Exception as error:
+            outcomes.append(_failed(job, name, error, started))
+        started = time.perf_counter()
+    return tuple(outcomes)
+
+
+def _checked(capture: Capture) -> tuple[str, ...]:
+    """What the check of a capture says, for its results; wrong geometry is refused."""
+    findings = check(capture)
+    refuse_wrong_geometry(findings, capture.name, way_out="'bgars check' shows it")
+    return told_by(findings)
+
+
+def _part(
+    job: Job,
+    capture: Capture,
+    recipe: PartRecipe | None,
+    place: str,
+    serial: str,
+    identity: PartIdentity,
+    digests: list[str],
+    told: Callable[[], tuple[str, ...]],
+    started: float,
+) -> Outcome:
+    """Inspect a part, or that at a place of a strip, unless the store has it."""
     key = key_of(digests, serial=serial, method=job.method, version=version("bgars"))
     if key in job.known:
         return Outcome(job.folder, serial, is_known=True, seconds=time.perf_counter() - started)
-    findings = check(capture)
-    refuse_wrong_geometry(findings, capture.name, way_out="'bgars check' shows it")
-    result = inspect(capture, recipe, method=job.method, threads=job.threads, check=False)
-    result = replace(result, warnings=(*told_by(findings), *result.warnings))
-    identity = replace(identity, captured_utc=last_written_utc(capture))
+    found = told()
+    if recipe is not None and place:
+        result = inspect_place(capture, recipe, place, method=job.method, check=False, threads=job.threads)
+    else:
+        result = inspect(capture, recipe, method=job.method, check=False, threads=job.threads)
+    result = replace(result, warnings=(*found, *result.warnings))
     if recipe is not None and job.content:  # as it is where the folder is seen
         given = Path(job.recipe)
-        recipe = replace(recipe, file=given)
         files = tuple(f._replace(name=given.name) if f.name == Path(RECIPE).name else f for f in result.files)
-        result = replace(result, recipe=recipe, files=files)
+        result = replace(result, recipe=replace(recipe, file=given), files=files)
     result = replace(result, serial=serial, identity=identity)
     if part_key(result) != key:
         msg = f"{job.folder}: its files changed while they were read"

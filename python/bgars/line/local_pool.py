@@ -44,8 +44,8 @@ def share_cores(jobs: int, processes: int | None, threads: int | None) -> tuple[
     return processes, threads or max(1, cores // processes)
 
 
-def run_local(jobs: Iterator[Job], processes: int) -> Generator[Outcome, None, None]:
-    """Yield the outcome of every job, as they come; those at hand, too, before a KeyboardInterrupt goes on.
+def run_local(jobs: Iterator[Job], processes: int) -> Generator[tuple[Outcome, ...], None, None]:
+    """Yield the outcomes of every job, as they come; those at hand, too, before a KeyboardInterrupt goes on.
 
     A job whose process is killed is tried once more, alone; then it is a failure, and the others go on.
     """
@@ -63,14 +63,14 @@ def run_local(jobs: Iterator[Job], processes: int) -> Generator[Outcome, None, N
             with ProcessPoolExecutor(1, context, _start_worker) as pool:
                 broken = yield from _until_broken(pool, iter([job]), 1)
             if broken:
-                yield Outcome(job.folder, reason=KILLED, is_input=False)
+                yield (Outcome(job.folder, reason=KILLED, is_input=False),)
 
 
 def _until_broken(
     pool: ProcessPoolExecutor, jobs: Iterator[Job], processes: int
-) -> Generator[Outcome, None, list[Job]]:
+) -> Generator[tuple[Outcome, ...], None, list[Job]]:
     """Yield outcomes; return the jobs that were at hand when a process was killed, or none at the end."""
-    running: dict[Future[Outcome], Job] = {}
+    running: dict[Future[tuple[Outcome, ...]], Job] = {}
     suspects: list[Job] = []
     interrupted = False
     while True:
@@ -94,11 +94,11 @@ def _until_broken(
         for future in done:
             job = running.pop(future)
             try:
-                outcome = future.result()
+                outcomes = future.result()
             except BrokenProcessPool:
                 suspects.append(job)
                 continue
-            yield outcome
+            yield outcomes
     if interrupted:
         raise KeyboardInterrupt
     return suspects

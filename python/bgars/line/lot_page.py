@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from bgars.errors import InputError
 from bgars.io.atomic import atomic_file
 from bgars.line.pages import page_name
+from bgars.line.strip_page import PLACE, strip_cells, template
 
 if TYPE_CHECKING:
     from bgars.store import Store
@@ -23,7 +24,10 @@ DRIFTS = {
     "seating_coplanarity_um": "seating coplanarity",
     "warpage_um": "warpage",
 }
-WIDTH, HEIGHT, MARGIN = 640.0, 150.0, 12.0
+WIDTH, HEIGHT, MARGIN, LEFT = 640.0, 150.0, 14.0, 70.0
+"""Of a chart of drift; its numbers stand at the left."""
+LETTERED_PX = 9.0
+"""Least radius of a ball in the map that has room for its name."""
 MAP_SIZE = 420.0
 TITLES = {
     "missing": "ball missing",
@@ -54,16 +58,11 @@ def write_lot_page(store: Store, page: Path, *, lot: str | None = None) -> dict[
     FileFormatError
         The page cannot be written.
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined  # noqa: PLC0415 - only where a page is written
-
     facts = lot_facts(store, lot)
-    for row in facts["last"]:
+    for row in (*facts["last"], *facts["not_passed"]):
         name = page_name(row["serial"])
         row["page"] = name if (page.parent / name).is_file() else ""
-    environment = Environment(
-        loader=PackageLoader("bgars.line", "template"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
-    )
-    text = environment.get_template("lot.html.j2").render(facts=facts, store=store.folder.name, titles=TITLES)
+    text = template("lot.html.j2").render(facts=facts, store=store.folder.name, titles=TITLES)
     with atomic_file(page) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return facts
@@ -72,7 +71,12 @@ def write_lot_page(store: Store, page: Path, *, lot: str | None = None) -> dict[
 def lot_facts(store: Store, lot: str | None = None) -> dict[str, Any]:
     """Return what is on the page as plain values."""
     chosen = "" if lot is None else f"where lot = '{lot.replace(chr(39), chr(39) * 2)}'"
-    counts = _rows(store, f"select verdict, count(*) n from parts {chosen} group by verdict")
+    # A part that came again after rework counts once, as it was found last.
+    last_round = (
+        f"select * from parts {chosen} qualify serial = '' "
+        "or row_number() over (partition by serial, recipe order by round desc) = 1"
+    )
+    counts = _rows(store, f"select verdict, count(*) n from ({last_round}) group by verdict")
     by_verdict = {"pass": 0, "fail": 0, "undecided": 0} | {row["verdict"]: row["n"] for row in counts}
     total = sum(by_verdict.values())
     if not total:
@@ -86,7 +90,7 @@ def lot_facts(store: Store, lot: str | None = None) -> dict[str, Any]:
     names = ", ".join(DRIFTS)
     drift = _rows(
         store,
-        f"select * from (select serial, inspected_utc, sequence, {names} from parts {chosen} "
+        f"select * from (select serial, inspected_utc, sequence, verdict, {names} from parts {chosen} "
         f"order by sequence desc limit {DRIFT_PARTS}) order by sequence",
     )
     last = _rows(
@@ -111,6 +115,12 @@ def lot_facts(store: Store, lot: str | None = None) -> dict[str, Any]:
         ),
         "defects": defects,
         "places": _places(store, chosen),
+        "strip": _strip(store, chosen),
+        "not_passed": _rows(
+            store,
+            "select serial, lot, round, inspected_utc, verdict, reason "
+            f"from ({last_round}) where verdict <> 'pass' order by sequence desc limit {LAST_PARTS}",
+        ),
         "drifts": [chart for name, title in DRIFTS.items() if (chart := _drift(drift, name, title)) is not None],
         "last": last,
         "failures": _rows(store, f"select serial, capture_folder, reason from failures {chosen} limit {LAST_PARTS}"),
@@ -144,12 +154,38 @@ def _places(store: Store, chosen: str) -> dict[str, Any] | None:
             "x": round(30.0 + (row["x"] - min(xs)) * scale, 1),
             "y": round(30.0 + (max(ys) - row["y"]) * scale, 1),
             "share": row["failed"] / most if most else 0.0,
+            "failed": row["failed"],
             "words": f"{row['name']}: fails in {row['failed']} of {row['n']} parts",
         }
         for row in rows
     ]
     height = round(60.0 + (max(ys) - min(ys)) * scale, 1)
-    return {"marks": marks, "radius": round(radius, 1), "most": most, "width": MAP_SIZE, "height": height}
+    return {
+        "marks": marks,
+        "radius": round(radius, 1),
+        "most": most,
+        "named": radius >= LETTERED_PX,
+        "width": MAP_SIZE,
+        "height": height,
+    }
+
+
+def _strip(store: Store, chosen: str) -> list[list[dict[str, Any]]]:
+    """Share of parts that pass by their place on the strip, as cells; empty where parts come one by one."""
+    rows = _rows(
+        store,
+        f"select position, count(*) n, count(*) filter (verdict = 'pass') passed from parts {chosen} group by position",
+    )
+    told = {
+        row["position"]: {
+            "style": "pass" if row["passed"] == row["n"] else "fail",
+            "words": f"{100 * row['passed'] / row['n']:.0f} % of {row['n']}",
+            "link": "",
+        }
+        for row in rows
+        if PLACE.fullmatch(row["position"])
+    }
+    return strip_cells(told) if told else []
 
 
 def _drift(rows: list[dict[str, Any]], name: str, title: str) -> dict[str, Any] | None:
@@ -158,11 +194,12 @@ def _drift(rows: list[dict[str, Any]], name: str, title: str) -> dict[str, Any] 
     if not known:
         return None
     values = [value for _, value in known]
+    mean = sum(values) / len(values)
     low, high = min(values), max(values)
     span, steps = (high - low) or 1.0, max(len(rows) - 1, 1)
     points = [
         (
-            round(MARGIN + at / steps * (WIDTH - 2 * MARGIN), 1),
+            round(LEFT + at / steps * (WIDTH - LEFT - MARGIN), 1),
             round(MARGIN + (high - value) / span * (HEIGHT - 2 * MARGIN), 1),
         )
         for at, value in known
@@ -171,9 +208,10 @@ def _drift(rows: list[dict[str, Any]], name: str, title: str) -> dict[str, Any] 
         "title": title,
         "low": low,
         "high": high,
-        "mean": sum(values) / len(values),
+        "mean": mean,
+        "mean_y": round(MARGIN + (high - mean) / span * (HEIGHT - 2 * MARGIN), 1),
         "points": [
-            {"x": x, "y": y, "words": f"{rows[at]['serial']}: {value:.2f}"}
+            {"x": x, "y": y, "words": f"{rows[at]['serial']}: {value:.2f}", "verdict": rows[at]["verdict"]}
             for (x, y), (at, value) in zip(points, known, strict=True)
         ],
         "line": " ".join(f"{x},{y}" for x, y in points),

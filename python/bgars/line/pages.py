@@ -11,6 +11,7 @@ from bgars.errors import BgarsError, InputError
 from bgars.io.capture import read_capture
 from bgars.io.provenance import capture_files, checksums
 from bgars.io.result_file import RESULT_NAME, parse_result
+from bgars.pipelines.strip import part_of_strip
 from bgars.report.html.page import write_page
 from bgars.report.html.source import PageSource, source_of
 
@@ -90,6 +91,9 @@ def _with_photograph(result: PartResult, folder: Path) -> PageSource:
         same = Counter(checksums(capture_files(capture))) <= Counter(result.files)
         if not same or len(result.light_directions) != len(capture.images):
             return PageSource(result.to_dict(), warnings=(f"no photograph: {folder} holds other images now",))
+        strip = None if result.recipe is None else result.recipe.strip
+        if strip is not None and result.identity.position:
+            capture = part_of_strip(capture, strip, strip.place(result.identity.position))
         return source_of(result, capture)
     except (BgarsError, OSError) as error:
         return PageSource(result.to_dict(), warnings=(f"no photograph: {error}",))

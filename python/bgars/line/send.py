@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import importlib
 import json
-import os
 import re
 import time
 from dataclasses import dataclass, field
@@ -18,6 +17,7 @@ from urllib.parse import urlsplit
 from bgars.errors import FileFormatError, InputError
 from bgars.io.result_file import RESULT_NAME, parse_result
 from bgars.line.cfx import to_cfx
+from bgars.line.credentials import credentials
 from bgars.line.notify import message
 from bgars.store.append import write_durably
 
@@ -37,7 +37,7 @@ USER, PASSWORD = "BGARS_MQTT_USER", "BGARS_MQTT_PASSWORD"
 
 
 class Mqtt:
-    """A topic of an MQTT broker; user and password come from the environment.
+    """A topic of an MQTT broker; user and password come from the environment or a file.
 
     Parameters
     ----------
@@ -61,6 +61,7 @@ class Mqtt:
         self.host, self.is_secure, self.topic = parts.hostname, parts.scheme == "mqtts", parts.path.strip("/")
         self.port = parts.port or (8883 if self.is_secure else 1883)
         self.name = f"{parts.scheme}://{self.host}:{self.port}/{self.topic}"
+        self._user, self._password = credentials(USER, PASSWORD)
         self._library = _need_paho()
         self._client: Any = None
 
@@ -94,8 +95,8 @@ class Mqtt:
     def _connected(self) -> Any:  # noqa: ANN401 - paho's client
         library = self._library
         client = library.Client(library.CallbackAPIVersion.VERSION2, clean_session=True)
-        if os.environ.get(USER):
-            client.username_pw_set(os.environ[USER], os.environ.get(PASSWORD))
+        if self._user:
+            client.username_pw_set(self._user, self._password or None)
         if self.is_secure:
             client.tls_set()
         client.connect(self.host, self.port, keepalive=30)
@@ -117,7 +118,7 @@ class Sender:
     Attributes
     ----------
     store : Store
-    channel : Mqtt
+    channel : Mqtt or Amqp
         Or anything with ``name``, ``send(text)`` and ``close()``.
     is_cfx : bool
         Send IPC-CFX ``UnitsInspected`` instead of the short message.

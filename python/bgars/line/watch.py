@@ -24,6 +24,7 @@ from bgars.normals.methods import DEFAULT_METHOD, Method
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from bgars.records.part_result import PartResult
     from bgars.store import Store
 
 __all__ = ["Watch", "watched"]
@@ -112,7 +113,7 @@ class Watch:
                     taken += self._take(part)
             elif time.monotonic() - part.since_s > self.patience_s:
                 reason = f"incomplete: {self.inbox.missing(part)}, and nothing new for {self.patience_s:g} s"
-                taken += self._reject(part, Outcome(str(part.folder), self._serial(part.folder), reason=reason))
+                taken += self._reject(part, (Outcome(str(part.folder), self._serial(part.folder), reason=reason),))
         return taken > 0
 
     def _take(self, part: Waiting) -> bool:
@@ -126,45 +127,58 @@ class Watch:
             self.naming,
             threads=self.threads,
         )
-        outcome = run_job(job)
-        if outcome.result is None:
+        outcomes = run_job(job)
+        if all(outcome.result is None for outcome in outcomes):
             now = time.monotonic()
             seen, since = self._refused.setdefault(part.folder.name, (part.signature, now))
             if seen != part.signature:  # it goes on changing: half-written before
                 self._refused[part.folder.name] = (part.signature, now)
-            elif now - since >= self.patience_s or (self.inbox.trigger and outcome.is_input):
-                return self._reject(part, outcome)
+            elif now - since >= self.patience_s or (self.inbox.trigger and all(each.is_input for each in outcomes)):
+                return self._reject(part, outcomes)
             return False
         place = self._free(self.done, part.folder.name)
-        try:
-            kept = store_outcome(outcome, self.store, moved_to=place)
-        except BgarsError as error:
-            self._problem_once(f"{error}; {part.folder.name} stays in the inbox, tried again")
-            self._back_off()
-            return False
-        self._tries, self._problem = 0, ""
-        result = kept or outcome.result
-        for problem in self.notifier.tell(result, place):
-            self.say(f"{result.serial}: {problem}")
+        kept = self._keep(part, outcomes, place)
         if kept is None:
-            self.say(f"{part.folder.name}: the store had it; told and moved again")
-        self.say(f"{result.summary_line()} seconds={outcome.seconds:.2f}")
+            return False
+        for outcome, new in zip(outcomes, kept, strict=True):
+            if outcome.result is None:
+                self._tell_failure(outcome, place)
+                continue
+            result = new or outcome.result
+            for problem in self.notifier.tell(result, place):
+                self.say(f"{result.serial}: {problem}")
+            if new is None:
+                self.say(f"{part.folder.name}: the store had it; told and moved again")
+            self.say(f"{result.summary_line()} seconds={outcome.seconds:.2f}")
         return self._move(part, place)
 
-    def _reject(self, part: Waiting, outcome: Outcome) -> bool:
+    def _reject(self, part: Waiting, outcomes: tuple[Outcome, ...]) -> bool:
         """Keep why a part could not be inspected, and move it to the failed ones."""
         place = self._free(self.failed, part.folder.name)
+        if self._keep(part, outcomes, place) is None:
+            return False
+        for outcome in outcomes:
+            self._tell_failure(outcome, place)
+        return self._move(part, place)
+
+    def _keep(self, part: Waiting, outcomes: tuple[Outcome, ...], place: Path) -> list[PartResult | None] | None:
+        """Bring what became of a part, or of those of a strip, to the disk; None: it cannot be written now."""
+        lot = self.naming.common.lot
         try:
-            store_outcome(outcome, self.store, recipe=self._name, lot=self.naming.common.lot, moved_to=place)
+            kept = [
+                store_outcome(outcome, self.store, recipe=self._name, lot=lot, moved_to=place) for outcome in outcomes
+            ]
         except BgarsError as error:
             self._problem_once(f"{error}; {part.folder.name} stays in the inbox, tried again")
             self._back_off()
-            return False
+            return None
         self._tries, self._problem = 0, ""
+        return kept
+
+    def _tell_failure(self, outcome: Outcome, place: Path) -> None:
         for problem in self.notifier.tell_failure(outcome.serial, place, outcome.reason):
             self.say(f"{outcome.serial}: {problem}")
-        self.say(f"{part.folder.name}: not inspected: {outcome.reason}")
-        return self._move(part, place)
+        self.say(f"{outcome.serial or Path(outcome.folder).name}: not inspected: {outcome.reason}")
 
     def _move(self, part: Waiting, place: Path) -> bool:
         """Rename a part out of the inbox; where that fails it stays, and the store knows it when it is met again."""

@@ -96,6 +96,9 @@ def inspect(
     threads = thread_count(threads)
     if recipe is not None and not isinstance(recipe, PartRecipe):
         recipe = read_part_recipe(recipe)
+    if recipe is not None and recipe.strip is not None:
+        msg = "recipe: its images show a strip of parts; name the one to inspect: bgars.inspect_place(.., place)"
+        raise InputError(msg)
 
     def report(stage: InspectionStage, fraction: float) -> None:
         if progress is not None:

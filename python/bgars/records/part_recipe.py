@@ -11,6 +11,7 @@ from bgars.errors import InputError
 from bgars.records.ball_layout import BallLayout
 from bgars.records.ball_names import ball_name, mirrored_name
 from bgars.records.keys import Key
+from bgars.records.strip_layout import StripLayout
 
 __all__ = ["BALL_LIMITS", "PART_LIMITS", "BallPlace", "Limits", "PartRecipe", "View", "layout_places"]
 
@@ -143,6 +144,8 @@ class PartRecipe:
         q alone takes a `u_q` of 0.01, `u_q` alone a q of 1. Both None: not stated.
     pitch_u_um : float or None
         Standard uncertainty of the lattice's pitch.
+    strip : StripLayout or None
+        Where the parts are, if one image shows many.
 
     Raises
     ------
@@ -175,6 +178,9 @@ class PartRecipe:
     )
     pitch_u_um: Annotated[
         float | None, Key("standard uncertainty (k = 1) of the grid's pitch, in um; null = not stated", is_late=True)
+    ] = None
+    strip: Annotated[
+        StripLayout | None, Key("where the parts of one image are; null = it shows one part", is_late=True)
     ] = None
 
     def __post_init__(self) -> None:

@@ -48,7 +48,11 @@ CREATE VIEW failures AS SELECT * EXCLUDE (filename, copy) FROM (
 WHERE copy = 1 AND NOT EXISTS (
     SELECT 1 FROM parts_taken p
     WHERE p.sequence > f.sequence
-      AND ((f.serial <> '' AND p.serial = f.serial) OR p.capture_folder = f.capture_folder));
+      AND ((f.serial <> '' AND p.serial = f.serial)
+           OR (p.capture_folder = f.capture_folder
+               -- Another part of the same strip, which is named STRIP-PLACE, says nothing of this one.
+               AND NOT (p.position <> '' AND ends_with(p.serial, '-' || p.position)
+                        AND starts_with(f.serial, p.serial[:-length(p.position) - 1])))));
 """
 
 

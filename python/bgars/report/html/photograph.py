@@ -40,6 +40,8 @@ PHOTOGRAPH_FILE = "photograph.jpg"
 SIDE_FILE = "report.json"
 MAX_SIDE_PX = 1400
 QUALITY = 82
+SMALL_SHARE = 0.5
+"""Of the image: what is used is shown alone where it takes less."""
 MAX_BYTES = 8 << 20
 HEADROOM = 1.1
 """White is kept for what is drawn over the photograph."""
@@ -83,21 +85,33 @@ class Lamp:
 
 def photograph_of(capture: Capture) -> Photograph:
     """Return the mean of the images, thinned to a drawable size, the square root of its grey levels."""
-    step = max(1, math.ceil(max(capture.mask.shape) / MAX_SIDE_PX))
-    total: NDArray[np.float32] = np.zeros(capture.mask[::step, ::step].shape, dtype=np.float32)
+    window = _window(capture.mask)
+    step = max(1, math.ceil(max(capture.mask[window].shape) / MAX_SIDE_PX))
+    total: NDArray[np.float32] = np.zeros(capture.mask[window][::step, ::step].shape, dtype=np.float32)
     for image in capture.images:
-        total += image[::step, ::step]
+        total += image[window][::step, ::step]
     rows, cols = capture.mask.shape
     pitch_um = capture.pixel_pitch_um or 1.0
     # Thinned pixels are squares of `step` pixels from the top left: the last may reach over the edge.
     high_um, wide_um = (size * step * pitch_um for size in total.shape)
-    left_um, top_um = -cols / 2 * pitch_um, rows / 2 * pitch_um
+    left_um, top_um = (window[1].start - cols / 2) * pitch_um, (rows / 2 - window[0].start) * pitch_um
     meaning = f"mean of the {len(capture.images)} images, square root of the grey levels"
     if step > 1:
         meaning += f", every {step}th pixel"
     jpeg = io.BytesIO()
     Image.fromarray(_stretched(total)).save(jpeg, "jpeg", quality=QUALITY)
     return Photograph(jpeg.getvalue(), left_um, left_um + wide_um, top_um - high_um, top_um, meaning)
+
+
+def _window(mask: NDArray[np.bool_]) -> tuple[slice, slice]:
+    """The pixels to show: all, or those around what is used where that is a small part, as one part of a strip."""
+    rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if not rows.size:
+        return slice(0, mask.shape[0]), slice(0, mask.shape[1])
+    window = slice(int(rows[0]), int(rows[-1]) + 1), slice(int(cols[0]), int(cols[-1]) + 1)
+    return (
+        window if mask[window].size <= SMALL_SHARE * mask.size else (slice(0, mask.shape[0]), slice(0, mask.shape[1]))
+    )
 
 
 def _stretched(values: NDArray[np.float32]) -> NDArray[np.uint8]:

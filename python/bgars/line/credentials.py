@@ -1,0 +1,31 @@
+"""User and password of a broker: from the environment or a file, never from an address or an option."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from bgars.errors import InputError
+
+__all__ = ["credentials"]
+
+
+def credentials(user: str, password: str) -> tuple[str, str]:
+    """Return user and password ("" = none) from these environment variables.
+
+    ``{password}_FILE`` names a file that holds the password instead, as container platforms mount secrets.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read.
+    """
+    name = os.environ.get(user, "")
+    file = os.environ.get(f"{password}_FILE", "")
+    if not file:
+        return name, os.environ.get(password, "")
+    try:
+        return name, Path(file).read_text(encoding="utf-8").strip("\r\n")
+    except (OSError, UnicodeDecodeError) as error:
+        msg = f"{password}_FILE: {file}: cannot be read ({getattr(error, 'strerror', None) or 'not UTF-8'})"
+        raise InputError(msg) from None
