@@ -181,7 +181,7 @@ fn bad_requests_are_named() {
     assert!(matches!(run(&images, &lights, anchored(&[])), Err(Error::NoMaterial)));
     let tiny = [Circle::exact(0.0, 0.0, 1.0)];
     assert!(matches!(run(&images, &lights, anchored(&tiny)), Err(Error::OutOfRange { argument: "circles", .. })));
-    let found = run(&images[..5 * SIDE * SIDE], &ring(5), anchored(&tiny));
+    let found = run(&images[..3 * SIDE * SIDE], &ring(3), anchored(&tiny));
     assert!(matches!(found, Err(Error::OutOfRange { argument: "lights", .. })));
     let material = solder(7);
     let found = run(&images, &lights, Request { material: Some(&material), ..anchored(&tiny) });
