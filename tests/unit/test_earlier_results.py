@@ -23,7 +23,8 @@ def command(*arguments: object) -> str:
 
 
 OWN = {
-    ".json": b'{"format": "bgars-result", "inspected_utc": "2026-01-01T00:00:00Z", "files": ["height.npy","mesh.glb"]}',
+    ".json": b'{"format": "bgars-result", "inspected_utc": "2026-01-01T00:00:00Z", '
+    b'"files": ["height.npy","mesh.glb","height.x3p"]}',
     ".csv": b"name,row,col,present,verdict,reasons,kind\n",
     ".html": b'<!doctype html><meta charset="utf-8"><meta name="generator" content="bgars">',
     ".png": b"\x89PNG\r\n\x1a\n....tEXtSoftware\0bgars",
@@ -36,6 +37,9 @@ OWN = {
     ".stl": b"bgars mesh",
     ".npy": b"",
     ".glb": b"",
+    ".gsf": b"Gwyddion Simple Field 1.0\nTitle = bgars height map\n",
+    ".sdf": b"bISO-1.0bgars",
+    ".x3p": b"",
     ".txt": b"earlier",
 }
 MESSAGE = b'{"MessageName": "CFX.Production", "TimeStamp": "2026-01-01T00:00:00Z"}'
