@@ -198,10 +198,10 @@ def test_a_batch_keeps_findings_with_the_part_and_refuses_wrong_lights(balls: bg
         rows = ", ".join(str(each.tolist()) for each in lights)
         text = f"pixel_pitch_um = 10.0\n[lights]\ndirections = [{rows}]\n"
         (folder / "capture.toml").write_text(text, encoding="utf-8")
-    kept = run_job(Job(str(tmp_path / "veiled"), method="robust-filter"))
+    (kept,) = run_job(Job(str(tmp_path / "veiled"), method="robust-filter"))
     assert kept.result is not None
     assert kept.result.warnings[0].startswith("capture: ambient")
-    refused = run_job(Job(str(tmp_path / "mirrored"), method="robust-filter"))
+    (refused,) = run_job(Job(str(tmp_path / "mirrored"), method="robust-filter"))
     assert refused.result is None
     assert refused.is_input
     assert "lights on the other side in y" in refused.reason
