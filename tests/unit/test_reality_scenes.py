@@ -19,7 +19,7 @@ DOZEN = range(1, 13)
 FOUND = 99.5
 """Percent of the balls, as wanted of any hundred scenes."""
 WITHIN_2U = {"x": 88.0, "y": 88.0, "diameter": 88.0, "top": 86.0}
-"""Percent of the readings of a part: 92 are wanted of a hundred scenes; twelve scatter by 6; docs/accuracy.md has those."""
+"""Percent of the readings of a part: 92 are wanted of a hundred scenes, twelve scatter by 6 (docs/accuracy.md)."""
 
 
 @pytest.mark.timeout(900)
