@@ -312,12 +312,7 @@ def _intensities(values: ArrayLike | None, count: int) -> NDArray[np.float64]:
     if intensities.shape != (count,):
         msg = f"light_intensities: must have shape ({count},), one a light, got {intensities.shape}"
         raise InputError(msg)
-    wrong = np.flatnonzero(~(np.isfinite(intensities) & (intensities > 0)))
-    if wrong.size:
-        index = int(wrong[0])
-        msg = f"light_intensities[{index}]: must be finite and above 0, got {intensities[index]:g}"
-        raise InputError(msg)
-    return intensities
+    return _positive("light_intensities", intensities)
 
 
 def _uncertainties(u_deg: ArrayLike | None, count: int) -> NDArray[np.float64] | None:
@@ -330,9 +325,14 @@ def _uncertainties(u_deg: ArrayLike | None, count: int) -> NDArray[np.float64] |
     if values.shape != (count,):
         msg = f"u_deg: must be one number, or have shape ({count},), one a light, got {values.shape}"
         raise InputError(msg)
+    return _positive("u_deg", values)
+
+
+def _positive(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The values (L,), where all are finite and above 0."""
     wrong = np.flatnonzero(~(np.isfinite(values) & (values > 0)))
     if wrong.size:
         index = int(wrong[0])
-        msg = f"u_deg[{index}]: must be finite and above 0, got {values[index]:g}"
+        msg = f"{name}[{index}]: must be finite and above 0, got {values[index]:g}"
         raise InputError(msg)
     return values
