@@ -133,7 +133,7 @@ def inspect(
     pictures = _is_drawn(pictures, "the pictures are left out: drawing them", "matplotlib")
     page = _is_drawn(page, "report.html is left out: it", "plotly")
     wanted = Wanted(pictures=pictures, page=page, parquet=parquet, cfx=cfx)
-    with stage_progress() as report, atomic_folder(output, NAMES) as place, _painter(wanted=pictures) as painter:
+    with stage_progress() as report, atomic_folder(output, NAMES) as place:
         clear_places(output)
         part = None if recipe is None else bgars.read_part_recipe(recipe)
         capture = bgars.read_capture(folder, station=station)
@@ -145,10 +145,11 @@ def inspect(
                 capture, part, part.strip, output, place, wanted, method, serial, identity, told, report
             )
         else:
-            result = bgars.inspect(capture, part, method=method, surface=page, check=False, progress=report)
-            result = replace(result, serial=serial, identity=identity, inspected_utc=utc_now())
-            result = replace(result, warnings=(*told, *result.warnings))
-            files = write_result(result, capture, place, wanted, painter)
+            with _painter(wanted=pictures) as painter:
+                result = bgars.inspect(capture, part, method=method, surface=page, check=False, progress=report)
+                result = replace(result, serial=serial, identity=identity, inspected_utc=utc_now())
+                result = replace(result, warnings=(*told, *result.warnings))
+                files = write_result(result, capture, place, wanted, painter)
     if part is not None and part.strip is not None:
         tell_strip(rows, output, as_json=as_json, log_line=log_line)
         verdicts = {row.verdict for row in rows}
