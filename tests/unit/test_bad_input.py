@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import struct
 import zlib
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import bgars
 import imageio.v3 as iio
@@ -212,6 +214,24 @@ def test_lp_files(capture_folder: Path, text: str, words: list[str]) -> None:
     (capture_folder / "capture.toml").unlink()
     (capture_folder / "a.lp").write_text(text, encoding="utf-8")
     refused(capture_folder, bgars.FileFormatError, "a.lp", *words)
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        bgars.calibrate_flat,
+        bgars.calibrate_lights,
+        bgars.calibrate_material,
+        bgars.estimate_normals,
+        bgars.evaluate,
+        bgars.find_balls,
+        bgars.inspect,
+        bgars.reconstruct,
+    ],
+)
+def test_a_path_is_no_capture(function: Callable[[Any], object]) -> None:
+    with pytest.raises(bgars.InputError, match=r"capture: must be a Capture, as bgars.read_capture\(FOLDER\).*got str"):
+        function("folder")
 
 
 def test_arrays() -> None:

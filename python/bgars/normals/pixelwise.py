@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
@@ -16,6 +17,7 @@ from bgars.records.normal_field import NormalField
 from bgars.records.pixels import float_full_scale
 from bgars.records.plain_arrays import every_pixel, integer_full_scale, masked_pixels, pixel_array, plain_bool
 from bgars.records.rig import LightRig
+from bgars.records.whole_capture import need_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -110,6 +112,8 @@ def capture_of(
                 msg = f"{name}: the capture brings its own; leave it out, or give plain arrays"
                 raise InputError(msg)
         return images
+    if isinstance(images, str | Path):
+        need_whole(images)
     if light_directions is None:
         msg = "light_directions: needed with plain image arrays, shape (L, 3)"
         raise InputError(msg)

@@ -8,6 +8,7 @@ from bgars import _bgars
 from bgars.errors import CalibrationError
 from bgars.pipelines.normals import estimate_normals
 from bgars.records.scalar_checks import thread_count
+from bgars.records.whole_capture import need_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -59,6 +60,7 @@ def calibrate_material(
     (1, 8, True)
     """
     threads = thread_count(threads)
+    need_whole(capture)
     if len(capture.rig) < _bgars.REFLECTANCE_MIN_LIGHTS:
         least = _bgars.REFLECTANCE_MIN_LIGHTS
         msg = f"{capture.name}: a material needs {least} lights or more, the capture has {len(capture.rig)}"

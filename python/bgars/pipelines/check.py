@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,8 +13,6 @@ from bgars.io.capture import read_capture
 from bgars.records.capture import Capture
 
 if TYPE_CHECKING:
-    from os import PathLike
-
     from bgars.records.findings import Findings
 
 __all__ = ["check", "check_before", "refuse_wrong_geometry", "told_by"]
@@ -56,7 +55,7 @@ def check(capture: Capture | str | PathLike[str]) -> Findings:
     >>> bgars.check(replace(capture, rig=mirrored))
     Findings(error handedness)
     """
-    return check_capture(capture if isinstance(capture, Capture) else read_capture(Path(capture)))
+    return check_capture(read_capture(Path(capture)) if isinstance(capture, str | PathLike) else capture)
 
 
 def told_by(findings: Findings) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from bgars.normals.methods import DEFAULT_METHOD, Method
 from bgars.pipelines.normals import estimate_normals
 from bgars.records.normal_field import NormalField
 from bgars.records.renamed import renamed
+from bgars.records.whole_capture import need_whole
 from bgars.surface.integrate import integrate_normals
 
 if TYPE_CHECKING:
@@ -137,6 +138,7 @@ def evaluate(
     >>> round(errors.mean_deg, 1), errors.invalid
     (9.3, 0)
     """
+    need_whole(capture)
     if truth is None:
         if capture.folder is None:
             msg = "truth: needed for a capture that was not read from a folder"

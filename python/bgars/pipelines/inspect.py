@@ -25,6 +25,7 @@ from bgars.records.circle_pixels import inside_circles
 from bgars.records.part_material import part_material
 from bgars.records.part_recipe import PartRecipe
 from bgars.records.scalar_checks import thread_count
+from bgars.records.whole_capture import need_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -104,6 +105,7 @@ def inspect(
         if progress is not None:
             progress(stage, fraction)
 
+    need_whole(capture)
     check_capture(capture)
     found_first = check_before(capture) if check else ()
     material, warnings = _material(recipe, method, len(capture.rig))

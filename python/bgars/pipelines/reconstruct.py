@@ -13,6 +13,7 @@ from bgars.normals.noise_floor import without_background
 from bgars.pipelines.check import check_before
 from bgars.pipelines.normals import estimate_normals
 from bgars.records.scalar_checks import thread_count
+from bgars.records.whole_capture import need_whole
 from bgars.surface.flatten import Bow, Flatten, find_bow, flattened
 from bgars.surface.integrate import Difference, integrate_normals
 from bgars.surface.mesh import check_faces, mesh_from_height, mesh_size
@@ -153,6 +154,7 @@ def reconstruct(
         if progress is not None:
             progress(stage, fraction)
 
+    need_whole(capture)
     if check:
         check_before(capture)
     report("normals", 0.0)

@@ -12,6 +12,7 @@ from bgars.normals.methods import DEFAULT_METHOD, Method
 from bgars.pipelines.inspect import inspect
 from bgars.records.part_identity import PartIdentity
 from bgars.records.part_recipe import layout_places
+from bgars.records.whole_capture import need_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -114,6 +115,7 @@ def inspect_place(
     CalibrationError
         As :func:`bgars.inspect`.
     """
+    need_whole(capture)
     places_of_strip(capture, recipe)
     strip = _strip_of(recipe)
     alone = part_of_strip(capture, strip, strip.place(place))

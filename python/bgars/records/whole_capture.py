@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from bgars.errors import InputError
-
-if TYPE_CHECKING:
-    from bgars.records.capture import Capture
+from bgars.records.capture import Capture
 
 __all__ = ["need_whole"]
 
 STACK_NDIM = 3
 
 
-def need_whole(capture: Capture) -> None:
+def need_whole(capture: object) -> None:
     """Raise InputError where images, lights, mask, dark frame and levels of a capture do not fit each other.
 
     Readers make captures that do; the constructor takes what it is given.
     """
+    if not isinstance(capture, Capture):
+        msg = f"capture: must be a Capture, as bgars.read_capture(FOLDER) returns it, got {type(capture).__name__}"
+        raise InputError(msg)
     images = capture.images
     if images.ndim != STACK_NDIM or not images.size:
         msg = f"images: must have shape (lights, rows, columns), none of them 0, got {images.shape}"

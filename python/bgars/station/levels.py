@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from bgars.errors import InputError
+from bgars.records.whole_capture import need_whole
 
 if TYPE_CHECKING:
     from bgars.records.capture import Capture
@@ -44,6 +45,7 @@ def linear_levels(capture: Capture) -> Levels:
     InputError
         Images without any light.
     """
+    need_whole(capture)
     full = capture.full_scale if math.isfinite(capture.full_scale) else float(capture.images.max())
     if not full > 0:
         msg = f"{capture.name}: all pixels are 0"

@@ -15,6 +15,7 @@ from bgars.records.light_calibration import BallView, LightCalibration
 from bgars.records.remark import Remark
 from bgars.records.rig import LightRig
 from bgars.records.scalar_checks import check_pitch
+from bgars.records.whole_capture import need_whole
 from bgars.station.light_bundle import solve_lights
 from bgars.station.observe import observe, outlines_a_capture
 
@@ -102,6 +103,8 @@ def calibrate_lights(
     True
     """
     captures = [capture] if isinstance(capture, Capture) else list(capture)
+    for each in captures:
+        need_whole(each)
     if sphere not in {"mirror", "matt"}:
         msg = f"sphere: must be 'mirror' or 'matt', got {sphere!r}"
         raise InputError(msg)
