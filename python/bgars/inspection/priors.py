@@ -81,9 +81,13 @@ ASIDE_PX = 0.015
 """All outlines together aside: lights of a ring cancel what shading does to a rim, but for their differences."""
 OUTLIER_SIGMAS = 3.0
 """A light or an outline that lies farther off gets a standard deviation that puts it there."""
+KNOWN_BY_SHADOWS = 1e-3
+"""Share of what is known of an outline that shadows are taken to say at least, against rounding."""
 LEAST_OUTLINE_PX = 0.02
 """Least scatter of the radii of outlines from ball to ball."""
 MAD_TO_SIGMA = 1.4826
+MAD_NOISE = 1.65
+"""Relative noise of a variance by the median of absolute deviations, over that by the mean square (efficiency 37 %)."""
 MEDIAN_OF_CHI_SQUARE = 0.693
 """Median of the mean of two squared standard normal variables."""
 
@@ -173,19 +177,45 @@ def common_mixtures(problem: Problem, priors: Priors, refine_lights: bool) -> di
     return mixtures
 
 
-def refined_priors(priors: Priors, solution: Solution, chosen: NDArray[np.intp], declared_rig: bool) -> Priors:
-    """Scatter of lights, of q and of outlines as the result shows it (empirical Bayes)."""
+def refined_priors(
+    priors: Priors, solution: Solution, chosen: NDArray[np.intp], u_radius: Array, declared_rig: bool
+) -> Priors:
+    """Scatter of lights, of q and of outlines as the result shows it (empirical Bayes).
+
+    `u_radius` (N,) is what the finder states of the outlines' radii, px.
+    """
     u_q = priors.u_q.copy()
     u_q[chosen] = q_spread(solution, priors.u_q[chosen])
     u_outlines = priors.u_outlines.copy()
-    off = -outline_rows(solution.state, priors.outlines[chosen])[0][:, 2]
-    # Ball by ball: what is alike on all is the outlines' common error.
-    scatter = MAD_TO_SIGMA * float(np.median(np.abs(off - np.median(off))))
-    shadows = float(np.median(solution.alone[:, 3, 3]))
-    own_px = np.sqrt(max(scatter**2 - shadows, LEAST_OUTLINE_PX**2))
-    u_outlines[chosen, 2] = np.maximum(own_px, np.abs(off - np.median(off)) / OUTLIER_SIGMAS)
+    u_outlines[chosen, 2] = _scatter_of_outlines(priors.of_balls(chosen), solution, u_radius[chosen])
     priors = priors._replace(u_q=u_q, u_outlines=u_outlines)
     return priors if declared_rig else priors._replace(u_light_rad=_scatter_of_lights(priors, solution))
+
+
+def _scatter_of_outlines(priors: Priors, solution: Solution, u_stated: Array) -> Array:
+    """(N,) standard deviation of the radius of each outline by itself; one that is far off has its own.
+
+    Outlines drew the solution to themselves; they are compared with what shadows alone say, by a Kalman update
+    backwards. What is alike on all balls is the outlines' common error. Few balls, or shadows that know little of
+    radii, say little of the scatter: that estimate and the finder's word are weighted.
+    """
+    rows, by_ball, _ = outline_rows(solution.state, priors.outlines)
+    row = by_ball[:, 2]
+    relief = np.einsum("ni,ni->n", np.square(row), solution.relief)
+    after = np.einsum("ni,nij,nj->n", row, solution.alone, row) - relief
+    information = np.maximum(1.0 / after - priors.u_outlines[:, 2] ** -2.0, KNOWN_BY_SHADOWS / after)
+    off = -rows[:, 2] / (after * information)
+    off = off - np.median(off)
+    by_shadows = 1.0 / information + relief
+    usual, stated = float(np.median(by_shadows)), float(np.median(u_stated)) ** 2
+    seen = (MAD_TO_SIGMA * float(np.median(np.abs(off)))) ** 2
+    freedom = max(len(off) - 1, 1e-6)
+    u_seen = MAD_NOISE * max(seen, usual) * np.sqrt(2.0 / freedom)
+    weight = stated**2 / (stated**2 + u_seen**2)
+    own_px = np.sqrt(max(weight * (seen - usual) + (1.0 - weight) * stated, LEAST_OUTLINE_PX**2))
+    apart_px = np.sqrt(np.maximum(np.square(off / OUTLIER_SIGMAS) - by_shadows, 0.0))
+    own: Array = np.maximum(own_px, apart_px)
+    return own
 
 
 def _scatter_of_lights(priors: Priors, solution: Solution) -> Array:
@@ -194,7 +224,8 @@ def _scatter_of_lights(priors: Priors, solution: Solution) -> Array:
     ways = tangents(solution.vectors)
     turn = np.einsum("lc,lkc->lk", solution.vectors - priors.vectors, ways) / np.square(length)[:, None]
     off = turn - solution.common[[AZIMUTH, ELEVATION]]
-    size = np.square(off).sum(axis=1) / 2.0
+    # What all are turned by is their own mean (Bessel's correction).
+    size = np.square(off).sum(axis=1) / 2.0 * len(off) / max(len(off) - 1, 1)
     usual = float(np.median(size)) / MEDIAN_OF_CHI_SQUARE
     for _ in range(3):
         ordinary = size < OUTLIER_SIGMAS**2 * usual

@@ -207,7 +207,7 @@ class ShadowPasses:
         solution = bundle(self.state.take(chosen), LONG_ROUNDS if self.is_last else SHORT_ROUNDS)
         for _ in range(EMPIRICAL_ROUNDS if self.is_last else 1):
             before = self.priors
-            self.priors = refined_priors(before, solution, chosen, self.fixed_rig)
+            self.priors = refined_priors(before, solution, chosen, self.problem.u_radius, self.fixed_rig)
             if not self.is_last:
                 break
             solution = bundle(solution.state, SHORT_ROUNDS)
