@@ -28,7 +28,7 @@ SCALAR_WANTED = {"string_type", "float_type", "int_type", "bool_type", "literal_
 class Strict(BaseModel):
     """A table whose unknown keys are errors; `old_names` of keys are taken for one release, with a warning."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=False, defer_build=True)
     old_names: ClassVar[dict[str, str]] = {}
 
     @model_validator(mode="before")
