@@ -139,7 +139,11 @@ def scene_row(name: str, case: Case) -> str:
     radius = (seen["diameter_um"] / 2.0 - true["radius_mm"])[plain]
     top = (seen["top_um"] - true["top_height_mm"])[plain]
     coplanarity = coplanarity_error_um(case, known)
-    flats = [f"{ball.name} {ball.flat_um:.0f} +- {ball.u_flat_um:.0f}" for ball in case.measured.balls if _flat(ball)]
+    flats = [
+        f"{ball.name} {ball.flat_top_depth_um:.0f} +- {ball.u_flat_top_depth_um:.0f}"
+        for ball in case.measured.balls
+        if _flat(ball)
+    ]
     cells = [
         name,
         f"{known.sum()} of {case.present}",

@@ -33,7 +33,7 @@ def failure() -> None:
         found = []
         for q in (1.0, 0.98, 0.95, 0.9, 0.85):
             scene = bgars.Scene.ball_array(2, 2, board=BOARD)
-            scene = replace(scene, balls=tuple(replace(ball, q=q) for ball in scene.balls))
+            scene = replace(scene, balls=tuple(replace(ball, aspect_ratio=q) for ball in scene.balls))
             part = made(scene, material)
             error, fit = part.error_deg(), part.field.reflectance
             judged = part.truth.mask & (part.truth.normals[..., 2] > 0.3)  # noqa: PLR2004
@@ -101,7 +101,7 @@ def inspected_alike() -> None:
     q_values, errors_um, stated_um, moved_deg = (1.0, 0.98, 0.95, 0.9), [], [], []
     for q in q_values:
         scene = bgars.Scene.ball_array(4, 4, board=bgars.Board(material=bgars.Material.matte(0.3)))
-        scene = replace(scene, balls=tuple(replace(ball, q=q) for ball in scene.balls))
+        scene = replace(scene, balls=tuple(replace(ball, aspect_ratio=q) for ball in scene.balls))
         capture, truth = bgars.simulate(scene, RIG, PAINT, NOISY)
         result = bgars.inspect(capture)
         pairs = list(zip(result.balls, truth.balls, strict=True))
@@ -109,7 +109,8 @@ def inspected_alike() -> None:
         stated_um.append(float(np.median([2 * found.u_top_um for found, _ in pairs])))
         elevation_deg = np.degrees(np.arcsin(np.array(result.light_directions)[:, 2]))
         moved_deg.append(float(np.mean(elevation_deg - RIG.elevations_deg)))
-        say("inspected", q, errors_um[-1], stated_um[-1], moved_deg[-1], float(np.median([b.q for b in result.balls])))
+        ratio = float(np.median([ball.aspect_ratio for ball in result.balls]))
+        say("inspected", q, errors_um[-1], stated_um[-1], moved_deg[-1], ratio)
     figure = new_figure(11.5, 3.9)
     left, right = panels(figure, 1, 2)[0]
     left.plot(q_values, errors_um, "o-", color=OKABE_ITO[0], label="true error of the heights (median)")

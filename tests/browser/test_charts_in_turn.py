@@ -65,7 +65,7 @@ def test_a_chart_far_below_waits_and_then_bears_what_was_chosen(page_path: Path,
     marked = "name => document.querySelector(`[data-figure=${name}]`).data.at(-1).x"
     assert page.evaluate(marked, "coplanarity") == [index, index], "below both planes"
     later = [name for name, there in drawn(page).items() if not there]
-    assert "flat_um" in later, "the last is still far away"
+    assert "flat_top_depth_um" in later, "the last is still far away"
     assert page.locator("html[data-charted]").count() == 0
 
     opened.scroll_through()

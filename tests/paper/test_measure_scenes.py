@@ -135,7 +135,7 @@ def test_the_flattened_ball(data_folder: Path) -> None:
         result = measure(data_folder / "scenes" / scene)
         place = next(index for index, row in enumerate(result.rows) if row["shape"] == "ellipsoid")
         assert abs(result.top_um[place]) <= 0.6 * result.scale
-        assert result.measured.balls[place].q == pytest.approx(225.0 / 324.0, abs=0.005)
+        assert result.measured.balls[place].aspect_ratio == pytest.approx(225.0 / 324.0, abs=0.005)
 
 
 def test_all_balls_of_the_large_scene(data_folder: Path) -> None:
@@ -165,6 +165,6 @@ def test_the_realistic_scene(data_folder: Path, bits: str) -> None:
     assert abs(result.coplanarity_um) <= 5.0 * result.scale
     assert result.lights_deg <= 0.3
     clipped = next(index for index, row in enumerate(result.rows) if row["shape"] == "clipped")
-    assert result.measured.balls[clipped].flat_um == pytest.approx(60.0, abs=15.0)
+    assert result.measured.balls[clipped].flat_top_depth_um == pytest.approx(60.0, abs=15.0)
     flagged = [ball.name for ball in result.measured.balls if any("flat top" in reason for reason in ball.reasons)]
     assert flagged == [result.rows[clipped]["name"]]

@@ -289,7 +289,7 @@ def test_limits_of_one_side_count_from_zero() -> None:
         "diameter_um": 80.0,
         "top_um": 80.0,
         "true_position_um": 50.0,
-        "q": pytest.approx(0.2),
+        "aspect_ratio": pytest.approx(0.2),
         "seating_coplanarity_um": 60.0,
         "regression_coplanarity_um": None,
         "pitch_um": 40.0,

@@ -27,14 +27,14 @@ def capture(*, height: float = 1.0, elevation_deg: float = 45.0) -> bgars.Captur
 def flattened_q(height: float) -> float:
     """Vertical over horizontal radius of these balls."""
     flat = {name: bgars.Defect.flattened(height, 1.0) for name in NAMES}
-    return float(bgars.Scene.ball_array(3, 3, height_um=460.0, defects=flat).balls[0].q)
+    return float(bgars.Scene.ball_array(3, 3, height_um=460.0, defects=flat).balls[0].aspect_ratio)
 
 
 def test_a_sound_part_passes_with_a_limit_on_warpage() -> None:
     result = bgars.inspect(capture(), PART)
     assert result.verdict == "pass", result.reasons
     assert 0.0 < result.u_warpage_um < 1.0
-    assert "material fitted on 9 balls" in result.normals_choice
+    assert "material fitted on 9 balls" in result.method_reason
     assert result.material is not None
     told = {row.name: row for row in result.material.parameters}
     assert not result.material.from_file
@@ -57,7 +57,7 @@ def test_flattened_balls_or_a_wrong_common_elevation_are_in_u_and_named(options:
 def test_a_declared_rig_or_shape_settles_what_shadows_cannot() -> None:
     """Either of both, stated with its uncertainty, makes the heights good again."""
     flat = capture(height=0.95)
-    told = replace(PART, q=flattened_q(0.95), u_q=0.002)
+    told = replace(PART, aspect_ratio=flattened_q(0.95), u_aspect_ratio=0.002)
     rig = replace(flat, rig=flat.rig.with_u_deg(0.02))
     for taken, part in ((flat, told), (rig, PART)):
         result = bgars.inspect(taken, part)

@@ -24,8 +24,8 @@ LIMITS = Limits(
     true_position_um=50.0,
     diameter_um=(560.0, 640.0),
     height_um=(460.0, 540.0),
-    q=(0.97, 1.03),
-    flat_um=10.0,
+    aspect_ratio=(0.97, 1.03),
+    flat_top_depth_um=10.0,
     pitch_um=(998.0, 1002.0),
     seating_coplanarity_um=60.0,
     regression_coplanarity_um=60.0,
@@ -233,13 +233,24 @@ def test_a_single_ball_is_judged_by_its_own_limits() -> None:
 
 
 LENGTHS = ("x_um", "y_um", "diameter_um", "top_um")
-UNCERTAINTIES = ("u_x_um", "u_diameter_um", "u_top_um", "u_q", "u_flat_um")
+UNCERTAINTIES = ("u_x_um", "u_diameter_um", "u_top_um", "u_aspect_ratio", "u_flat_top_depth_um")
 
 
 @settings(max_examples=60, deadline=None)
 @given(
     index=st.integers(0, 19),
-    harm=st.sampled_from([*LENGTHS, *UNCERTAINTIES, "q", "flat_um", "reasons", "not measured", "not found", "missing"]),
+    harm=st.sampled_from(
+        [
+            *LENGTHS,
+            *UNCERTAINTIES,
+            "aspect_ratio",
+            "flat_top_depth_um",
+            "reasons",
+            "not measured",
+            "not found",
+            "missing",
+        ]
+    ),
     own=st.booleans(),
 )
 def test_never_a_pass_on_a_ball_that_was_not_measured(index: int, harm: str, own: bool) -> None:
@@ -258,7 +269,13 @@ def test_never_a_pass_on_a_ball_that_was_not_measured(index: int, harm: str, own
     # With limits of coplanarity only, lengths and reasons still count; other quantities are then not judged.
     recipe = RECIPE if own else replace(RECIPE, limits=Limits(seating_coplanarity_um=60.0))
     result = judge_part(found, measurement, recipe)
-    if own or harm not in {"q", "flat_um", "u_q", "u_flat_um", "u_diameter_um"}:
+    if own or harm not in {
+        "aspect_ratio",
+        "flat_top_depth_um",
+        "u_aspect_ratio",
+        "u_flat_top_depth_um",
+        "u_diameter_um",
+    }:
         assert result.verdict != "pass"
         assert result.reasons
     json.loads(result.to_json())

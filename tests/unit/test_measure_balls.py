@@ -265,13 +265,13 @@ def test_near_lights() -> None:
 def test_a_flattened_ball_among_round_ones() -> None:
     scene = array(4, 4, 7)
     balls = list(scene.balls)
-    balls[5] = replace(balls[5], q=0.7, centre_z_um=0.65 * balls[5].radius_um)
-    balls[10] = replace(balls[10], q=0.98)
+    balls[5] = replace(balls[5], aspect_ratio=0.7, centre_z_um=0.65 * balls[5].radius_um)
+    balls[10] = replace(balls[10], aspect_ratio=0.98)
     scene = bgars.Scene(tuple(balls), (), scene.board, scene.size_um)
     capture, truth, found = photograph(scene, bgars.LightRig.ring(8))
     measured = measure_balls(capture, found)
-    assert measured.balls[5].q == pytest.approx(0.7, abs=0.006)
-    assert measured.balls[10].q == pytest.approx(0.98, abs=0.004)
+    assert measured.balls[5].aspect_ratio == pytest.approx(0.7, abs=0.006)
+    assert measured.balls[10].aspect_ratio == pytest.approx(0.98, abs=0.004)
     assert rms(errors(measured, truth, "top_um")) < 0.7
 
 
@@ -279,10 +279,10 @@ def test_a_flat_top_is_found_by_normals() -> None:
     scene = array(3, 4, 8, defects={"B2": bgars.Defect.clipped(40.0)})
     capture, truth, found = photograph(scene, bgars.LightRig.ring(8))
     blind = measure_balls(capture, found)
-    assert all(np.isnan(ball.flat_um) for ball in blind.balls)
+    assert all(np.isnan(ball.flat_top_depth_um) for ball in blind.balls)
     measured = measure_balls(capture, found, field=bgars.estimate_normals(capture))
     clipped = next(ball for ball in measured.balls if ball.name == "B2")
-    assert clipped.flat_um == pytest.approx(40.0, abs=max(3.0, 3.0 * clipped.u_flat_um))
+    assert clipped.flat_top_depth_um == pytest.approx(40.0, abs=max(3.0, 3.0 * clipped.u_flat_top_depth_um))
     assert any("flat top" in reason for reason in clipped.reasons)
     others = [ball for ball in measured.balls if ball.name != "B2"]
     assert all(ball.reasons == () for ball in others)

@@ -24,7 +24,8 @@ def flattened(ratio: float, material: bgars.Material = SOLDER) -> tuple[bgars.Ca
     """Nine balls whose height is `ratio` of their radius, standing in the board to their middle."""
     scene = bgars.Scene.ball_array(3, 3, pitch_um=900.0)
     balls = tuple(
-        replace(ball, q=ratio, centre_z_um=min(ball.centre_z_um, 0.7 * ratio * ball.radius_um)) for ball in scene.balls
+        replace(ball, aspect_ratio=ratio, centre_z_um=min(ball.centre_z_um, 0.7 * ratio * ball.radius_um))
+        for ball in scene.balls
     )
     camera = bgars.Camera(pixel_pitch_um=14.0, read_noise_levels=0.5)
     return bgars.simulate(replace(scene, balls=balls), RING, material, camera, seed=3)

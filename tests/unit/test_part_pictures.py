@@ -73,7 +73,7 @@ def test_the_outline_is_the_shadow_of_the_simulator(near: bool, flattened: bool)
         outline = shadow_outline_um(
             np.array([ball.x_um, ball.y_um, ball.centre_z_um]),
             ball.radius_um,
-            ball.q,
+            ball.aspect_ratio,
             rig.positions_um[light] if rig.positions_um is not None else rig.directions[light],
             np.zeros(2),
             is_position=near,

@@ -49,25 +49,41 @@ def test_a_whole_recipe(tmp_path: Path) -> None:
     ("text", "stated"),
     [
         ("", (None, None, None)),
-        ("q = 0.95\nu_q = 0.02\npitch_u_um = 0.5\n", (0.95, 0.02, 0.5)),
-        ("q = 1\n", (1.0, 0.01, None)),
-        ("u_q = 0.003\n", (1.0, 0.003, None)),
+        ("aspect_ratio = 0.95\nu_aspect_ratio = 0.02\npitch_u_um = 0.5\n", (0.95, 0.02, 0.5)),
+        ("aspect_ratio = 1\n", (1.0, 0.01, None)),
+        ("u_aspect_ratio = 0.003\n", (1.0, 0.003, None)),
     ],
 )
 def test_what_is_known_of_the_balls_and_the_lattice(
     tmp_path: Path, text: str, stated: tuple[float | None, ...]
 ) -> None:
     recipe = bgars.read_part_recipe(write(tmp_path, LATTICE + text))
-    assert (recipe.q, recipe.u_q, recipe.pitch_u_um) == stated
+    assert (recipe.aspect_ratio, recipe.u_aspect_ratio, recipe.pitch_u_um) == stated
     values = recipe.to_dict()
-    assert (values["q"], values["u_q"], values["pitch_u_um"]) == stated
+    assert (values["aspect_ratio"], values["u_aspect_ratio"], values["pitch_u_um"]) == stated
+
+
+def test_old_names_of_keys_are_taken_with_a_warning_that_names_the_file(tmp_path: Path) -> None:
+    old = "q = 0.95\nu_q = 0.02\n[limits]\nq = [0.9, 1.1]\nflat_um = 10\n"
+    path = write(tmp_path, LATTICE + old)
+    with pytest.warns(FutureWarning) as told:
+        recipe = bgars.read_part_recipe(path)
+    assert {str(entry.message).split(";")[0] for entry in told} == {
+        f"{path}: {was} is called {now} now"
+        for was, now in (("q", "aspect_ratio"), ("u_q", "u_aspect_ratio"), ("flat_um", "flat_top_depth_um"))
+    }
+    assert (recipe.aspect_ratio, recipe.u_aspect_ratio) == (0.95, 0.02)
+    assert recipe.limits == bgars.Limits(aspect_ratio=(0.9, 1.1), flat_top_depth_um=10.0)
+    both = write(tmp_path, LATTICE + "q = 0.95\naspect_ratio = 0.95\n")
+    with pytest.raises(bgars.InputError, match="unknown key 'q'"):
+        bgars.read_part_recipe(both)
 
 
 def test_a_recipe_made_in_python_obeys_the_same_rules() -> None:
     layout = bgars.BallLayout(rows=2, cols=2, pitch_um=1000.0)
-    assert bgars.PartRecipe("p", layout, q=0.9).u_q == 0.01
-    assert bgars.PartRecipe("p", layout, u_q=0.02).q == 1.0
-    wrong = ({"q": float("nan")}, {"u_q": -1.0}, {"pitch_u_um": float("inf")})
+    assert bgars.PartRecipe("p", layout, aspect_ratio=0.9).u_aspect_ratio == 0.01
+    assert bgars.PartRecipe("p", layout, u_aspect_ratio=0.02).aspect_ratio == 1.0
+    wrong = ({"aspect_ratio": float("nan")}, {"u_aspect_ratio": -1.0}, {"pitch_u_um": float("inf")})
     for values in wrong:
         with pytest.raises(bgars.InputError, match=f"{next(iter(values))}: must be "):
             bgars.PartRecipe("p", layout, **values)
@@ -103,15 +119,18 @@ def test_positions_instead_of_a_lattice(tmp_path: Path) -> None:
         (LATTICE + "[limits]\nwarpage_um = true\n", ["limits.warpage_um", "True"]),
         (LATTICE + "[limit]\nwarpage_um = 5\n", ["unknown key 'limit'", "'limits'"]),
         ('name = "p"\nrows = 4\ncols = 5\n', ["missing: pitch_um"]),
-        (LATTICE + "q = 0.19\n", ["q: must be from 0.2 to 2", "got 0.19"]),
-        (LATTICE + "q = 2.1\n", ["q: must be from 0.2 to 2", "got 2.1"]),
-        (LATTICE + "q = nan\n", ["q: ", "finite", "nan"]),
-        (LATTICE + "q = [0.9, 1.1]\n", ["q: ", "number", "[0.9, 1.1]"]),
-        (LATTICE + "q = true\n", ["q: ", "number", "True"]),
-        (LATTICE + "u_q = 0\n", ["u_q: ", "greater than 0", "0"]),
-        (LATTICE + "u_q = inf\n", ["u_q: ", "finite", "inf"]),
-        (LATTICE + 'u_q = "1 %"\n', ["u_q: ", "number", "1 %"]),
-        (LATTICE + "q = 0.9\n[limits]\nq = [0.95, 1.05]\n", ["q: ", "within limits.q (0.95 to 1.05)", "got 0.9"]),
+        (LATTICE + "aspect_ratio = 0.19\n", ["aspect_ratio: must be from 0.2 to 2", "got 0.19"]),
+        (LATTICE + "aspect_ratio = 2.1\n", ["aspect_ratio: must be from 0.2 to 2", "got 2.1"]),
+        (LATTICE + "aspect_ratio = nan\n", ["aspect_ratio: ", "finite", "nan"]),
+        (LATTICE + "aspect_ratio = [0.9, 1.1]\n", ["aspect_ratio: ", "number", "[0.9, 1.1]"]),
+        (LATTICE + "aspect_ratio = true\n", ["aspect_ratio: ", "number", "True"]),
+        (LATTICE + "u_aspect_ratio = 0\n", ["u_aspect_ratio: ", "greater than 0", "0"]),
+        (LATTICE + "u_aspect_ratio = inf\n", ["u_aspect_ratio: ", "finite", "inf"]),
+        (LATTICE + 'u_aspect_ratio = "1 %"\n', ["u_aspect_ratio: ", "number", "1 %"]),
+        (
+            LATTICE + "aspect_ratio = 0.9\n[limits]\naspect_ratio = [0.95, 1.05]\n",
+            ["aspect_ratio: ", "within limits.aspect_ratio (0.95 to 1.05)", "got 0.9"],
+        ),
         (LATTICE + "pitch_u_um = -1\n", ["pitch_u_um: ", "greater than 0", "-1"]),
         (LATTICE + "u_pitch_um = 1\n", ["unknown key 'u_pitch_um'", "nearest known key is 'pitch_u"]),
         ('name = "p"\n', ["rows, cols and pitch_um, or positions"]),

@@ -30,6 +30,19 @@ def test_old_names_are_taken_with_a_warning(field: bgars.NormalField) -> None:
     assert len(told) == 1
 
 
+def test_readings_of_balls_have_their_old_names() -> None:
+    ball = bgars.BallResult("A1", 0, 0, True, "pass", (), aspect_ratio=0.9, u_flat_top_depth_um=2.0)
+    with pytest.warns(DeprecationWarning, match="BallResult.q is called aspect_ratio now"):
+        assert ball.q == 0.9  # type: ignore[attr-defined]
+    with pytest.warns(DeprecationWarning, match="BallResult.u_flat_um is called u_flat_top_depth_um now"):
+        assert ball.u_flat_um == 2.0  # type: ignore[attr-defined]
+    with pytest.warns(DeprecationWarning, match="PartRecipe.u_q"):
+        part = bgars.PartRecipe("p", bgars.BallLayout(2, 2, 1000.0), u_q=0.02)  # type: ignore[call-arg]
+    assert (part.aspect_ratio, part.u_aspect_ratio) == (1.0, 0.02)
+    with pytest.warns(DeprecationWarning, match="Limits.flat_um"):
+        assert bgars.Limits(flat_um=3.0) == bgars.Limits(flat_top_depth_um=3.0)  # type: ignore[call-arg]
+
+
 def test_summaries_hold_both_names() -> None:
     result = bgars.evaluate(bgars.read_capture(bgars.sample_capture()), method="lambertian").to_dict()
     assert result["choice"] == result["method_reason"] == "lambertian, as asked"

@@ -267,7 +267,7 @@ def test_a_result_that_is_none_is_refused_by_name(tmp_path: Path, text: str, wor
 VALUES = st.one_of(
     st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=5), st.just([]), st.just({}),
     st.sampled_from([[None], 0, 0.0, -1.0, 1e-300, 1e300, 10**400, "pass", [1.0, 2.0]]),
-    st.sampled_from([{"limits": 3}, {"limits": {"q": [1]}}]),
+    st.sampled_from([{"limits": 3}, {"limits": {"aspect_ratio": [1]}}]),
 )  # fmt: skip
 
 

@@ -17,6 +17,7 @@ from bgars.io.result_schema import table_of
 from bgars.records.ball_layout import BallLayout
 from bgars.records.keys import Key, as_plain, keys_of
 from bgars.records.part_check import PartCheck
+from bgars.records.part_identity import PartIdentity
 from bgars.records.part_recipe import PartRecipe
 from bgars.records.seating_result import SeatingResult
 from judged_parts import LIMITS, RECIPE, judged
@@ -100,9 +101,9 @@ def test_a_field_is_all_that_a_reading_takes() -> None:
 
 
 def test_what_a_recipe_knows_of_balls_and_lattice_comes_back(tmp_path: Path) -> None:
-    result = judged(replace(RECIPE, q=0.98, u_q=0.02, pitch_u_um=0.5))
+    result = judged(replace(RECIPE, aspect_ratio=0.98, u_aspect_ratio=0.02, pitch_u_um=0.5))
     text = result.to_json()
-    assert '"q": 0.98' in text
+    assert '"aspect_ratio": 0.98' in text
     (tmp_path / "result.json").write_text(text, encoding="utf-8")
     again = bgars.read_result(tmp_path)
     assert again.recipe == result.recipe
@@ -111,10 +112,42 @@ def test_what_a_recipe_knows_of_balls_and_lattice_comes_back(tmp_path: Path) -> 
 
 def test_a_result_from_before_recipes_could_state_q_is_read(tmp_path: Path) -> None:
     values = json.loads(judged().to_json())
-    for key in ("q", "u_q", "pitch_u_um"):
+    for key in ("aspect_ratio", "u_aspect_ratio", "pitch_u_um"):
         assert values["recipe"].pop(key) is None
     (tmp_path / "result.json").write_text(json.dumps(values), encoding="utf-8")
     assert bgars.read_result(tmp_path).recipe == RECIPE
+
+
+OLD_NAMES = {"q": "aspect_ratio", "flat_um": "flat_top_depth_um"}
+OLD_NAMES |= {f"u_{old}": f"u_{new}" for old, new in OLD_NAMES.items()} | {"normals_choice": "method_reason"}
+LATER = {
+    2: ("material", "normals_choice"),
+    3: ("seating_budget", "budget"),
+    4: ("identity", "q", "u_q", "pitch_u_um", "strip"),
+}
+"""Keys that came with a version, of the result, its recipe and its balls."""
+
+
+@pytest.mark.parametrize("version", [1, 2, 3, 4])
+def test_results_of_every_earlier_version_are_read(version: int, tmp_path: Path) -> None:
+    """As that version wrote them: with its names, and without the keys that came later."""
+    result = judged()
+    values = json.loads(result.to_json()) | {"format_version": version}
+    for table in (values, values["recipe"], values["recipe"]["limits"], *values["balls"]):
+        for old, new in OLD_NAMES.items():
+            if new in table:
+                table[old] = table.pop(new)
+    late = {key for came, keys in LATER.items() if came > version for key in keys}
+    balls = ((ball, late - {"q", "u_q"}) for ball in values["balls"])
+    for table, keys in ((values, late), (values["recipe"], late), *balls):
+        for key in keys & table.keys():
+            del table[key]
+    (tmp_path / "result.json").write_text(json.dumps(values), encoding="utf-8")
+    again = bgars.read_result(tmp_path)
+    known = {} if version > 1 else {"material": None, "method_reason": ""}
+    budgets = {} if version > 2 else {"seating_budget": {}, "balls": tuple(replace(b, budget={}) for b in result.balls)}
+    identity = {} if version > 3 else {"identity": PartIdentity()}
+    assert again.to_json() == replace(result, **known, **budgets, **identity).to_json()
 
 
 def change(key: str, value: object) -> Callable[[dict[str, Any]], object]:
@@ -123,8 +156,8 @@ def change(key: str, value: object) -> Callable[[dict[str, Any]], object]:
 
 SPOILT: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     "foreign": (lambda v: v.pop("format"), "is not a result of bgars: it must be an object"),
-    "older": (lambda v: v.pop("format_version"), "format_version: this bgars reads 2 to 4, got None"),
-    "newer": (change("format_version", 5), "format_version: this bgars reads 2 to 4, got 5"),
+    "older": (lambda v: v.pop("format_version"), "format_version: this bgars reads 1 to 5, got None"),
+    "newer": (change("format_version", 6), "format_version: this bgars reads 1 to 5, got 6"),
     "key gone": (lambda v: v["balls"][2].pop("top_um"), "balls.2.top_um: Field required"),
     "unknown key": (change("colour", "red"), "unknown key 'colour'"),
     "unknown key of a ball": (lambda v: v["balls"][0].update(x_mm=1), "unknown key 'balls.0.x_mm'; the nearest known"),
@@ -133,7 +166,10 @@ SPOILT: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     "one light too few": (lambda v: v["light_change_deg"].pop(), "light_change_deg: must have one number for each"),
     "no pitch": (change("pixel_pitch_um", None), "pixel_pitch_um: Input should be a valid number"),
     "contradicting layout": (lambda v: v["recipe"]["layout"].update(rows=None), "recipe: layout.rows: must be above 0"),
-    "impossible q": (lambda v: v["recipe"].update(q=5.0), "recipe: q: must be from 0.2 to 2, got 5"),
+    "impossible q": (
+        lambda v: v["recipe"].update(aspect_ratio=5.0),
+        "recipe: aspect_ratio: must be from 0.2 to 2, got 5",
+    ),
     "checksum": (lambda v: v["files"][0].update(sha256="abc"), "files.0.sha256"),
     "material's unit": (lambda v: v["material"]["parameters"][0].update(unit="cd"), "material.parameters.0.unit"),
     "time": (change("inspected_utc", "yesterday"), "inspected_utc"),

@@ -55,7 +55,7 @@ def test_parquet_holds_every_reading_with_its_unit(tmp_path: Path) -> None:
     bgars.write_parquet(result, tmp_path / "balls.parquet")
     table = parquet.read_table(tmp_path / "balls.parquet")
     assert table.schema.metadata[b"format"] == b"bgars-result-balls"
-    assert table.schema.metadata[b"format_version"] == b"4"
+    assert table.schema.metadata[b"format_version"] == b"5"
     for name in table.column_names:
         about = table.schema.field(name).metadata
         assert about[b"unit"] == (b"um" if name.endswith("_um") else b""), name

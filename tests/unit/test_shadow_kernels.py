@@ -32,7 +32,7 @@ def part(rig: bgars.LightRig) -> tuple[bgars.Capture, Array, Array]:
     capture, truth = bgars.simulate(
         scene, rig, bgars.Material(i_d=0.5, i_s=1.0, hardness=40), bgars.Camera(pixel_pitch_um=PITCH_UM), seed=3
     )
-    rows = [(ball.x_um, ball.y_um, ball.centre_z_um, ball.diameter_um, ball.q) for ball in truth.balls]
+    rows = [(ball.x_um, ball.y_um, ball.centre_z_um, ball.diameter_um, ball.aspect_ratio) for ball in truth.balls]
     unit = [PITCH_UM, PITCH_UM, PITCH_UM, 2.0 * PITCH_UM, 1.0]
     table = np.array(rows, dtype=np.float64) / unit + [0.4, -0.3, 0.2, 0.1, 0.0]
     vectors = rig.directions if rig.positions_um is None else rig.positions_um / PITCH_UM

@@ -36,16 +36,19 @@ CASES: list[tuple[Callable[[], object], list[str]]] = [
     (lambda: bgars.Ball(0, 0, radius_um=300, centre_z_um=-300), ["centre_z_um", "above the board", "0"]),
     (lambda: bgars.Ball(0, 0, radius_um=0, centre_z_um=0), ["ball A1: radius_um", "above 0", "0"]),
     (lambda: bgars.Ball(NAN, 0, radius_um=1, centre_z_um=0), ["x_um", "finite", "nan"]),
-    (lambda: bgars.Ball(0, 0, radius_um=9, centre_z_um=9, q=0.5), ["centre_z_um", "4.5", "9"]),
-    (lambda: bgars.Ball(0, 0, radius_um=9, centre_z_um=0, q=-1), ["q", "above 0", "-1"]),
-    (lambda: bgars.Ball(0, 0, radius_um=9, centre_z_um=5, flat_um=9), ["flat_um", "below 9", "equator", "9"]),
+    (lambda: bgars.Ball(0, 0, radius_um=9, centre_z_um=9, aspect_ratio=0.5), ["centre_z_um", "4.5", "9"]),
+    (lambda: bgars.Ball(0, 0, radius_um=9, centre_z_um=0, aspect_ratio=-1), ["aspect_ratio", "above 0", "-1"]),
+    (
+        lambda: bgars.Ball(0, 0, radius_um=9, centre_z_um=5, flat_top_depth_um=9),
+        ["flat_top_depth_um", "below 9", "equator", "9"],
+    ),
     (lambda: bgars.Scene((bgars.Scene.ball().balls[0],) * 2), ["scene.balls", "different names", "A1"]),
     (lambda: ARRAY(0, 3), ["scene.rows", "1 or more", "0"]),
     (lambda: ARRAY(2, 2.5), ["scene.cols", "whole number", "2.5"]),  # type: ignore[arg-type]
     (lambda: ARRAY(2, 2, defects={"C1": bgars.Defect.missing()}), ["scene.defects", "2 x 2 array", "'C1'"]),
     (lambda: ARRAY(2, 2, defects={"A1": bgars.Defect.flattened(0.3)}), ["ball A1", "above the ball's centre", "-50"]),
     (lambda: ARRAY(2, 2, defects={"A1": bgars.Defect.offset(500, 0)}), ["A1 and A2 overlap", "500"]),
-    (lambda: ARRAY(2, 2, defects={"A1": bgars.Defect.clipped(300)}), ["flat_um", "equator", "300"]),
+    (lambda: ARRAY(2, 2, defects={"A1": bgars.Defect.clipped(300)}), ["flat_top_depth_um", "equator", "300"]),
     (lambda: ARRAY(2, 2, seed=-1), ["scene.seed", "0 or more", "-1"]),
     (lambda: bgars.Defect.size(0.0), ["defect.scale", "above 0", "0"]),
     (lambda: bgars.Defect("melted"), ["defect.kind", "'missing'", "'melted'"]),  # type: ignore[arg-type]

@@ -199,7 +199,7 @@ def test_the_ball_table_is_a_csv_and_a_json(tmp_path: Path) -> None:
     assert float(rows[0]["top_um"]) == truth.balls[0].top_um
     values = json.loads((tmp_path / "truth.json").read_text(encoding="utf-8"))
     assert values["seating_coplanarity_um"] == truth.seating_coplanarity_um
-    assert values["ball_table"][0]["q"] == 1.0
+    assert values["ball_table"][0]["aspect_ratio"] == 1.0
 
 
 @pytest.mark.parametrize("name", sorted(set(bgars.named_recipes()) - {"array-10x10"}))

@@ -21,7 +21,7 @@ def test_the_shadow_on_the_board_is_the_ellipse(elevation_deg: float, q: float) 
     """Centre c_xy - c_z l_xy / l_z, semi-axes R across and R / l_z along; a spheroid with c_z / q and l_z / q."""
     radius, centre_z, x0, y0 = 300.0, 200.0, 13.0, -29.0
     rig = bgars.LightRig.ring(5, elevation_deg=elevation_deg, azimuth0_deg=17.0)
-    scene = bgars.Scene((bgars.Ball(x0, y0, radius_um=radius, centre_z_um=centre_z, q=q),))
+    scene = bgars.Scene((bgars.Ball(x0, y0, radius_um=radius, centre_z_um=centre_z, aspect_ratio=q),))
     shape = (400, 410)
     _, truth = bgars.simulate(scene, rig, MATTE, bgars.Camera(pixel_pitch_um=7.0, shape=shape))
     x, y = grid_um(shape, 7.0)
@@ -54,7 +54,7 @@ def is_inside(scene: bgars.Scene, points: np.ndarray) -> np.ndarray:
     for ball in scene.balls:
         if ball.present:
             square = (points[:, 0] - ball.x_um) ** 2 + (points[:, 1] - ball.y_um) ** 2
-            square = square + ((points[:, 2] - ball.centre_z_um) / ball.q) ** 2
+            square = square + ((points[:, 2] - ball.centre_z_um) / ball.aspect_ratio) ** 2
             inside |= (square < ball.radius_um**2) & (points[:, 2] < ball.top_um)
     for bridge in scene.bridges:
         first, second = by_name[bridge.first], by_name[bridge.second]

@@ -78,7 +78,7 @@ def test_normals_are_the_slope_of_the_height_on_every_kind_of_surface() -> None:
 
 
 def test_a_spheroid_and_a_flat_top() -> None:
-    ball = bgars.Ball(0.0, 0.0, radius_um=300.0, centre_z_um=150.0, q=0.8, flat_um=30.0)
+    ball = bgars.Ball(0.0, 0.0, radius_um=300.0, centre_z_um=150.0, aspect_ratio=0.8, flat_top_depth_um=30.0)
     truth = truth_of(bgars.Scene((ball,)), shape=(101, 101))
     x, y = grid_um((101, 101), 10.0)
     inside = np.maximum(1.0 - (x**2 + y**2) / 300.0**2, 0.0)
@@ -88,8 +88,8 @@ def test_a_spheroid_and_a_flat_top() -> None:
     flat = np.hypot(x, y) < 300.0 * np.sqrt(1 - (210.0 / 240.0) ** 2)
     assert (truth.normals[flat] == [0, 0, 1]).all()
     assert ball.top_um == 360.0
-    assert truth.balls[0].q == 0.8
-    assert truth.balls[0].flat_um == 30.0
+    assert truth.balls[0].aspect_ratio == 0.8
+    assert truth.balls[0].flat_top_depth_um == 30.0
 
 
 def test_the_ball_table_of_an_array() -> None:

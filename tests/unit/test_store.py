@@ -10,13 +10,15 @@ import sqlite3
 import subprocess
 import sys
 import time
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
 import bgars
 import pytest
 from bgars.store import append, part_key
-from bgars.store.schema import TABLES, arrow_schema
+from bgars.store.schema import OLD_NAMES, TABLES, arrow_schema
+from pyarrow import parquet
 from stored_parts import filled_store, part
 
 HERE = Path(__file__).parent
@@ -49,7 +51,7 @@ def test_files_say_units_and_lie_by_day_and_recipe(tmp_path: Path) -> None:
     assert file.parent.relative_to(tmp_path / "store") == Path("balls/day=2026-01-01/recipe=two%20by%20three")
     schema = parquet.ParquetFile(file).schema_arrow
     assert schema.field("top_um").metadata[b"unit"] == b"um"
-    assert schema.metadata[b"format_version"] == b"1"
+    assert schema.metadata[b"format_version"] == b"2"
     for table in TABLES:
         for field in arrow_schema(table):
             assert len(field.metadata[b"description"]) > 2
@@ -168,8 +170,8 @@ def test_processes_append_and_compact_at_once_and_kill_each_other(tmp_path: Path
 def test_a_newer_store_is_refused_in_one_line(tmp_path: Path) -> None:
     store = filled_store(tmp_path / "store", 1)
     mark = store.folder / "store.json"
-    mark.write_text(json.dumps(json.loads(mark.read_text()) | {"format_version": 2}))
-    with pytest.raises(bgars.FileFormatError, match="reads stores up to 1, got 2: written by a newer bgars"):
+    mark.write_text(json.dumps(json.loads(mark.read_text()) | {"format_version": 3}))
+    with pytest.raises(bgars.FileFormatError, match="reads stores up to 2, got 3: written by a newer bgars"):
         bgars.open_store(store.folder)
     with pytest.raises(bgars.FileFormatError, match="is not a store of bgars"):
         bgars.open_store(tmp_path)
@@ -180,6 +182,42 @@ def test_a_newer_store_is_refused_in_one_line(tmp_path: Path) -> None:
     mark.write_text("{")
     with pytest.raises(bgars.FileFormatError, match="cannot be read"):
         bgars.open_store(store.folder)
+
+
+def as_version_1(folder: Path) -> Path:
+    """Give a store the columns, and the mark, that version 1 wrote."""
+    for path in (folder / "balls").rglob("*.parquet"):
+        table = parquet.read_table(path, partitioning=None)
+        was = {new: old for old, new in OLD_NAMES["balls"].items()}
+        parquet.write_table(table.rename_columns([was.get(name, name) for name in table.column_names]), path)
+    mark = folder / "store.json"
+    mark.write_text(json.dumps(json.loads(mark.read_text()) | {"format_version": 1}))
+    return folder
+
+
+def test_a_store_of_version_1_is_read_and_appended_to(tmp_path: Path) -> None:
+    folder = as_version_1(filled_store(tmp_path / "store", 2).folder)
+    asked = "select serial, name, aspect_ratio, u_aspect_ratio, flat_top_depth_um from balls order by all"
+    assert bgars.open_store(folder).query("select * from balls").column_names.count("q") == 0
+    assert bgars.open_store(folder).append(part(2))
+    expected = filled_store(tmp_path / "new", 3).query(asked)
+    assert bgars.open_store(folder).query(asked) == expected
+    assert json.loads((folder / "store.json").read_text())["format_version"] == 2
+    bgars.open_store(folder).compact()
+    assert bgars.open_store(folder).query(asked) == expected
+
+
+def test_a_database_of_version_1_goes_on(tmp_path: Path) -> None:
+    store, url = filled_store(tmp_path / "store", 1), f"sqlite:///{tmp_path / 'parts.db'}"
+    store.export(url)
+    with closing(sqlite3.connect(tmp_path / "parts.db")) as base, base:
+        for old, new in OLD_NAMES["balls"].items():
+            base.execute(f"alter table bgars_balls rename column {new} to {old}")
+    store.append(part(1))
+    assert store.export(url)["bgars_parts"] == 1
+    with closing(sqlite3.connect(tmp_path / "parts.db")) as base:
+        (count,) = base.execute("select count(aspect_ratio) from bgars_balls").fetchone()
+    assert count == len(part(0).balls) + len(part(1).balls)
 
 
 def test_a_store_is_made_where_making_one_was_killed(tmp_path: Path) -> None:

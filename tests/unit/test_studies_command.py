@@ -113,7 +113,7 @@ def mixed_recipe(folder: Path) -> None:
 
 
 def other_limits(folder: Path) -> None:
-    limits = replace(RECIPE.limits, flat_um=7.0)
+    limits = replace(RECIPE.limits, flat_top_depth_um=7.0)
     rewrite(folder / "part2" / "place1" / "2", judged(replace(RECIPE, limits=limits), part=2))
 
 

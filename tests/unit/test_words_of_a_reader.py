@@ -44,9 +44,9 @@ def test_pages_say_the_micrometre_in_one_way_and_keep_the_result_as_it_is() -> N
 
 def test_small_uncertainties_are_not_rounded_to_nothing_in_the_table() -> None:
     result = passing()
-    ball = replace(result.balls[0], u_q=0.000294, q=1.000105, u_top_um=0.00042)
+    ball = replace(result.balls[0], u_aspect_ratio=0.000294, aspect_ratio=1.000105, u_top_um=0.00042)
     row = next(csv.DictReader(io.StringIO(replace(result, balls=(ball,)).to_csv())))
-    assert (row["u_q"], row["q"], row["u_top_um"]) == ("0.000294", "1.000105", "0.00042")
+    assert (row["u_aspect_ratio"], row["aspect_ratio"], row["u_top_um"]) == ("0.000294", "1.000105", "0.00042")
 
 
 def test_marks_of_the_deviations_are_explained() -> None:

@@ -117,7 +117,7 @@ def warn(message: str) -> None:
 
 
 def notes_to_stderr() -> None:
-    """Print what had to be assumed to read a capture as notes, each once; other warnings stay as they are."""
+    """Print as notes, each once, what had to be assumed to read a file, and old names in it; other warnings stay."""
     other = warnings.showwarning
 
     def show(  # as warnings.showwarning
@@ -128,7 +128,7 @@ def notes_to_stderr() -> None:
         file: TextIO | None = None,
         line: str | None = None,
     ) -> None:
-        if issubclass(category, CaptureWarning):
+        if issubclass(category, CaptureWarning | FutureWarning):
             sys.stderr.write(f"note: {_encodable(str(message))}\n")
         else:
             other(message, category, filename, lineno, file, line)

@@ -28,8 +28,8 @@ WORDS = {
     "true_position_um": "true position",
     "diameter_um": "diameter",
     "height_um": "height",
-    "q": "vertical over horizontal radius",
-    "flat_um": "flat top",
+    "aspect_ratio": "vertical over horizontal radius",
+    "flat_top_depth_um": "flat top",
 }
 MISSING = "no ball at its place"
 UNCLEAR = "something is at its place, but it was not measured"
@@ -105,7 +105,7 @@ def judge_ball(
                 allowed = limits.range_of(name)
                 if allowed is None:
                     continue
-                verdict, reason = decide(WORDS[name], value, u, allowed, unit="" if name == "q" else "um")
+                verdict, reason = decide(WORDS[name], value, u, allowed, unit="" if name == "aspect_ratio" else "um")
                 if verdict == "fail" and (doubts or circle_alone):
                     verdict = "undecided"
                 if verdict != "pass":
@@ -131,8 +131,8 @@ def _readings(ball: MeasuredBall, position: Position) -> Iterator[tuple[str, flo
         "true_position_um": (position.distance_um, position.u_um),
         "diameter_um": (ball.diameter_um, ball.u_diameter_um),
         "height_um": (ball.top_um, ball.u_top_um),
-        "q": (ball.q, ball.u_q),
-        "flat_um": (ball.flat_um, ball.u_flat_um),
+        "aspect_ratio": (ball.aspect_ratio, ball.u_aspect_ratio),
+        "flat_top_depth_um": (ball.flat_top_depth_um, ball.u_flat_top_depth_um),
     }
     for name in BALL_LIMITS:
         yield name, *pairs[name]

@@ -80,4 +80,10 @@ def _ball_to_scale(ball: MeasuredBall, lens: LensScale) -> MeasuredBall:
         if name in budget:
             causes = {cause: part * factor for cause, part in budget[name].items()} | {SCALE: by_scale}
             budget[name] = dict(sorted(causes.items(), key=lambda pair: -pair[1]))
-    return replace(ball, **values, flat_um=ball.flat_um * length, u_flat_um=ball.u_flat_um * length, budget=budget)
+    return replace(
+        ball,
+        **values,
+        flat_top_depth_um=ball.flat_top_depth_um * length,
+        u_flat_top_depth_um=ball.u_flat_top_depth_um * length,
+        budget=budget,
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import ConfigDict, Field, model_validator
 
@@ -13,7 +13,7 @@ from bgars.io.positions import read_positions
 from bgars.io.strict_toml import Strict, checked, read_values
 from bgars.records.ball_layout import BallLayout
 from bgars.records.ball_names import ball_name, ball_place
-from bgars.records.part_recipe import BALL_LIMITS, PART_LIMITS, Limits, PartRecipe, View
+from bgars.records.part_recipe import Limits, PartRecipe, View
 from bgars.records.strip_layout import StripLayout
 
 if TYPE_CHECKING:
@@ -38,13 +38,15 @@ class StrictNumbers(Strict):
 class LimitsTable(StrictNumbers):
     """The ``[limits]`` table."""
 
+    old_names: ClassVar = {"q": "aspect_ratio", "flat_um": "flat_top_depth_um"}
+
     true_position_um: Positive | None = Field(
         None, description="largest distance of a ball from its grid place; half of a diametral tolerance"
     )
     diameter_um: Range | None = Field(None, description="lowest and highest horizontal diameter")
     height_um: Range | None = Field(None, description="lowest and highest top above the local board")
-    q: Range | None = Field(None, description="lowest and highest vertical over horizontal radius (a ratio)")
-    flat_um: Positive | None = Field(None, description="largest height that a flat top may lack")
+    aspect_ratio: Range | None = Field(None, description="lowest and highest vertical over horizontal radius")
+    flat_top_depth_um: Positive | None = Field(None, description="largest height that a flat top may lack")
     pitch_um: Range | None = Field(None, description="lowest and highest pitch of the best-fitting grid")
     seating_coplanarity_um: Positive | None = Field(None, description="largest apex distance from the seating plane")
     regression_coplanarity_um: Positive | None = Field(
@@ -57,8 +59,7 @@ class LimitsTable(StrictNumbers):
     def _in_order(cls, values: Any) -> Any:  # noqa: ANN401 - whatever the file holds
         if not isinstance(values, dict):
             return values
-        for name in (*BALL_LIMITS, *PART_LIMITS):
-            limit = values.get(name)
+        for name, limit in values.items():
             if isinstance(limit, list):
                 numbers = [number for number in limit if isinstance(number, int | float)]
                 pair = 2
@@ -112,6 +113,8 @@ class StripTable(StrictNumbers):
 class PartTable(StrictNumbers):
     """The whole of ``part.toml``; file names are relative to its folder."""
 
+    old_names: ClassVar = {"q": "aspect_ratio", "u_q": "u_aspect_ratio"}
+
     name: Annotated[str, Field(min_length=1)] = Field(description="name of the part")
     view: View = Field("bottom", description='side that names and positions refer to; "top" exchanges left and right')
     rows: Annotated[int, Field(ge=1, le=MAX_BALLS)] | None = Field(None, description="rows of the lattice")
@@ -130,11 +133,13 @@ class PartTable(StrictNumbers):
     )
     diameter_um: Positive | None = Field(None, description="nominal horizontal diameter")
     height_um: Positive | None = Field(None, description="nominal height of the tops above the board")
-    q: Number | None = Field(
+    aspect_ratio: Number | None = Field(
         None,
-        description="vertical over horizontal radius that all balls share (a ratio), 0.2 to 2; 1 with u_q alone",
+        description="vertical over horizontal radius that all balls share, 0.2 to 2; 1 with u_aspect_ratio alone",
     )
-    u_q: Positive | None = Field(None, description="standard uncertainty of q, of all balls alike; 0.01 with q alone")
+    u_aspect_ratio: Positive | None = Field(
+        None, description="standard uncertainty of aspect_ratio, of all balls alike; 0.01 with aspect_ratio alone"
+    )
     gravity_um: list[Number] | None = Field(
         None, description="[x, y] of the centre of gravity against the middle; the mean of the places by default"
     )
@@ -196,13 +201,13 @@ def read_part_recipe(path: str | PathLike[str]) -> PartRecipe:
             limits=Limits(**table.limits.model_dump()),
             diameter_um=table.diameter_um,
             height_um=table.height_um,
-            q=table.q,
-            u_q=table.u_q,
+            aspect_ratio=table.aspect_ratio,
+            u_aspect_ratio=table.u_aspect_ratio,
             pitch_u_um=table.pitch_u_um,
             strip=None if table.strip is None else table.strip.layout(),
             file=path,
         )
-        _check_sizes(table, recipe.q)
+        _check_sizes(table, recipe.aspect_ratio)
     except InputError as error:
         msg = f"{path}: {error}"
         raise InputError(msg) from None
@@ -267,7 +272,7 @@ def _places_of(entry: str) -> tuple[str, ...]:
     return tuple(ball_name(row, col) for row in range(top, bottom + 1) for col in range(left, right + 1))
 
 
-def _check_sizes(table: PartTable, q: float | None) -> None:
+def _check_sizes(table: PartTable, aspect_ratio: float | None) -> None:
     if table.gravity_um is not None and len(table.gravity_um) != len("xy"):
         msg = f"gravity_um: must be [x, y], got {table.gravity_um}"
         raise InputError(msg)
@@ -276,7 +281,7 @@ def _check_sizes(table: PartTable, q: float | None) -> None:
         ("diameter_um", table.diameter_um),
         ("height_um", table.height_um),
         ("pitch_um", table.pitch_um),
-        ("q", q),
+        ("aspect_ratio", aspect_ratio),
     ):
         limit = getattr(limits, name)
         if nominal is not None and limit is not None and not limit[0] <= nominal <= limit[1]:

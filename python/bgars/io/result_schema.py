@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, Strict, create_model, model_validator
 
-from bgars.records.keys import default_of, keys_of, types_of
+from bgars.records.keys import default_of, keys_of, old_names, types_of
 from bgars.records.part_result import FORMAT, FORMAT_VERSION, OLDEST_VERSION, PartResult
 
 __all__ = ["result_model", "result_schema", "table_of"]
@@ -69,11 +69,14 @@ def _model(record: type, heading: dict[str, Any]) -> type[Table]:
             about |= {"min_length": key.shape[0], "max_length": key.shape[0]}
         entries[name] = (_form(types[name], key.shape, key.names, is_known=bool(rules)), Field(**about, **rules))
     late = {name: default_of(record, name) for name, key in keys_of(record).items() if key.is_late}
+    old = old_names(record)
 
     def earlier(values: Any) -> Any:  # noqa: ANN401 - whatever the file holds
-        return late | values if isinstance(values, dict) else values
+        if not isinstance(values, dict):
+            return values
+        return late | {key if old.get(key, key) in values else old[key]: value for key, value in values.items()}
 
-    checks: dict[str, Any] = {"earlier": model_validator(mode="before")(earlier)} if late else {}
+    checks: dict[str, Any] = {"earlier": model_validator(mode="before")(earlier)} if late or old else {}
     about_record = (record.__doc__ or "").partition("\n\n")[0].strip()
     return create_model(record.__name__, __base__=Table, __doc__=about_record, __validators__=checks, **entries)
 

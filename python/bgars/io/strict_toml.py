@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import difflib
 import re
-from typing import TYPE_CHECKING, Any, TypeVar, get_args
+import warnings
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from bgars.errors import InputError
 from bgars.io.toml_text import read_values
@@ -14,6 +15,7 @@ from bgars.io.toml_text import read_values
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from pydantic import ValidationInfo
     from pydantic_core import ErrorDetails
 
 __all__ = ["Strict", "checked", "read_values"]
@@ -24,9 +26,21 @@ SCALAR_WANTED = {"string_type", "float_type", "int_type", "bool_type", "literal_
 
 
 class Strict(BaseModel):
-    """A table whose unknown keys are errors."""
+    """A table whose unknown keys are errors; `old_names` of keys are taken for one release, with a warning."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=False, defer_build=True)
+    old_names: ClassVar[dict[str, str]] = {}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _take_old_names(cls, values: Any, info: ValidationInfo) -> Any:  # noqa: ANN401 - whatever the file holds
+        for old, new in cls.old_names.items() if isinstance(values, dict) else ():
+            if old in values and new not in values:
+                place = f"{info.context}: " if info.context else ""
+                text = f"{place}{old} is called {new} now; the old name goes with the next release"
+                warnings.warn(text, FutureWarning, stacklevel=2)
+                values = {new if key == old else key: value for key, value in values.items()}
+        return values
 
 
 def checked(model: type[Model], values: dict[str, Any], path: Path) -> Model:
@@ -38,7 +52,7 @@ def checked(model: type[Model], values: dict[str, Any], path: Path) -> Model:
         An unknown key (the nearest known one is named), a wrong type or a value out of range.
     """
     try:
-        return model.model_validate(values)
+        return model.model_validate(values, context=path)
     except ValidationError as error:
         raise InputError(_explain(model, path, error)) from None
 

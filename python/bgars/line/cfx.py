@@ -26,8 +26,8 @@ READINGS = {
     "true_position_um": ("true_position_um", "BALL_POSITION", "PinShifted"),
     "diameter_um": ("diameter_um", "BALL_DIAMETER", "SolderDefect"),
     "top_um": ("height_um", "BALL_HEIGHT", "WrongPinHeight"),
-    "q": ("q", "BALL_SHAPE", "SolderDefect"),
-    "flat_um": ("flat_um", "BALL_SHAPE", "SolderDefect"),
+    "aspect_ratio": ("aspect_ratio", "BALL_SHAPE", "SolderDefect"),
+    "flat_top_depth_um": ("flat_top_depth_um", "BALL_SHAPE", "SolderDefect"),
 }
 """Reading of a ball: its limit, and the code and CFX category of a ball that is outside."""
 MICROMETRE, RATIO = "µm", ""

@@ -135,7 +135,7 @@ def inspect(
     result = replace(
         result,
         method=method,
-        normals_choice="" if field is None else field.method_reason,
+        method_reason="" if field is None else field.method_reason,
         material=None if fit is None else part_material(fit, from_file=material is not None),
         capture=capture.name,
     )
@@ -198,7 +198,11 @@ def _measured(
     if not (balls & capture.mask).any():
         return measure_balls(capture, found, field=field, threads=threads), None
     anchors = found if method == "reflectance" else None
-    roundness = None if recipe is None or recipe.q is None or recipe.u_q is None else (recipe.q, recipe.u_q)
+    roundness = (
+        None
+        if recipe is None or recipe.aspect_ratio is None or recipe.u_aspect_ratio is None
+        else (recipe.aspect_ratio, recipe.u_aspect_ratio)
+    )
     with ThreadPoolExecutor(1) as background:
         normals = background.submit(
             estimate_normals,

@@ -8,12 +8,14 @@ from typing import Annotated, Any, Literal
 
 from bgars.records.found_balls import BallKind
 from bgars.records.keys import Key, as_plain
+from bgars.records.renamed import renamed
 
 __all__ = ["BallResult", "Verdict"]
 
 Verdict = Literal["pass", "fail", "undecided"]
 
 
+@renamed(q="aspect_ratio", u_q="u_aspect_ratio", flat_um="flat_top_depth_um", u_flat_um="u_flat_top_depth_um")
 @dataclass(frozen=True, repr=False)
 class BallResult:
     """One ball, or a place that should have one.
@@ -36,7 +38,7 @@ class BallResult:
         Its place in the best-fitting grid.
     true_position_um : float
         Distance of the centre from that place.
-    diameter_um, centre_z_um, top_um, q, flat_um : float
+    diameter_um, centre_z_um, top_um, aspect_ratio, flat_top_depth_um : float
         As in :class:`bgars.records.measured_balls.MeasuredBall`.
     seating_deviation_um, regression_deviation_um : float
         Distance of the apex below either plane.
@@ -70,10 +72,12 @@ class BallResult:
     u_centre_z_um: Annotated[float, Key("standard uncertainty (k = 1) of centre_z_um, in um")] = math.nan
     top_um: Annotated[float, Key("height of the top above the local board, in um")] = math.nan
     u_top_um: Annotated[float, Key("standard uncertainty (k = 1) of top_um, in um")] = math.nan
-    q: Annotated[float, Key("vertical over horizontal radius, a ratio; 1 = sphere")] = math.nan
-    u_q: Annotated[float, Key("standard uncertainty (k = 1) of q, a ratio")] = math.nan
-    flat_um: Annotated[float, Key("height that a flat top lacks, in um")] = math.nan
-    u_flat_um: Annotated[float, Key("standard uncertainty (k = 1) of flat_um, in um")] = math.nan
+    aspect_ratio: Annotated[float, Key("vertical over horizontal radius; 1 = sphere", was="q")] = math.nan
+    u_aspect_ratio: Annotated[float, Key("standard uncertainty (k = 1) of aspect_ratio", was="u_q")] = math.nan
+    flat_top_depth_um: Annotated[float, Key("height that a flat top lacks, in um", was="flat_um")] = math.nan
+    u_flat_top_depth_um: Annotated[
+        float, Key("standard uncertainty (k = 1) of flat_top_depth_um, in um", was="u_flat_um")
+    ] = math.nan
     seating_deviation_um: Annotated[float, Key("distance of the top below the seating plane, in um")] = math.nan
     regression_deviation_um: Annotated[float, Key("distance of the top below the regression plane, in um")] = math.nan
     lights_used: Annotated[int, Key("lights whose shadow of this ball was usable", ge=0)] = 0

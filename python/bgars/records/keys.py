@@ -15,7 +15,7 @@ from typing import Any, get_type_hints
 
 import numpy as np
 
-__all__ = ["DIGITS", "Key", "as_plain", "default_of", "keys_of", "plain_value", "types_of"]
+__all__ = ["DIGITS", "Key", "as_plain", "default_of", "keys_of", "old_names", "plain_value", "types_of"]
 
 DIGITS = 6
 
@@ -40,6 +40,8 @@ class Key:
         Whether numbers keep all digits.
     is_late : bool
         Whether files of earlier versions lack the key: they then mean the field's default.
+    was : str
+        Name that files of earlier versions have for it.
     """
 
     meaning: str
@@ -50,6 +52,7 @@ class Key:
     names: tuple[str, ...] = ()
     is_exact: bool = False
     is_late: bool = False
+    was: str = ""
 
 
 @cache
@@ -71,6 +74,19 @@ def keys_of(record: type) -> dict[str, Key]:
     """
     hints = get_type_hints(record, include_extras=True)
     return {name: key for name, hint in hints.items() if (key := _key(hint)) is not None}
+
+
+@cache
+def old_names(record: type) -> dict[str, str]:
+    """Names that earlier versions had for a record's fields, and what they are called now.
+
+    Examples
+    --------
+    >>> import bgars
+    >>> old_names(bgars.BallResult)["q"]
+    'aspect_ratio'
+    """
+    return {key.was: name for name, key in keys_of(record).items() if key.was}
 
 
 def _key(hint: Any) -> Key | None:  # noqa: ANN401 - a type

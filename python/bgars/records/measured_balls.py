@@ -27,9 +27,9 @@ class MeasuredBall:
         Horizontal diameter.
     centre_z_um, top_um : float
         Height of the centre and of the top above the local board.
-    q : float
+    aspect_ratio : float
         Vertical over horizontal radius: 1 for a sphere.
-    flat_um : float
+    flat_top_depth_um : float
         Height that a flat top lacks against the full spheroid; 0 for none.
     lights_used : int
         Lights whose shadow was usable.
@@ -47,15 +47,15 @@ class MeasuredBall:
     diameter_um: float
     centre_z_um: float
     top_um: float
-    q: float
-    flat_um: float
+    aspect_ratio: float
+    flat_top_depth_um: float
     u_x_um: float
     u_y_um: float
     u_diameter_um: float
     u_centre_z_um: float
     u_top_um: float
-    u_q: float
-    u_flat_um: float
+    u_aspect_ratio: float
+    u_flat_top_depth_um: float
     lights_used: int
     kind: BallKind = "ball"
     reasons: tuple[str, ...] = ()

@@ -11,20 +11,22 @@ from bgars.errors import InputError
 from bgars.records.ball_layout import BallLayout
 from bgars.records.ball_names import ball_name, mirrored_name
 from bgars.records.keys import Key
+from bgars.records.renamed import renamed
 from bgars.records.strip_layout import StripLayout
 
 __all__ = ["BALL_LIMITS", "PART_LIMITS", "BallPlace", "Limits", "PartRecipe", "View", "layout_places"]
 
 View = Literal["bottom", "top"]
 Range = tuple[float, float]
-BALL_LIMITS = ("true_position_um", "diameter_um", "height_um", "q", "flat_um")
+BALL_LIMITS = ("true_position_um", "diameter_um", "height_um", "aspect_ratio", "flat_top_depth_um")
 PART_LIMITS = ("pitch_um", "seating_coplanarity_um", "regression_coplanarity_um", "warpage_um")
-Q_RANGE = (0.2, 2.0)
-"""Nominal q of what can be called a ball: from a low cap to an egg on end."""
-DEFAULT_U_Q = 0.01
-"""Where q alone is given: the balls of one lot share their shape, and package balls are round, within about 1 %."""
+ASPECT_RATIOS = (0.2, 2.0)
+"""Nominal aspect ratio of what can be called a ball: from a low cap to an egg on end."""
+DEFAULT_U_ASPECT_RATIO = 0.01
+"""Where the aspect ratio alone is given: balls of one lot share their shape; package balls are round within 1 %."""
 
 
+@renamed(q="aspect_ratio", flat_um="flat_top_depth_um")
 @dataclass(frozen=True)
 class Limits:
     """Limits; a pair is lowest and highest, a single number the highest, what has none is not judged.
@@ -35,9 +37,9 @@ class Limits:
         Distance of a ball from its place in the best-fitting grid: half of a diametral position tolerance.
     diameter_um, height_um : (float, float) or None
         Of each ball; height = top above the local board.
-    q : (float, float) or None
-        Vertical over horizontal radius, a ratio.
-    flat_um : float or None
+    aspect_ratio : (float, float) or None
+        Vertical over horizontal radius.
+    flat_top_depth_um : float or None
         Height that a flat top lacks.
     pitch_um : (float, float) or None
         Of the best-fitting grid.
@@ -50,8 +52,8 @@ class Limits:
     true_position_um: Annotated[float | None, Key("of each ball, in um")] = None
     diameter_um: Annotated[Range | None, Key("of each ball, in um")] = None
     height_um: Annotated[Range | None, Key("of each ball's top_um, in um")] = None
-    q: Annotated[Range | None, Key("of each ball, a ratio")] = None
-    flat_um: Annotated[float | None, Key("of each ball, in um")] = None
+    aspect_ratio: Annotated[Range | None, Key("of each ball", was="q")] = None
+    flat_top_depth_um: Annotated[float | None, Key("of each ball, in um", was="flat_um")] = None
     pitch_um: Annotated[Range | None, Key("of the best-fitting grid, in um")] = None
     seating_coplanarity_um: Annotated[float | None, Key("of the part, in um")] = None
     regression_coplanarity_um: Annotated[float | None, Key("of the part, in um")] = None
@@ -66,7 +68,7 @@ class Limits:
 
         Examples
         --------
-        >>> Limits(flat_um=5.0).range_of("flat_um")
+        >>> Limits(flat_top_depth_um=5.0).range_of("flat_top_depth_um")
         (None, 5.0)
         """
         limit = getattr(self, name)
@@ -115,6 +117,7 @@ def layout_places(layout: BallLayout) -> tuple[BallPlace, ...]:
     )
 
 
+@renamed(q="aspect_ratio", u_q="u_aspect_ratio")
 @dataclass(frozen=True)
 class PartRecipe:
     """A part as it should be; read one with :func:`bgars.read_part_recipe`.
@@ -139,9 +142,9 @@ class PartRecipe:
         Material fitted on an earlier capture.
     file : Path or None
         Where the recipe was read from.
-    q, u_q : float or None
-        Vertical over horizontal radius that the part's balls have in common, a ratio, and its standard uncertainty;
-        q alone takes a `u_q` of 0.01, `u_q` alone a q of 1. Both None: not stated.
+    aspect_ratio, u_aspect_ratio : float or None
+        Vertical over horizontal radius that the part's balls have in common, and its standard uncertainty: 0.01 where
+        the ratio alone is given; the uncertainty alone means a ratio of 1. Both None: not stated.
     pitch_u_um : float or None
         Standard uncertainty of the lattice's pitch.
     strip : StripLayout or None
@@ -150,11 +153,12 @@ class PartRecipe:
     Raises
     ------
     InputError
-        q outside 0.2 to 2, an uncertainty that is not above 0, or one of the pitch with a list of positions.
+        An aspect ratio outside 0.2 to 2, an uncertainty that is not above 0, or one of the pitch with a list of
+        positions.
 
     Examples
     --------
-    >>> PartRecipe("coined", BallLayout(rows=2, cols=3, pitch_um=800.0), q=0.9).u_q
+    >>> PartRecipe("coined", BallLayout(rows=2, cols=3, pitch_um=800.0), aspect_ratio=0.9).u_aspect_ratio
     0.01
     """
 
@@ -169,13 +173,13 @@ class PartRecipe:
     ] = None
     material_file: Annotated[Path | None, Key("file of a material fitted earlier")] = None
     file: Annotated[Path | None, Key("file that the recipe was read from")] = None
-    q: Annotated[
+    aspect_ratio: Annotated[
         float | None,
-        Key("vertical over horizontal radius that all balls share, a ratio; null = not stated", is_late=True),
+        Key("vertical over horizontal radius that all balls share; null = not stated", is_late=True, was="q"),
     ] = None
-    u_q: Annotated[float | None, Key("standard uncertainty (k = 1) of q, a ratio; null = not stated", is_late=True)] = (
-        None
-    )
+    u_aspect_ratio: Annotated[
+        float | None, Key("standard uncertainty (k = 1) of aspect_ratio; null = not stated", is_late=True, was="u_q")
+    ] = None
     pitch_u_um: Annotated[
         float | None, Key("standard uncertainty (k = 1) of the grid's pitch, in um; null = not stated", is_late=True)
     ] = None
@@ -184,16 +188,16 @@ class PartRecipe:
     ] = None
 
     def __post_init__(self) -> None:
-        """Complete q by its uncertainty or the other way round, and check them."""
-        if self.q is None and self.u_q is not None:
-            object.__setattr__(self, "q", 1.0)
-        if self.u_q is None and self.q is not None:
-            object.__setattr__(self, "u_q", DEFAULT_U_Q)
-        lowest, highest = Q_RANGE
-        if self.q is not None and not lowest <= self.q <= highest:
-            msg = f"q: must be from {lowest:g} to {highest:g}, got {self.q:g}"
+        """Complete the aspect ratio by its uncertainty or the other way round, and check them."""
+        if self.aspect_ratio is None and self.u_aspect_ratio is not None:
+            object.__setattr__(self, "aspect_ratio", 1.0)
+        if self.u_aspect_ratio is None and self.aspect_ratio is not None:
+            object.__setattr__(self, "u_aspect_ratio", DEFAULT_U_ASPECT_RATIO)
+        lowest, highest = ASPECT_RATIOS
+        if self.aspect_ratio is not None and not lowest <= self.aspect_ratio <= highest:
+            msg = f"aspect_ratio: must be from {lowest:g} to {highest:g}, got {self.aspect_ratio:g}"
             raise InputError(msg)
-        for name, value in (("u_q", self.u_q), ("pitch_u_um", self.pitch_u_um)):
+        for name, value in (("u_aspect_ratio", self.u_aspect_ratio), ("pitch_u_um", self.pitch_u_um)):
             if value is not None and not (math.isfinite(value) and value > 0):
                 msg = f"{name}: must be finite and above 0, got {value:g}"
                 raise InputError(msg)

@@ -17,6 +17,7 @@ from bgars.records.part_identity import PartIdentity
 from bgars.records.part_material import PartMaterial
 from bgars.records.part_recipe import PartRecipe
 from bgars.records.part_surface import PartSurface
+from bgars.records.renamed import renamed
 from bgars.records.result_text import csv_text, log_line, table_text
 from bgars.records.seating_result import SeatingResult
 from bgars.records.shown import ShownPart
@@ -24,12 +25,13 @@ from bgars.records.shown import ShownPart
 __all__ = ["FORMAT", "FORMAT_VERSION", "OLDEST_VERSION", "PartResult"]
 
 FORMAT = "bgars-result"
-FORMAT_VERSION = 4
+FORMAT_VERSION = 5
 """Rises with every change of the keys of result.json, or of their meaning (docs/result.schema.json)."""
-OLDEST_VERSION = 2
+OLDEST_VERSION = 1
 """That :func:`bgars.read_result` reads."""
 
 
+@renamed(normals_choice="method_reason")
 @dataclass(frozen=True, eq=False, repr=False)
 class PartResult(ShownPart):
     """What an inspection found.
@@ -82,7 +84,7 @@ class PartResult(ShownPart):
         Of bgars.
     method : str
         Estimator of the normals, which show flat tops.
-    normals_choice : str
+    method_reason : str
         What it did, and how well one material explains the balls; empty: no ball was looked at.
     material : PartMaterial or None
         What the estimator fitted to the balls; None: another estimator, or no ball was looked at.
@@ -135,10 +137,17 @@ class PartResult(ShownPart):
     files: Annotated[tuple[InputFile, ...], Key("every input file")] = ()
     version: Annotated[str, Key("version of bgars")] = ""
     method: Annotated[str, Key("estimator of the normals, which show flat tops")] = ""
-    normals_choice: Annotated[
-        str, Key("what the estimator did, and how well one material explains the balls; empty = no ball looked at")
+    method_reason: Annotated[
+        str,
+        Key(
+            "what the estimator did, and how well one material explains the balls; empty = no ball looked at",
+            is_late=True,
+            was="normals_choice",
+        ),
     ] = ""
-    material: Annotated[PartMaterial | None, Key("null: another estimator, or no ball was looked at")] = None
+    material: Annotated[PartMaterial | None, Key("null: another estimator, or no ball was looked at", is_late=True)] = (
+        None
+    )
     capture: Annotated[str, Key("name of the capture folder")] = ""
     serial: Annotated[str, Key("serial number of the part; empty = not given")] = ""
     inspected_utc: Annotated[

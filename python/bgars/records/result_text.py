@@ -27,8 +27,8 @@ TABLE = (
     ("diameter um", "diameter_um", ".1f"),
     ("height um", "top_um", ".1f"),
     ("seating um", "seating_deviation_um", ".1f"),
-    ("q", "q", ".3f"),
-    ("flat um", "flat_um", ".1f"),
+    ("aspect ratio", "aspect_ratio", ".3f"),
+    ("flat um", "flat_top_depth_um", ".1f"),
     ("verdict", "verdict", ""),
 )
 LINE_READINGS = (

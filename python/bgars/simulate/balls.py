@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from bgars.records.renamed import renamed
 from bgars.simulate.checks import at_least, number, positive, require
 
 __all__ = ["Ball", "Bridge", "ball_name", "row_letters"]
@@ -40,6 +41,7 @@ def ball_name(row: int, col: int) -> str:
     return f"{row_letters(row)}{col}"
 
 
+@renamed(q="aspect_ratio", flat_um="flat_top_depth_um")
 @dataclass(frozen=True)
 class Ball:
     """A solder ball: a spheroid with a vertical axis, cut off by the board and perhaps by a flat top.
@@ -51,10 +53,10 @@ class Ball:
     radius_um : float
         Horizontal semi-axis.
     centre_z_um : float
-        Height of the centre above the board under it. Not above ``q radius_um``: the ball must touch its board.
-    q : float
+        Height of the centre above the board under it, ``aspect_ratio radius_um`` at most: the ball touches its board.
+    aspect_ratio : float
         Vertical over horizontal semi-axis; 1 = sphere.
-    flat_um : float
+    flat_top_depth_um : float
         Height cut off the top by a horizontal plane.
     name : str
         Such as "B3".
@@ -82,8 +84,8 @@ class Ball:
     y_um: float
     radius_um: float
     centre_z_um: float
-    q: float = 1.0
-    flat_um: float = 0.0
+    aspect_ratio: float = 1.0
+    flat_top_depth_um: float = 0.0
     name: str = "A1"
     row: int = 1
     col: int = 1
@@ -97,12 +99,12 @@ class Ball:
         for name in ("x_um", "y_um", "centre_z_um"):
             number(field + name, getattr(self, name))
         positive(field + "radius_um", self.radius_um)
-        positive(field + "q", self.q)
-        at_least(field + "flat_um", self.flat_um, 0.0)
+        positive(field + "aspect_ratio", self.aspect_ratio)
+        at_least(field + "flat_top_depth_um", self.flat_top_depth_um, 0.0)
         for name in ("x_nominal_um", "y_nominal_um"):
             if getattr(self, name) is not None:
                 number(field + name, getattr(self, name))
-        semi_axis_um = self.q * self.radius_um
+        semi_axis_um = self.aspect_ratio * self.radius_um
         require(
             self.centre_z_um <= semi_axis_um * (1.0 + TOUCH_TOLERANCE),
             field + "centre_z_um",
@@ -110,17 +112,17 @@ class Ball:
             float(self.centre_z_um),
         )
         require(
-            self.flat_um < semi_axis_um,
-            field + "flat_um",
+            self.flat_top_depth_um < semi_axis_um,
+            field + "flat_top_depth_um",
             f"must be below {semi_axis_um:g} (the equator)",
-            self.flat_um,
+            self.flat_top_depth_um,
         )
         require(self.top_um > 0, field + "centre_z_um", "must leave the top above the board; the top is", self.top_um)
 
     @property
     def top_um(self) -> float:
         """Height of the top above the board under it."""
-        return self.centre_z_um + self.q * self.radius_um - self.flat_um
+        return self.centre_z_um + self.aspect_ratio * self.radius_um - self.flat_top_depth_um
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
+from bgars.records.renamed import renamed
 from bgars.simulate.checks import at_least, number, one_of, positive, require
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ DefectKind = Literal["missing", "offset", "size", "flattened", "clipped"]
 KINDS = ("missing", "offset", "size", "flattened", "clipped")
 
 
+@renamed(flat_um="flat_top_depth_um")
 @dataclass(frozen=True)
 class Defect:
     """A defect of one ball; bridges join two and are given apart (:class:`bgars.Bridge`).
@@ -32,7 +34,7 @@ class Defect:
         Factor of radius and height ("size").
     height, width : float
         Factors of top height and radius ("flattened").
-    flat_um : float
+    flat_top_depth_um : float
         Height cut off the top ("clipped").
     """
 
@@ -42,7 +44,7 @@ class Defect:
     scale: float = 1.0
     height: float = 1.0
     width: float = 1.0
-    flat_um: float = 0.0
+    flat_top_depth_um: float = 0.0
 
     def __post_init__(self) -> None:
         one_of("defect.kind", self.kind, KINDS)
@@ -50,7 +52,7 @@ class Defect:
         number("defect.dy_um", self.dy_um)
         for name in ("scale", "height", "width"):
             positive(f"defect.{name}", getattr(self, name))
-        at_least("defect.flat_um", self.flat_um, 0.0)
+        at_least("defect.flat_top_depth_um", self.flat_top_depth_um, 0.0)
         require(
             self.kind != "size" or self.scale != 1.0, "defect.scale", "of kind 'size', must differ from 1", self.scale
         )
@@ -76,9 +78,9 @@ class Defect:
         return cls("flattened", height=height, width=width)
 
     @classmethod
-    def clipped(cls, flat_um: float) -> Defect:
-        """A sphere whose top `flat_um` is cut off by a horizontal plane."""
-        return cls("clipped", flat_um=flat_um)
+    def clipped(cls, flat_top_depth_um: float) -> Defect:
+        """A sphere whose top `flat_top_depth_um` is cut off by a horizontal plane."""
+        return cls("clipped", flat_top_depth_um=flat_top_depth_um)
 
     def applied(self, ball: Ball) -> Ball:
         """Return the ball with this defect.
@@ -98,7 +100,7 @@ class Defect:
             radius_um, centre_z_um = ball.radius_um * self.scale, ball.centre_z_um * self.scale
             return replace(ball, radius_um=radius_um, centre_z_um=centre_z_um, defect=defect)
         if self.kind == "clipped":
-            return replace(ball, flat_um=self.flat_um, defect="clipped")
+            return replace(ball, flat_top_depth_um=self.flat_top_depth_um, defect="clipped")
         radius_um = ball.radius_um * self.width
         vertical_um = ball.top_um * self.height - ball.centre_z_um
         require(
@@ -107,4 +109,4 @@ class Defect:
             "must leave the top above the ball's centre; its vertical semi-axis is",
             vertical_um,
         )
-        return replace(ball, radius_um=radius_um, q=vertical_um / radius_um, defect="flattened")
+        return replace(ball, radius_um=radius_um, aspect_ratio=vertical_um / radius_um, defect="flattened")

@@ -205,7 +205,7 @@ def _check_bridges(balls: tuple[Ball, ...], bridges: tuple[Bridge, ...]) -> None
         require(length_um > 0, pair, "must join balls at different places; their distance is", length_um)
         z_um = bridge.z_um if bridge.z_um is not None else (ends[0].centre_z_um + ends[1].centre_z_um) / 2
         for ball in ends:
-            room_um = min(ball.radius_um, ball.q * ball.radius_um) - abs(z_um - ball.centre_z_um)
+            room_um = min(ball.radius_um, ball.aspect_ratio * ball.radius_um) - abs(z_um - ball.centre_z_um)
             room_um = min(room_um, ball.top_um - z_um)
             rule = f"must end inside ball {ball.name}, where its radius may be {room_um:g}"
             require(bridge.radius_um <= room_um, f"{pair}.radius_um", rule, bridge.radius_um)

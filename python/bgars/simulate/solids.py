@@ -181,7 +181,7 @@ def solids_of(scene: Scene) -> list[Solid]:
         ground_um = float(scene.board.height_um(np.array(ball.x_um), np.array(ball.y_um)))
         centre = (ball.x_um, ball.y_um, ground_um + ball.centre_z_um)
         centres[ball.name] = (label, centre, ground_um)
-        solids.append(Spheroid(label, *centre, ball.radius_um, ball.q, ground_um + ball.top_um))
+        solids.append(Spheroid(label, *centre, ball.radius_um, ball.aspect_ratio, ground_um + ball.top_um))
     heights = {ball.name: ball.centre_z_um for ball in scene.balls}
     for bridge in scene.bridges:
         (first, start, ground_a), (second, end, ground_b) = centres[bridge.first], centres[bridge.second]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bgars.records.pixels import BoolArray, FloatArray
+from bgars.records.renamed import renamed
 from bgars.records.truth import Truth
 from bgars.simulate.coplanarity import PlaneTruth, regression_plane, seating_plane
 
@@ -41,6 +42,7 @@ class SimulationSetup:
     seed: int = 0
 
 
+@renamed(q="aspect_ratio", flat_um="flat_top_depth_um")
 @dataclass(frozen=True)
 class BallTruth:
     """One ball; heights are above the local board. Lengths of a missing ball are None.
@@ -59,9 +61,9 @@ class BallTruth:
         Horizontal diameter.
     centre_z_um, top_um : float or None
         Heights of centre and top above the board under the ball.
-    q : float or None
+    aspect_ratio : float or None
         Vertical over horizontal semi-axis.
-    flat_um : float or None
+    flat_top_depth_um : float or None
         Height cut off the top.
     defect : str
         "none", or what is wrong.
@@ -84,8 +86,8 @@ class BallTruth:
     diameter_um: float | None
     centre_z_um: float | None
     top_um: float | None
-    q: float | None
-    flat_um: float | None
+    aspect_ratio: float | None
+    flat_top_depth_um: float | None
     defect: str
     x_nominal_um: float
     y_nominal_um: float
@@ -168,8 +170,8 @@ def ball_table(scene: Scene, material: Material, solids: list[Solid], finishes: 
             diameter_um=None,
             centre_z_um=None,
             top_um=None,
-            q=None,
-            flat_um=None,
+            aspect_ratio=None,
+            flat_top_depth_um=None,
             defect=ball.defect,
             x_nominal_um=x_nominal_um,
             y_nominal_um=y_nominal_um,
@@ -185,8 +187,8 @@ def ball_table(scene: Scene, material: Material, solids: list[Solid], finishes: 
                 diameter_um=2.0 * ball.radius_um,
                 centre_z_um=ball.centre_z_um,
                 top_um=ball.top_um,
-                q=ball.q,
-                flat_um=ball.flat_um,
+                aspect_ratio=ball.aspect_ratio,
+                flat_top_depth_um=ball.flat_top_depth_um,
                 i_d=material.i_d * factors[0],
                 i_s=None if lobe is None else lobe.i_s * factors[1],
                 roughness=None if lobe is None else lobe.roughness * factors[2],

@@ -74,6 +74,7 @@ class Store:
         key = part_key(result)
         if key in self.known():
             return False
+        _raise_version(self.folder / MARK)
         rows = result_rows(result, sequence=self._next_sequence(), capture_folder=capture_folder, seconds=seconds)
         place = partition(result.inspected_utc[:10], result.name if result.recipe is not None else "")
         append_rows(self.folder, place, f"p-{key[:40]}", rows)
@@ -203,6 +204,13 @@ def _is_free(folder: Path) -> bool:
     return folder.is_dir() and all(
         path.name.startswith(".") and path.name.endswith(PARTIAL) for path in folder.iterdir()
     )
+
+
+def _raise_version(mark: Path) -> None:
+    """Say that files of this version are in a store: an earlier bgars must not read them as its own."""
+    heading = json.loads(mark.read_text(encoding="utf-8"))
+    if heading["format_version"] < FORMAT_VERSION:
+        write_durably(mark, json.dumps(heading | {"format_version": FORMAT_VERSION}, indent=2).encode() + b"\n")
 
 
 def _check_mark(mark: Path) -> None:

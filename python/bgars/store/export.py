@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from bgars.errors import FileFormatError, InputError
 from bgars.store.query import query
-from bgars.store.schema import TABLES
+from bgars.store.schema import OLD_NAMES, TABLES
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -65,6 +65,7 @@ def export(folder: Path, url: str) -> dict[str, int]:
 def _copy(alchemy: Any, engine: Any, folder: Path) -> dict[str, int]:  # noqa: ANN401 - modules without types
     metadata = alchemy.MetaData()
     tables = {name: _table(alchemy, metadata, name) for name in TABLES}
+    _rename_columns(alchemy, engine)
     metadata.create_all(engine)
     with engine.connect() as connection:
         there = set(connection.execute(alchemy.select(tables["parts"].c.part_key)).scalars())
@@ -84,6 +85,18 @@ def _copy(alchemy: Any, engine: Any, folder: Path) -> dict[str, int]:  # noqa: A
         rows = query(folder, f"select {every} from failures")
         added[f"{PREFIX}failures"] += _insert(connection, tables["failures"], rows)
     return added
+
+
+def _rename_columns(alchemy: Any, engine: Any) -> None:  # noqa: ANN401 - as above
+    """Give the columns of a database that an earlier version filled the names that they have now."""
+    looked = alchemy.inspect(engine)
+    with engine.begin() as connection:
+        for name, names in OLD_NAMES.items():
+            table = f"{PREFIX}{name}"
+            there = {each["name"] for each in looked.get_columns(table)} if looked.has_table(table) else set()
+            for old, new in names.items():
+                if old in there and new not in there:
+                    connection.execute(alchemy.text(f"ALTER TABLE {table} RENAME COLUMN {old} TO {new}"))
 
 
 def _table(alchemy: Any, metadata: Any, name: str) -> Any:  # noqa: ANN401 - as above

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from bgars.errors import FileFormatError, InputError
-from bgars.store.schema import TABLES, arrow_schema
+from bgars.store.schema import OLD_NAMES, TABLES, arrow_schema
 
 __all__ = ["VIEWS", "connect", "need_duckdb", "query"]
 
@@ -102,15 +102,24 @@ def connect(folder: Path) -> Any:  # noqa: ANN401 - duckdb's connection
 
 
 def _source(connection: Any, folder: Path, table: str) -> str:  # noqa: ANN401 - as above
-    """What to select from: the files of a table, or its empty form where there are none."""
+    """What to select from: the files of a table, or its empty form where there are none; all names are today's."""
     if next((folder / table).rglob("*.parquet"), None) is None:
         empty = arrow_schema(table).empty_table()
         connection.register(f"empty_{table}", empty)
         return f"(SELECT *, '' AS filename, NULL::DATE AS day, NULL::VARCHAR AS recipe FROM empty_{table})"
     files = _quoted(str(folder.resolve() / table / "*" / "*" / "*.parquet"))
-    return (
+    read = (
         f"read_parquet({files}, filename = true, union_by_name = true, hive_partitioning = true, "
         "hive_types = {'day': DATE, 'recipe': VARCHAR})"
+    )
+    old = OLD_NAMES.get(table)
+    if not old:
+        return read
+    both = ", ".join(f"NULL::DOUBLE AS {name}" for names in old.items() for name in names)
+    taken = ", ".join(f"coalesce({new}, {was}) AS {new}" for was, new in old.items())
+    return (
+        f"(SELECT * EXCLUDE ({', '.join(old)}) REPLACE ({taken}) FROM "
+        f"(SELECT * FROM {read} UNION ALL BY NAME SELECT {both} WHERE false))"
     )
 
 

@@ -26,8 +26,8 @@ BALL_READINGS = {
     "true_position_um": "true_position_um",
     "diameter_um": "diameter_um",
     "top_um": "height_um",
-    "q": "q",
-    "flat_um": "flat_um",
+    "aspect_ratio": "aspect_ratio",
+    "flat_top_depth_um": "flat_top_depth_um",
 }
 """Reading of a ball and the limit that it is judged by."""
 

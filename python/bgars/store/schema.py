@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bgars.io.parquet import need_pyarrow
 from bgars.records.ball_result import BallResult
-from bgars.records.keys import keys_of
+from bgars.records.keys import keys_of, old_names
 from bgars.records.part_check import PartCheck
 from bgars.records.part_result import PartResult
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-__all__ = ["FORMAT", "FORMAT_VERSION", "TABLES", "Column", "arrow_schema"]
+__all__ = ["FORMAT", "FORMAT_VERSION", "OLD_NAMES", "TABLES", "Column", "arrow_schema"]
 
 FORMAT = "bgars-store"
-FORMAT_VERSION = 1
-"""Rises when a column goes or changes its meaning; new columns alone do not raise it."""
+FORMAT_VERSION = 2
+"""Rises when a column goes, changes its name or its meaning; new columns alone do not raise it."""
 KEY_MEANING = "the part: SHA-256 of its input files' contents, serial, recipe, method and version"
 READINGS = (
     "pitch_um",
@@ -115,6 +115,8 @@ FAILURES = (
     Column("version", "text", "version of bgars"),
 )
 TABLES = {"parts": PARTS, "balls": BALLS, "checks": CHECKS, "budgets": BUDGETS, "failures": FAILURES}
+OLD_NAMES = {"balls": old_names(BallResult)}
+"""Columns that files of earlier versions have under another name, by table."""
 UNITS = {"_um": "um", "_deg": "deg", "seconds": "s"}
 
 

@@ -48,7 +48,7 @@ class Characteristic:
         Examples
         --------
         >>> from bgars import BallLayout, Limits, PartRecipe
-        >>> recipe = PartRecipe("demo", BallLayout(2, 2, 1000.0), limits=Limits(flat_um=5.0, height_um=(460.0, 540.0)))
+        >>> recipe = PartRecipe("demo", BallLayout(2, 2, 1000.0), limits=Limits(height_um=(460.0, 540.0)))
         >>> [each.tolerance(recipe) for each in CHARACTERISTICS if each.name in {"top_um", "diameter_um"}]
         [None, 80.0]
         """
@@ -60,7 +60,7 @@ CHARACTERISTICS = (
     Characteristic("diameter_um", "diameter", "ball", "diameter_um"),
     Characteristic("top_um", "height of the top", "ball", "height_um"),
     Characteristic("true_position_um", "true position", "ball", "true_position_um"),
-    Characteristic("q", "shape q", "ball", "q"),
+    Characteristic("aspect_ratio", "aspect ratio", "ball", "aspect_ratio"),
     Characteristic("seating_coplanarity_um", "seating coplanarity", "part", "seating_coplanarity_um"),
     Characteristic("regression_coplanarity_um", "regression coplanarity", "part", "regression_coplanarity_um"),
     Characteristic("pitch_um", "pitch", "part", "pitch_um"),

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import csv
 import math
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bgars.errors import FileFormatError, InputError
+from bgars.records.ball_result import BallResult
+from bgars.records.keys import old_names
 from bgars.studies.characteristics import CHARACTERISTICS
 
 if TYPE_CHECKING:
@@ -49,6 +52,7 @@ def read_references(path: str | PathLike[str]) -> References:
         msg = f"{path}: line 1: must be {','.join(COLUMNS)}, got {','.join(heading)!r}"
         raise FileFormatError(msg)
     known = [each.name for each in CHARACTERISTICS]
+    old = old_names(BallResult)
     references: References = {}
     for number, cells in enumerate(rows[1:], 2):
         if not any(cell.strip() for cell in cells):
@@ -57,6 +61,10 @@ def read_references(path: str | PathLike[str]) -> References:
             msg = f"{path}: line {number}: must have {len(COLUMNS)} cells, got {len(cells)}"
             raise FileFormatError(msg)
         part, ball, name, text = (cell.strip() for cell in cells)
+        if name in old:
+            told = f"{path}: {name} is called {old[name]} now; the old name goes with the next release"
+            warnings.warn(told, FutureWarning, stacklevel=2)
+            name = old[name]
         if name not in known:
             msg = f"{path}: line {number}: characteristic must be one of {', '.join(known)}, got {name!r}"
             raise InputError(msg)

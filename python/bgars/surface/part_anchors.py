@@ -79,7 +79,7 @@ def anchors_from_part(result: PartResult, shape: tuple[int, int]) -> Anchors:
         regions[rows, cols][off < (max(radius_px - RIM_PX, 0.0) / radius_px) ** 2] = number
         cap = (off >= CAP_FROM**2) & (off <= CAP_TO**2)
         if math.isfinite(ball.top_um) and math.isfinite(ball.centre_z_um):
-            q = ball.q if math.isfinite(ball.q) else 1.0
+            q = ball.aspect_ratio if math.isfinite(ball.aspect_ratio) else 1.0
             base_um = float(board_um(ball.x_um, ball.y_um))
             # A wide flat top reaches into the ring.
             cap_um = np.minimum(ball.centre_z_um + q * radius_um * np.sqrt(1.0 - off[cap]), ball.top_um)

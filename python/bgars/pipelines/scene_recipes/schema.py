@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -84,13 +84,15 @@ class BoardRecipe(Strict):
 class DefectRecipe(Strict):
     """:class:`bgars.Defect`."""
 
+    old_names: ClassVar = {"flat_um": "flat_top_depth_um"}
+
     kind: Literal["missing", "offset", "size", "flattened", "clipped"]
     dx_um: float = 0.0
     dy_um: float = 0.0
     scale: float = 1.0
     height: float = 0.85
     width: float = 1.08
-    flat_um: float = 0.0
+    flat_top_depth_um: float = 0.0
 
 
 class BridgeRecipe(Strict):
@@ -161,12 +163,14 @@ class BallArrayRecipe(Strict):
 class OneBallRecipe(Strict):
     """:class:`bgars.Ball`, all of it."""
 
+    old_names: ClassVar = {"q": "aspect_ratio", "flat_um": "flat_top_depth_um"}
+
     x_um: float
     y_um: float
     radius_um: float
     centre_z_um: float
-    q: float = 1.0
-    flat_um: float = 0.0
+    aspect_ratio: float = 1.0
+    flat_top_depth_um: float = 0.0
     name: str = "A1"
     row: int = 1
     col: int = 1

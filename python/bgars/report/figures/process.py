@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PictureProcess", "serve"]
 
-CODE = "import sys; sys.path[:] = {path!r}; from bgars.report.figures.process import serve; serve()"
+CODE = "import gc, sys; gc.disable(); sys.path[:] = {path!r}; from bgars.report.figures.process import serve; serve()"
 
 
 class PictureProcess:

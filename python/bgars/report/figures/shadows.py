@@ -123,7 +123,7 @@ def _shadow(ball: BallResult, result: PartResult, capture: Capture, light: int) 
     return shadow_outline_um(
         np.array([ball.x_um, ball.y_um, ball.centre_z_um]),
         ball.diameter_um / 2,
-        ball.q if math.isfinite(ball.q) else 1.0,
+        ball.aspect_ratio if math.isfinite(ball.aspect_ratio) else 1.0,
         np.asarray(toward, dtype=np.float64),
         slopes,
         is_position=capture.rig.positions_um is not None,

@@ -18,7 +18,8 @@ ADVICE = {
     "elevation of all lights together": RIG,
     "azimuth of all lights together": RIG,
     "direction of each light": RIG,
-    "roundness of all balls together": "Measure the shape of this kind of ball and state q and u_q in the recipe.",
+    "roundness of all balls together": "Measure the shape of this kind of ball, and state aspect_ratio and "
+    "u_aspect_ratio in the recipe.",
     "distance of the camera": "State camera in capture.toml: its distance, or telecentric.",
     "response, penumbra and reflected light at the edges": "Smaller lamps, a linear or measured response, dark "
     "surroundings, a dark frame.",

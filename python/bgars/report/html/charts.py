@@ -21,7 +21,7 @@ __all__ = ["BLUE", "FAIL", "PURPLE", "UNDECIDED", "axis", "coplanarity_chart", "
 
 BLUE, PURPLE, FAIL, UNDECIDED = "#0072B2", "#B0578D", "#D55E00", "#E69F00"
 """Okabe and Ito, Color universal design, 2008; the purple darkened for thin marks."""
-HISTOGRAMS = ("true_position_um", "diameter_um", "top_um", "seating_deviation_um", "q", "flat_um")
+HISTOGRAMS = ("true_position_um", "diameter_um", "top_um", "seating_deviation_um", "aspect_ratio", "flat_top_depth_um")
 LEAST_SPAN_UM = 1.0
 LEAST_SPAN_RATIO = 0.002
 MAX_TICKS = 32

@@ -41,7 +41,7 @@ def solids_of(result: dict[str, Any], board: Callable[[float, float], Any]) -> l
     return [
         Solid(
             index, ball["x_um"], ball["y_um"], float(board(ball["x_um"], ball["y_um"])),
-            ball["diameter_um"] / 2, ball["centre_z_um"], ball["top_um"], ball["q"] or 1.0,
+            ball["diameter_um"] / 2, ball["centre_z_um"], ball["top_um"], ball["aspect_ratio"] or 1.0,
         )
         for index, ball in enumerate(result["balls"])
         if _is_whole(ball)
@@ -50,7 +50,12 @@ def solids_of(result: dict[str, Any], board: Callable[[float, float], Any]) -> l
 
 def _is_whole(ball: dict[str, Any]) -> bool:
     lengths = (ball[name] for name in ("x_um", "y_um", "diameter_um", "centre_z_um", "top_um"))
-    return ball["present"] and all(map(is_known, lengths)) and ball["diameter_um"] > 0 and (ball["q"] or 1.0) > 0
+    return (
+        ball["present"]
+        and all(map(is_known, lengths))
+        and ball["diameter_um"] > 0
+        and (ball["aspect_ratio"] or 1.0) > 0
+    )
 
 
 def cap_points(sides: int) -> int:

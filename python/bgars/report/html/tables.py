@@ -26,7 +26,13 @@ if TYPE_CHECKING:
 __all__ = ["ball_rows", "board_words", "key_readings", "light_rows", "raised_together", "recipe_rows", "unmeasured"]
 
 VERDICT_ORDER = {"fail": 0, "undecided": 1, "pass": 2}
-CORE = (("x_um", "position"), ("diameter_um", "diameter"), ("top_um", "height"), ("q", "q"), ("flat_um", "flat top"))
+CORE = (
+    ("x_um", "position"),
+    ("diameter_um", "diameter"),
+    ("top_um", "height"),
+    ("aspect_ratio", "aspect ratio"),
+    ("flat_top_depth_um", "flat top"),
+)
 
 
 def key_readings(result: dict[str, Any]) -> list[dict[str, str]]:

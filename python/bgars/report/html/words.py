@@ -97,8 +97,17 @@ QUANTITIES = (
         "below regression plane",
         "distance of the apex below the plane parallel to the least-squares plane, through the highest apex",
     ),
-    Quantity("q", "u_q", "q", "q", "vertical over horizontal radius, 1 for a sphere", unit=""),
-    Quantity("flat_um", "u_flat_um", "flat_um", "flat top", "height that a flat top lacks"),
+    Quantity(
+        "aspect_ratio",
+        "u_aspect_ratio",
+        "aspect_ratio",
+        "aspect ratio",
+        "vertical over horizontal radius, 1 for a sphere",
+        unit="",
+    ),
+    Quantity(
+        "flat_top_depth_um", "u_flat_top_depth_um", "flat_top_depth_um", "flat top", "height that a flat top lacks"
+    ),
 )
 
 
