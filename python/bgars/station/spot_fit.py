@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from bgars.station.highlights import GRID_PX, blurred_disc, spread_of
+from bgars.station.highlights import blurred_disc, spread_of
 from bgars.station.mirror import reflected
 
 if TYPE_CHECKING:
@@ -35,6 +35,8 @@ BOUNDS_PX = ((0.15, 12.0), (0.12, 2.0), (0.15, 2.0))
 """Of the disc's radius, the width of the lens's blur, and that of the filter after the pixels (its least is none)."""
 STARTS_PX = ((0.5, 0.2), (0.2, 0.5))
 """Both blurs: either can be the larger."""
+MODEL_PX = 0.04
+"""What lenses and lamps that are neither Gaussian nor a disc leave of a place, seen on rendered balls."""
 EFFORT, MOST_DAMPING, LEAST_GAIN = 25, 1e6, 0.02
 SHARED, OWN = 3, 3
 """Unknowns of all lights together, and of each: its place and the logarithm of its level."""
@@ -72,7 +74,7 @@ def fit_spots(
     whole = np.linalg.pinv(normal)
     blocks = [slice(SHARED + OWN * light, SHARED + OWN * light + 2) for light in range(len(seen))]
     raised = np.maximum(misfits, 1.0)[:, None, None] ** 2
-    covariances = np.array([whole[block, block] for block in blocks]) * raised + GRID_PX**2 * np.eye(2)
+    covariances = np.array([whole[block, block] for block in blocks]) * raised + MODEL_PX**2 * np.eye(2)
     return FittedSpots(values[SHARED:].reshape(-1, OWN)[:, :2], covariances, misfits, math.exp(values[0]))
 
 
