@@ -29,6 +29,7 @@ from .line.batch import inspect_many as inspect_many
 from .line.cfx import to_cfx as to_cfx
 from .line.naming import Naming as Naming
 from .normals.methods import register_method as register_method
+from .pipelines.calibrate_lights import calibrate_lights as calibrate_lights
 from .pipelines.calibrate_material import calibrate_material as calibrate_material
 from .pipelines.check import check as check
 from .pipelines.evaluate import Evaluation as Evaluation
@@ -95,7 +96,6 @@ from .simulate import Texture as Texture
 from .simulate import Variation as Variation
 from .simulate import simulate as simulate
 from .station import calibrate_flat as calibrate_flat
-from .station import calibrate_lights as calibrate_lights
 from .station import calibrate_scale as calibrate_scale
 from .store import Store as Store
 from .store import open_store as open_store

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 import bgars
+from bgars.cli.calibrated_lights import lights_values, said_values, tell_lights
 from bgars.cli.camera_option import CameraOption, seen_by
 from bgars.cli.console import print_json, say, stage_progress, utc_now
 from bgars.errors import InputError
@@ -21,6 +22,8 @@ from bgars.station import drift as station_drift
 from bgars.station.flat import falloff_findings
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from bgars.records.capture import Capture
     from bgars.records.light_calibration import LightCalibration
     from bgars.records.remark import Remark
@@ -51,6 +54,20 @@ SphereOption = Annotated[
     Literal["mirror", "matt"],
     typer.Option(help="mirror: a bearing ball, a chrome or glossy black one. matt: a dull, light one."),
 ]
+InViewOption = Annotated[
+    Literal["mirror", "matt", "balls"],
+    typer.Option(
+        help="mirror: a bearing ball, a chrome or glossy black one. matt: a dull, light one. balls: the solder balls "
+        "of a part; its capture.toml says where the lights are to some degrees."
+    ),
+]
+RecipeOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="part.toml", help="With --sphere balls: the part's layout, and how round its balls usually are.",
+        show_default=False,
+    ),
+]  # fmt: skip
 OutlineOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -85,26 +102,28 @@ def register(group: typer.Typer) -> None:
 def lights(
     folders: FoldersArgument,
     output: OutputOption,
-    sphere: SphereOption = "mirror",
+    sphere: InViewOption = "mirror",
     outline: OutlineOption = None,
     near: NearOption = None,
     diameter_mm: DiameterOption = None,
+    recipe: RecipeOption = None,
     camera: CameraOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Find where the lights are, on a ball (docs/station.md shows how to photograph it).
+    """Find where the lights are, on a ball (docs/station.md shows how to photograph it) or on the balls of a part.
 
     Exit code 2 where there is no ball, or a light does not show on it; nothing is written then.
     """
     known = _existing(output)
-    captures = [seen_by(_raw(folder, known), camera) for folder in folders]
-    found = _calibrate_lights(captures, sphere, outline, near, diameter_mm)
+    read = bgars.read_capture if sphere == "balls" else read_unlit
+    captures = [seen_by(_raw(folder, known, read), camera) for folder in folders]
+    found = _calibrate_lights(captures, sphere, outline, near, diameter_mm, recipe)
     write_balls(captures, found, output.with_suffix(".balls.svg"))
     keep_part(output, {"lights": found}, found.findings)
     if as_json:
-        print_json({"bgars": bgars.__version__, **_lights_values(found), "file": str(output)})
+        print_json({"bgars": bgars.__version__, **lights_values(found), "file": str(output)})
         return
-    _tell_lights(found)
+    tell_lights(found)
     tell_findings(found.findings, output)
 
 
@@ -179,10 +198,10 @@ def station(
     keep_part(output, parts, tuple(findings), name=name)
     if as_json:
         print_json(
-            {"bgars": bgars.__version__, **_lights_values(found), **said_values(tuple(findings)), "file": str(output)}
+            {"bgars": bgars.__version__, **lights_values(found), **said_values(tuple(findings)), "file": str(output)}
         )
         return
-    _tell_lights(found)
+    tell_lights(found)
     if "scale" in parts:
         scale = parts["scale"]
         say(f"A pixel is {scale.pixel_pitch_um:.4f} um (u {scale.pixel_pitch_u_um:.2g} um).")
@@ -226,7 +245,12 @@ def drift(
 
 
 def _calibrate_lights(
-    captures: list[Capture], sphere: str, outline: list[str] | None, near: bool | None, diameter_mm: float | None
+    captures: list[Capture],
+    sphere: str,
+    outline: list[str] | None,
+    near: bool | None,
+    diameter_mm: float | None,
+    recipe: Path | None = None,
 ) -> LightCalibration:
     circles = _circles(outline, captures)
     with stage_progress() as report:
@@ -236,6 +260,7 @@ def _calibrate_lights(
             circles[0] if circles is not None and len(captures) == 1 else circles,
             near=near,
             diameter_um=None if diameter_mm is None else 1000.0 * diameter_mm,
+            recipe=recipe,
             progress=lambda fraction: report("lights", fraction),
         )
 
@@ -273,9 +298,9 @@ def _existing(path: Path) -> Station:
     return read_station(path)
 
 
-def _raw(folder: Path, known: Station) -> Capture:
+def _raw(folder: Path, known: Station, read: Callable[[Path], Capture] = read_unlit) -> Capture:
     """A capture with the response, scale and distortion that are known already."""
-    capture = read_unlit(folder)
+    capture = read(folder)
     return bgars.with_station(capture, bgars.Station(known.name, response=known.response, scale=known.scale))
 
 
@@ -289,44 +314,6 @@ def keep_part(output: Path, parts: dict[str, Any], findings: tuple[Remark, ...],
     new = replace(known, **parts, calibrated_utc=utc_now(), findings=(*kept, *findings), name=name or known.name)
     write_station(new, output)
     write_station_page(new, output.with_suffix(".html"))
-
-
-def _lights_values(found: LightCalibration) -> dict[str, Any]:
-    rig = found.rig
-    return {
-        "sphere": found.sphere,
-        "directions": rig.directions.tolist(),
-        "positions_mm": None if rig.positions_um is None else (rig.positions_um / 1000.0).tolist(),
-        "intensities": rig.intensities.tolist(),
-        "u_deg": found.u_deg.tolist(),
-        "u_own_deg": found.u_own_deg.tolist(),
-        "u_common_deg": found.u_common_deg.tolist(),
-        "outlines_px": [ball.outline_px.tolist() for ball in found.balls],
-        "residual_px": found.residual_px,
-        **said_values(found.findings),
-    }
-
-
-def said_values(findings: tuple[Remark, ...]) -> dict[str, Any]:
-    """Findings as plain values."""
-    return {"findings": [finding.to_dict() for finding in findings]}
-
-
-def _tell_lights(found: LightCalibration) -> None:
-    rig = found.rig
-    kind = "near lights, positions in mm" if rig.is_near else "distant lights"
-    say(f"{len(rig)} {kind}, on {len(found.balls)} {found.sphere} ball(s):")
-    say("  light  azimuth  elevation   u (deg)   own  common  strength" + ("   x, y, z (mm)" if rig.is_near else ""))
-    for index in range(len(rig)):
-        place = (
-            ""
-            if rig.positions_um is None
-            else "   " + ", ".join(f"{value / 1000.0:.2f}" for value in rig.positions_um[index])
-        )
-        say(
-            f"  {index:>5}  {rig.azimuths_deg[index]:7.2f}  {rig.elevations_deg[index]:9.2f}  {found.u_deg[index]:8.3f}"
-            f" {found.u_own_deg[index]:5.3f}   {found.u_common_deg[index]:5.3f}  {rig.intensities[index]:8.3f}{place}"
-        )
 
 
 def tell_findings(findings: tuple[Remark, ...], output: Path) -> None:

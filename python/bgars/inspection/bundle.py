@@ -88,6 +88,17 @@ class Solution:
         return np.sqrt(np.where(variance >= 0, variance, np.nan))
 
     @property
+    def u_common_light_rad(self) -> float:
+        """Part of these, on either axis, that all lights share: the mean covariance of turns of two lights."""
+        lights = len(self.vectors)
+        blocks = self.border[: LIGHT_TERMS * lights, : LIGHT_TERMS * lights]
+        shared = 0.0
+        for axis in range(2):
+            turns = blocks[axis::LIGHT_TERMS, axis::LIGHT_TERMS]
+            shared += float(turns.sum() - np.trace(turns)) / max(lights * (lights - 1), 1)
+        return float(np.sqrt(max(0.5 * shared, 0.0)))
+
+    @property
     def board_covariance(self) -> Array:
         """(5, 5) of the coefficients of `board`."""
         part = slice(LIGHT_TERMS * len(self.vectors), LIGHT_TERMS * len(self.vectors) + SHAPE_TERMS)

@@ -137,6 +137,8 @@ def measurement(found: FoundBalls, problem: Problem, fit: Fit | None, flats: Fla
         warnings,
         board_covariance_um(solution.board_covariance, pitch),
         doubts,
+        u_light_deg=np.degrees(solution.u_light_rad) / np.sqrt(2.0),
+        u_light_common_deg=np.full(len(unit), np.degrees(solution.u_common_light_rad)),
         shared_um=shared,
         causes=budgets["top_um"].causes,
         corner_um=corner_um,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bgars.errors import CaptureWarning, InputError
+from bgars.io.bracket import bracket_names, lights_in_bracket, merge_exposures, recipe_of_exposure
 from bgars.io.capture_headers import Headers, read_headers
 from bgars.io.capture_images import choose_images, match
 from bgars.io.capture_lights import Lights, read_lights
@@ -121,7 +122,13 @@ def read_capture(
         lights = read_lights(folder, recipe, notes)
     else:
         lights = _by_order(known.lights.rig, known.name)
-    capture = _load_chosen(folder, recipe, lights, listing, images, channel, max_megapixels, threads, notes)
+    if recipe.exposures_ms is not None:
+        if images is not None:
+            msg = f"images: cannot be chosen from an exposure bracket (exposures_ms in {folder / RECIPE_NAME})"
+            raise InputError(msg)
+        capture = _load_bracket(folder, recipe, lights, listing, channel, max_megapixels, threads, notes, known)
+    else:
+        capture = _load_chosen(folder, recipe, lights, listing, images, channel, max_megapixels, threads, notes)
     for note in notes:
         warnings.warn(f"{folder}: {note}", CaptureWarning, stacklevel=2)
     return capture if known is None else with_station(capture, known)
@@ -141,6 +148,9 @@ def read_unlit(folder: str | PathLike[str], *, channel: ChannelName | None = Non
         recipe = _undescribed(folder, listing, notes, may_lack_lights=True)
     if recipe.lights is not None:
         return read_capture(folder, channel=channel)
+    if recipe.exposures_ms is not None:
+        lights = _by_order(LightRig.ring(max(lights_in_bracket(folder, recipe), 3)), str(folder))
+        return _load_bracket(folder, recipe, lights, listing, channel, MAX_MEGAPIXELS, None, notes, None)
     lights = _by_order(LightRig.ring(max(len(recipe.images or listing.images), 3)), str(folder))
     return _load_chosen(folder, recipe, lights, listing, None, channel, MAX_MEGAPIXELS, None, notes)
 
@@ -183,6 +193,38 @@ def _load_chosen(
     if recipe.mask is None and chosen.mask is not None:
         recipe = recipe.model_copy(update={"mask": chosen.mask})
     return _load(folder, recipe, lights, names, channel or recipe.channel, max_megapixels, threads, notes)
+
+
+def _load_bracket(
+    folder: Path,
+    recipe: CaptureRecipe,
+    lights: Lights,
+    listing: Listing,
+    channel: ChannelName | None,
+    max_megapixels: float,
+    threads: int | None,
+    notes: list[str],
+    station: Station | None,
+) -> Capture:
+    """Read every exposure as a capture of its own, and merge them."""
+    times = recipe.exposures_ms or []
+    names = bracket_names(recipe, len(lights.rig))
+    found: dict[int, Capture] = {}
+    saturation: float | None = None
+    # The longest one first: it clips, and so tells how many bits the camera has.
+    for place in sorted(range(len(times)), key=lambda index: -times[index]):
+        one = recipe_of_exposure(recipe, names[place], place, saturation)
+        said: list[str] = []
+        capture = _load_chosen(folder, one, lights, listing, None, channel, max_megapixels, threads, said)
+        notes += [note for note in said if note not in notes]
+        if saturation is None and capture.images.dtype.kind == "u":
+            saturation = capture.saturation
+        if station is not None and station.response is not None:
+            capture = with_station(capture, replace(station, lights=None, flat=None, scale=None))
+        found[place] = capture
+    merged, said = merge_exposures([found[place] for place in range(len(times))], times)
+    notes += said
+    return replace(merged, assumed=tuple(notes))
 
 
 def _load(

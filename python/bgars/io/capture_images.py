@@ -100,7 +100,7 @@ def _without(listing: Listing, names: set[str]) -> Listing:
 
 def _named(folder: Path, recipe: CaptureRecipe, lights: Lights, listing: Listing) -> tuple[list[str], Path | None]:
     """Names of the images and the file that gives them; none where nothing does."""
-    if recipe.images is not None:
+    if isinstance(recipe.images, list):
         return recipe.images, folder / RECIPE_NAME
     names_file = next((name for name in listing.others if name.lower() == NAMES_FILE), None)
     if names_file is not None:

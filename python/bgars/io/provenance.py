@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bgars.errors import FileFormatError
+from bgars.io.bracket import bracket_names, recipe_of_exposure
 from bgars.io.image_listing import list_folder
 from bgars.io.light_discovery import default_recipe
 from bgars.io.recipe import RECIPE_NAME, TableResponse, read_recipe
@@ -42,7 +43,11 @@ def capture_files(capture: Capture) -> tuple[Path, ...]:
         named.append(recipe.response.table)
     if recipe.lights is not None:
         named += [value for value in vars(recipe.lights).values() if isinstance(value, str)]
-    others = [capture.folder / name for name in named if name is not None]
+    if recipe.exposures_ms is not None:
+        exposures = [recipe_of_exposure(recipe, one, place, None) for place, one in
+                     enumerate(bracket_names(recipe, len(capture.images)))]  # fmt: skip
+        named += [name for one in exposures for name in (*(one.images or ()), one.dark)]
+    others = [path for name in named if name is not None and (path := capture.folder / name) not in capture.files]
     return (*dict.fromkeys(capture.files), *(file for file in others if file.is_file()))
 
 

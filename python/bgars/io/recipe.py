@@ -102,7 +102,8 @@ class CaptureRecipe(Strict):
     pixel_pitch_um: Positive | None = None
     pixel_pitch_u_um: Uncertainty | None = None
     camera: CameraRecipe | None = None
-    images: Annotated[list[str], Field(min_length=1)] | None = None
+    images: Annotated[list[str], Field(min_length=1)] | str | None = None
+    exposures_ms: Annotated[list[Positive], Field(min_length=2)] | None = None
     channel: ChannelName = "luminance"
     dark: FileName | None = None
     mask: FileName | None = None
@@ -122,6 +123,26 @@ class CaptureRecipe(Strict):
             msg = 'must be "telecentric" or { distance_mm = ... }'
             raise ValueError(msg)
         return value
+
+    @model_validator(mode="after")
+    def _bracket_is_named(self) -> CaptureRecipe:
+        if self.exposures_ms is None:
+            if isinstance(self.images, str):
+                msg = "images: must be a list of file names; a pattern goes with exposures_ms"
+                raise ValueError(msg)
+            return self
+        if len(set(self.exposures_ms)) < len(self.exposures_ms):
+            msg = f"exposures_ms: must differ from each other, got {self.exposures_ms}"
+            raise ValueError(msg)
+        if self.images is None:
+            msg = 'exposures_ms: needs images, a list or a pattern such as "light_{light}_{exposure}.png"'
+            raise ValueError(msg)
+        if isinstance(self.images, str) and not (
+            "{light" in self.images and ("{exposure" in self.images or "{ms" in self.images)
+        ):
+            msg = f"images: a pattern must hold {{light}}, and {{exposure}} or {{ms}}, got {self.images!r}"
+            raise ValueError(msg)
+        return self
 
     @model_validator(mode="after")
     def _pitch_is_known(self) -> CaptureRecipe:

@@ -41,7 +41,7 @@ Vector = tuple[Number, Number, Number]
 class LightsTable(Strict):
     """The ``[lights]`` table."""
 
-    sphere: str = Field("", description="what was in view: mirror or matt")
+    sphere: str = Field("", description="what was in view: mirror, matt or balls")
     directions: list[Vector] | None = Field(None, description="unit vectors from the board to the lights, one an image")
     positions_mm: list[Vector] | None = Field(None, description="or positions, origin = image centre on the board")
     intensities: list[Positive] = Field(description="relative, mean 1")

@@ -147,7 +147,11 @@ def take_capture(
         raise InputError(msg)
     names = [f"light_{light:02d}.png" for light in range(lights)]
     if rig is not None:
-        described = read_recipe(Path(rig)).images
+        recipe = read_recipe(Path(rig))
+        if recipe.exposures_ms is not None or isinstance(recipe.images, str):
+            msg = f"{rig}: exposures_ms: a camera is asked for one image a light; take the bracket's files yourself"
+            raise InputError(msg)
+        described = recipe.images
         if described is not None and len(described) != lights:
             msg = f"{rig}: images: must name {lights} files, one a light, got {len(described)}"
             raise InputError(msg)

@@ -92,6 +92,9 @@ class BallMeasurement:
         Distance of the image's corner from its middle.
     u_pixel_pitch : float or None
         Relative standard uncertainty of the pixel pitch, where it was declared.
+    u_light_deg, u_light_common_deg : (L,) float64 or None
+        Standard uncertainty of each refined direction on either axis across it, and its part that moves all lights
+        together; None where no light was refined.
     """
 
     balls: tuple[MeasuredBall, ...]
@@ -106,3 +109,5 @@ class BallMeasurement:
     causes: tuple[str, ...] = ()
     corner_um: float = math.nan
     u_pixel_pitch: float | None = None
+    u_light_deg: NDArray[np.float64] | None = None
+    u_light_common_deg: NDArray[np.float64] | None = None

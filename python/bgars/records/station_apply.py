@@ -135,7 +135,9 @@ def _with_flat(capture: Capture, flat: FlatField, name: str) -> Capture:
         dark = linear(np.array([round(capture.black_level)]))[0]
     images = np.zeros(shape, np.float32)
     gains = [np.maximum(flat_maps(flat, light) / _modelled(capture, light), LEAST_GAIN) for light in range(shape[0])]
-    top = full / min(float(gain.min()) for gain in gains)
+    # Brackets are on the scale of their longest exposure: their highlights exceed full scale.
+    clip = max(full, capture.saturation) if math.isfinite(capture.saturation) else full
+    top = clip / min(float(gain.min()) for gain in gains)
     for light, gain in enumerate(gains):
         values = capture.images[light]
         images[light] = (linear(values) - dark) / gain

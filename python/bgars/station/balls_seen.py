@@ -13,11 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 from bgars.errors import CalibrationError, InputError
 from bgars.records.remark import Remark
 from bgars.station.matt_lights import shading_misfit
-from bgars.station.outline import Outline, as_outline, find_outline, refine_outline
+from bgars.station.outline import as_outline, find_outline, refine_outline
+from bgars.station.rim import fit_rim
 
 if TYPE_CHECKING:
     from bgars.records.capture import Capture
     from bgars.station.levels import Levels
+    from bgars.station.outline import Outline
 
 __all__ = ["given_outlines", "outlines_of"]
 
@@ -28,8 +30,9 @@ WRONG_SIGMAS, WRONG_SHARE = 4.0, 0.01
 SOFT_PX = 2.5
 """Width of an edge from which on a ball is out of focus."""
 SOFT_SHARE = 0.03
-MATT_FLOOR_PX = 0.15
-"""Shading of a matt ball runs into its edge."""
+UNEXPLAINED_PX = 0.15
+"""Shading runs into the edge of a matt ball, and a mirror is brighter at its rim: laws of edges differ by so much."""
+STRAYED_PX = 1.5
 NOT_SEEN_U_PX = 0.5
 """Uncertainty of a stated outline that the images do not show."""
 NOT_A_DISC = 0.1
@@ -78,8 +81,11 @@ def outlines_of(
         found = (
             find_outline(pictures, partial(shading_misfit, levels) if matt else None, steps)
             if start is None
-            else _joined(refine_outline(pictures, start, steps), start)
+            else refine_outline(pictures, start, steps)
         )
+        found = _sharpened(levels, found, matt)
+        if start is not None:
+            found = _joined(found, start)
         if found is None:
             msg = (
                 f"{capture.name}: no ball found: no sharp circle in the images (out of focus, or of the level of its "
@@ -124,20 +130,9 @@ def outlines_of(
             u_px = np.maximum(off, NOT_SEEN_U_PX)
             outlines.append(replace(as_outline(circle), u_centre_px=float(u_px[:2].max()), u_radius_px=float(u_px[2])))
         else:
-            outlines.append(_joined(seen, circle))
-    for index, outline in enumerate(outlines):
+            outlines.append(_joined(_sharpened(levels, seen, matt), circle))
+    for outline in outlines:
         findings += _judge(capture, outline, height, width)
-        if matt and not outline.given:
-            u_radius = math.hypot(outline.u_radius_px, MATT_FLOOR_PX)
-            outlines[index] = Outline(
-                outline.x_px,
-                outline.y_px,
-                outline.radius_px,
-                outline.u_centre_px,
-                u_radius,
-                outline.edge_px,
-                outline.arc,
-            )
     return outlines, findings
 
 
@@ -173,6 +168,16 @@ def _judge(capture: Capture, outline: Outline, height: int, width: int) -> list[
 def _pictures(levels: Levels) -> list[Array]:
     mean = levels.images.mean(axis=0)
     return [mean, levels.images.max(axis=0), np.log(np.maximum(mean, 0.0) + 2.0 * levels.noise)]
+
+
+def _sharpened(levels: Levels, outline: Outline | None, matt: bool) -> Outline | None:
+    """An outline as the pixels around it have it, where a law of their levels explains them."""
+    if outline is None:
+        return None
+    fitted = fit_rim(levels, outline, matt=matt)
+    if fitted is not None and float(np.abs(fitted.circle_px - outline.circle_px).max()) < STRAYED_PX:
+        return fitted
+    return replace(outline, u_radius_px=math.hypot(outline.u_radius_px, UNEXPLAINED_PX))
 
 
 def _joined(seen: Outline | None, stated_px: Array) -> Outline:

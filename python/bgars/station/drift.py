@@ -66,6 +66,12 @@ def drift(
         See :func:`bgars.calibrate_lights` and :func:`bgars.calibrate_flat`.
     """
     kind = reference or (station.lights.sphere if station.lights is not None else "flat")
+    if kind == "balls":
+        msg = (
+            f"{station.name}: its lights were calibrated on the balls of a part: calibrate them again, or give "
+            "reference 'mirror', 'matt' or 'flat' with a capture of that"
+        )
+        raise InputError(msg)
     if kind == "flat":
         return _even(station, capture, limit_intensity)
     if station.lights is None:

@@ -50,30 +50,7 @@ def calibrate_lights(
     diameter_um: float | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> LightCalibration:
-    """Find where the lights are, from a mirror or a matt ball in view.
-
-    Parameters
-    ----------
-    capture : Capture or sequence of Capture
-        The ball under each light; or several captures, with the ball moved in between. Their rig is a starting guess
-        only: what comes out does not depend on it.
-    sphere : {"mirror", "matt"}
-        A bearing ball, a chrome or a glossy black one; or a matt one.
-    outline : (3,) or (N, 3) array_like, or a sequence of these, optional
-        x, y (from the image centre, x right, y up) and radius of the ball, or of several balls, in pixels; with several
-        captures, one entry a capture. By default the circle is looked for, or taken from a mask that is a disc.
-    near : bool, optional
-        True: positions in space, which takes two balls or one ball moved. False: directions. By default positions where
-        the balls show that directions differ from place to place.
-    diameter_um : float, optional
-        Diameter of the ball: gives the pixel pitch where the captures state none.
-    progress : callable, optional
-        Called with the fraction done.
-
-    Returns
-    -------
-    LightCalibration
-        The rig with standard uncertainties (`u_deg`), intensities where they can be measured, residuals, findings.
+    """Find where the lights are, from a mirror or a matt ball in view: see :func:`bgars.calibrate_lights`.
 
     Raises
     ------
@@ -81,32 +58,12 @@ def calibrate_lights(
         No ball, a ball cut off or burnt out, a light whose highlight is on no ball.
     InputError
         Captures with different numbers of images, or an outline of a wrong shape.
-
-    Notes
-    -----
-    A mirror ball turns a step of the highlight into twice the angle: of a ball of 200 pixels radius one pixel is half a
-    degree, and a radius that is wrong by 1 pixel tilts a light at 45 degrees by 0.2 degrees, all lights alike
-    (`u_common_deg`).
-
-    References
-    ----------
-    Zhou, W. & Kambhamettu, C. (2002). Estimation of illuminant direction and intensity of multiple light sources.
-    Powell, M. W., Sarkar, S. & Goldgof, D. (2001). A simple strategy for calibrating the geometry of light sources.
-
-    Examples
-    --------
-    >>> import bgars
-    >>> scene, matt = bgars.Scene.hemisphere(300.0), bgars.Material(i_s=0.0)
-    >>> ball, _ = bgars.simulate(scene, bgars.LightRig.ring(8), matt, bgars.Camera())
-    >>> found = bgars.calibrate_lights(ball, sphere="matt")
-    >>> float(abs(found.rig.elevations_deg - 45.0).max()) < 1.0
-    True
     """
     captures = [capture] if isinstance(capture, Capture) else list(capture)
     for each in captures:
         need_whole(each)
     if sphere not in {"mirror", "matt"}:
-        msg = f"sphere: must be 'mirror' or 'matt', got {sphere!r}"
+        msg = f"sphere: must be 'mirror', 'matt' or 'balls', got {sphere!r}"
         raise InputError(msg)
     if sphere == "matt":
         if near:

@@ -38,6 +38,8 @@ LEAST_LEVEL = 12.0
 """Grey levels of 255 of the brightest point from which on there is shading."""
 BOARD_SHARE = 0.5
 """Spread of what the board reflects, of the ball's level, before it is measured in the attached shadow."""
+SHADOWED = 0.1
+"""Part of the board's light that the ball keeps from itself by its shadow, and that one side lacks."""
 POLYNOMIAL = 4
 STEP_RAD = 1e-4
 
@@ -83,7 +85,7 @@ def shading_on(capture: Capture, levels: Levels, outline: Outline) -> SeenShadin
                 "expose shorter"
             )
             raise CalibrationError(msg)
-        vector, residual = _fit(_normals(points, outline.circle_px), values, used, levels.noise)
+        vector, board, residual = _fit(_normals(points, outline.circle_px), values, used, levels.noise)
         strength = float(np.linalg.norm(vector))
         if vector[2] <= 0:
             msg = (
@@ -93,6 +95,8 @@ def shading_on(capture: Capture, levels: Levels, outline: Outline) -> SeenShadin
             raise CalibrationError(msg)
         direction = vector / strength
         own[light], jacobians[light] = _spread(points, values, used, outline, levels.noise, direction)
+        # The ball's own shadow takes a part of the board's light, on the side away from the lamp: it looks lower.
+        own[light] += (SHADOWED * board / strength) ** 2 * np.eye(2)
         if residual > EXPLAINED * levels.noise:
             # Two laws that explain the ball as badly: the truth is as likely nearer to either of them.
             general, left = _monotone(_normals(points, outline.circle_px), values, used, direction)
@@ -128,7 +132,7 @@ def shading_misfit(levels: Levels, outline: Outline) -> float:
     left = 0.0
     for image in levels.images[:3]:
         values = image.ravel()[index]
-        _, residual = _fit(_normals(points, outline.circle_px), values, values < levels.clip, levels.noise)
+        *_, residual = _fit(_normals(points, outline.circle_px), values, values < levels.clip, levels.noise)
         left = max(left, residual / max(float(np.percentile(values, 99.0)), 1.0))
     return left
 
@@ -148,8 +152,8 @@ def _normals(points: Array, circle: Array) -> Array:
     return np.column_stack([flat, np.sqrt(np.maximum(1.0 - np.square(flat).sum(axis=1), 0.0))])
 
 
-def _fit(normals: Array, values: Array, used: NDArray[np.bool_], noise: float) -> tuple[Array, float]:
-    """Strength times direction, and the root mean square residual.
+def _fit(normals: Array, values: Array, used: NDArray[np.bool_], noise: float) -> tuple[Array, float, float]:
+    """Strength times direction, level of the board's light, and the root mean square residual.
 
     The board reflects onto a ball what an endless plane does: (1 - n_z) / 2 of its level.
     """
@@ -167,7 +171,7 @@ def _fit(normals: Array, values: Array, used: NDArray[np.bool_], noise: float) -
     start = np.array([*first, 0.0, 0.0])
     fit = least_squares(residuals, start, loss="soft_l1", max_nfev=60)
     off = np.abs(fit.fun[:-1]) * spread
-    return fit.x[:3], float(np.sqrt(np.mean(np.minimum(off, 4.0 * np.median(off) + noise) ** 2)))
+    return fit.x[:3], abs(float(fit.x[4])), float(np.sqrt(np.mean(np.minimum(off, 4.0 * np.median(off) + noise) ** 2)))
 
 
 def _monotone(normals: Array, values: Array, used: NDArray[np.bool_], start: Array) -> tuple[Array, float]:
@@ -203,7 +207,7 @@ def _spread(
     sector = ((np.arctan2(*(points - circle[:2]).T[::-1]) / (2 * math.pi) + 0.5) * SECTORS).astype(int) % SECTORS
     tries = []
     for part in range(SECTORS):
-        vector, _ = _fit(normals, values, used & (sector != part), noise)
+        vector, *_ = _fit(normals, values, used & (sector != part), noise)
         tries.append(vector / np.linalg.norm(vector))
     off = np.array(tries) - np.mean(tries, axis=0)
     covariance = (SECTORS - 1) / SECTORS * off.T @ off
@@ -211,8 +215,8 @@ def _spread(
     columns = []
     step = 0.5
     for axis in np.eye(3):
-        ahead, _ = _fit(_normals(points, circle + step * axis), values, used, noise)
-        behind, _ = _fit(_normals(points, circle - step * axis), values, used, noise)
+        ahead, *_ = _fit(_normals(points, circle + step * axis), values, used, noise)
+        behind, *_ = _fit(_normals(points, circle - step * axis), values, used, noise)
         columns.append((ahead / np.linalg.norm(ahead) - behind / np.linalg.norm(behind)) / (2 * step))
     return across @ covariance @ across.T + STEP_RAD**2 * np.eye(2), np.column_stack(columns)
 

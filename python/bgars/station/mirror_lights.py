@@ -14,12 +14,15 @@ from bgars.records.remark import Remark
 from bgars.station.highlights import REACH, find_spot, fit_highlight, glare, middle_of
 from bgars.station.mirror import sphere_of_outline
 from bgars.station.small_spots import SMALL_PX, place_small_spots
+from bgars.station.spot_fit import fit_spots
 
 if TYPE_CHECKING:
     from bgars.records.capture import Capture
     from bgars.station.highlights import Spot
     from bgars.station.levels import Levels
+    from bgars.station.mirror import Sphere
     from bgars.station.outline import Outline
+    from bgars.station.small_spots import SmallSpot
 
 __all__ = ["SeenHighlights", "highlights_on"]
 
@@ -31,6 +34,8 @@ WIDE_DEG, TOO_WIDE_DEG = 8.0, 25.0
 """Angle of a lamp from which on its middle is doubted, and refused: a burnt-out image, or no mirror."""
 POOR_FIT, FAR_SHARE = 3.0, 0.3
 """Misfit of a disc, and distance of its middle from that of the bright pixels, of its radius, that make it none."""
+MOVED_PX = 1.0
+"""Small spots lie so near to the middle of their clipped pixels."""
 ROUGH_SHARE = 0.15
 """Uncertainty of the middle of a highlight of any shape, of its radius."""
 ALIKE = {
@@ -96,15 +101,8 @@ def highlights_on(capture: Capture, levels: Levels, outline: Outline, camera_px:
         spots[index] = spot
     small = [index for index, spot in spots.items() if spot.extent_px <= SMALL_PX and _saturated(levels, index, spot)]
     if small:
-        placed = place_small_spots(
-            [levels.images[index] for index in small],
-            still,
-            [spots[index] for index in small],
-            sphere,
-            levels.clip,
-            levels.noise,
-            camera_px,
-        )
+        placed = _place_small([levels.images[index] for index in small], still, [spots[index] for index in small],
+                              sphere, levels, camera_px)  # fmt: skip
         for index, one in zip(small, placed, strict=True):
             places[index], covariances[index], lamp_deg[index] = one.place_px, one.covariance_px2, one.lamp_deg
     for index in sorted(set(spots) - set(small)):
@@ -124,6 +122,24 @@ def highlights_on(capture: Capture, levels: Levels, outline: Outline, camera_px:
         places[index], covariances[index] = (fit.x_px, fit.y_px), fit.covariance_px2
         lamp_deg[index], flux[index] = fit.lamp_deg, fit.flux
     return SeenHighlights(places, covariances, lamp_deg, flux, _together(findings, capture.name, count))
+
+
+def _place_small(
+    images: list[Array], still: Array, spots: list[Spot], sphere: Sphere, levels: Levels, camera_px: float
+) -> list[SmallSpot]:
+    """Places of clipped highlights of a few pixels."""
+    placed = place_small_spots(images, still, spots, sphere, levels.clip, levels.noise, camera_px)
+    starts = np.array([one.place_px for one in placed])
+    extent_px = math.radians(placed[0].lamp_deg) * sphere.radius_px / 4.0
+    fitted = fit_spots(images, still, spots, starts, sphere, levels.clip, levels.noise, camera_px, extent_px)
+    # Where no lens and no disc explain the pixels, all of them that come near are weighed instead.
+    explained = (fitted.misfits < POOR_FIT) & (np.hypot(*(fitted.places_px - starts).T) < MOVED_PX)
+    return [
+        one._replace(place_px=place, covariance_px2=covariance) if good else one
+        for one, place, covariance, good in zip(
+            placed, fitted.places_px, fitted.covariances_px2, explained, strict=True
+        )
+    ]
 
 
 def _together(findings: list[Remark], name: str, count: int) -> list[Remark]:
