@@ -185,7 +185,7 @@ def test_the_side_file_goes_before_the_name(tmp_path: Path) -> None:
     assert (result.serial, result.identity.lot, result.identity.operator) == ("SN99", "L3", "ada")
     assert result.identity.captured_utc.endswith("Z")
     csv = result.to_csv().splitlines()
-    assert csv[0].endswith("part_serial,part_lot,part_capture,part_inspected_utc")
+    assert csv[0].endswith("part_serial,part_lot,part_capture,part_inspected_utc,part_round")
     assert ",SN99,L3,folder," in csv[1]
 
 
