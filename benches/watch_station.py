@@ -27,7 +27,6 @@ import imageio.v3 as iio
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
-RESULTS = Path(__file__).with_suffix(".json")
 PAGE = ROOT / "docs" / "line.md"
 BEGIN, END = "<!-- station: begin -->", "<!-- station: end -->"
 LIGHTS, SIDE_PX, PIXEL_UM = 8, 64, 20.0
@@ -192,19 +191,22 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--parts", type=int, default=1000, help="parts that are inspected")
     options.add_argument("--instant", type=int, default=5000, help="parts whose inspection answers at once")
+    options.add_argument("--rows", type=Path, nargs="+", help="runs that were kept by --keep, instead of new ones")
+    options.add_argument("--keep", type=Path, help="JSON file for the runs")
     options.add_argument("--docs", action="store_true", help="rewrite the table of docs/line.md")
     given = options.parse_args()
     kinds = (("inspected", given.parts, False), ("inspection answers at once", given.instant, True))
-    runs = []
+    runs = [Run(**each) for path in given.rows or () for each in json.loads(path.read_text(encoding="utf-8"))]
     with tempfile.TemporaryDirectory() as place:
         for name, parts, instant in kinds:
-            if parts:
+            if parts and not given.rows:
                 runs.append(station(Path(place) / name.replace(" ", "-"), name, parts, instant=instant))
     lines = list(table(runs))
     sys.stdout.write("\n".join(lines) + "\n")
-    if given.docs:
+    if given.keep:
         kept = [asdict(run) | {"latencies_s": [round(each, 4) for each in run.latencies_s]} for run in runs]
-        RESULTS.write_text(json.dumps(kept) + "\n", encoding="utf-8")
+        given.keep.write_text(json.dumps(kept) + "\n", encoding="utf-8")
+    if given.docs:
         text = PAGE.read_text(encoding="utf-8")
         head, tail = text.split(BEGIN)[0], text.split(END)[1]
         PAGE.write_text(f"{head}{BEGIN}\n{chr(10).join(lines)}\n{END}{tail}", encoding="utf-8")
