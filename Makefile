@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo docs wheel api test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral station station-balls simulator experiments method check-faults kills line schema constants studies performance bench fuzz clean
+.PHONY: demo docs wheel api test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral station station-balls simulator experiments method check-faults kills line watch-station schema constants studies performance bench fuzz clean
 
 demo: $(VENV)/.run-time ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
@@ -100,6 +100,9 @@ bench: $(VENV)/.run-time ## CPU seconds, wall time and memory of whole commands,
 
 line: $(VENV)/.installed ## Measure batch, watch and store, and rewrite the tables of docs/line.md (10 minutes)
 	$(BIN)/python docs/make_line.py
+
+watch-station: $(VENV)/.installed ## Latency and memory of `bgars watch` over 6,000 small parts, into docs/line.md (20 minutes)
+	$(BIN)/python benches/watch_station.py --docs
 
 KILLS ?= 200
 kills: $(VENV)/.installed ## Kill `bgars watch` at KILLS random times: every part is in the store once or still in the inbox (10 minutes)

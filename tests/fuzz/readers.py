@@ -12,9 +12,15 @@ import imageio.v3 as iio
 import numpy as np
 import tifffile
 from bgars.files.light_files import read_filenames, read_intensities, read_lp
+from bgars.files.light_formats import read_light_file
 from bgars.io.images import decode_stack
+from bgars.io.masks import read_mask
 from bgars.io.normal_map import read_stored_normals
+from bgars.io.response import read_response_table
 from bgars.io.surface_file import read_surface
+from bgars.records.flat_field import FlatField
+from bgars.station.verify import read_known
+from scipy.io import savemat
 
 
 def normals() -> np.ndarray:
@@ -70,7 +76,70 @@ def make_corpus(folder: Path) -> None:
     scene = bgars.read_scene("hemisphere")
     assert scene.scene is not None
     (folder / "scene.json").write_text(json.dumps({"scene": {"kind": "plane"}}), encoding="utf-8")
+    make_dialects(folder)
+    make_captures(folder)
     (folder / "r.csv").write_text("part,ball,characteristic,reference\n1,A1,top_um,500\n", encoding="utf-8")
+
+
+def make_dialects(folder: Path) -> None:
+    """Lights and images in other programs' formats, responses, stations."""
+    directions = bgars.LightRig.ring(4).directions
+    rows = [[round(float(value), 6) for value in row] for row in directions]
+    plain = "\n".join(" ".join(map(str, row)) for row in rows)
+    (folder / "lights.txt").write_text(f"{len(rows)}\n{plain}\n", encoding="utf-8")
+    named = "".join(f"img{at};{';'.join(map(str, row))}\n" for at, row in enumerate(rows))
+    (folder / "lights.csv").write_text("file;x;y;z\n" + named, encoding="utf-8")
+    comma = plain.replace(" ", "\t").replace(".", ",")
+    (folder / "lights.tsv").write_bytes(f"x\ty\tz\n{comma}\n".encode("utf-16"))
+    (folder / "lights.json").write_text(
+        json.dumps(
+            {"lights": [{"viewId": at, "direction": row, "intensity": [1, 1, 1]} for at, row in enumerate(rows)]}
+        ),
+        encoding="utf-8",
+    )
+    (folder / "lights.dome").write_text(
+        json.dumps({"directions": [dict(zip("xyz", row, strict=True)) for row in rows], "ledAdjust": []}),
+        encoding="utf-8",
+    )
+    (folder / "lights-led.txt").write_text(
+        "N_img nrows ncols f x0 y0 mean_distance\n1 9 11 100 5 4 300\n1 2 3 0 0 1 1 1 1 0 0\n", encoding="utf-8"
+    )
+    np.save(folder / "lights.npy", directions)
+    for name, packed in (("lights.mat", False), ("lights-z.mat", True)):
+        savemat(folder / name, {"L": directions, "intensities": np.ones(4), "text": "x"}, do_compression=packed)
+    grey = np.arange(168, dtype=np.uint8).reshape(12, 14)
+    for suffix in ("tga", "webp", "gif"):
+        iio.imwrite(folder / f"d.{suffix}", np.stack([grey] * 3, axis=-1))
+    np.save(folder / "d.npy", grey)
+    iio.imwrite(folder / "d.tif", grey, plugin="pillow", compression="tiff_lzw")
+    (folder / "d.hdr").write_bytes(
+        b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 9\n" + (b"\2\2\0\x09" + b"\x89\x10" * 4) * 2
+    )
+    (folder / "response.csv").write_text(
+        "".join(f"{level},{level**2 / 255}\n" for level in range(256)), encoding="utf-8"
+    )
+    rig, u = bgars.LightRig.from_directions(directions, u_deg=0.05), np.full(4, 0.05)
+    levels = np.linspace(0, 1, 9)
+    station = bgars.Station(
+        lights=bgars.LightCalibration(rig, u, u, u, "mirror", (), 0.02, u_intensities=np.full(4, 0.01)),
+        flat=FlatField(np.ones((4, 6)), 2, (12, 14)),
+        response=bgars.ResponseCurve(levels, levels**2, 0.001, "sums"),
+        scale=bgars.Scale(3.4, 0.002, distortion=0.004, points=80),
+    )
+    bgars.write_station(station, folder / "station.toml")
+    (folder / "known.csv").write_text("name,height_um,diameter_um,u_um\nA1,400,500,0.2\nA2,410,,\n", encoding="utf-8")
+
+
+def make_captures(folder: Path) -> None:
+    """A capture: its images are not touched, what describes it is."""
+    for light in range(4):
+        iio.imwrite(folder / f"light_{light}.png", np.full((6, 7), 50 * light + 30, np.uint8))
+    (folder / "capture.toml").write_text(
+        'images = ["light_0.png", "light_1.png", "light_2.png", "light_3.png"]\npixel_pitch_um = 10.0\n'
+        "response = { gamma = 2.2 }\nblack_level = 1.0\nsaturation = 250\n"
+        "[lights]\nring = { count = 4, elevation_deg = 45.0, azimuth0_deg = 0.0 }\n[part]\nserial = 'S1'\n",
+        encoding="utf-8",
+    )
 
 
 def _side(path: Path) -> object:
@@ -89,6 +158,10 @@ def _images(path: Path) -> object:
     return decode_stack([path], max_megapixels=16.0)
 
 
+def _capture(path: Path) -> object:
+    return bgars.read_capture(path.parent, max_megapixels=1.0)
+
+
 # name: (what reads a path, patterns of its whole files)
 READERS: dict[str, tuple[Callable[[Path], object], tuple[str, ...]]] = {
     "height map": (bgars.read_height, ("h*.tif", "h.npy")),
@@ -103,6 +176,13 @@ READERS: dict[str, tuple[Callable[[Path], object], tuple[str, ...]]] = {
     "intensities": (read_intensities, ("i.txt",)),
     "file names": (read_filenames, ("f.txt",)),
     "references": (bgars.read_references, ("r.csv",)),
+    "lights": (read_light_file, ("lights*",)),
+    "other images": (_images, ("d.*",)),
+    "mask": (lambda path: read_mask(path, (12, 14)), ("g.*", "d.[tgwn]*", "n8.png")),
+    "response": (lambda path: read_response_table(path, 255.0), ("response.csv",)),
+    "station": (bgars.read_station, ("station.toml",)),
+    "known sizes": (read_known, ("known.csv",)),
+    "capture": (_capture, ("capture.toml", "light_2.png")),
     "surface": (read_surface, ("surface.npz",)),
     "page source": (_side, ("report.json",)),
 }

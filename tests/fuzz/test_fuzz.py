@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections import Counter
 from pathlib import Path
@@ -85,6 +86,17 @@ def test_a_deep_side_file_is_refused_in_one_line(tmp_path: Path) -> None:
     read, _ = READERS["page source"]
     with pytest.raises(bgars.FileFormatError, match="remove it to do without"):
         read(tmp_path / "report.json")
+
+
+def test_an_encrypted_surface_file_is_refused_in_one_line(corpus: Path, tmp_path: Path) -> None:
+    content = bytearray((corpus / "surface.npz").read_bytes())
+    for mark, flags in ((b"PK\x01\x02", 8), (b"PK\x03\x04", 6)):  # in the table of contents, and before each array
+        for found in re.finditer(re.escape(mark), bytes(content)):
+            content[found.start() + flags] |= 1
+    (tmp_path / "surface.npz").write_bytes(content)
+    read, _ = READERS["surface"]
+    with pytest.raises(bgars.FileFormatError, match="remove it to do without"):
+        read(tmp_path / "surface.npz")
 
 
 def test_a_black_capture_is_dark_and_no_accident() -> None:

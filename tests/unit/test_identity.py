@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import bgars
@@ -38,6 +39,79 @@ def test_a_result_of_version_3_is_read_without_identity(tmp_path: Path) -> None:
     assert bgars.read_result(path).identity == bgars.PartIdentity()
     path.write_text(part(0).to_json())
     assert bgars.read_result(path).identity == part(0).identity
+
+
+def test_a_result_without_a_round_is_read(tmp_path: Path) -> None:
+    values = part(0).to_dict()
+    del values["identity"]["round"]
+    path = tmp_path / "result.json"
+    path.write_text(json.dumps(values))
+    assert bgars.read_result(path).identity == part(0).identity
+    path.write_text(json.dumps(values | {"identity": values["identity"] | {"round": 0}}))
+    with pytest.raises(bgars.FileFormatError, match=r"identity\.round"):
+        bgars.read_result(path)
+    for bad in (0, -1, True, 1.0, "2"):
+        with pytest.raises(bgars.InputError, match="round: must be 1 or more"):
+            bgars.PartIdentity(round=bad)
+
+
+def test_a_part_that_comes_again_has_its_round_in_every_record(tmp_path: Path) -> None:
+    store = bgars.open_store(tmp_path / "store", create=True)
+    other = bgars.open_store(tmp_path / "store")  # another process
+    assert other.known() == {}
+    first, again = (replace(part(1), files=(("a.png", f"{n:064d}"),)) for n in range(2))
+    assert store.append(first)
+    assert not other.append(first), "what another process appended meanwhile is known"
+    assert other.numbered(first).identity.round == 1
+    assert other.append(again)
+    reworked = store.numbered(again)
+    assert reworked.identity.round == 2
+    assert not store.append(again)
+    rows = store.query("select round, result_json from parts join results using (part_key) order by round").to_pylist()
+    assert [row["round"] for row in rows] == [1, 2]
+    assert [json.loads(row["result_json"])["identity"]["round"] for row in rows] == [1, 2]
+    assert dict(identity_facts(reworked.to_dict()))["round"] == "2"
+    assert reworked.to_csv().splitlines()[0].endswith(",part_round")
+    assert reworked.to_csv().splitlines()[1].endswith(",2")
+    assert reworked.summary_line().endswith(" round=2")
+    assert part(1).summary_line().endswith(" round=null")
+    store.compact()
+    store.refresh()
+    assert store.numbered(again).identity.round == 2
+    assert store.numbered(replace(part(1), files=(("a.png", f"{9:064d}"),))).identity.round == 3
+
+
+def test_a_round_that_is_stated_counts(tmp_path: Path) -> None:
+    store = bgars.open_store(tmp_path / "store", create=True)
+    stated = replace(part(1), identity=replace(part(1).identity, round=4))
+    store.append(stated)
+    store.append(replace(part(1), files=(("a.png", f"{1:064d}"),)))
+    assert sorted(store.query("select round from parts")["round"].to_pylist()) == [4, 5]
+    assert store.numbered(replace(part(1), serial="")).identity.round is None
+    folder = tmp_path / "SN7_r2"
+    folder.mkdir()
+    serial, identity = bgars.Naming("{serial}_r{round}").of_name(folder)
+    assert (serial, identity.round) == ("SN7", 2)
+    with pytest.raises(bgars.InputError, match="must follow the pattern"):
+        bgars.Naming("{serial}_{round}").of_name(folder)
+    (folder / "capture.toml").write_text("[part]\nround = 3\n")
+    assert bgars.Naming("{serial}_r{round}").of_name(folder)[1].round == 3
+
+
+def test_files_of_a_store_without_rounds_are_counted(tmp_path: Path) -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    store = bgars.open_store(tmp_path / "store", create=True)
+    for n, stamp in enumerate(("2026-01-02T00:00:00Z", "2026-01-01T00:00:00Z")):
+        store.append(replace(part(1), inspected_utc=stamp, files=(("a.png", f"{n:064d}"),)))
+    for path in (tmp_path / "store" / "parts").rglob("*.parquet"):
+        old: pyarrow.Table = parquet.ParquetFile(path).read()
+        parquet.write_table(old.drop_columns(["round"]), path)
+    store = bgars.open_store(tmp_path / "store")
+    rows = store.query("select round, inspected_utc from parts order by inspected_utc").to_pylist()
+    assert [row["round"] for row in rows] == [1, 2]
+    store.append(replace(part(1), inspected_utc="2026-01-03T00:00:00Z", files=(("a.png", f"{3:064d}"),)))
+    assert sorted(store.query("select round from parts")["round"].to_pylist()) == [1, 2, 3]
 
 
 def test_one_inspection_takes_its_identity_from_side_file_and_options(tmp_path: Path) -> None:

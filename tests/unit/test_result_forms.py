@@ -18,7 +18,15 @@ from judged_parts import LIMITS, RECIPE, judged
 KEYS = [
     *("time", "part", "serial", "capture", "verdict", "balls", "balls_pass", "balls_fail", "balls_undecided"),
     *("balls_missing", "bridges", "pitch_um", "seating_coplanarity_um", "u_seating_coplanarity_um"),
-    *("regression_coplanarity_um", "u_regression_coplanarity_um", "warpage_um", "reason", "warnings", "version"),
+    *(
+        "regression_coplanarity_um",
+        "u_regression_coplanarity_um",
+        "warpage_um",
+        "reason",
+        "warnings",
+        "version",
+        "round",
+    ),
 ]
 PAIR = re.compile(r'(\w+)=("(?:[^"\\]|\\.)*"|\S+)(?: |$)')
 

@@ -36,7 +36,8 @@ def test_a_part_is_kept_with_all_of_it_and_once(tmp_path: Path) -> None:
     assert store.append(replace(part(0), serial="other")), "the same images under another serial are another part"
     assert counts(store) == (3, 18, 12)
     kept = store.query("select result_json from results where serial = 'SN0001'")["result_json"][0].as_py()
-    assert kept == part(1).to_json()
+    assert kept == store.numbered(part(1)).to_json()
+    assert json.loads(kept)["identity"]["round"] == 1
     row = store.query("select * from parts where serial = 'SN0001'").to_pylist()[0]
     assert (row["lot"], row["station"], row["day"].isoformat(), row["seconds"]) == ("L1", "S1", "2026-01-01", 1.5)
     top = store.query("select top_um, u_top_um from balls where serial = 'SN0001' and name = 'B3'").to_pylist()[0]

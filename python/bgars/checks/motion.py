@@ -2,70 +2,110 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bgars.checks.evidence import critical_t
+from bgars.checks.shifts import image_shifts
 from bgars.records.findings import Finding
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
-    from bgars.checks.windows import FrameFit
+    from bgars.checks.shifts import ImageShifts
+    from bgars.records.capture import Capture
 
-__all__ = ["check_motion", "own_shifts"]
+__all__ = ["check_motion", "moves"]
 
 Array = NDArray[np.float64]
+Images = NDArray[np.intp]
 
 MOVED_PX = 0.3
 """Shift that is told: a third of a pixel is what edges of albedo turn into false slopes of some degrees."""
 OF_OTHERS = 6.0
-"""Times the usual residual shift of the other images, which the shape of highlights and edges makes."""
+"""Times the usual shift that is left of the other images, which the shape of highlights and edges makes."""
+EQUAL_PX = 0.02
+"""To which images lie alike, at best."""
 MIN_LIGHTS = 6
 """Of fewer, what is left over does not tell which image has moved."""
 
 
-def own_shifts(fit: FrameFit, lights: Array) -> tuple[Array, Array]:
-    """(L, 2) shifts without what goes with the direction of the light, and (L,) the usual ones of the other images.
+class Move(NamedTuple):
+    """Images that moved together: their shift (x right, y up), its standard error, the usual one that is left."""
+
+    images: Images
+    shift_px: Array
+    u_px: float
+    usual_px: float
+
+    @property
+    def size_px(self) -> float:
+        """Length of the shift."""
+        return float(np.hypot(*self.shift_px))
+
+
+def moves(found: ImageShifts, lights: Array) -> Iterator[Move]:
+    """Each image, and all from each image on, as if these had moved and nothing else.
 
     Gradients of shading are not where those of albedo are: that shifts all images in proportion to their lights.
     """
-    design = np.column_stack([np.ones(len(lights)), lights[:, :2]])
-    weight = 1.0 / np.maximum((fit.u_shift_px**2).sum(axis=1), 1e-4)
-    shifts, usual = np.zeros_like(fit.shift_px), np.zeros(len(lights))
-    for index in range(len(lights)):
-        others = np.arange(len(lights)) != index
-        scaled = design[others] * weight[others, None] ** 0.5
-        common = np.linalg.lstsq(scaled, fit.shift_px[others] * weight[others, None] ** 0.5, rcond=None)[0]
-        left = fit.shift_px - design @ common
-        shifts[index] = left[index]
-        usual[index] = float(np.median(np.hypot(*left[others].T)))
-    return shifts, usual
+    count = len(lights)
+    usual_model = np.column_stack([np.ones(count), lights[:, :2]])
+    tiles = len(found.without_px)
+    groups = [np.array([index]) for index in range(count)]
+    groups += [np.arange(first, count) for first in range(2, count - 1)]
+    for images in groups:
+        moved = np.zeros(count)
+        moved[images] = 1.0
+        solve = np.linalg.pinv(np.column_stack([usual_model, moved]))
+        shift = solve[-1] @ found.place_px
+        spread = np.square(found.without_px.transpose(0, 2, 1) @ solve[-1] - shift).sum(axis=1)
+        error = float(np.sqrt((tiles - 1) / tiles * spread.sum()))
+        left = found.place_px - usual_model @ (solve[:3] @ found.place_px) - moved[:, None] * shift
+        free = left if len(images) > 1 else np.delete(left, images, axis=0)
+        yield Move(images, shift, error, float(np.median(np.hypot(*free.T))))
 
 
-def check_motion(fit: FrameFit, lights: Array, names: Sequence[str]) -> list[Finding]:
-    """Find images that moved."""
+def check_motion(capture: Capture, kept: Images, lights: Array, names: Sequence[str]) -> list[Finding]:
+    """Find an image that moved, or the moment from which on the images lie elsewhere.
+
+    Parameters
+    ----------
+    capture : Capture
+    kept : (K,) intp
+        Images with light of their own.
+    lights, names
+        Of these.
+    """
     if len(lights) < MIN_LIGHTS:
         return []
-    shifts, usual = own_shifts(fit, lights)
-    size = np.hypot(*shifts.T)
-    error = np.hypot(*fit.u_shift_px.T)
-    index = int(np.argmax(np.where(size > critical_t(fit.tiles, len(lights)) * error, size / (usual + 0.02), 0.0)))
-    certain = size[index] > critical_t(fit.tiles, len(lights)) * error[index] and size[index] > OF_OTHERS * usual[index]
-    if size[index] < MOVED_PX or not certain:
+    found = image_shifts(capture, kept)
+    if found is None:
         return []
-    right, up = shifts[index]
+    candidates = list(moves(found, lights))
+    critical = critical_t(len(found.without_px), len(candidates))
+    certain = [
+        move
+        for move in candidates
+        if move.size_px > max(MOVED_PX, critical * move.u_px, OF_OTHERS * max(move.usual_px, EQUAL_PX))
+    ]
+    if not certain:
+        return []
+    # A shift that is put where it is not leaves more over.
+    best = min(certain, key=lambda move: move.usual_px / move.size_px)
+    right, up = best.shift_px
+    first = int(best.images[0])
+    which = names[first] if len(best.images) == 1 else f"each image from {names[first]} on"
     return [
         Finding(
             "motion",
             "warning",
-            f"{names[index]} is shifted by {size[index]:.1f} pixels against the others "
-            f"({right:+.1f} right, {up:+.1f} up)",
+            f"{which} is shifted by {best.size_px:.1f} pixels against the others ({right:+.1f} right, {up:+.1f} up)",
             "fix part and camera, wait until everything stands still, and take the images again",
-            image=index,
-            value=float(size[index]),
+            image=first,
+            value=best.size_px,
             limit=MOVED_PX,
             unit="px",
         )

@@ -11,7 +11,7 @@ from bgars.records.findings import Finding
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from bgars.checks.windows import FrameFit
+    from numpy.typing import NDArray
 
 __all__ = ["check_noise"]
 
@@ -24,13 +24,13 @@ NOISY, VERY_NOISY = 0.06, 0.12
 error of the normals says the first, too, so that it is a note."""
 
 
-def check_noise(fit: FrameFit, level: float, names: Sequence[str]) -> list[Finding]:
+def check_noise(noise: NDArray[np.float64], level: float, names: Sequence[str]) -> list[Finding]:
     """Find noise."""
-    if len(names) < 5 or not fit.noise.any():  # noqa: PLR2004 - three images leave nothing over
+    if len(names) < 5 or not noise.any():  # noqa: PLR2004 - three images leave nothing over
         return []
-    index = int(np.argmax(fit.noise))
-    usual = float(np.median(np.delete(fit.noise, index)))
-    value = float(fit.noise[index])
+    index = int(np.argmax(noise))
+    usual = float(np.median(np.delete(noise, index)))
+    value = float(noise[index])
     if value > NOISIER * max(usual, LEAST):
         return [
             Finding(

@@ -34,24 +34,24 @@ class Patch(NamedTuple):
     inside: Mask
 
 
-def cut_patches(capture: Capture) -> Iterator[Patch]:
+def cut_patches(capture: Capture, side_px: int = SIDE_PX) -> Iterator[Patch]:
     """Cut patches evenly over the image; the whole of a small one."""
     rows, cols = capture.mask.shape
     full = used_scale(capture, capture.images)
     dark = None if capture.dark is None else np.asarray(np.median(capture.dark), dtype=capture.dark.dtype)
     limit = min(float(capture.saturation), full)
-    for first_row, end_row in _cuts(rows):
-        for first_col, end_col in _cuts(cols):
+    for first_row, end_row in _cuts(rows, side_px):
+        for first_col, end_col in _cuts(cols, side_px):
             at = np.s_[first_row:end_row, first_col:end_col]
             raw = capture.images[:, at[0], at[1]]
             yield Patch(linear_values(capture, raw, dark), np.asarray(raw >= NEAR_CLIP * limit), capture.mask[at])
 
 
-def _cuts(size: int) -> list[tuple[int, int]]:
-    if size <= ALONG * SIDE_PX:
+def _cuts(size: int, side_px: int) -> list[tuple[int, int]]:
+    if size <= ALONG * side_px:
         return [(0, size)]
-    firsts = np.linspace(0, size - SIDE_PX, ALONG).astype(int)
-    return [(int(first), int(first) + SIDE_PX) for first in firsts]
+    firsts = np.linspace(0, size - side_px, ALONG).astype(int)
+    return [(int(first), int(first) + side_px) for first in firsts]
 
 
 def box_blocks(stack: Floats, side: int) -> Floats:

@@ -23,7 +23,7 @@ from bgars.checks.response import check_noise_of_levels, check_response
 from bgars.checks.table import check_table
 from bgars.checks.view import TILES, make_view
 from bgars.checks.vignetting import check_vignetting
-from bgars.checks.windows import cut_windows, fit_frames
+from bgars.checks.windows import cut_windows, noise_of
 from bgars.records.findings import Finding, Findings
 from bgars.records.whole_capture import need_whole
 
@@ -112,15 +112,12 @@ def _single(capture: Capture, view: View, lights: NDArray[np.float64], kept: NDA
     uneven, factors = check_gains(view, moments_by(view, lit, view.tiles, TILES * TILES), lights)
     lights = lights * factors[:, None]
     found += uneven
-    windows = cut_windows(capture, view)
-    if windows is None or len(kept) != len(capture.rig):
-        return found + blurred
-    fit = fit_frames(windows, lights)
-    if fit is None:
-        return found + blurred
-    moved = check_motion(fit, lights, view.names)
     # A blurred image looks shifted, and less noisy; a shifted one is as sharp as the others.
-    return found + (blurred or moved or check_noise(fit, windows.level, view.names))
+    moved = blurred or check_motion(capture, kept, lights, view.names)
+    windows = None if moved or len(kept) != len(capture.rig) else cut_windows(capture, view)
+    if windows is None:
+        return found + moved
+    return found + check_noise(noise_of(windows, lights), windows.level, view.names)
 
 
 def _renumbered(found: list[Finding], kept: NDArray[np.intp]) -> list[Finding]:

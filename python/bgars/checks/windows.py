@@ -1,8 +1,7 @@
-"""Parts of a capture at full resolution, where shifts, blur and noise of single images are measured.
+"""Parts of a capture at full resolution, where the noise of single images is measured.
 
-A matt pixel's values lie in the span of three images, whatever the surface is. What image j does wrong (a shift, a
-blur) adds a known pattern times an unknown number; all numbers of all images are fitted at once to what the span
-leaves over. Their errors come from the scatter of that fit over tiles.
+A matt pixel's values lie in the span of three images, whatever the surface is; what the span leaves over between
+neighbours is noise.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from bgars.checks.view import View
     from bgars.records.capture import Capture
 
-__all__ = ["FrameFit", "Windows", "cut_windows", "fit_frames"]
+__all__ = ["Windows", "cut_windows", "noise_of"]
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -32,7 +31,6 @@ SHADOWED, SHINES = 0.25, 2.2
 """Of the pixel's median: darker or brighter under a light is shadow or highlight, which moves with the light."""
 GROW_PX = 3
 """Pixels around shadows and highlights that are left out, too."""
-RIDGE = 1e-6
 LEAST_SINGULAR = 0.2
 """Of the largest singular value: noise shares below are too alike to tell images apart."""
 MIN_STEPS = 1000
@@ -47,29 +45,6 @@ class Windows:
     lit: Mask
     level: float
     """Usual level of a pixel, of full scale."""
-
-
-@dataclass(frozen=True, eq=False)
-class FrameFit:
-    """What each image does wrong, with standard errors.
-
-    Attributes
-    ----------
-    shift_px, u_shift_px : (L, 2) float64
-        Displacement of the image's content, x right and y up.
-    blur_px2, u_blur_px2 : (L,) float64
-        Added variance of the blur; negative: sharper than the others.
-    noise : (L,) float64
-        Standard deviation of the noise, of full scale.
-    tiles : float
-    """
-
-    shift_px: Array
-    u_shift_px: Array
-    blur_px2: Array
-    u_blur_px2: Array
-    noise: Array
-    tiles: float
 
 
 def cut_windows(capture: Capture, view: View) -> Windows | None:
@@ -137,66 +112,12 @@ def _grown(bad: Mask) -> Mask:
     return grown
 
 
-def fit_frames(windows: Windows, lights: Array) -> FrameFit | None:
-    """Fit shift and blur of every image, and measure its noise."""
-    count = len(lights)
-    left = np.eye(count) - lights @ np.linalg.pinv(lights)
-    noise = _noise(windows, left)
-    smooth = _smoothed(windows.values)
-    lit = windows.lit[:, 3:-3, 3:-3]
-    inner = smooth[..., 3:-3, 3:-3]
-    right = 0.5 * (smooth[..., 3:-3, 4:-2] - smooth[..., 3:-3, 2:-4])
-    up = 0.5 * (smooth[..., 2:-4, 3:-3] - smooth[..., 4:-2, 3:-3])
-    bend = (
-        smooth[..., 3:-3, 4:-2] + smooth[..., 3:-3, 2:-4] + smooth[..., 2:-4, 3:-3] + smooth[..., 4:-2, 3:-3]
-    ) - 4.0 * inner
-    patterns = np.stack([-right, -up, 0.5 * bend], axis=2)
-    residual = np.tensordot(left.astype(np.float32), inner, axes=(1, 1)).transpose(1, 0, 2, 3)
-    size = 3 * count
-    normals, rights = [], []
-    for window in range(len(lit)):
-        for rows in _cuts(lit.shape[1]):
-            for cols in _cuts(lit.shape[2]):
-                mask = lit[window, rows, cols]
-                if mask.sum() < TILE_PX:
-                    continue
-                pattern = patterns[window][:, :, rows, cols][:, :, mask].astype(np.float64)
-                flat = pattern.reshape(size, -1)
-                products = (flat @ flat.T).reshape(count, 3, count, 3) * left[:, None, :, None]
-                normals.append(products.reshape(size, size))
-                own = residual[window][:, rows, cols][:, mask].astype(np.float64)
-                rights.append((pattern * own[:, None]).sum(axis=2).ravel())
-    if len(normals) < 4:  # noqa: PLR2004 - tiles that make a scatter
-        return None
-    matrix = np.sum(normals, axis=0)
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-12))
-    inverse = np.linalg.pinv(matrix / scale[:, None] / scale[None, :] + RIDGE * np.eye(size), hermitian=True)
-    inverse = inverse / scale[:, None] / scale[None, :]
-    solution = inverse @ np.sum(rights, axis=0)
-    spread = np.zeros((size, size))
-    for one, two in zip(normals, rights, strict=True):
-        off = two - one @ solution
-        spread += np.outer(off, off)
-    error = np.sqrt(np.maximum(np.diag(inverse @ spread @ inverse), 0.0)).reshape(count, 3)
-    value = solution.reshape(count, 3)
-    return FrameFit(value[:, :2], error[:, :2], value[:, 2], error[:, 2], noise * windows.level, float(len(normals)))
+def noise_of(windows: Windows, lights: Array) -> Array:
+    """(L,) standard deviation of each image's noise, of full scale; 0 where too few pixels tell it.
 
-
-def _cuts(size: int) -> list[slice]:
-    return [slice(first, min(first + TILE_PX, size)) for first in range(0, size, TILE_PX)]
-
-
-def _smoothed(values: Floats) -> Floats:
-    """Binomial filter of five pixels along both axes: its variance is 1 px^2, so that gradients reach over a pixel."""
-    for _ in range(2):
-        values = 0.25 * (np.roll(values, 1, axis=-1) + np.roll(values, -1, axis=-1)) + 0.5 * values
-        values = 0.25 * (np.roll(values, 1, axis=-2) + np.roll(values, -1, axis=-2)) + 0.5 * values
-    smooth: Floats = values
-    return smooth
-
-
-def _noise(windows: Windows, left: Array) -> Array:
-    """(L,) noise over the usual level, from what the span leaves over between neighbouring pixels."""
+    From what the span of three images leaves over between neighbouring pixels.
+    """
+    left = np.eye(len(lights)) - lights @ np.linalg.pinv(lights)
     residual = np.tensordot(left.astype(np.float32), windows.values, axes=(1, 1))
     step = (residual[..., 1:] - residual[..., :-1]) / np.float32(2.0**0.5)
     both = windows.lit[..., 1:] & windows.lit[..., :-1]
@@ -209,5 +130,5 @@ def _noise(windows: Windows, left: Array) -> Array:
     common = float(measured.sum() / shares.sum())
     own = np.linalg.lstsq(shares, measured - common * shares.sum(axis=1), rcond=LEAST_SINGULAR)[0]
     variance = common + own
-    noise: Array = np.sqrt(np.maximum(variance, 0.0))
+    noise: Array = np.sqrt(np.maximum(variance, 0.0)) * windows.level
     return noise

@@ -21,6 +21,7 @@ from bgars.cli.options import (
     MethodOption,
     OperatorOption,
     RecipeOption,
+    RoundOption,
     SerialFrom,
     StationNameOption,
     StoreOption,
@@ -77,6 +78,7 @@ def batch(
     lot: LotOption = "",
     station_name: StationNameOption = "",
     operator: OperatorOption = "",
+    round_: RoundOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Inspect many captures into one store: all cores, failures kept with their reason, killed runs taken up again.
@@ -87,7 +89,7 @@ def batch(
     Exit code 0: every part passes. 1: a part does not, or could not be inspected. 2: wrong use, or a store that cannot
     be written. 130: interrupted; run it again to go on.
     """
-    naming = Naming(serial_from, PartIdentity(lot=lot, station=station_name, operator=operator))
+    naming = Naming(serial_from, PartIdentity(lot=lot, station=station_name, operator=operator, round=round_))
     store = open_store(output, create=True)
     with _progress() as report:
         done = inspect_many(

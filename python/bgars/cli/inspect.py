@@ -21,6 +21,7 @@ from bgars.cli.options import (
     LotOption,
     MethodOption,
     OperatorOption,
+    RoundOption,
     StationNameOption,
     StationOption,
 )
@@ -85,6 +86,7 @@ def inspect(
     lot: LotOption = "",
     station_name: StationNameOption = "",
     operator: OperatorOption = "",
+    round_: RoundOption = None,
     parquet: Annotated[
         # The help is markup: a bracket that is no style is escaped.
         bool,
@@ -138,7 +140,9 @@ def inspect(
         part = None if recipe is None else bgars.read_part_recipe(recipe)
         capture = bgars.read_capture(folder, station=station)
         told = told_by(check_first(capture, force=force))
-        named, identity = identity_of(capture, PartIdentity(lot=lot, station=station_name, operator=operator))
+        named, identity = identity_of(
+            capture, PartIdentity(lot=lot, station=station_name, operator=operator, round=round_)
+        )
         serial = serial or named
         if part is not None and part.strip is not None:
             rows = inspect_strip(

@@ -25,6 +25,7 @@ __all__ = [
     "OperatorOption",
     "OutOption",
     "RecipeOption",
+    "RoundOption",
     "SerialFrom",
     "StationNameOption",
     "StationOption",
@@ -68,6 +69,15 @@ StationNameOption = Annotated[
     str, typer.Option(metavar="NAME", help="Name of the station that took the images.", show_default=False)
 ]
 OperatorOption = Annotated[str, typer.Option(metavar="NAME", help="Who runs it.", show_default=False)]
+RoundOption = Annotated[
+    int | None,
+    typer.Option(
+        "--round",
+        min=1,
+        help="Which inspection of its serial number: 1 before rework, 2 after it; a store counts by itself.",
+        show_default=False,
+    ),
+]
 StoreOption = Annotated[
     Path, typer.Option("--output", "-o", metavar="STORE", help="Store; made if missing.", show_default=False)
 ]
@@ -80,8 +90,8 @@ SerialFrom = Annotated[
     typer.Option(
         metavar="PATTERN",
         help="Where serial numbers come from: a pattern of the folder's name with {serial}, {lot}, {substrate}, "
-        "{position}, {station}, {operator}, such as '{lot}/{serial}_{position}'; or 'code', the DataMatrix in the "
-        r"images. A \[part] table in capture.toml goes first.",
+        "{position}, {station}, {operator}, {round}, such as '{lot}/{serial}_{position}'; or 'code', the "
+        r"DataMatrix in the images. A \[part] table in capture.toml goes first.",
     ),
 ]
 StationOption = Annotated[

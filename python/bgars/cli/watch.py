@@ -22,6 +22,7 @@ from bgars.io.given_paths import need_path
 from bgars.line.inbox import Inbox
 from bgars.line.naming import Naming
 from bgars.line.notify import Notifier
+from bgars.line.warm import warm_up
 from bgars.line.watch import Watch, watched
 from bgars.normals.methods import DEFAULT_METHOD
 from bgars.records.part_identity import PartIdentity
@@ -137,6 +138,7 @@ def watch(
             say=_say,
         )
         with ended_by_signals(watching):
+            warm_up(watching.store, method)
             watching.run(most=most)
 
 

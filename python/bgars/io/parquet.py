@@ -9,6 +9,7 @@ from bgars.errors import InputError
 from bgars.io.atomic import atomic_file
 from bgars.records.ball_result import BallResult
 from bgars.records.keys import keys_of
+from bgars.records.part_identity import PartIdentity
 from bgars.records.part_result import FORMAT, FORMAT_VERSION, PartResult
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ __all__ = ["need_pyarrow", "write_parquet"]
 
 PART_COLUMNS = ("name", "serial", "capture", "inspected_utc", "verdict", "version")
 PREFIX = "part_"
-LOT = "part_lot"
+LOT, ROUND = "part_lot", "part_round"
 UNITS = {"_um": "um", "_deg": "deg"}
 WHOLE = {"row", "col", "lights_used"}
 TEXT = {"name", "verdict", "kind"}
@@ -28,9 +29,9 @@ TEXT = {"name", "verdict", "kind"}
 def write_parquet(result: PartResult, path: str | PathLike[str]) -> None:
     """Write the balls as a Parquet file; many of them read as one table.
 
-    Columns are those of ``balls.csv``, full digits, null = not measured, after seven of the part
+    Columns are those of ``balls.csv``, full digits, null = not measured, after eight of the part
     (``part_name``, ``part_serial``, ``part_capture``, ``part_inspected_utc``, ``part_verdict``, ``part_version``,
-    ``part_lot``). Each column's
+    ``part_lot``, ``part_round``). Each column's
     metadata holds its ``unit`` ("" for none) and ``description``; the table's, ``format`` and ``format_version``.
 
     Parameters
@@ -51,6 +52,8 @@ def write_parquet(result: PartResult, path: str | PathLike[str]) -> None:
         about = keys_of(PartResult)[name].meaning
         columns.append((PREFIX + name, about, [getattr(result, name)] * len(result.balls)))
     columns.append((LOT, "lot or order of the part", [result.identity.lot] * len(result.balls)))
+    about = keys_of(PartIdentity)["round"].meaning
+    columns.append((ROUND, about, [result.identity.round] * len(result.balls)))
     for name, key in keys_of(BallResult).items():
         if name != "budget":
             columns.append((name, key.meaning, [_cell(getattr(ball, name)) for ball in result.balls]))
@@ -82,10 +85,10 @@ def _cell(value: Any) -> Any:  # noqa: ANN401 - a field of a record
 
 
 def _type(pyarrow: Any, name: str) -> Any:  # noqa: ANN401 - pyarrow has no types
+    if name in WHOLE or name == ROUND:
+        return pyarrow.int32()
     if name.startswith(PREFIX) or name in TEXT:
         return pyarrow.string()
-    if name in WHOLE:
-        return pyarrow.int32()
     if name == "present":
         return pyarrow.bool_()
     return pyarrow.list_(pyarrow.string()) if name == "reasons" else pyarrow.float64()

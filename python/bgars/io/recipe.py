@@ -69,6 +69,7 @@ class PartIdentityTable(Strict):
     position: str = ""
     station: str = ""
     operator: str = ""
+    round: Annotated[int, Field(ge=1)] | None = None
 
 
 class LightsRecipe(Strict):

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import io
-import zipfile
-import zlib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bgars.errors import FileFormatError
+from bgars.io.guarded import load_npz
 from bgars.records.part_surface import PartSurface
 
 if TYPE_CHECKING:
@@ -21,6 +20,7 @@ __all__ = ["SURFACE_FILE", "read_surface", "surface_bytes"]
 
 SURFACE_FILE = "surface.npz"
 MOST_SAMPLES = 64_000_000
+ABOUT = "what `bgars inspect` writes beside its result; remove it to do without"
 ARRAYS = {"ball_height_um": np.float32, "ball_measured": np.bool_, "board_height_um": np.float32}
 
 
@@ -39,34 +39,22 @@ def read_surface(path: Path) -> PartSurface:
     FileFormatError
         It cannot be read, or is not such a file.
     """
+    values = load_npz(path, ABOUT)
     try:
-        with path.open("rb") as content, np.load(content, allow_pickle=False) as file:
-            maps = {name: _array(file[name], name, kind) for name, kind in ARRAYS.items()}
-            rows, cols = (int(size) for size in file["shape_px"])
-            surface = PartSurface(
-                shape_px=(rows, cols),
-                pixel_pitch_um=float(file["pixel_pitch_um"]),
-                ball_step_px=int(file["ball_step_px"]),
-                board_step_px=int(file["board_step_px"]),
-                ball_height_um=maps["ball_height_um"],
-                ball_measured=maps["ball_measured"],
-                board_height_um=maps["board_height_um"],
-            )
+        maps = {name: _array(values[name], name, kind) for name, kind in ARRAYS.items()}
+        rows, cols = (int(size) for size in values["shape_px"])
+        surface = PartSurface(
+            shape_px=(rows, cols),
+            pixel_pitch_um=float(values["pixel_pitch_um"]),
+            ball_step_px=int(values["ball_step_px"]),
+            board_step_px=int(values["board_step_px"]),
+            ball_height_um=maps["ball_height_um"],
+            ball_measured=maps["ball_measured"],
+            board_height_um=maps["board_height_um"],
+        )
         _check(surface)
-    except OSError as error:
-        msg = f"{path}: cannot be read ({error.strerror or error})"
-        raise FileFormatError(msg) from error
-    except (
-        ValueError,
-        KeyError,
-        TypeError,
-        AttributeError,
-        EOFError,
-        OverflowError,
-        zipfile.BadZipFile,
-        zlib.error,
-    ) as error:
-        msg = f"{path}: is not what `bgars inspect` writes beside its result ({error!r}); remove it to do without"
+    except (ValueError, KeyError, TypeError, OverflowError) as error:
+        msg = f"{path}: is not {ABOUT} ({error!r})"
         raise FileFormatError(msg) from error
     return surface
 

@@ -214,7 +214,10 @@ def store_outcome(
         return None
     now = datetime.now(timezone.utc).strftime(TIME_FORM)
     result = replace(outcome.result, inspected_utc=now)
-    if store is not None and not store.append(result, capture_folder=folder, seconds=outcome.seconds):
+    if store is None:
+        return result
+    result = store.numbered(result)
+    if not store.append(result, capture_folder=folder, seconds=outcome.seconds):
         return None
     return result
 

@@ -23,6 +23,7 @@ __all__ = ["CODE", "Naming", "identity_of", "last_written_utc"]
 CODE = "code"
 """A pattern that asks for the code in the images."""
 NAMES = ("serial", *(entry.name for entry in fields(PartIdentity) if entry.name != "captured_utc"))
+FORMS = {"round": "0*[1-9][0-9]{0,5}"}
 DEFAULT_PATTERN = "{serial}"
 
 
@@ -36,8 +37,8 @@ class Naming:
     ----------
     pattern : str
         Of the folder's name, with ``{serial}`` and, where they are in it, ``{lot}``, ``{substrate}``, ``{position}``,
-        ``{station}``, ``{operator}``; ``/`` reaches into the folders above. ``code``: the DataMatrix or QR code that
-        the images show.
+        ``{station}``, ``{operator}``, ``{round}`` (a whole number); ``/`` reaches into the folders above. ``code``:
+        the DataMatrix or QR code that the images show.
     common : PartIdentity
         Of all parts.
 
@@ -79,13 +80,15 @@ class Naming:
             The name does not follow the pattern, and the side file names no serial number.
         """
         known = _side_file(folder if side is None else side)
-        found: dict[str, str] = {}
+        found: dict[str, Any] = {}
         if self.pattern != CODE:
             depth = self.pattern.count("/") + 1
             told = "/".join(folder.absolute().parts[-depth:])
             match = self._expression().fullmatch(told)
             if match is not None:
                 found = match.groupdict()
+                if "round" in found:
+                    found["round"] = int(found["round"])
             elif not known.get("serial"):
                 msg = f"{folder}: its name must follow the pattern {self.pattern!r}, got {told!r}"
                 raise InputError(msg)
@@ -120,7 +123,10 @@ class Naming:
         if "serial" not in names or len(set(names)) < len(names):
             msg = f"serial-from: must hold {{serial}}, and each name once, got {self.pattern!r}"
             raise InputError(msg)
-        told = "".join(f"(?P<{piece}>[^/]+?)" if at % 2 else re.escape(piece) for at, piece in enumerate(pieces))
+        told = "".join(
+            f"(?P<{piece}>{FORMS.get(piece, '[^/]+?')})" if at % 2 else re.escape(piece)
+            for at, piece in enumerate(pieces)
+        )
         return re.compile(told)
 
 
@@ -138,7 +144,7 @@ def last_written_utc(capture: Capture) -> str:
     return datetime.fromtimestamp(max(times), timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ") if times else ""
 
 
-def _side_file(folder: Path) -> dict[str, str]:
+def _side_file(folder: Path) -> dict[str, Any]:
     path = folder / RECIPE_NAME
     part = read_recipe(path).part if path.is_file() else None
     return {} if part is None else {name: value for name, value in vars(part).items() if value}

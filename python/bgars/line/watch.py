@@ -144,7 +144,7 @@ class Watch:
             if outcome.result is None:
                 self._tell_failure(outcome, place)
                 continue
-            result = new or outcome.result
+            result = new or self.store.numbered(outcome.result)
             for problem in self.notifier.tell(result, place):
                 self.say(f"{result.serial}: {problem}")
             if new is None:

@@ -181,7 +181,7 @@ class PartResult(ShownPart):
     def to_csv(self) -> str:
         """Return the balls as CSV text, one line per ball; empty cells where something was not measured.
 
-        The last columns say which part it is: serial number, lot, capture, time.
+        The last columns say which part it is: serial number, lot, capture, time, round.
         Text that a spreadsheet would run as a formula begins with an apostrophe.
         """
         return csv_text(self)

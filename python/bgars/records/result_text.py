@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["csv_text", "log_line", "table_text"]
 
 CSV_DIGITS = 3
-CSV_PART = ("part_serial", "part_lot", "part_capture", "part_inspected_utc")
+CSV_PART = ("part_serial", "part_lot", "part_capture", "part_inspected_utc", "part_round")
 TABLE = (
     ("ball", "name", ""),
     ("x um", "x_um", ".1f"),
@@ -46,7 +46,7 @@ def csv_text(result: PartResult) -> str:
     text = io.StringIO()
     names = [name for name in keys_of(BallResult) if name != "budget"]
     writer = csv.writer(text, lineterminator="\n")
-    part = [result.serial, result.identity.lot, result.capture, result.inspected_utc]
+    part = [result.serial, result.identity.lot, result.capture, result.inspected_utc, result.identity.round or ""]
     writer.writerow([*names, *CSV_PART])
     for ball in result.balls:
         cells = [_csv_cell(name, getattr(ball, name)) for name in names]
@@ -88,6 +88,7 @@ def log_line(result: PartResult) -> str:
         "reason": result.reasons[0] if result.reasons else "",
         "warnings": len(result.warnings),
         "version": result.version,
+        "round": result.identity.round,
     }
     return " ".join(f"{key}={_log_value(value)}" for key, value in pairs.items())
 

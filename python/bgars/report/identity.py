@@ -9,6 +9,7 @@ __all__ = ["identity_facts", "identity_line"]
 
 TITLES = (
     ("serial", "serial number"),
+    ("round", "round"),
     ("lot", "lot"),
     ("substrate", "substrate"),
     ("position", "position"),

@@ -8,12 +8,14 @@ calibrated sizes is given to neither side, as ISO 14253-1 asks.
 from __future__ import annotations
 
 import csv
+import io
 import math
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
 from bgars.errors import CalibrationError, FileFormatError, InputError
+from bgars.files.safe_files import read_text
 from bgars.records.remark import Remark
 from bgars.records.station import Verification
 
@@ -51,9 +53,8 @@ def read_known(path: Path) -> dict[str, Known]:
         A value that is no number above 0, or a name that comes twice.
     """
     try:
-        with path.open(encoding="utf-8-sig", newline="") as stream:
-            lines = list(csv.DictReader(stream))
-    except (OSError, UnicodeDecodeError) as error:
+        lines = list(csv.DictReader(io.StringIO(read_text(path).content, newline="")))
+    except csv.Error as error:
         msg = f"{path}: cannot be read as CSV ({error})"
         raise FileFormatError(msg) from error
     columns = set(lines[0]) if lines else set()

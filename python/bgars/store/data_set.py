@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
+from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from bgars.store.append import PARTIAL, append_rows, partition, write_durably
 from bgars.store.compact import compact
 from bgars.store.export import export
 from bgars.store.keys import failure_key, part_key
+from bgars.store.known_parts import KnownParts
 from bgars.store.query import query
 from bgars.store.rows import TIME_FORM, result_rows
 from bgars.store.schema import FORMAT, FORMAT_VERSION, TABLES
@@ -42,13 +44,13 @@ class Store:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._last_sequence = 0
-        self._known: dict[str, str] | None = None
+        self._known: KnownParts | None = None
 
     def __repr__(self) -> str:
         return f"Store({str(self.folder)!r})"
 
     def append(self, result: PartResult, *, capture_folder: str = "", seconds: float = math.nan) -> bool:
-        """Add a result, durably and whole, unless it is there.
+        """Add a result, durably and whole, unless it is there; with the round of :meth:`numbered`.
 
         Parameters
         ----------
@@ -72,14 +74,29 @@ class Store:
             No time of inspection.
         """
         key = part_key(result)
+        result = self.numbered(result)
         if key in self.known():
             return False
         _raise_version(self.folder / MARK)
         rows = result_rows(result, sequence=self._next_sequence(), capture_folder=capture_folder, seconds=seconds)
         place = partition(result.inspected_utc[:10], result.name if result.recipe is not None else "")
         append_rows(self.folder, place, f"p-{key[:40]}", rows)
-        self.known()[key] = result.serial
+        self._parts().add(self.folder / "parts" / place / f"p-{key[:40]}.parquet", rows["parts"][0])
         return True
+
+    def numbered(self, result: PartResult) -> PartResult:
+        """Return a result with its round, unless it states one or has no serial number.
+
+        The first inspection of a serial number under a recipe is round 1; that of other images, such as after rework,
+        the next. What any process appended meanwhile counts.
+        """
+        if result.identity.round is not None or not result.serial:
+            return result
+        known = self._parts()
+        known.look()
+        place = partition("", result.name if result.recipe is not None else "").name
+        number = known.round_of(part_key(result), result.serial, place)
+        return replace(result, identity=replace(result.identity, round=number))
 
     def append_failure(
         self, capture_folder: str, reason: str, *, serial: str = "", recipe: str = "", version: str = "", lot: str = ""
@@ -101,26 +118,18 @@ class Store:
         append_rows(self.folder, place, f"f-{key[:40]}", {"failures": [row]})
 
     def known(self) -> dict[str, str]:
-        """Return the keys of all parts with their serial numbers, as of the first call and this process's appends."""
+        """Return the keys of all parts with their serial numbers, as of the last append or :meth:`refresh`."""
+        return self._parts().serials
+
+    def _parts(self) -> KnownParts:
         if self._known is None:
-            self._known = {}
-            _, parquet = need_pyarrow()
-            for path in sorted((self.folder / "parts").rglob("*.parquet")):
-                try:
-                    table = parquet.ParquetFile(path).read(["part_key", "serial", "sequence"])
-                except FileNotFoundError:  # gone into a compacted file, which is read, or a second copy of it
-                    continue
-                except (OSError, ValueError) as error:
-                    msg = f"{path}: is not a readable file of a store ({error})"
-                    raise FileFormatError(msg) from error
-                self._known |= dict(zip(table["part_key"].to_pylist(), table["serial"].to_pylist(), strict=True))
-                self._last_sequence = max([self._last_sequence, *table["sequence"].to_pylist()])
+            self._known = KnownParts(self.folder)
+            self._known.look()
         return self._known
 
     def last_sequence(self) -> int:
         """Return the largest number in the order of parts; 0 for an empty store."""
-        self.known()
-        return self._last_sequence
+        return max(self._last_sequence, self._parts().last_sequence)
 
     def refresh(self) -> None:
         """Forget what is known: the next look sees what other processes appended."""
@@ -146,7 +155,7 @@ class Store:
 
     def _next_sequence(self) -> int:
         """Nanoseconds of the clock, but never less than what this store has seen: clocks are set back."""
-        self.known()
+        self._last_sequence = max(self._last_sequence, self._parts().last_sequence)
         self._last_sequence = max(time.time_ns(), self._last_sequence + 1)
         return self._last_sequence
 

@@ -16,7 +16,7 @@ __all__ = ["export"]
 
 BLOCK_PARTS = 100
 PREFIX = "bgars_"
-OWN_COLUMNS = {"day": "text", "recipe": "text", "round": "whole"}
+OWN_COLUMNS = {"day": "text", "recipe": "text"}
 KEYS = {
     "parts": ("part_key",),
     "balls": ("part_key", "name"),
@@ -109,7 +109,7 @@ def _table(alchemy: Any, metadata: Any, name: str) -> Any:  # noqa: ANN401 - as 
         "time": alchemy.DateTime,
     }
     columns = [(column.name, column.kind) for column in TABLES[name] if column.name != "result_json"]
-    columns += [(own, kind) for own, kind in OWN_COLUMNS.items() if own != "round" or name == "parts"]
+    columns += list(OWN_COLUMNS.items())
     keys = KEYS.get(name, ())
     made = [alchemy.Column("row_id", alchemy.Integer, primary_key=True)] if not keys else []
     # MySQL and others index text only with a length: keys are 64 digits, names of balls are short.

@@ -26,12 +26,14 @@ VIEWS = {
 # there are two copies of both.
 PARTS = """
 CREATE TABLE parts_taken AS
-SELECT *, CASE WHEN serial = '' THEN 1
-          ELSE row_number() OVER (PARTITION BY serial, recipe ORDER BY inspected_utc, sequence) END AS round
+SELECT * REPLACE (CASE WHEN serial = '' THEN 1 ELSE coalesce(round, row_number() OVER (
+    PARTITION BY serial, recipe ORDER BY inspected_utc, sequence)) END AS round)
 FROM (SELECT * EXCLUDE (filename, copy) FROM (
     SELECT *, parse_filename(filename, true) AS stem,
            row_number() OVER (PARTITION BY part_key ORDER BY filename) AS copy
-    FROM (SELECT * EXCLUDE (result_json) FROM {parts})) WHERE copy = 1);
+    -- Files of an earlier bgars have no rounds.
+    FROM (SELECT * EXCLUDE (result_json) FROM {parts} UNION ALL BY NAME SELECT NULL::BIGINT AS round WHERE false))
+    WHERE copy = 1);
 CREATE VIEW parts AS SELECT * EXCLUDE (stem) FROM parts_taken;
 CREATE VIEW results AS SELECT part_key, serial, result_json FROM (
     SELECT *, row_number() OVER (PARTITION BY part_key ORDER BY filename) AS copy FROM {parts}) WHERE copy = 1;

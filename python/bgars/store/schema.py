@@ -61,6 +61,7 @@ PARTS = (
     Column("part_key", "text", KEY_MEANING),
     Column("sequence", "whole", "order in which parts came into the store; does not follow a clock that is set back"),
     Column("serial", "text", "serial number of the part"),
+    Column("round", "whole", "inspection of the serial number: 1 = the first, 2 = the next, such as after rework"),
     Column("lot", "text", "lot or order"),
     Column("substrate", "text", "strip, tray or panel"),
     Column("position", "text", "place on the substrate"),

@@ -1,0 +1,118 @@
+"""What a store knows of its parts: keys, serial numbers and rounds, read once from each of its files."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bgars.errors import FileFormatError
+from bgars.io.parquet import need_pyarrow
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+__all__ = ["KnownParts"]
+
+READ = ("part_key", "serial", "sequence", "inspected_utc", "round")
+SETTLED_NS = 10_000_000_000
+"""Age of a folder's time from which it tells changes: file systems count it in steps, and clocks differ."""
+
+
+class KnownParts:
+    """Parts of a store, as far as its files were read.
+
+    Attributes
+    ----------
+    serials : dict of str
+        Serial number by key.
+    last_sequence : int
+        Largest number in the order of parts.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.serials: dict[str, str] = {}
+        self.last_sequence = 0
+        self._folder = folder
+        self._rounds: dict[tuple[str, str], list[tuple[str, int]]] = {}
+        self._times_ns: dict[str, int] = {}
+        self._read: set[str] = set()
+
+    def look(self) -> None:
+        """Read the files that came since the last look, from whatever process.
+
+        Raises
+        ------
+        FileFormatError
+            A file is damaged.
+        """
+        rows = [row for path, recipe in self._new_files() for row in _rows(path, recipe)]
+        # A part of an earlier bgars has no round; then its place in time tells it, as in the view.
+        for row in sorted(rows, key=lambda row: (row["inspected_utc"], row["sequence"])):
+            self._add(row)
+
+    def add(self, path: Path, row: dict[str, Any]) -> None:
+        """Take in a part that this process wrote."""
+        self._read.add(str(path))
+        self._add({**row, "recipe": path.parent.name})
+
+    def round_of(self, key: str, serial: str, recipe: str) -> int | None:
+        """Return the round of a part: as the store has it, else the next of its serial number; None without one."""
+        if not serial:
+            return None
+        rounds = self._rounds.get((serial, recipe), [])
+        return next((number for other, number in rounds if other == key), max([0, *(n for _, n in rounds)]) + 1)
+
+    def _add(self, row: dict[str, Any]) -> None:
+        key, serial = row["part_key"], row["serial"]
+        self.last_sequence = max(self.last_sequence, row["sequence"])
+        if key in self.serials:  # compaction wrote it again
+            return
+        self.serials[key] = serial
+        if serial:
+            number = row["round"] or self.round_of(key, serial, row["recipe"])
+            self._rounds.setdefault((serial, row["recipe"]), []).append((key, int(number or 1)))
+
+    def _new_files(self) -> Iterator[tuple[str, str]]:
+        """Files that were not read yet, and the folder of their recipe."""
+        for day in _folders(self._folder / "parts"):
+            for place in _folders(Path(day.path)):
+                try:
+                    changed_ns = place.stat().st_mtime_ns
+                    if self._times_ns.get(place.path) == changed_ns:
+                        continue
+                    settled = time.time_ns() - changed_ns > SETTLED_NS
+                    with os.scandir(place.path) as entries:
+                        names = [entry.path for entry in entries if entry.name.endswith(".parquet")]
+                except FileNotFoundError:
+                    continue
+                for path in names:
+                    if path not in self._read:
+                        self._read.add(path)
+                        yield path, place.name
+                if settled:
+                    self._times_ns[place.path] = changed_ns
+
+
+def _folders(folder: Path) -> list[os.DirEntry[str]]:
+    try:
+        with os.scandir(folder) as entries:
+            return sorted((entry for entry in entries if entry.is_dir()), key=lambda entry: entry.name)
+    except FileNotFoundError:
+        return []
+
+
+def _rows(path: str, recipe: str) -> list[dict[str, Any]]:
+    _, parquet = need_pyarrow()
+    try:
+        with parquet.ParquetFile(path) as file:
+            rows: list[dict[str, Any]] = file.read(
+                [name for name in READ if name in file.schema_arrow.names]
+            ).to_pylist()
+    except FileNotFoundError:  # gone into a compacted file, which is read, or a second copy of it
+        return []
+    except (OSError, ValueError) as error:
+        msg = f"{path}: is not a readable file of a store ({error})"
+        raise FileFormatError(msg) from error
+    return [{"round": None, **row, "recipe": recipe} for row in rows]
