@@ -127,7 +127,9 @@ def _lights_of_part(
     if recipe is not None and not isinstance(recipe, PartRecipe):
         recipe = read_part_recipe(recipe)
     layout = None if recipe is None else recipe.image_layout
-    roundness = None if recipe is None or recipe.q is None or recipe.u_q is None else (recipe.q, recipe.u_q)
+    roundness = None
+    if recipe is not None and recipe.aspect_ratio is not None and recipe.u_aspect_ratio is not None:
+        roundness = recipe.aspect_ratio, recipe.u_aspect_ratio
     if capture.pixel_pitch_um is None:
         msg = f"{capture.name}: pixel_pitch_um: needed with sphere 'balls'; calibrate the scale first, or state it"
         raise InputError(msg)
@@ -191,7 +193,7 @@ def _findings(measured: BallMeasurement, capture: Capture, *, known: bool) -> li
     found += [Remark("note", f"{capture.name}: {text}", "balls-warning") for text in measured.warnings]
     if not known:
         message = (
-            "how round the balls usually are is not stated (q and u_q of a recipe): the elevation of all lights "
+            "how round the balls usually are is not stated (aspect_ratio and u_aspect_ratio of a recipe): the elevation of all lights "
             "together cannot be told from balls flattened alike"
         )
         found.append(Remark("note", message, "roundness-unknown"))
