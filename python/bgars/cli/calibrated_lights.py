@@ -39,7 +39,9 @@ def tell_lights(found: LightCalibration) -> None:
     """Print a line a light."""
     rig = found.rig
     kind = "near lights, positions in mm" if rig.is_near else "distant lights"
-    say(f"{len(rig)} {kind}, on {len(found.balls)} {found.sphere} ball(s):")
+    count = len(found.balls)
+    balls = f"{found.sphere} ball{'s' if count != 1 else ''}" if found.sphere != "balls" else "solder balls"
+    say(f"{len(rig)} {kind}, on {count} {balls}:")
     say("  light  azimuth  elevation   u (deg)   own  common  strength" + ("   x, y, z (mm)" if rig.is_near else ""))
     for index in range(len(rig)):
         place = (
