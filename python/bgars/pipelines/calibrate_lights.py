@@ -193,8 +193,8 @@ def _findings(measured: BallMeasurement, capture: Capture, *, known: bool) -> li
     found += [Remark("note", f"{capture.name}: {text}", "balls-warning") for text in measured.warnings]
     if not known:
         message = (
-            "how round the balls usually are is not stated (aspect_ratio and u_aspect_ratio of a recipe): the elevation of all lights "
-            "together cannot be told from balls flattened alike"
+            "how round the balls usually are is not stated (aspect_ratio and u_aspect_ratio of a recipe): the "
+            "elevation of all lights together cannot be told from balls flattened alike"
         )
         found.append(Remark("note", message, "roundness-unknown"))
     return found
