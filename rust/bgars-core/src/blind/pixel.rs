@@ -107,16 +107,19 @@ pub(super) fn trust(observation: &Observation, material: &Material, facet: &Face
     for (index, used) in used.iter_mut().enumerate() {
         let model = albedo * material.shade(&facet.normal, &observation.lights[index]);
         let ratio = observation.residual(index, model) / SCALE;
-        let weight = observation.share(index) / (1.0 + ratio * ratio);
+        // A clipped value that the model exceeds has no residual whatever the normal is: no witness of it.
+        let is_witness = observation.kinds[index] != Kind::Clipped || ratio < 0.0;
+        let share = if is_witness { observation.share(index) } else { 0.0 };
+        let weight = share / (1.0 + ratio * ratio);
         squares += weight * (ratio * SCALE).powi(2);
         weights += weight;
-        lights += observation.share(index);
+        lights += share;
         *used = ratio.abs() <= USED;
     }
     let information = equations(observation, material, facet, &frame).matrix * (SCALE * SCALE);
     let noise = (observation.sigma * observation.weight).powi(2);
     let over = (lights - UNKNOWNS).max(LEAST_LIGHTS - 2.0);
-    let of_noise = noise * over / lights * (1.0 + (2.0 / over).sqrt());
+    let of_noise = noise * over / lights.max(1.0) * (1.0 + (2.0 / over).sqrt());
     let unexplained = (squares / weights - of_noise).max(0.0);
     let misfit = (lights * unexplained + PRIOR_RESIDUAL * PRIOR_RESIDUAL) / misfit_freedom(lights.max(LEAST_LIGHTS));
     let variance = noise + misfit;
