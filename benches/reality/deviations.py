@@ -133,7 +133,7 @@ def shift_half(draws: Draws, setup: Setup) -> None:
 
 @_weight(2)
 def all_squashed(draws: Draws, setup: Setup) -> None:
-    """All balls lower than wide: q of 0.90 to 0.995."""
+    """All balls lower than wide: aspect ratio 0.90 to 0.995."""
     setup.part.squash = draws.uniform(0.90, 0.995, 4)
 
 

@@ -43,6 +43,15 @@ def test_links_lead_somewhere(page: Path) -> None:
     assert not dead
 
 
+def test_what_is_looked_for_is_where_contributing_says() -> None:
+    page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    rows = re.findall(r"(?m)^\| [^|]+ \| `([^`]+)` \| `(\w+)` \|$", page)
+    assert len(rows) > 10
+    for file, name in rows:
+        code = (ROOT / file).read_text(encoding="utf-8")
+        assert re.search(rf"(?m)^ *(pub(\([a-z]+\))? )?(def|class|fn|struct) {name}\b", code), f"{file}: no {name}"
+
+
 def test_every_page_is_in_the_navigation() -> None:
     listed = re.findall(r"[\w/]+\.md", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"))
     there = {path.name for path in ROOT.glob("docs/*.md")}

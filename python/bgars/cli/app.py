@@ -191,7 +191,7 @@ def normals(
 ) -> None:
     """Estimate the normals only: normals.png (16 bit), albedo.tif, confidence.tif, measured.png, lights_kept.png.
 
-    With '-o FILE', such as normals.exr, only the normals, in the format that the ending says.
+    With '-o FILE', such as normals.exr: only the normals, in the format of the ending.
 
     The capture is checked first ('bgars check'): where its lights and images do not fit, nothing is written (exit code
     2) unless --force says so. Black background is not measured.

@@ -81,9 +81,9 @@ def batch(
     round_: RoundOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Inspect many captures into one store: all cores, failures kept with their reason, killed runs taken up again.
+    """Inspect many captures into one store: all cores, failures kept with their reason, killed runs resumed.
 
-    What the store has by the contents of images, recipe and version is not done again. No pages are written: see
+    A part whose images, recipe and version are in the store already is not inspected again. No pages are written: see
     'bgars report STORE' for the overview, 'bgars report STORE SERIAL' for a part, 'bgars query STORE' for questions.
 
     Exit code 0: every part passes. 1: a part does not, or could not be inspected. 2: wrong use, or a store that cannot

@@ -32,7 +32,7 @@ def register(app: typer.Typer) -> None:
     """Add the group of commands."""
     group = typer.Typer(
         name="calibrate",
-        help="Learn what every capture of a station shares, and keep it in a file.",
+        help="Measure what all captures of a station share, and keep it in a file.",
         no_args_is_help=True,
     )
     group.callback()(lambda: None)
@@ -69,9 +69,9 @@ def material(
         bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
     ] = False,
 ) -> None:
-    """Fit how a surface shines, on the balls of a capture, for 'bgars normals --material FILE' and its like.
+    """Fit how a surface shines, on the balls of a capture, for 'bgars normals --material FILE' and the other commands.
 
-    The file holds for captures under the same lights at the same exposure. Exit code 2 where there is no ball or no
+    The file is valid for captures under the same lights at the same exposure. Exit code 2 where there is no ball or no
     material that explains them; nothing is written then.
     """
     output = material_path(output)

@@ -45,7 +45,7 @@ def response(
     srgb: Annotated[bool, typer.Option("--srgb", help="Take the sRGB curve.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Find what light a grey level stands for; says when the camera is not linear."""
+    """Find how much light each grey level means; says when the camera is not linear."""
     if [exposures is not None, sums, srgb].count(True) != 1:
         msg = "--exposures, --sums, --srgb: give one of them"
         raise InputError(msg)
@@ -90,7 +90,7 @@ def scale(
     target: Annotated[Literal["dots", "chessboard"], typer.Option(help="What is on the target.")] = "dots",
     as_json: JsonOption = False,
 ) -> None:
-    """Measure a pixel on a grid that lies where parts lie; says how far the lens distorts."""
+    """Measure the pixel pitch on a grid that lies where parts lie; says how much the lens distorts."""
     u_um = None if u_pitch_mm is None else 1000.0 * u_pitch_mm
     found, findings = bgars.calibrate_scale(read_unlit(folder), 1000.0 * pitch_mm, target=target, u_pitch_um=u_um)
     keep_part(output, {"scale": found}, findings)

@@ -47,7 +47,9 @@ OutputOption = Annotated[
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")]
 FoldersArgument = Annotated[
     list[Path],
-    typer.Argument(metavar="FOLDER...", help="Capture folders, one a place of the ball; lights need not be described."),
+    typer.Argument(
+        metavar="FOLDER...", help="Capture folders, one per place of the ball; lights need not be described."
+    ),
 ]
 FolderArgument = Annotated[Path, typer.Argument(metavar="FOLDER", help="Capture folder.", show_default=False)]
 SphereOption = Annotated[
@@ -73,7 +75,7 @@ OutlineOption = Annotated[
     typer.Option(
         metavar="COL,ROW,RADIUS",
         help="Outline of the ball in pixels as an image viewer shows it (0,0 = middle of the first pixel), where it "
-        "cannot be found; once a folder, or several balls of one folder.",
+        "cannot be found; once per folder, or several balls of one folder.",
         show_default=False,
     ),
 ]
@@ -169,7 +171,7 @@ def station(
     name: Annotated[str, typer.Option(help="Name of the station.")] = "station",
     as_json: JsonOption = False,
 ) -> None:
-    """Do all at once: scale from a grid, lights from a ball, evenness from a board."""
+    """Calibrate everything at once: scale from a grid, lights from a ball, evenness from a board."""
     if (grid is None) != (grid_pitch_mm is None):
         msg = "--grid and --grid-pitch-mm: give both or none"
         raise InputError(msg)

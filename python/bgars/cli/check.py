@@ -59,11 +59,11 @@ def check(
         bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
     ] = False,
 ) -> None:
-    """Say whether images and lights belong together, and what else is wrong with a capture, before any number.
+    """Say whether images and lights belong together, and what else is wrong with a capture, before it is measured.
 
     Order and handedness of the lights, lights below the surface, the same image twice, dead and uneven lamps, exposure,
-    frames lit in part, ambient light, vignetting, motion, focus, noise, response, bit depth. What a capture cannot show
-    (a flat part has no shading) is not said. With --station: what moved since its calibration (docs/station.md).
+    partly lit frames, ambient light, vignetting, motion, focus, noise, response, bit depth. What a capture cannot show
+    (a flat part has no shading) is not judged. With --station: what moved since its calibration (docs/station.md).
 
     Exit code 0: no error was found (there may be warnings). 1: an error was found: numbers from this capture would be
     wrong. 2: wrong use, or a capture that cannot be read.

@@ -59,7 +59,11 @@ def grr(
     recipe: Annotated[
         Path | None,
         typer.Option(
-            "--recipe", "-r", metavar="PART.toml", help="Of captures; results bring their own.", show_default=False
+            "--recipe",
+            "-r",
+            metavar="PART.toml",
+            help="Recipe for captures; results bring their own.",
+            show_default=False,
         ),
     ] = None,
     references: Annotated[
@@ -75,11 +79,11 @@ def grr(
         bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
     ] = False,
 ) -> None:
-    """Say how well the gauge repeats: gauge R&R by analysis of variance, from repeated measurements of several parts.
+    """Say how repeatable the gauge is: gauge R&R by analysis of variance, from repeated measurements of several parts.
 
     Runs that are captures are inspected, and their results kept in OUT/results, in folders of the same names.
 
-    Exit code 0: GRR is at most 10 % of every tolerance. 1: it is not, or it cannot be said; the output says why. 2:
+    Exit code 0: GRR is at most 10 % of every tolerance. 1: it is more, or unknown; the output says why. 2:
     wrong use, a design that is not balanced, runs that do not belong together, or a capture that cannot be measured.
     """
     need_folder(folder)

@@ -112,8 +112,8 @@ def inspect(
     Files of others are never touched: OUT may not hold a capture, nor files of these names that bgars did not write.
 
     Where the recipe has a strip, FOLDER shows many parts: each gets a folder of its own in OUT, named after its place
-    (R1C1: first row and column of the image), and strip.html and parts.csv are the overview. --json and --log tell
-    a row a part.
+    (R1C1: first row and column of the image), and strip.html and parts.csv are the overview. --json and --log
+    print one row per part.
 
     The capture is checked first ('bgars check'): where its lights and images do not fit, there is no verdict.
 

@@ -31,12 +31,12 @@ LAZY_COMMANDS = {
         "bgars.cli.send",
         "Send the results of a store to a broker, by MQTT or AMQP 1.0: at least once, in order.",
     ),
-    "grr": ("bgars.cli.grr", "Say how well the gauge repeats: gauge R&R by analysis of variance."),
+    "grr": ("bgars.cli.grr", "Say how repeatable the gauge is: gauge R&R by analysis of variance."),
     "spc": (
         "bgars.cli.spc",
         "Chart many results over time: X-bar / S or I-MR charts, Cp, Cpk, Pp, Ppk with confidence intervals.",
     ),
-    "calibrate": ("bgars.cli.calibrate", "Learn what every capture of a station shares, and keep it in a file."),
+    "calibrate": ("bgars.cli.calibrate", "Measure what all captures of a station share, and keep it in a file."),
     "init": (
         "bgars.cli.init",
         "Write capture.toml: from these options, or by asking on a terminal.",
@@ -96,7 +96,10 @@ def _with_added_methods(command: Any) -> None:  # noqa: ANN401
 
 
 def _reflow(command: Any) -> None:  # noqa: ANN401
-    """Join the lines of each paragraph of the help, which the terminal's width then breaks."""
+    """Join the lines of each paragraph of the help, which the terminal's width then breaks; flags take no value."""
+    for option in getattr(command, "params", ()):
+        if getattr(option, "is_flag", False):
+            option.metavar = ""  # else <bool>, as if they took one
     command.help = "\n\n".join(" ".join(text.split()) for text in (command.help or "").split("\n\n"))
     if any(option.name == "method" for option in getattr(command, "params", ())):
         _with_added_methods(command)

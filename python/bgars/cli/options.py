@@ -61,14 +61,14 @@ ForceOption = Annotated[
     bool,
     typer.Option(
         "--force",
-        help="Go on though the images do not fit the lights (order, mirrored, below the surface, an image twice).",
+        help="Continue although the images do not fit the lights (order, mirrored, below the surface, an image twice).",
     ),
 ]
-LotOption = Annotated[str, typer.Option(metavar="LOT", help="Lot of all parts.", show_default=False)]
+LotOption = Annotated[str, typer.Option(metavar="LOT", help="Lot that the parts belong to.", show_default=False)]
 StationNameOption = Annotated[
     str, typer.Option(metavar="NAME", help="Name of the station that took the images.", show_default=False)
 ]
-OperatorOption = Annotated[str, typer.Option(metavar="NAME", help="Who runs it.", show_default=False)]
+OperatorOption = Annotated[str, typer.Option(metavar="NAME", help="Who operates the station.", show_default=False)]
 RoundOption = Annotated[
     int | None,
     typer.Option(
@@ -144,13 +144,13 @@ MaterialOption = Annotated[
 ]
 ChannelChoice = Annotated[
     ChannelOption | None,
-    typer.Option(help="How colour becomes one value (linear); the recipe's choice by default.", show_default=False),
+    typer.Option(help="How colour becomes one value (linear); by default what capture.toml says.", show_default=False),
 ]
 DirectxOption = Annotated[bool, typer.Option("--directx", help="Write normals.png with green = y down.")]
 FlattenOption = Annotated[
     Literal["plane", "quadratic"] | None,
     typer.Option(
-        help="Take one plane, or one quadratic surface, off the heights: so wrong or near lights bend flat parts.",
+        help="Subtract a plane, or a quadratic surface, from the heights: wrong or near lights bend flat parts so.",
         show_default=False,
     ),
 ]

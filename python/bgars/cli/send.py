@@ -46,7 +46,7 @@ def send(
     ] = "",
     cfx: Annotated[bool, typer.Option("--cfx", help="Send IPC-CFX UnitsInspected, not the short message.")] = False,
     follow: Annotated[
-        bool, typer.Option("--follow", help="Go on as parts come, over restarts of the broker, until it is ended.")
+        bool, typer.Option("--follow", help="Keep sending as parts come, across restarts of the broker, until stopped.")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:

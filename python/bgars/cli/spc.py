@@ -54,12 +54,12 @@ def spc(
     subgroup: Annotated[
         int | None,
         typer.Option(
-            help="Consecutive parts of a subgroup; 1: each part a point, with moving ranges (I-MR). By default "
+            help="Consecutive parts of a subgroup; 1: each part is a point, with moving ranges (I-MR). By default "
             f"{DEFAULT_SUBGROUP}, and 1 below {FEW_PARTS} parts.",
             show_default=False,
         ),
     ] = None,
-    target: Annotated[float, typer.Option(help="Ppk that is wanted.")] = TARGET,
+    target: Annotated[float, typer.Option(help="Required Ppk.")] = TARGET,
     western_electric: Annotated[
         bool, typer.Option("--western-electric", help="Look for the zone patterns, too; more false alarms.")
     ] = False,
@@ -87,7 +87,7 @@ def spc(
 ) -> None:
     """Chart many results over time: X-bar / S or I-MR charts, Cp, Cpk, Pp, Ppk with confidence intervals.
 
-    Exit code 0: every characteristic with limits is in control and capable. 1: one is not, or it cannot be said; the
+    Exit code 0: every characteristic with limits is in control and capable. 1: one is not, or it is unknown; the
     output says which. 2: wrong use, too few results, or results that do not belong together.
     """
     for path in results:

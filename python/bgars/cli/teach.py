@@ -40,7 +40,8 @@ def teach(
 ) -> None:
     """Write a part recipe from golden parts: layout, empty places, nominal sizes, and limits by a rule the file states.
 
-    The limits are what these parts keep with room; a drawing's limits are better. Exit code 2 where the parts differ.
+    The limits are what these parts keep with a margin; limits from a drawing are better. Exit code 2 where the parts
+    differ.
     """
     if output.exists() and not force:
         msg = f"{output}: is there already; --force replaces it"

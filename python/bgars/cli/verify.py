@@ -59,7 +59,7 @@ def verify(
 ) -> None:
     """Compare a station with a part of known sizes: bias, linearity, repeatability (protocol: docs/station.md).
 
-    Exit code 0: within --mpe-um, or none was given. 1: an error is beyond it, or that it is kept cannot be shown.
+    Exit code 0: within --mpe-um, or none was given. 1: an error is beyond it, or it cannot be shown to be within.
     """
     if mpe_um is not None and not (math.isfinite(mpe_um) and mpe_um > 0):
         msg = f"--mpe-um: must be finite and above 0, got {mpe_um:g}"

@@ -72,10 +72,12 @@ def watch(
             show_default=False,
         ),
     ] = "",
-    settle: Annotated[float, typer.Option(min=0.0, help="Seconds without a change that make a part complete.")] = 0.5,
+    settle: Annotated[
+        float, typer.Option(min=0.0, help="Seconds without a change after which a part is complete.")
+    ] = 0.5,
     poll: Annotated[float, typer.Option(min=0.01, help="Seconds between two looks.")] = 0.1,
     patience: Annotated[
-        float, typer.Option(min=0.0, help="Seconds after which an incomplete or unreadable part is a failed one.")
+        float, typer.Option(min=0.0, help="Seconds after which an incomplete or unreadable part counts as failed.")
     ] = 60.0,
     done: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Where parts go; INBOX/_done by default.", show_default=False)
@@ -105,17 +107,17 @@ def watch(
     station_name: StationNameOption = "",
     operator: OperatorOption = "",
     most: Annotated[
-        int | None, typer.Option("--stop-after", min=1, help="End after so many parts.", show_default=False)
+        int | None, typer.Option("--stop-after", min=1, help="Stop after this many parts.", show_default=False)
     ] = None,
 ) -> None:
-    """Inspect parts as they come: each once, none lost, also over restarts, full disks and clocks that are set.
+    """Inspect parts as they come: each once, none lost, across restarts, full disks and changes of the clock.
 
     A part is a folder in INBOX. It is complete with --count images and when nothing changed for --settle seconds, or as
-    soon as the --trigger file is there. It is inspected where it lies, its result is brought to the disk, told, and
-    only then the part is moved to the done or failed ones: whatever happens in between, it is met again and is in the
-    store once. One line of key=value pairs is printed for each part; --result-file and --tcp give it to a PLC.
+    soon as the --trigger file is there. It is inspected where it lies; its result is written to disk and reported,
+    and only then the part moves to the done or failed ones: if that is interrupted, it is inspected again, and is in
+    the store once. One line of key=value pairs is printed for each part; --result-file and --tcp give it to a PLC.
 
-    SIGTERM and Ctrl-C end it after the part at hand.
+    SIGTERM and Ctrl-C end it after the current part.
 
     Exit code 0: it was ended. 2: wrong use, or another bgars watch works on INBOX.
     """

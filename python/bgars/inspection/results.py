@@ -1,4 +1,4 @@
-"""From fitted shadows to records: micrometres, uncertainties, and reasons where something was not measured."""
+"""From fitted shadows to records: readings in micrometres, each with its whole u, and reasons where there is none."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Read a ``result.json`` again: everything is checked, nothing is guessed."""
+"""Read a ``result.json`` again, which `PartResult.to_json` wrote: everything is checked, nothing is guessed."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ TABLE = (
     ("height um", "top_um", ".1f"),
     ("seating um", "seating_deviation_um", ".1f"),
     ("aspect ratio", "aspect_ratio", ".3f"),
-    ("flat um", "flat_top_depth_um", ".1f"),
+    ("flat top um", "flat_top_depth_um", ".1f"),
     ("verdict", "verdict", ""),
 )
 LINE_READINGS = (

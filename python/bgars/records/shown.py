@@ -13,17 +13,28 @@ import numpy as np
 from bgars.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike, NDArray
     from PIL import Image
 
-__all__ = ["ABSENT", "VERDICT_COLORS", "ShownCapture", "ShownField", "ShownHeight", "ShownPart"]
+    from bgars.records.ball_result import BallResult
+
+__all__ = ["ABSENT", "VERDICT_COLORS", "ShownCapture", "ShownField", "ShownHeight", "ShownPart", "counted"]
 
 VERDICT_COLORS = {"pass": "#56B4E9", "fail": "#D55E00", "undecided": "#E69F00"}
 """Okabe and Ito, Color universal design, 2008: told apart by colour-blind readers."""
 ABSENT = {"fail": "missing", "undecided": "place not clear"}
 """What a place without a ball is, by its verdict: seen to be empty, or not."""
 THUMBNAIL_PX = 320
+
+
+def counted(balls: Sequence[BallResult]) -> list[str]:
+    """How many balls pass, fail, ..., in words; nothing of what there is none of."""
+    states = [ball.verdict if ball.present else ABSENT[ball.verdict] for ball in balls]
+    known = [(name, states.count(name)) for name in (*VERDICT_COLORS, *ABSENT.values()) if name in states]
+    return [f"{count} {name if count == 1 else name.replace('place', 'places')}" for name, count in known]
 
 
 class Shown:
@@ -188,13 +199,12 @@ class ShownPart(Shown):
 
     def _facts(self) -> dict[str, object]:
         part: Any = self
-        states = [ball.verdict if ball.present else ABSENT[ball.verdict] for ball in part.balls]
-        counts = [f"{states.count(name)} {name}" for name in (*VERDICT_COLORS, *ABSENT.values()) if name in states]
+        counts = counted(part.balls)
         coplanarity = part.seating_coplanarity_um
         return {
             "name": repr(part.name),
             "verdict": part.verdict,
-            "balls": f"{len(states)} ({', '.join(counts)})" if states else 0,
+            "balls": f"{len(part.balls)} ({', '.join(counts)})" if counts else 0,
             "seating_coplanarity": f"{coplanarity:.2f} um" if math.isfinite(coplanarity) else "not measured",
         }
 

@@ -65,7 +65,10 @@ def _panel(
         low, high = float(values.min()), float(values.max())
         room = max(0.02 * (high - low), 0.5 * (LEAST_SPAN_UM - (high - low)))
         bins = int(np.clip(np.sqrt(values.size) * 2, 5, 40))
-        axes.hist(values, bins=bins, range=(max(low - room, min(low, 0.0)), high + room), color=BAR, alpha=0.85)
+        counts, at = np.histogram(values, bins=bins, range=(max(low - room, min(low, 0.0)), high + room))
+        drawn = counts > 0
+        # With an edge, which is seen where limits are far away and bars are thinner than a pixel.
+        axes.bar(at[:-1][drawn], counts[drawn], np.diff(at)[drawn], align="edge", color=BAR, ec=BAR, lw=3.0, zorder=3)
         axes.ticklabel_format(axis="x", useOffset=False)
     else:
         axes.set_xticks([])
@@ -74,7 +77,8 @@ def _panel(
         axes.axvline(edge, color=VERDICT_COLORS["fail"], linestyle="--", linewidth=1.6, zorder=4)
         if math.isfinite(u_um):
             half = COVERAGE_FACTOR * u_um
-            axes.axvspan(edge - half, edge + half, color=VERDICT_COLORS["undecided"], alpha=0.35, linewidth=0)
+            color = VERDICT_COLORS["undecided"]
+            axes.axvspan(edge - half, edge + half, color=color, alpha=0.35, linewidth=0, zorder=3.5)
         axes.annotate(
             f" limit {edge:g}",
             (edge, 1.0),

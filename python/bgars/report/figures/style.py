@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from bgars.records.shown import ABSENT, VERDICT_COLORS
+from bgars.records.shown import ABSENT, VERDICT_COLORS, counted
 from bgars.report.figure_file import write_png
 
 if TYPE_CHECKING:
@@ -125,10 +125,7 @@ def window_size_in(window: tuple[float, float, float, float], longest_in: float)
 
 def part_title(result: PartResult) -> str:
     """Name and verdict, and how many balls are which."""
-    states = [ball.verdict if ball.present else ABSENT[ball.verdict] for ball in result.balls]
-    told = ", ".join(
-        f"{states.count(state)} {state}" for state in (*VERDICT_COLORS, *ABSENT.values()) if state in states
-    )
+    told = ", ".join(counted(result.balls))
     return f"{result.name}: {result.verdict.upper()}   ({told or 'no balls'})"
 
 
