@@ -96,7 +96,11 @@ def balls() -> Iterator[str]:
         for folder in sorted(one for one in MITSUBA.iterdir() if (one / "truth.json").exists()):
             truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
             lights = np.array(truth["lights"])
-            found = bgars.calibrate_lights(read_unlit(folder), "matt" if truth["kind"] == "matt" else "mirror")
+            try:
+                found = bgars.calibrate_lights(read_unlit(folder), "matt" if truth["kind"] == "matt" else "mirror")
+            except bgars.CalibrationError as error:
+                judged[folder.name] = {"refused": str(error)}
+                continue
             off = apart_deg(found.rig.directions, lights)
             z = on_axes_deg(found.rig.directions, lights) / found.u_deg[:, None]
             judged[folder.name] = {"off_deg": off.round(5).tolist(), "scaled": z.round(4).tolist()}
@@ -104,9 +108,11 @@ def balls() -> Iterator[str]:
     if JUDGED.exists():
         judged = json.loads(JUDGED.read_text(encoding="utf-8"))
         for kind, words in RENDERED.items():
-            these = [one for name, one in judged.items() if name.startswith(kind)]
+            these = [one for name, one in judged.items() if name.startswith(kind) and "off_deg" in one]
+            refused = sum(name.startswith(kind) and "refused" in one for name, one in judged.items())
+            said = f"{words}, {refused} more refused" if refused else words
             errors = [np.array(one["off_deg"]) for one in these]
-            yield row(words, len(these), errors, [np.array(one["scaled"]) for one in these])
+            yield row(said, len(these), errors, [np.array(one["scaled"]) for one in these])
 
 
 def near() -> Iterator[str]:
@@ -320,9 +326,10 @@ def solder() -> Iterator[str]:
         errors.append(apart_deg(found.rig.directions, true))
         scaled.append(on_axes_deg(found.rig.directions, true) / found.u_deg[:, None])
     error, z = np.concatenate(errors), np.abs(np.concatenate(scaled))
+    inside = f"{100 * np.mean(z < 1):.0f} % | {100 * np.mean(z < TWO):.0f} %"
     yield (
         f"| {parts}, of which {refused} refused | {len(error)} | {np.concatenate(before).mean():.2f} | "
-        f"{error.mean():.2f} | {np.percentile(error, 95):.2f} | {100 * np.mean(z < 1):.0f} % | {100 * np.mean(z < TWO):.0f} % |"
+        f"{error.mean():.2f} | {np.percentile(error, 95):.2f} | {inside} |"
     )
 
 
