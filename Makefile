@@ -58,7 +58,9 @@ station: data $(VENV)/.installed ## Measure the calibration of stations and rewr
 
 station-balls: $(VENV)/.installed ## Render balls for it with Mitsuba (20 s a seed; needs an LLVM, see benches/reality)
 	$(BIN)/python -m pip install --quiet --requirement benches/reality/requirements.txt
-	$(BIN)/python benches/station/render_balls.py benches/station/balls 101 102 103 104 105 106 107 108 109 110
+	$(BIN)/python benches/station/render_balls.py benches/station/balls board 301 302 303 304 401 402 403
+	$(BIN)/python benches/station/render_balls.py benches/station/balls grey 301 302 303 304 401 402 403
+	$(BIN)/python benches/station/render_balls.py benches/station/balls matt 301 302 303 304 401 402 403
 
 simulator: data $(VENV)/.installed ## Rewrite the tables of docs/simulator.md (needs BGARS_DATA)
 	$(BIN)/python docs/make_simulator_check.py

@@ -3,7 +3,7 @@
 Balls by Mitsuba are judged where benches/station/render_balls.py rendered them; benches/station/judged.json keeps it.
 
 Commands: ``make station`` for the page (needs BGARS_DATA for the photographs; 5 minutes),
-``python docs/make_station.py balls|near|photographs|psm|board|parts`` for one table.
+``python docs/make_station.py balls|near|photographs|psm|board|disc|solder|parts`` for one table.
 """
 
 from __future__ import annotations
@@ -32,6 +32,11 @@ HERE = Path(__file__).parent
 PAGE = HERE / "station.md"
 MITSUBA = HERE.parent / "benches" / "station" / "balls"
 JUDGED = HERE.parent / "benches" / "station" / "judged.json"
+RENDERED = {
+    "board": "mirror on a board, Mitsuba",
+    "grey": "mirror in a grey room, Mitsuba",
+    "matt": "matt on a dark board, Mitsuba",
+}
 SEEDS, MATT_SEEDS, NEAR_SEEDS, PARTS = 12, 6, 3, 10
 DISC_PX = 1200.0
 TWO = 2.0
@@ -91,15 +96,23 @@ def balls() -> Iterator[str]:
         for folder in sorted(one for one in MITSUBA.iterdir() if (one / "truth.json").exists()):
             truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
             lights = np.array(truth["lights"])
-            found = bgars.calibrate_lights(read_unlit(folder))
+            try:
+                found = bgars.calibrate_lights(read_unlit(folder), "matt" if truth["kind"] == "matt" else "mirror")
+            except bgars.CalibrationError as error:
+                judged[folder.name] = {"refused": str(error)}
+                continue
             off = apart_deg(found.rig.directions, lights)
             z = on_axes_deg(found.rig.directions, lights) / found.u_deg[:, None]
             judged[folder.name] = {"off_deg": off.round(5).tolist(), "scaled": z.round(4).tolist()}
         JUDGED.write_text(json.dumps(judged, indent=1) + "\n", encoding="utf-8")
     if JUDGED.exists():
         judged = json.loads(JUDGED.read_text(encoding="utf-8"))
-        errors = [np.array(one["off_deg"]) for one in judged.values()]
-        yield row("mirror, Mitsuba", len(judged), errors, [np.array(one["scaled"]) for one in judged.values()])
+        for kind, words in RENDERED.items():
+            these = [one for name, one in judged.items() if name.startswith(kind) and "off_deg" in one]
+            refused = sum(name.startswith(kind) and "refused" in one for name, one in judged.items())
+            said = f"{words}, {refused} more refused" if refused else words
+            errors = [np.array(one["off_deg"]) for one in these]
+            yield row(said, len(these), errors, [np.array(one["scaled"]) for one in these])
 
 
 def near() -> Iterator[str]:
@@ -242,6 +255,50 @@ def board() -> Iterator[str]:
         yield f"| {name} | {float(np.ptp(bend)) * (DISC_PX / SIDE) ** 2:.1f} |"
 
 
+def disc() -> Iterator[str]:
+    """A flat disc with turned grooves under near lamps and a lens that vignettes: the dome that it comes out as."""
+    yield "| flat turned disc, 1,200 px, lamps at 2,000 px, vignetting 20 % | dome (px) |"
+    yield "|---|---|"
+    side = int(DISC_PX)
+    rng = np.random.default_rng(61)
+    lamps = ring(8, 45.0) * 2000.0
+    middle = np.arange(side) + 0.5 - side / 2.0
+    x, y = np.meshgrid(middle, -middle)
+    radius = np.hypot(x, y)
+    # Grooves of 7 pixels, 6 degrees steep: what a lathe leaves.
+    slope = 0.1 * np.sin(2.0 * np.pi * radius / 7.0)
+    normals = np.stack([-slope * x / radius, -slope * y / radius, np.ones_like(x)], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    lens = 1.0 - 0.2 * (radius / radius.max()) ** 2
+
+    def photograph(facing: Array, albedo: float) -> bgars.Capture:
+        images = []
+        for lamp in lamps:
+            way = lamp - np.stack([x, y, np.zeros_like(x)], axis=-1)
+            distance = np.linalg.norm(way, axis=-1)
+            lit = np.maximum(np.sum(facing * way, axis=-1), 0.0) / distance**3 * 2000.0**2
+            images.append(np.clip(np.rint(255.0 * albedo * lens * lit + rng.normal(0.0, 1.0, x.shape)), 0, 255))
+        return as_capture(np.array(images, np.uint8), bgars.LightRig.from_directions(ring(8, 45.0)))
+
+    board, _ = bgars.calibrate_flat(photograph(np.broadcast_to([0.0, 0.0, 1.0], normals.shape), 0.7))
+    seen = photograph(normals, 0.5)
+    inside = radius < 0.48 * side
+    for name, capture in (
+        ("uncalibrated", seen),
+        ("flat field of a board", bgars.with_station(seen, bgars.Station("disc", flat=board))),
+    ):
+        field = bgars.estimate_normals(replace(capture, mask=inside))
+        surface = bgars.integrate_normals(field)
+        use = inside & field.mask & np.isfinite(surface.height)
+        height = (
+            ndimage.uniform_filter(np.where(use, surface.height, 0.0), 15)[use]
+            / ndimage.uniform_filter(use.astype(np.float64), 15)[use]
+        )
+        plane = np.column_stack([np.ones(int(use.sum())), x[use], y[use]])
+        bend = height - plane @ np.linalg.lstsq(plane, height, rcond=None)[0]
+        yield f"| {name} | {float(np.ptp(bend)) / (surface.pixel_pitch_um or 1.0):.1f} |"
+
+
 def parts() -> Iterator[str]:
     """Ten parts by the calibrated station, against exact knowledge."""
     yield "| ten parts of nine balls, error (um, rms) | balls | height | diameter | x | y |"
@@ -250,12 +307,40 @@ def parts() -> Iterator[str]:
         yield f"| {one.name} | {one.balls} | " + " | ".join(f"{value:.2f}" for value in one.rms_um) + " |"
 
 
+def solder() -> Iterator[str]:
+    """Lights from the solder balls of rendered parts, whose rigs are stated wrong."""
+    reality = Path(os.environ["BGARS_DATA"]) / "reality"
+    yield "| rendered parts | lights | rig as stated, error (deg) | found, mean | 95 % | within u | within 2 u |"
+    yield "|---|---|---|---|---|---|---|"
+    errors, scaled, before, refused, parts = [], [], [], 0, 0
+    for folder in sorted(reality.iterdir(), key=lambda one: int(one.name)):
+        true = np.array(json.loads((folder / "scene.json").read_text(encoding="utf-8"))["true_light_directions"])
+        capture = bgars.read_capture(folder)
+        parts += 1
+        try:
+            found = bgars.calibrate_lights(capture, "balls", recipe=folder / "part.toml")
+        except bgars.BgarsError:
+            refused += 1
+            continue
+        before.append(apart_deg(capture.rig.directions, true))
+        errors.append(apart_deg(found.rig.directions, true))
+        scaled.append(on_axes_deg(found.rig.directions, true) / found.u_deg[:, None])
+    error, z = np.concatenate(errors), np.abs(np.concatenate(scaled))
+    inside = f"{100 * np.mean(z < 1):.0f} % | {100 * np.mean(z < TWO):.0f} %"
+    yield (
+        f"| {parts}, of which {refused} refused | {len(error)} | {np.concatenate(before).mean():.2f} | "
+        f"{error.mean():.2f} | {np.percentile(error, 95):.2f} | {inside} |"
+    )
+
+
 TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "balls": balls,
     "near": near,
     "photographs": photographs,
     "psm": psm,
     "board": board,
+    "disc": disc,
+    "solder": solder,
     "parts": parts,
 }
 

@@ -17,6 +17,14 @@ def unit(vectors: Array) -> Array:
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
+def dielectric(cosine: Array, index: float) -> Array:
+    """Fresnel's equations for a real refractive index, by Snell's law."""
+    inner = np.sqrt(1.0 - (1.0 - cosine**2) / index**2)
+    across = (cosine - index * inner) / (cosine + index * inner)
+    along = (inner - index * cosine) / (inner + index * cosine)
+    return 0.5 * (across**2 + along**2)
+
+
 def ring(count: int, elevation_deg: float, azimuth0_deg: float = 10.0) -> Array:
     azimuth = np.radians(azimuth0_deg + 360.0 / count * np.arange(count))
     elevation = np.radians(elevation_deg)
@@ -77,10 +85,12 @@ def render(
     seed: int = 0,
     samples: int = 5,
     bits: int = 8,
+    refraction: float | None = None,
 ) -> NDArray[np.uint8]:
     """Return (L, H, W) images; `ball` is x, y, radius in pixels from the image centre, y up; it rests on the board.
 
     `lights` are unit directions, or positions in pixels with `near`; `lamp_deg` is the whole angle of a lamp.
+    A mirror reflects 0.6 at any angle, or as Fresnel's equations say of a refractive index.
     """
     height, width = size
     step = (np.arange(samples) + 0.5) / samples
@@ -124,7 +134,8 @@ def render(
             ground = points + reach[..., None] * mirrored
             ground[..., 2] = 0.0
             seen = np.where(down, board_level(ground), seen)
-            level = np.where(inside, 0.6 * seen, board_level(points * [1, 1, 0]))
+            share = 0.6 if refraction is None else dielectric(normals[..., 2], refraction)
+            level = np.where(inside, share * seen, board_level(points * [1, 1, 0]))
         else:
             shade = albedo * (room + power[index] * fall * np.maximum(np.sum(normals * way, axis=-1), 0.0))
             level = np.where(inside, shade, board_level(points * [1, 1, 0]))

@@ -12,6 +12,7 @@ from scipy.optimize import least_squares, minimize
 from bgars.errors import CalibrationError
 from bgars.files.light_names import light_name
 from bgars.records.remark import Remark
+from bgars.station.board_light import board_light
 
 if TYPE_CHECKING:
     from bgars.records.capture import Capture
@@ -38,8 +39,8 @@ LEAST_LEVEL = 12.0
 """Grey levels of 255 of the brightest point from which on there is shading."""
 BOARD_SHARE = 0.5
 """Spread of what the board reflects, of the ball's level, before it is measured in the attached shadow."""
-SHADOWED = 0.1
-"""Part of the board's light that the ball keeps from itself by its shadow, and that one side lacks."""
+UNEVEN = 0.1
+"""Part of the board's light that one side has more of than its shadow says: the ball shines on the board, too."""
 POLYNOMIAL = 4
 STEP_RAD = 1e-4
 
@@ -95,8 +96,7 @@ def shading_on(capture: Capture, levels: Levels, outline: Outline) -> SeenShadin
             raise CalibrationError(msg)
         direction = vector / strength
         own[light], jacobians[light] = _spread(points, values, used, outline, levels.noise, direction)
-        # The ball's own shadow takes a part of the board's light, on the side away from the lamp: it looks lower.
-        own[light] += (SHADOWED * board / strength) ** 2 * np.eye(2)
+        own[light] += (UNEVEN * board / strength) ** 2 * np.eye(2)
         if residual > EXPLAINED * levels.noise:
             # Two laws that explain the ball as badly: the truth is as likely nearer to either of them.
             general, left = _monotone(_normals(points, outline.circle_px), values, used, direction)
@@ -155,11 +155,10 @@ def _normals(points: Array, circle: Array) -> Array:
 def _fit(normals: Array, values: Array, used: NDArray[np.bool_], noise: float) -> tuple[Array, float, float]:
     """Strength times direction, level of the board's light, and the root mean square residual.
 
-    The board reflects onto a ball what an endless plane does: (1 - n_z) / 2 of its level.
+    The board reflects onto a ball what an endless plane does on which the ball rests, and throws its shadow.
     """
     normals, values = normals[used], values[used]
     scale = max(float(values.max()), 1.0)
-    below = 0.5 * (1.0 - normals[:, 2])
     spread = math.hypot(noise, 0.01 * scale)
 
     def residuals(p: Array) -> Array:
@@ -168,6 +167,7 @@ def _fit(normals: Array, values: Array, used: NDArray[np.bool_], noise: float) -
 
     lit = values > np.percentile(values, 40.0)
     first, *_ = np.linalg.lstsq(normals[lit], values[lit], rcond=None)
+    below = board_light(normals, first / np.linalg.norm(first))
     start = np.array([*first, 0.0, 0.0])
     fit = least_squares(residuals, start, loss="soft_l1", max_nfev=60)
     off = np.abs(fit.fun[:-1]) * spread

@@ -159,8 +159,9 @@ def _band_of(levels: Levels, outline: Outline, matt: bool) -> _Band | None:
     good &= total > 0
     value = (seen * both).sum(axis=0)[good] / total[good]
     # The ground itself says how rough it is, and how much noise there is where black is cut off.
-    rough = np.sqrt(np.mean(np.square((seen - base)[:, ground & good]), where=both[:, ground & good], axis=1))
-    noise = np.maximum(np.nan_to_num(rough), levels.noise)
+    beside = both[:, ground & good]
+    square = np.sum(np.square((seen - base)[:, ground & good]), where=beside, axis=1)
+    noise = np.maximum(np.sqrt(square / np.maximum(beside.sum(axis=1), 1)), levels.noise)
     u = np.sqrt((both[:, good] * noise[:, None] ** 2).sum(axis=0)) / total[good]
     if int(good.sum()) < LEAST_PIXELS:
         return None
