@@ -8,6 +8,7 @@ from pathlib import Path
 import bgars
 import numpy as np
 import pytest
+from bgars.files.light_formats import read_light_file
 from case_captures import (
     COUNT,
     LIGHTS,
@@ -149,3 +150,15 @@ def test_a_stem_that_fits_two_images_is_not_guessed(tmp_path: Path) -> None:
     write_images(tmp_path, [f"img_{index:02d}.bmp" for index in range(1, COUNT + 1)])
     write_lp(tmp_path, with_names(lambda name: name.replace("png", "CR2")))
     refused(tmp_path, "img_01.CR2", "no such image")
+
+
+@pytest.mark.parametrize("header", ["y x z", "file,z,y,x", "light_y;light_x;light_z"])
+def test_columns_in_another_order_are_refused(tmp_path: Path, header: str) -> None:
+    path = tmp_path / "lights.csv"
+    path.write_text("\n".join([header, *(" ".join(line.split()[1:]) for line in PLAIN)]), encoding="utf-8")
+    with pytest.raises(bgars.FileFormatError, match="line 1: the columns must stand in the order x, y, z"):
+        read_light_file(path)
+    good = {"y x z": "x y z intensity", "file,z,y,x": "lx,ly,lz", "light_y;light_x;light_z": "x y z"}[header]
+    lines = path.read_text(encoding="utf-8").split("\n")
+    path.write_text("\n".join([good, *lines[1:]]), encoding="utf-8")
+    np.testing.assert_allclose(read_light_file(path).vectors, LIGHTS, atol=1e-4)

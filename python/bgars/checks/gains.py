@@ -69,7 +69,10 @@ def check_gains(view: View, moments: Array, lights: Array) -> tuple[list[Finding
         off = np.abs(np.log(np.maximum(gain, 1e-3)))
         off[factors != 1.0] = 0.0
         worst = int(np.argmax(off))
-        usual = float(np.median(np.delete(off, worst)))
+        # One lamp that is off puts the predictions of the others off, too: what is usual shows without it.
+        without = np.where(np.arange(len(lights)) == worst, gain[worst], 1.0)
+        left, _ = gains_of(moments, lights * (factors * without)[:, None])
+        usual = float(np.median(np.delete(np.abs(np.log(np.maximum(left, 1e-3))), worst)))
         if off[worst] < OF_OTHERS * usual or off[worst] < critical * float(np.hypot(error[worst], table[worst])):
             break
         factors[worst] *= gain[worst]

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from bgars.checks.patches import Patch
     from bgars.records.capture import Capture
 
-__all__ = ["ImageShifts", "image_shifts"]
+__all__ = ["ImageShifts", "edge_products", "image_shifts"]
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -70,7 +70,7 @@ def image_shifts(capture: Capture, kept: NDArray[np.intp]) -> ImageShifts | None
 
 def _surfaces(patch: Patch, levels: Floats) -> Iterator[Array]:
     """(L, 2 R + 1, 2 R + 1) correlation of each image with the others, of every tile."""
-    edges = _edges(levels)
+    edges = edge_products(levels, PASSES)
     inside = patch.inside[PASSES:-PASSES, PASSES:-PASSES]
     rows, cols = inside.shape
     for row in _cuts(rows):
@@ -87,11 +87,11 @@ def _surfaces(patch: Patch, levels: Floats) -> Iterator[Array]:
             yield np.roll(found, (REACH_PX, REACH_PX), axis=(1, 2))[:, : 2 * REACH_PX + 1, : 2 * REACH_PX + 1]
 
 
-def _edges(levels: Floats) -> Floats:
-    """(3, L, h, w) products of the gradients, over their size: xx, xy and yy; the border is cut off."""
+def edge_products(levels: Floats, passes: int) -> Floats:
+    """(3, L, h, w) products of the gradients, over their size: xx, xy and yy; `passes` pixels of border are cut off."""
     smooth = levels
     quarter, half = np.float32(0.25), np.float32(0.5)
-    for _ in range(PASSES):
+    for _ in range(passes):
         smooth = quarter * (smooth[..., :-2, :] + smooth[..., 2:, :]) + half * smooth[..., 1:-1, :]
         smooth = quarter * (smooth[..., :-2] + smooth[..., 2:]) + half * smooth[..., 1:-1]
     across, down = np.gradient(smooth, axis=-1), np.gradient(smooth, axis=-2)
@@ -111,7 +111,11 @@ def _cuts(size: int) -> list[slice]:
 def _peaks(surfaces: Array) -> Array:
     """(L, 2) places of the highest points, x right and y up: of the parabolas through their neighbours."""
     size = surfaces.shape[-1]
-    highest = surfaces.reshape(len(surfaces), -1).argmax(axis=1)
+    # Of the peaks of a regular pattern, which are as high, the nearest.
+    away = np.square(np.arange(size) - REACH_PX)
+    near = np.exp(-(away[:, None] + away[None, :]) / (2.0 * (2.0 * REACH_PX) ** 2))
+    raised = surfaces - surfaces.min(axis=(1, 2), keepdims=True)
+    highest = (raised * near).reshape(len(surfaces), -1).argmax(axis=1)
     places = []
     for surface, at in zip(surfaces, highest, strict=True):
         row, col = (min(max(int(each), 1), size - 2) for each in divmod(int(at), size))

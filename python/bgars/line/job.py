@@ -7,7 +7,6 @@ import tempfile
 import time
 from dataclasses import dataclass, field, replace
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,6 +20,7 @@ from bgars.pipelines.check import check, refuse_wrong_geometry, told_by
 from bgars.pipelines.inspect import inspect
 from bgars.pipelines.strip import inspect_place, places_of_strip
 from bgars.store.keys import key_of, part_key
+from bgars.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -183,7 +183,7 @@ def _part(
     started: float,
 ) -> Outcome:
     """Inspect a part, or that at a place of a strip, unless the store has it."""
-    key = key_of(digests, serial=serial, method=job.method, version=version("bgars"))
+    key = key_of(digests, serial=serial, method=job.method, version=__version__)
     if key in job.known:
         return Outcome(job.folder, serial, is_known=True, seconds=time.perf_counter() - started)
     found = told()

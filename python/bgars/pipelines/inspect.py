@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -26,6 +25,7 @@ from bgars.records.part_material import part_material
 from bgars.records.part_recipe import PartRecipe
 from bgars.records.scalar_checks import thread_count
 from bgars.records.whole_capture import need_whole
+from bgars.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -126,7 +126,7 @@ def inspect(
         name=capture.name,
         pixel_pitch_um=float(capture.pixel_pitch_um or 0.0),
         files=checksums(files),
-        version=version("bgars"),
+        version=__version__,
         light_files=[path.name for path in capture.files],
         warnings=(*found_first, *warnings),
     )

@@ -35,9 +35,11 @@ class KnownParts:
         self.serials: dict[str, str] = {}
         self.last_sequence = 0
         self._folder = folder
-        self._rounds: dict[tuple[str, str], list[tuple[str, int]]] = {}
+        # There may be millions of parts: numbers stand for names, and only rounds that are not the first are kept.
+        self._last_round: dict[int, int] = {}
+        self._later: dict[str, int] = {}
         self._times_ns: dict[str, int] = {}
-        self._read: set[str] = set()
+        self._read: set[int] = set()
 
     def look(self) -> None:
         """Read the files that came since the last look, from whatever process.
@@ -54,25 +56,30 @@ class KnownParts:
 
     def add(self, path: Path, row: dict[str, Any]) -> None:
         """Take in a part that this process wrote."""
-        self._read.add(str(path))
+        self._read.add(hash(str(path)))
         self._add({**row, "recipe": path.parent.name})
 
     def round_of(self, key: str, serial: str, recipe: str) -> int | None:
         """Return the round of a part: as the store has it, else the next of its serial number; None without one."""
         if not serial:
             return None
-        rounds = self._rounds.get((serial, recipe), [])
-        return next((number for other, number in rounds if other == key), max([0, *(n for _, n in rounds)]) + 1)
+        if key in self.serials:
+            return self._later.get(key, 1)
+        return self._last_round.get(hash((serial, recipe)), 0) + 1
 
     def _add(self, row: dict[str, Any]) -> None:
         key, serial = row["part_key"], row["serial"]
         self.last_sequence = max(self.last_sequence, row["sequence"])
         if key in self.serials:  # compaction wrote it again
             return
+        number = row["round"] or self.round_of(key, serial, row["recipe"])
         self.serials[key] = serial
-        if serial:
-            number = row["round"] or self.round_of(key, serial, row["recipe"])
-            self._rounds.setdefault((serial, row["recipe"]), []).append((key, int(number or 1)))
+        if number is None:
+            return
+        place = hash((serial, row["recipe"]))
+        self._last_round[place] = max(self._last_round.get(place, 0), number)
+        if number > 1:
+            self._later[key] = number
 
     def _new_files(self) -> Iterator[tuple[str, str]]:
         """Files that were not read yet, and the folder of their recipe."""
@@ -88,8 +95,8 @@ class KnownParts:
                 except FileNotFoundError:
                     continue
                 for path in names:
-                    if path not in self._read:
-                        self._read.add(path)
+                    if hash(path) not in self._read:
+                        self._read.add(hash(path))
                         yield path, place.name
                 if settled:
                     self._times_ns[place.path] = changed_ns

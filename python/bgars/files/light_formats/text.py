@@ -27,6 +27,7 @@ ENCODINGS_TO_SAY = {"cp1252": "Windows-1252 (no valid UTF-8)", "utf-16": "UTF-16
     "utf-32-be": "UTF-32",
 }
 NUMBERED = re.compile(r"(?P<index>\d{1,6})\s+(?P<name>\S.*\.[A-Za-z]\w{1,4})", re.ASCII)
+AXIS = re.compile(r"(?:.*[^a-z])?[a-z]?([xyz])")
 WITH_INTENSITY, WITH_RGB, ANGLES = 4, 6, 2
 
 
@@ -66,6 +67,7 @@ def read_rows(path: Path, *, named: bool = False) -> Rows:
     if style.decimal_comma:
         notes.append("commas taken as decimal commas")
     if lines and _is_header(lines[0], style):
+        _refuse_order(path, lines[0])
         lines = lines[1:]
     if not lines:
         msg = f"{path}: holds no light"
@@ -180,6 +182,15 @@ def _is_header(line: Line, style: Style) -> bool:
     words = all(as_number(field, style) is None for field in fields)
     axes = {field.strip("\"'").lower()[-1:] for field in fields}
     return words and len(fields) >= AXES and {"x", "y", "z"} <= axes
+
+
+def _refuse_order(path: Path, header: Line) -> None:
+    """Refuse columns that are named in another order, such as y, x, z."""
+    fields = [field.strip("\"'").lower() for field in re.split(r"[\s,;]+", header.text)]
+    order = [match[1] for field in fields if (match := AXIS.fullmatch(field))]
+    if sorted(order[:AXES]) == ["x", "y", "z"] != order[:AXES]:
+        msg = f"{path}: line {header.number}: the columns must stand in the order x, y, z, got {_short(header.text)}"
+        raise FileFormatError(msg)
 
 
 def _is_index(column: NDArray[np.float64]) -> bool:
