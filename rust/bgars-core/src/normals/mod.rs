@@ -14,7 +14,6 @@ mod lanes;
 mod ranked;
 mod robust;
 mod solve;
-mod source;
 mod specular;
 mod symmetric;
 mod windows;
@@ -144,21 +143,6 @@ impl<'a> NormalMapMut<'a> {
         }
     }
 
-    /// Takes over a pixel of another map.
-    fn copy_pixel(&mut self, to: usize, from: &NormalMap, index: usize) {
-        let lights = self.set_lights();
-        self.normals[3 * to..3 * to + 3].copy_from_slice(&from.normals[3 * index..3 * index + 3]);
-        self.albedo[to] = from.albedo[index];
-        self.mask[to] = from.mask[index];
-        self.confidence[to] = from.confidence[index];
-        self.lights_kept[to] = from.lights_kept[index];
-        self.kept_sets[to * lights..(to + 1) * lights]
-            .copy_from_slice(&from.kept_sets[index * lights..(index + 1) * lights]);
-        if let Some(measured) = self.measured.get_mut(to) {
-            *measured = from.measured[index];
-        }
-    }
-
     /// Marks pixels as not asked for.
     fn clear(&mut self, pixels: Range<usize>) {
         let set_lights = self.set_lights();
@@ -178,9 +162,10 @@ impl<'a> NormalMapMut<'a> {
         }
     }
 
-    pub(crate) fn check(&self, pixels: usize, lights: usize) -> Result<()> {
+    /// Refuses arrays of another length than so many pixels need; `fills_in`: for a method that says what it has measured.
+    pub(crate) fn check(&self, pixels: usize, lights: usize, fills_in: bool) -> Result<()> {
         let kept_sets = if self.kept_sets.is_empty() { 0 } else { pixels * lights };
-        let measured = if self.measured.is_empty() { 0 } else { pixels };
+        let measured = if self.measured.is_empty() && !fills_in { 0 } else { pixels };
         for (argument, expected, actual) in [
             ("normals", pixels * 3, self.normals.len()),
             ("albedo", pixels, self.albedo.len()),
@@ -195,17 +180,6 @@ impl<'a> NormalMapMut<'a> {
             }
         }
         Ok(())
-    }
-
-    /// [`Self::check`] for methods that fill in what is not measured, and say where.
-    pub(crate) fn check_with_measured(&self, pixels: usize, lights: usize) -> Result<()> {
-        self.check(pixels, lights)?;
-        let actual = self.measured.len();
-        if actual == pixels {
-            Ok(())
-        } else {
-            Err(Error::LengthMismatch { argument: "measured", expected: pixels, actual })
-        }
     }
 }
 
