@@ -2,13 +2,30 @@
 
 use multiversion::multiversion;
 
-use crate::{ImageStack, Pixel, Radiometry};
+use crate::{Error, ImageStack, Lights, Pixel, Radiometry, Result};
 
 /// A stack, and how its grey levels become values in proportion to light.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Capture<'a, P> {
     pub stack: &'a ImageStack<'a, P>,
     pub radiometry: &'a Radiometry<'a, P>,
+}
+
+impl<P: Pixel> Capture<'_, P> {
+    /// Refuses lights, radiometry and masks (by their names) that do not fit the images.
+    pub fn check(&self, lights: &Lights, masks: &[(&'static str, Option<&[bool]>)]) -> Result<()> {
+        if lights.len() != self.stack.lights() {
+            return Err(Error::LightCountMismatch { images: self.stack.lights(), lights: lights.len() });
+        }
+        self.radiometry.check(self.stack)?;
+        let expected = self.stack.pixels();
+        for &(argument, mask) in masks {
+            if let Some(actual) = mask.map(<[bool]>::len).filter(|&actual| actual != expected) {
+                return Err(Error::LengthMismatch { argument, expected, actual });
+            }
+        }
+        Ok(())
+    }
 }
 
 /// What estimators ask of a [`Capture`].
@@ -31,6 +48,8 @@ pub(crate) trait Readings: Sync {
     fn has_no_offsets(&self) -> bool;
     /// Whether a light is clipped at a pixel.
     fn is_clipped(&self, light: usize, pixel: usize) -> bool;
+    /// Writes [`Self::is_clipped`] of some pixels.
+    fn clipped(&self, light: usize, pixels: &[usize], clipped: &mut [bool]);
 
     /// Centre of a pixel: x right, y up, origin at the image centre.
     fn centre(&self, pixel: usize) -> (f64, f64) {
@@ -66,12 +85,13 @@ impl<P: Pixel> Readings for Capture<'_, P> {
 
     fn levels(&self, light: usize, pixels: &[usize], levels: &mut [f32]) {
         let plane = self.stack.plane(light);
-        let [first, .., last] = pixels else { return };
-        if self.radiometry.response.is_none() && last - first + 1 == pixels.len() {
-            return widen(&plane[*first..=*last], levels);
-        }
-        for (level, &pixel) in levels.iter_mut().zip(pixels) {
-            *level = self.radiometry.linearise(plane[pixel]);
+        match run(plane, pixels).filter(|_| self.radiometry.response.is_none()) {
+            Some(codes) => widen(codes, levels),
+            None => {
+                for (level, &pixel) in levels.iter_mut().zip(pixels) {
+                    *level = self.radiometry.linearise(plane[pixel]);
+                }
+            }
         }
     }
 
@@ -86,6 +106,21 @@ impl<P: Pixel> Readings for Capture<'_, P> {
     fn is_clipped(&self, light: usize, pixel: usize) -> bool {
         self.stack.plane(light)[pixel].to_f32() >= self.radiometry.saturation
     }
+
+    fn clipped(&self, light: usize, pixels: &[usize], clipped: &mut [bool]) {
+        let plane = self.stack.plane(light);
+        let is_clipped = |code: &P| code.to_f32() >= self.radiometry.saturation;
+        match run(plane, pixels) {
+            Some(codes) => clipped.iter_mut().zip(codes).for_each(|(clipped, code)| *clipped = is_clipped(code)),
+            None => clipped.iter_mut().zip(pixels).for_each(|(clipped, &pixel)| *clipped = is_clipped(&plane[pixel])),
+        }
+    }
+}
+
+/// The codes of ascending pixels that follow each other without a gap.
+fn run<'a, P>(plane: &'a [P], pixels: &[usize]) -> Option<&'a [P]> {
+    let (&first, &last) = (pixels.first()?, pixels.last()?);
+    (last - first + 1 == pixels.len()).then(|| &plane[first..=last])
 }
 
 /// Codes as floats.

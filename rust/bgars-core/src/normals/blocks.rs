@@ -2,11 +2,11 @@
 
 use multiversion::{multiversion, target::target_cfg_f};
 
-use super::NormalMapMut;
 use super::cutoff::cutoffs;
 use super::fit::{Equations, Fit, Results};
 use super::lanes::{LANES, Lanes};
 use super::windows::{Memory, WindowFilter};
+use super::{NormalMap, NormalMapMut};
 use crate::Lights;
 use crate::readings::Readings;
 
@@ -92,7 +92,8 @@ struct Work<'a> {
     /// Where rounding could decide between two windows.
     close: Lanes<bool>,
     fit: Fit,
-    results: Results,
+    /// Pixels for the careful kernel.
+    careful: Lanes<bool>,
 }
 
 impl<'a> Work<'a> {
@@ -115,19 +116,17 @@ impl<'a> Work<'a> {
             keep_all: true,
             close: Lanes::of(false),
             fit: Fit::ZERO,
-            results: Results::ZERO,
+            careful: Lanes::of(false),
         }
     }
 
     #[inline(always)]
     fn run<const FMA: bool>(mut self, pixels: &[usize], first: usize, out: &mut NormalMapMut<'_>) -> Left {
+        let (blocks, rest) = pixels.as_chunks::<LANES>();
         let mut left = Left { finite: true, careful: Vec::new() };
-        let Some(&last) = pixels.last() else { return left };
-        let mut places = [0; LANES];
-        for block in pixels.chunks(LANES) {
-            places[..block.len()].copy_from_slice(block);
-            places[block.len()..].fill(last);
-            self.load(&places);
+        let mut spare = NormalMap::zeros(LANES, out.set_lights());
+        for block in blocks {
+            self.load(block);
             self.choose::<FMA>();
             if self.keep_all {
                 self.solver.equations.fit_all::<FMA>(&self.values, &mut self.fit);
@@ -135,31 +134,33 @@ impl<'a> Work<'a> {
                 self.solver.equations.fit_kept::<FMA>(&self.values, &self.weights, &mut self.fit);
             }
             left.finite &= self.fit.is_finite();
-            self.finish::<FMA>();
-            if places[LANES - 1] - places[0] == LANES - 1 {
-                self.write(0, LANES, places[0] - first, out);
+            let at = block[0] - first;
+            if block[LANES - 1] - block[0] == LANES - 1 {
+                self.write::<FMA>(at, out);
             } else {
+                self.write::<FMA>(0, &mut spare.as_mut());
                 for (lane, pixel) in block.iter().enumerate() {
-                    self.write(lane, 1, pixel - first, out);
+                    out.copy_pixel(pixel - first, &spare, lane);
                 }
             }
             self.leave(block, &mut left.careful);
         }
+        left.careful.extend(rest);
         left
     }
 
     /// Levels and values of a block.
     #[inline(always)]
-    fn load(&mut self, places: &[usize; LANES]) {
+    fn load(&mut self, pixels: &[usize; LANES]) {
         if !self.source.has_no_offsets() {
             for lane in 0..LANES {
-                self.offsets[lane] = self.source.offset(places[lane]);
+                self.offsets[lane] = self.source.offset(pixels[lane]);
             }
         }
         let value_scale = self.solver.value_scale;
         for light in 0..self.levels.len() {
             let (level, value) = (&mut self.levels[light], &mut self.values[light]);
-            self.source.levels(light, places, &mut **level);
+            self.source.levels(light, pixels, &mut **level);
             if let Some(scales) = &self.solver.scales {
                 for lane in 0..LANES {
                     level[lane] = (level[lane] - self.offsets[lane]) * scales[light];
@@ -172,9 +173,7 @@ impl<'a> Work<'a> {
             }
         }
         for (light, clipped) in self.clipped.iter_mut().enumerate() {
-            for lane in 0..LANES {
-                clipped[lane] = self.source.is_clipped(light, places[lane]);
-            }
+            self.source.clipped(light, pixels, &mut **clipped);
         }
     }
 
@@ -186,9 +185,11 @@ impl<'a> Work<'a> {
             Choice::UpToGap(gap) => {
                 let cutoffs = cutoffs(&self.levels, *gap);
                 self.keep_all = cutoffs.keep_all;
-                for (weight, level) in self.weights.iter_mut().zip(&self.levels) {
-                    for lane in 0..LANES {
-                        weight[lane] = if level[lane] > cutoffs.largest[lane] { 0.0 } else { 1.0 };
+                if !cutoffs.keep_all {
+                    for (weight, level) in self.weights.iter_mut().zip(&self.levels) {
+                        for lane in 0..LANES {
+                            weight[lane] = if level[lane] > cutoffs.largest[lane] { 0.0 } else { 1.0 };
+                        }
                     }
                 }
             }
@@ -201,55 +202,51 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Results of a block.
+    /// Results of a block, from place `at` on.
     #[inline(always)]
-    fn finish<const FMA: bool>(&mut self) {
-        self.fit.finish::<FMA>(self.solver.albedo_scale, &mut self.results);
-        let mut kept = Lanes::of(0);
-        for weight in &self.weights {
-            for lane in 0..LANES {
-                kept[lane] += u16::from(weight[lane] > 0.0);
-            }
-        }
-        self.results.lights_kept = kept;
-        for lane in 0..LANES {
-            self.results.careful[lane] |= self.close[lane];
-        }
-    }
-
-    /// Hands over some lanes from `lane` on, to place `at`.
-    #[inline(always)]
-    fn write(&self, lane: usize, count: usize, at: usize, out: &mut NormalMapMut<'_>) {
-        let (from, to) = (lane..lane + count, at..at + count);
-        let Results { normals, albedo, confidence, mask, lights_kept, .. } = &self.results;
-        out.normals[3 * at..3 * (at + count)].copy_from_slice(&normals.as_flattened()[3 * lane..3 * (lane + count)]);
-        out.albedo[to.clone()].copy_from_slice(&albedo[from.clone()]);
-        out.confidence[to.clone()].copy_from_slice(&confidence[from.clone()]);
-        out.mask[to.clone()].copy_from_slice(&mask[from.clone()]);
-        out.lights_kept[to.clone()].copy_from_slice(&lights_kept[from.clone()]);
-        if let Some(measured) = out.measured.get_mut(to) {
-            measured.copy_from_slice(&mask[from.clone()]);
-        }
-        if !out.kept_sets.is_empty() {
-            let lights = self.weights.len();
-            for (lane, set) in from.zip(out.kept_sets[at * lights..].chunks_exact_mut(lights)) {
-                for (kept, weight) in set.iter_mut().zip(&self.weights) {
-                    *kept = weight[lane] > 0.0;
+    fn write<const FMA: bool>(&mut self, at: usize, out: &mut NormalMapMut<'_>) {
+        let (lights, places) = (self.values.len(), at..at + LANES);
+        let mask = &mut out.mask[places.clone()];
+        if let (Ok(normals), Ok(albedo), Ok(confidence), Ok(mask), Ok(lights_kept)) = (
+            (&mut out.normals[3 * at..3 * places.end]).try_into(),
+            (&mut out.albedo[places.clone()]).try_into(),
+            (&mut out.confidence[places.clone()]).try_into(),
+            <&mut [bool; LANES]>::try_from(&mut *mask),
+            <&mut [u16; LANES]>::try_from(&mut out.lights_kept[places.clone()]),
+        ) {
+            let mut results = Results { normals, albedo, confidence, mask };
+            self.fit.finish::<FMA>(self.solver.albedo_scale, &mut results, &mut self.careful);
+            let mut kept = Lanes::of(lights as u16);
+            if !self.keep_all {
+                kept = Lanes::of(0);
+                for weight in &self.weights {
+                    for lane in 0..LANES {
+                        kept[lane] += u16::from(weight[lane] > 0.0);
+                    }
                 }
+            }
+            *lights_kept = kept.0;
+        }
+        if let Some(measured) = out.measured.get_mut(places) {
+            measured.copy_from_slice(mask);
+        }
+        let sets = out.kept_sets.chunks_exact_mut(lights).skip(at).take(LANES);
+        for (lane, set) in sets.enumerate() {
+            for (kept, weight) in set.iter_mut().zip(&self.weights) {
+                *kept = self.keep_all || weight[lane] > 0.0;
             }
         }
     }
 
     /// The pixels that want the careful kernel.
     #[inline(always)]
-    fn leave(&self, block: &[usize], left: &mut Vec<usize>) {
+    fn leave(&self, block: &[usize; LANES], left: &mut Vec<usize>) {
         let mut any = false;
-        for careful in &*self.results.careful {
-            any |= careful;
+        for lane in 0..LANES {
+            any |= self.careful[lane] | self.close[lane];
         }
         if any {
-            let careful = block.iter().zip(&*self.results.careful).filter(|(_, careful)| **careful);
-            left.extend(careful.map(|(&pixel, _)| pixel));
+            left.extend((0..LANES).filter(|&lane| self.careful[lane] || self.close[lane]).map(|lane| block[lane]));
         }
     }
 }

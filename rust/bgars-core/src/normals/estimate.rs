@@ -80,9 +80,9 @@ pub fn estimate_into<P: Pixel>(
     progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
     mut out: NormalMapMut<'_>,
 ) -> Result<()> {
-    check(stack, lights, radiometry, mask, method)?;
-    out.check(stack.pixels(), stack.lights(), false)?;
     let capture = Capture { stack, radiometry };
+    check(&capture, lights, mask, method)?;
+    out.check(stack.pixels(), stack.lights(), false)?;
     let kernel = Kernel::new(&capture, radiometry.is_plain(), lights, mask, method);
     let mut checked = P::CODES.is_some();
     let set_lights = out.set_lights();

@@ -82,26 +82,12 @@ pub(super) struct Fit {
 }
 
 /// What is written of a block of pixels.
-pub(super) struct Results {
-    /// Unit normals; NaN without solution, like the albedo.
-    pub normals: Lanes<[f32; 3]>,
-    pub albedo: Lanes<f32>,
-    pub confidence: Lanes<f32>,
-    pub mask: Lanes<bool>,
-    pub lights_kept: Lanes<u16>,
-    /// Facets seen from the side, and values far from 1: they are left to the careful kernel.
-    pub careful: Lanes<bool>,
-}
-
-impl Results {
-    pub const ZERO: Self = Self {
-        normals: Lanes::of([0.0; 3]),
-        albedo: Lanes::of(0.0),
-        confidence: Lanes::of(0.0),
-        mask: Lanes::of(false),
-        lights_kept: Lanes::of(0),
-        careful: Lanes::of(false),
-    };
+pub(super) struct Results<'a> {
+    /// Unit normals, x y z of each pixel; NaN without solution, like the albedo.
+    pub normals: &'a mut [f32; 3 * LANES],
+    pub albedo: &'a mut [f32; LANES],
+    pub confidence: &'a mut [f32; LANES],
+    pub mask: &'a mut [bool; LANES],
 }
 
 impl Equations {
@@ -291,9 +277,9 @@ impl Fit {
         finite
     }
 
-    /// Results from the fit, but for the number of lights.
+    /// Results from the fit; facets seen from the side, and values far from 1, are left to the careful kernel: true in `careful`.
     #[inline(always)]
-    pub fn finish<const FMA: bool>(&self, albedo_scale: f32, results: &mut Results) {
+    pub fn finish<const FMA: bool>(&self, albedo_scale: f32, results: &mut Results<'_>, careful: &mut Lanes<bool>) {
         let [x, y, z] = &self.scaled;
         let mut unit = [Lanes::of(0.0); 3];
         let mut all_sound = true;
@@ -313,17 +299,19 @@ impl Fit {
             results.mask[lane] = faces;
             let in_range = (square > MIN_SQUARE) & (square < 1.0 / MIN_SQUARE);
             let sound = self.usable[lane] & in_range & (scaled[2] * scaled[2] > square * (GRAZING * GRAZING));
-            results.careful[lane] = !sound;
+            careful[lane] = !sound;
             all_sound &= sound;
         }
         if !all_sound {
             for lane in 0..LANES {
                 // What is zero has no solution either way.
-                results.careful[lane] &= (x[lane] != 0.0) | (y[lane] != 0.0) | (z[lane] != 0.0);
+                careful[lane] &= (x[lane] != 0.0) | (y[lane] != 0.0) | (z[lane] != 0.0);
             }
         }
         for lane in 0..LANES {
-            results.normals[lane] = [unit[0][lane], unit[1][lane], unit[2][lane]];
+            for axis in 0..3 {
+                results.normals[3 * lane + axis] = unit[axis][lane];
+            }
         }
     }
 }

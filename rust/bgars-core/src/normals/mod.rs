@@ -143,6 +143,21 @@ impl<'a> NormalMapMut<'a> {
         }
     }
 
+    /// Takes over a pixel of another map.
+    fn copy_pixel(&mut self, to: usize, from: &NormalMap, index: usize) {
+        let lights = self.set_lights();
+        self.normals[3 * to..3 * to + 3].copy_from_slice(&from.normals[3 * index..3 * index + 3]);
+        self.albedo[to] = from.albedo[index];
+        self.mask[to] = from.mask[index];
+        self.confidence[to] = from.confidence[index];
+        self.lights_kept[to] = from.lights_kept[index];
+        self.kept_sets[to * lights..(to + 1) * lights]
+            .copy_from_slice(&from.kept_sets[index * lights..(index + 1) * lights]);
+        if let Some(measured) = self.measured.get_mut(to) {
+            *measured = from.mask[index];
+        }
+    }
+
     /// Marks pixels as not asked for.
     fn clear(&mut self, pixels: Range<usize>) {
         let set_lights = self.set_lights();

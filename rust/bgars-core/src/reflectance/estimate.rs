@@ -170,9 +170,9 @@ pub fn estimate_into<P: Pixel>(
     progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
     out: NormalMapMut<'_>,
 ) -> Result<Findings> {
-    check(stack, lights, radiometry, &request)?;
-    out.check(stack.pixels(), stack.lights(), true)?;
     let capture = Capture { stack, radiometry };
+    check(&capture, lights, &request)?;
+    out.check(stack.pixels(), stack.lights(), true)?;
     estimate_readings(&Reader::new(&capture), lights, request, progress, out)
 }
 
@@ -291,29 +291,14 @@ fn fitted(request: &Request<'_>, inside: &[Vec<usize>], core: &[Vec<usize>], sam
     Fitted { some, fit: Some(of_spheres), shape, circles: with_shape(request.circles, shape) }
 }
 
-fn check<P: Pixel>(
-    stack: &ImageStack<'_, P>,
-    lights: &Lights,
-    radiometry: &Radiometry<'_, P>,
-    request: &Request<'_>,
-) -> Result<()> {
-    if lights.len() != stack.lights() {
-        return Err(Error::LightCountMismatch { images: stack.lights(), lights: lights.len() });
-    }
+fn check<P: Pixel>(capture: &Capture<'_, P>, lights: &Lights, request: &Request<'_>) -> Result<()> {
+    capture.check(lights, &[("mask", request.mask), ("free", request.free)])?;
     if lights.len() < MIN_LIGHTS {
         return Err(Error::OutOfRange {
             argument: "lights",
             rule: "at least 4 for the reflectance estimator",
             value: lights.len() as f64,
         });
-    }
-    radiometry.check(stack)?;
-    for (argument, array) in [("mask", request.mask), ("free", request.free)] {
-        if let Some(array) = array
-            && array.len() != stack.pixels()
-        {
-            return Err(Error::LengthMismatch { argument, expected: stack.pixels(), actual: array.len() });
-        }
     }
     if let Some(material) = request.material
         && material.gains.len() != lights.len()
@@ -339,7 +324,7 @@ fn check<P: Pixel>(
             }
         }
     }
-    check_finite(stack, request.mask)
+    check_finite(capture.stack, request.mask)
 }
 
 /// Smallest radius of a ball in pixels: below, no pixel is free of the rim.
