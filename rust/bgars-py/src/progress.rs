@@ -38,7 +38,7 @@ pub fn watched<T: Send>(
     work: impl FnOnce(Report<'_>) -> bgars_core::Result<T> + Send,
 ) -> PyResult<T> {
     let mut outcome = None;
-    watch(py, &*pool(threads)?, callback, Box::new(|report: Report<'_>| outcome = Some(work(report))))?;
+    watch(py, &pool(threads)?, callback, Box::new(|report: Report<'_>| outcome = Some(work(report))))?;
     // A panic of the work has gone on from its scope.
     outcome.expect("the scope ends after the work").map_err(to_python)
 }
