@@ -57,7 +57,9 @@ fn writing(criterion: &mut Criterion) {
     let path = folder.path().join("mesh");
     let (heights, mask) = (wavy_heights(SIDE), rectangle(SIDE));
     let mesh = triangulate(&heights, &mask, SIDE, 1.0).unwrap();
-    let view = MeshView { vertices: &mesh.vertices, faces: &mesh.faces, normals: None, colors: None };
+    let vertices: Vec<[f64; 3]> = mesh.vertices.iter().map(|vertex| vertex.map(f64::from)).collect();
+    let faces: Vec<[i64; 3]> = mesh.faces.iter().map(|face| face.map(i64::from)).collect();
+    let view = MeshView { vertices: &vertices, faces: &faces, normals: None, colors: None };
     let mut group = criterion.benchmark_group(format!("write/{SIDE} x {SIDE}"));
     keep_short(&mut group);
     group.throughput(Throughput::Elements((SIDE * SIDE) as u64));

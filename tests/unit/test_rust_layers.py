@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 SOURCE = Path(__file__).parents[2] / "rust" / "bgars-core" / "src"
-ORDER = ["error", "key", "pixel", "median", "lights", "stack", "radiometry", "normals", "reflectance", "blind"]
+ORDER = ["error", "pixel", "median", "lights", "stack", "radiometry", "readings", "normals", "reflectance", "blind"]
 """Each may name those before it; what is not here stands by itself on the first seven."""
 INPUTS = 7
 NAMES = {

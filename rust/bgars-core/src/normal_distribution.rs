@@ -4,8 +4,8 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 use rayon::prelude::*;
 
-/// Values a thread takes at a time.
-const BLOCK: usize = 4096;
+/// Values that one thread has worked on before others are awake.
+pub const FEW_VALUES: usize = 4096;
 
 /// The share of the standard normal distribution below each value, to full precision in both tails; NaN stays NaN.
 ///
@@ -17,5 +17,9 @@ const BLOCK: usize = 4096;
 /// ```
 #[must_use]
 pub fn normal_distribution(values: &[f64]) -> Vec<f64> {
-    values.par_iter().with_min_len(BLOCK).map(|&value| 0.5 * libm::erfc(-value * FRAC_1_SQRT_2)).collect()
+    let share = |value: &f64| 0.5 * libm::erfc(-value * FRAC_1_SQRT_2);
+    if values.len() <= FEW_VALUES {
+        return values.iter().map(share).collect();
+    }
+    values.par_iter().with_min_len(FEW_VALUES).map(share).collect()
 }

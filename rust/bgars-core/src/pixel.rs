@@ -1,7 +1,7 @@
 //! The pixel types that the kernels take as they come from the camera.
 
 /// A grey level: `u8`, `u16` or `f32`.
-pub trait Pixel: crate::key::Key + Send + Sync + std::fmt::Debug + 'static {
+pub trait Pixel: Copy + Send + Sync + std::fmt::Debug + 'static {
     /// Number of different codes of an integer type (the size of a response table); `None` for floats.
     const CODES: Option<usize>;
 
@@ -12,44 +12,28 @@ pub trait Pixel: crate::key::Key + Send + Sync + std::fmt::Debug + 'static {
     fn code(self) -> usize;
 }
 
-impl Pixel for u8 {
-    const CODES: Option<usize> = Some(1 << 8);
+macro_rules! pixel {
+    ($type:ty, $codes:expr, $code:expr) => {
+        impl Pixel for $type {
+            const CODES: Option<usize> = $codes;
 
-    #[inline(always)]
-    fn to_f32(self) -> f32 {
-        f32::from(self)
-    }
+            #[inline(always)]
+            fn to_f32(self) -> f32 {
+                f32::from(self)
+            }
 
-    #[inline(always)]
-    fn code(self) -> usize {
-        usize::from(self)
-    }
+            #[inline(always)]
+            fn code(self) -> usize {
+                $code(self)
+            }
+        }
+    };
 }
 
-impl Pixel for u16 {
-    const CODES: Option<usize> = Some(1 << 16);
+pixel!(u8, Some(1 << 8), usize::from);
+pixel!(u16, Some(1 << 16), usize::from);
+pixel!(f32, None, no_code);
 
-    #[inline(always)]
-    fn to_f32(self) -> f32 {
-        f32::from(self)
-    }
-
-    #[inline(always)]
-    fn code(self) -> usize {
-        usize::from(self)
-    }
-}
-
-impl Pixel for f32 {
-    const CODES: Option<usize> = None;
-
-    #[inline(always)]
-    fn to_f32(self) -> f32 {
-        self
-    }
-
-    #[inline(always)]
-    fn code(self) -> usize {
-        0
-    }
+fn no_code(_: f32) -> usize {
+    0
 }

@@ -64,29 +64,16 @@ impl<P: Pixel> Radiometry<'_, P> {
                 return Err(Error::BadIntensity { index, value });
             }
         }
-        if let Some(full_scale) = self.full_scale
-            && !(full_scale.is_finite() && full_scale > 0.0)
-        {
-            return Err(Error::OutOfRange {
-                argument: "full_scale",
-                rule: "finite and above 0",
-                value: f64::from(full_scale),
-            });
-        }
-        let full_scale = self.full_scale.unwrap_or(f32::INFINITY);
-        if !(self.black_level.is_finite() && self.black_level >= 0.0 && self.black_level < full_scale) {
-            return Err(Error::OutOfRange {
-                argument: "black_level",
-                rule: "at least 0 and below full scale",
-                value: f64::from(self.black_level),
-            });
-        }
-        if self.saturation.is_nan() || self.saturation <= self.black_level {
-            return Err(Error::OutOfRange {
-                argument: "saturation",
-                rule: "above the black level",
-                value: f64::from(self.saturation),
-            });
+        let full_scale = self.full_scale.unwrap_or(f32::MAX);
+        let (black, clipped) = (self.black_level, self.saturation);
+        for (argument, value, rule, holds) in [
+            ("full_scale", full_scale, "finite and above 0", full_scale.is_finite() && full_scale > 0.0),
+            ("black_level", black, "at least 0 and below full scale", (0.0..full_scale).contains(&black)),
+            ("saturation", clipped, "above the black level", clipped > black),
+        ] {
+            if !holds {
+                return Err(Error::OutOfRange { argument, rule, value: f64::from(value) });
+            }
         }
         Ok(())
     }

@@ -1,9 +1,10 @@
 //! Normals of a mesh's vertices from its faces.
 
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::Result;
-use crate::io::{Coordinate, MeshView, VertexIndex};
+use crate::io::MeshView;
 
 /// Faces measured at a time.
 const BLOCK: usize = 1 << 16;
@@ -26,52 +27,37 @@ const MIN_CROSS: f64 = 1e-30;
 /// assert_eq!(normals, [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0; 3]]);
 /// # Ok::<(), bgars_core::Error>(())
 /// ```
-pub fn vertex_normals<V: Coordinate, I: VertexIndex>(vertices: &[[V; 3]], faces: &[[I; 3]]) -> Result<Vec<[f32; 3]>> {
+pub fn vertex_normals(vertices: &[[f64; 3]], faces: &[[i64; 3]]) -> Result<Vec<[f32; 3]>> {
     MeshView { vertices, faces, normals: None, colors: None }.check()?;
-    let mut sums = vec![[0f64; 3]; vertices.len()];
+    let mut sums = vec![Vector3::zeros(); vertices.len()];
     let mut corners = Vec::with_capacity(BLOCK.min(faces.len()));
     for faces in faces.chunks(BLOCK) {
-        let measure = |face: &[I; 3]| weighted_normals(face.map(|index| vertices[index.to_u64() as usize]));
+        let measure = |face: &[i64; 3]| weighted_normals(face.map(|index| vertices[index as usize].into()));
         faces.par_iter().map(measure).collect_into_vec(&mut corners);
         for (face, corners) in faces.iter().zip(&corners) {
-            for (index, corner) in face.iter().zip(corners) {
-                let sum = &mut sums[index.to_u64() as usize];
-                *sum = std::array::from_fn(|axis| sum[axis] + corner[axis]);
+            for (&index, corner) in face.iter().zip(corners) {
+                sums[index as usize] += corner;
             }
         }
     }
-    Ok(sums.par_iter().map(|&sum| unit(sum).map(|value| value as f32)).collect())
+    Ok(sums.par_iter().map(|&sum| unit(sum).map(|value| value as f32).into()).collect())
 }
 
 /// The face's unit normal times the angle at each of its corners; zero for a face without area.
-fn weighted_normals<V: Coordinate>(face: [[V; 3]; 3]) -> [[f64; 3]; 3] {
-    let [a, b, c] = face.map(|vertex| vertex.map(Coordinate::to_f64));
-    let (ab, ac, bc) = (minus(b, a), minus(c, a), minus(c, b));
-    let normal = unit(cross(ab, ac));
-    if dot(normal, normal) < 0.5 {
+fn weighted_normals([a, b, c]: [Vector3<f64>; 3]) -> [Vector3<f64>; 3] {
+    let normal = unit((b - a).cross(&(c - a)));
+    if normal.norm_squared() < 0.5 {
         // No area, no direction.
-        return [[0.0; 3]; 3];
+        return [Vector3::zeros(); 3];
     }
-    let [ab, ac, bc] = [ab, ac, bc].map(unit);
-    let at_a = dot(ab, ac).clamp(-1.0, 1.0).acos();
-    let at_b = (-dot(ab, bc)).clamp(-1.0, 1.0).acos();
-    [at_a, at_b, std::f64::consts::PI - at_a - at_b].map(|angle| normal.map(|value| value * angle))
-}
-
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|axis| a[axis] - b[axis])
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    let [ab, ac, bc] = [b - a, c - a, c - b].map(unit);
+    let at_a = ab.dot(&ac).clamp(-1.0, 1.0).acos();
+    let at_b = (-ab.dot(&bc)).clamp(-1.0, 1.0).acos();
+    [at_a, at_b, std::f64::consts::PI - at_a - at_b].map(|angle| normal * angle)
 }
 
 /// `vector` of length 1; zero where it has none.
-fn unit(vector: [f64; 3]) -> [f64; 3] {
-    let length = dot(vector, vector).sqrt();
-    if length > MIN_CROSS && length.is_finite() { vector.map(|value| value / length) } else { [0.0; 3] }
+fn unit(vector: Vector3<f64>) -> Vector3<f64> {
+    let length = vector.norm();
+    if length > MIN_CROSS && length.is_finite() { vector / length } else { Vector3::zeros() }
 }

@@ -9,7 +9,7 @@ use pyo3::types::PyDict;
 
 use crate::convert::{array2, slice2, slice3};
 use crate::errors::InputError;
-use crate::progress::watched;
+use crate::progress::{Done, watched};
 
 #[pyfunction]
 #[pyo3(signature = (normals, mask, weights, regions, *, camera, k, max_iters, tolerance, setting, threads, progress))]
@@ -42,7 +42,7 @@ pub fn integrate_bilateral<'py>(
     let regions = regions.as_ref().map(|regions| slice2(regions, "regions")).transpose()?;
     let field = Field { normals, mask, weights, regions, width: shape[1] };
     let surface = watched(py, threads, progress.as_ref(), |report| {
-        integrate(field, camera, &params, &mut |state| report((state.iteration, state.residual)))
+        integrate(field, camera, &params, &mut |state| report(Done::Iteration(state.iteration, state.residual)))
     })?;
     as_dict(py, surface, shape)
 }

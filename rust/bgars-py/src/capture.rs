@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 
 use crate::convert::{Stack, array_of_triples, slice2, slice3, triples};
 use crate::errors::to_python;
-use crate::progress::{on_threads, watched};
+use crate::progress::{Done, on_threads, watched};
 
 /// The attributes of `bgars.records.kernel_capture.KernelCapture`.
 #[derive(FromPyObject)]
@@ -86,7 +86,7 @@ impl Capture<'_> {
         };
         watched(py, threads, progress, move |report| {
             let stack = ImageStack::new(images, count, height, width)?;
-            work.run(&stack, &lights, &radiometry, &mut |done| report((done,)))
+            work.run(&stack, &lights, &radiometry, &mut |done| report(Done::Fraction(done)))
         })
     }
 }

@@ -5,9 +5,13 @@ use numpy::{
     Element, PyArray1, PyArray2, PyArray3, PyArray4, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray,
     PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArray4, PyReadwriteArray, PyUntypedArrayMethods,
 };
+use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 
 use crate::errors::InputError;
+
+/// Longest way in pixels, or number of parts of a circle, that an argument may ask for: no image is as wide.
+pub const MOST: usize = 1 << 16;
 
 /// A light stack of one of the accepted dtypes, shape (L, H, W).
 #[derive(FromPyObject)]
@@ -45,6 +49,31 @@ fn refuse_other_bools<T: Element, D: Dimension>(array: &PyReadonlyArray<'_, T, D
         }
     }
     Ok(())
+}
+
+/// Refuses a number that is not between 0 and [`MOST`], NaN among them.
+pub fn check_most(name: &str, values: impl IntoIterator<Item = f64>) -> PyResult<()> {
+    match values.into_iter().find(|value| !(0.0..=MOST as f64).contains(value)) {
+        Some(value) => Err(InputError::new_err(format!("{name}: must be 0 to {MOST}, got {value}"))),
+        None => Ok(()),
+    }
+}
+
+/// Refuses a count that is not between 1 and [`MOST`].
+pub fn check_count(name: &str, count: usize) -> PyResult<()> {
+    if (1..=MOST).contains(&count) {
+        return Ok(());
+    }
+    Err(InputError::new_err(format!("{name}: must be 1 to {MOST}, got {count}")))
+}
+
+/// Refuses results of so many elements along each axis that the system has no memory for, before anything is made of them.
+pub fn check_room<T>(shape: &[usize]) -> PyResult<()> {
+    let bytes = shape.iter().try_fold(size_of::<T>(), |bytes, &count| bytes.checked_mul(count));
+    if bytes.is_some_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok()) {
+        return Ok(());
+    }
+    Err(PyMemoryError::new_err(format!("out of memory: a result of shape {shape:?} does not fit")))
 }
 
 /// Elements of two dimensions.

@@ -59,7 +59,13 @@ pub fn decode_stack<'py>(
         response: response.as_ref().map(|table| table.as_slice()).transpose()?,
         gains: gains.as_ref().map(|gains| triples(gains, "gains")).transpose()?,
     };
+    if color.gains.is_some_and(|gains| gains.len() != paths.len()) {
+        return Err(InputError::new_err("gains: must have one row a file"));
+    }
     let plan = on_threads(py, threads, || StackPlan::new(&paths, &color, max_megapixels))?;
+    if plan.linear && plan.bits <= 16 && color.response.is_some_and(|table| table.len() < 1 << plan.bits) {
+        return Err(InputError::new_err(format!("response: must have an entry for each code of {} bits", plan.bits)));
+    }
     let array = allocate.call1(((paths.len(), plan.height, plan.width), numpy_name(plan.kind)))?;
     let mut out: OwnStack<'py> = array.extract()?;
     let out = match &mut out {

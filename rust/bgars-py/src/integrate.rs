@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 
 use crate::convert::{array2, slice_mut, slice2, slice3};
 use crate::errors::InputError;
-use crate::progress::{on_threads, watched};
+use crate::progress::{Done, on_threads, watched};
 
 /// components (pixels, first row, first column), iterations, residual.
 type Found = (Vec<(usize, usize, usize)>, usize, f64);
@@ -46,7 +46,13 @@ pub fn integrate_normals<'py>(
     let height_px = slice_mut(&mut height_px, "height_px")?;
     let labels = slice_mut(&mut labels, "labels")?;
     let fit = watched(py, threads, progress.as_ref(), |report| {
-        integrate_into(field, &params, &mut |state| report((state.iteration, state.residual)), height_px, labels)
+        integrate_into(
+            field,
+            &params,
+            &mut |state| report(Done::Iteration(state.iteration, state.residual)),
+            height_px,
+            labels,
+        )
     })?;
     let components = fit.components.iter().map(|part| (part.pixels, part.first_row, part.first_col)).collect();
     Ok((components, fit.iterations, fit.residual))

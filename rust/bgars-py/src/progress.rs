@@ -6,8 +6,8 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use pyo3::call::PyCallArgs;
 use pyo3::prelude::*;
+use rayon::ThreadPool;
 
 use crate::errors::to_python;
 use crate::pool::pool;
@@ -15,39 +15,62 @@ use crate::pool::pool;
 /// Time between two looks at Python.
 const INTERVAL: Duration = Duration::from_millis(100);
 
+/// State of some work: the arguments of the callback.
+#[derive(Clone, Copy)]
+pub enum Done {
+    /// How much of it is done.
+    Fraction(f64),
+    /// Iterations, and what is left.
+    Iteration(usize, f64),
+}
+
+/// Called with the state of some work; `Break` stops it.
+pub type Report<'a> = &'a mut dyn FnMut(Done) -> ControlFlow<()>;
+
 /// Runs `work` without the GIL, on at most `threads` threads (`None`: as many as `RAYON_NUM_THREADS` says, else one a core).
 ///
-/// `work` reports its state as the arguments of `callback`, which is called at most every 100 ms, from the calling thread:
-/// only there can Python deliver Ctrl-C. An exception, from the callback or from Ctrl-C, stops the work and is raised.
-pub fn watched<T, A, W>(py: Python<'_>, threads: Option<i64>, callback: Option<&Py<PyAny>>, work: W) -> PyResult<T>
-where
-    T: Send,
-    A: for<'py> PyCallArgs<'py> + Send,
-    W: FnOnce(&mut dyn FnMut(A) -> ControlFlow<()>) -> bgars_core::Result<T> + Send,
-{
-    let pool = pool(threads)?;
+/// `work` reports its state to `callback`, which is called at most every 100 ms, from the calling thread: only there can Python
+/// deliver Ctrl-C. An exception, from the callback or from Ctrl-C, stops the work and is raised.
+pub fn watched<T: Send>(
+    py: Python<'_>,
+    threads: Option<i64>,
+    callback: Option<&Py<PyAny>>,
+    work: impl FnOnce(Report<'_>) -> bgars_core::Result<T> + Send,
+) -> PyResult<T> {
+    let mut outcome = None;
+    watch(py, &pool(threads)?, callback, Box::new(|report: Report<'_>| outcome = Some(work(report))))?;
+    // A panic of the work has gone on from its scope.
+    outcome.expect("the scope ends after the work").map_err(to_python)
+}
+
+/// [`watched`] for any kind of work: compiled once.
+fn watch(
+    py: Python<'_>,
+    pool: &ThreadPool,
+    callback: Option<&Py<PyAny>>,
+    work: Box<dyn FnOnce(Report<'_>) + Send + '_>,
+) -> PyResult<()> {
     let cancelled = AtomicBool::new(false);
     let state = Mutex::new(None);
-    let mut report = |arguments: A| {
-        *state.lock().unwrap_or_else(PoisonError::into_inner) = Some(arguments);
+    let mut report = |done: Done| {
+        *state.lock().unwrap_or_else(PoisonError::into_inner) = Some(done);
         if cancelled.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let (mut raised, mut outcome) = (None, None);
+    let mut raised = None;
     py.detach(|| {
         pool.in_place_scope(|scope| {
             let (sender, receiver) = channel();
-            let outcome = &mut outcome;
             // On a thread of the pool: from outside, each parallel loop would wake it up anew.
             scope.spawn(move |_| {
-                *outcome = Some(work(&mut report));
+                work(&mut report);
                 // The receiver waits until the sender is gone, whatever it sent.
                 drop(sender);
             });
             while receiver.recv_timeout(INTERVAL) == Err::<(), _>(RecvTimeoutError::Timeout) {
-                let arguments = state.lock().unwrap_or_else(PoisonError::into_inner).take();
+                let done = state.lock().unwrap_or_else(PoisonError::into_inner).take();
                 // After an exception the work only has to end: nobody is told of its progress any more.
                 if raised.is_none()
-                    && let Err(error) = look_at_python(callback, arguments)
+                    && let Err(error) = look_at_python(callback, done)
                 {
                     cancelled.store(true, Ordering::Relaxed);
                     raised = Some(error);
@@ -55,11 +78,7 @@ where
             }
         });
     });
-    match raised {
-        Some(error) => Err(error),
-        // A panic of the work has gone on from its scope.
-        None => outcome.expect("the scope ends after the work").map_err(to_python),
-    }
+    raised.map_or(Ok(()), Err)
 }
 
 /// [`watched`] for work that reports nothing; Ctrl-C is raised when it is done.
@@ -68,15 +87,16 @@ pub fn on_threads<T: Send>(
     threads: Option<i64>,
     work: impl FnOnce() -> bgars_core::Result<T> + Send,
 ) -> PyResult<T> {
-    watched::<T, (f64,), _>(py, threads, None, |_| work())
+    watched(py, threads, None, |_| work())
 }
 
-fn look_at_python<A: for<'py> PyCallArgs<'py>>(callback: Option<&Py<PyAny>>, arguments: Option<A>) -> PyResult<()> {
+fn look_at_python(callback: Option<&Py<PyAny>>, done: Option<Done>) -> PyResult<()> {
     Python::attach(|py| {
         py.check_signals()?;
-        if let (Some(callback), Some(arguments)) = (callback, arguments) {
-            callback.call1(py, arguments)?;
+        match (callback, done) {
+            (Some(callback), Some(Done::Fraction(fraction))) => callback.call1(py, (fraction,)).map(drop),
+            (Some(callback), Some(Done::Iteration(count, left))) => callback.call1(py, (count, left)).map(drop),
+            _ => Ok(()),
         }
-        Ok(())
     })
 }

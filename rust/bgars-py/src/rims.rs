@@ -1,12 +1,13 @@
 //! Binding of `bgars_core::rims`.
 
 use bgars_core::rims::{
-    ANGLES, BASIS, Circle, PROFILES, Planes, RimPixels, SLOPES, bands, eliminate, profiles, ring_edges as edges,
+    ANGLES, BASIS, Circle, PROFILES, Planes, RimPixels, SLOPES, STEPS_PER_PX, bands, eliminate, profiles,
+    ring_edges as edges,
 };
 use numpy::{PyArray3, PyArray4, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArray4, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::convert::{array3, array4, slice2, slice3, slice4, triples};
+use crate::convert::{array3, array4, check_count, check_most, check_room, rows, slice2, slice3, slice4, triples};
 use crate::errors::InputError;
 use crate::progress::on_threads;
 
@@ -16,6 +17,9 @@ type Padded<'py> = Bound<'py, PyArray3<f32>>;
 #[pyfunction]
 #[pyo3(signature = (blur_px, reach_px, *, threads))]
 pub fn rim_profiles(py: Python<'_>, blur_px: f64, reach_px: f64, threads: Option<i64>) -> PyResult<Padded<'_>> {
+    check_most("blur_px", [blur_px])?;
+    check_most("reach_px", [reach_px])?;
+    check_room::<f32>(&[ANGLES, 2 * (reach_px * STEPS_PER_PX).ceil() as usize + 1, PROFILES])?;
     let table = on_threads(py, threads, || Ok(profiles(blur_px, reach_px)))?;
     let depths = table.len() / ANGLES;
     array3(py, table.into_flattened(), [ANGLES, depths, PROFILES])
@@ -33,15 +37,18 @@ pub fn rim_bands<'py>(
     threads: Option<i64>,
 ) -> PyResult<(Padded<'py>, Padded<'py>, Padded<'py>)> {
     let circles = circles_of(&circles)?;
-    let depths: Vec<[f64; 2]> = slice2(&depths, "depths")?.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();
-    if every == 0 || sectors == 0 || depths.len() != circles.len() {
-        return Err(InputError::new_err("depths: must be one pair a circle, every and sectors at least 1"));
+    let depths = rows::<f64, 2>(&depths, "depths")?;
+    if every == 0 || depths.len() != circles.len() {
+        return Err(InputError::new_err("depths: must be one pair a circle, and every at least 1"));
     }
-    let finite = circles.iter().all(|circle| (circle.row_px + circle.col_px + circle.radius_px).is_finite());
-    if !finite || !depths.as_flattened().iter().all(|depth| depth.is_finite()) {
-        return Err(InputError::new_err("circles, depths: must be finite"));
-    }
-    let found = on_threads(py, threads, || Ok(bands(&circles, &depths, every, sectors)))?;
+    check_count("sectors", sectors)?;
+    check_most("depths", depths.iter().flat_map(|depths| depths.map(f64::abs)))?;
+    check_most(
+        "circles",
+        circles.iter().flat_map(|circle| [circle.row_px, circle.col_px, circle.radius_px].map(f64::abs)),
+    )?;
+    check_room::<usize>(&[circles.len(), sectors])?;
+    let found = on_threads(py, threads, || Ok(bands(&circles, depths, every, sectors)))?;
     let shape = [circles.len(), sectors, found.most];
     Ok((array3(py, found.rows, shape)?, array3(py, found.cols, shape)?, array3(py, found.weights, shape)?))
 }
@@ -92,8 +99,9 @@ pub fn eliminate_rims<'py>(
         most,
     };
     let table = slice3(&table, "table")?.as_chunks().0;
-    let left = on_threads(py, threads, || Ok(eliminate(pixels, &circles, blur_px, table)))?;
     let others = SLOPES + lights;
+    check_room::<f64>(&[balls, sectors, others, others])?;
+    let left = on_threads(py, threads, || Ok(eliminate(pixels, &circles, blur_px, table)))?;
     Ok((
         array4(py, left.rest, [balls, sectors, others, others])?,
         array4(py, left.coefficients, [balls, sectors, BASIS, lights])?,
@@ -122,9 +130,11 @@ pub fn ring_edges<'py>(
     if centres.shape() != [count, 2] || lights * height * width == 0 {
         return Err(InputError::new_err("centres: must have shape (N, 2) beside radii_px (N, R), and images pixels"));
     }
+    check_count("directions", directions)?;
+    check_room::<f32>(&[count, directions, rings])?;
     let planes = Planes { values: slice3(&images, "images")?, lights, height, width };
-    let centres: Vec<[f64; 2]> = slice2(&centres, "centres")?.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();
+    let centres = rows(&centres, "centres")?;
     let radii = slice2(&radii_px, "radii_px")?;
-    let found = on_threads(py, threads, || Ok(edges(planes, &centres, radii, directions, rank)))?;
+    let found = on_threads(py, threads, || Ok(edges(planes, centres, radii, directions, rank)))?;
     array3(py, found, [count, directions, rings])
 }

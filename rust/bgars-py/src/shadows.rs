@@ -2,14 +2,15 @@
 
 use std::ops::ControlFlow;
 
+use bgars_core::normal_distribution::{self as distribution, FEW_VALUES};
 use bgars_core::shadows::model::{Ball, Board, Lamp};
-use bgars_core::shadows::{EdgeSettings, Edges, Margins, STRETCH_FIELDS, Silhouettes};
-use bgars_core::{ImageStack, Lights, Pixel, Radiometry, normal_distribution as distribution, shadows};
+use bgars_core::shadows::{EdgeSettings, Edges, Margins, STRETCH_FIELDS, Silhouettes, Stretch};
+use bgars_core::{ImageStack, Lights, Pixel, Radiometry, shadows};
 use numpy::{PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArray4, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use crate::capture::{Capture, Work};
-use crate::convert::{array2, array3, rows, slice2, slice3, slice4, triples};
+use crate::convert::{array2, array3, check_count, check_most, check_room, rows, slice2, slice3, slice4, triples};
 use crate::errors::InputError;
 use crate::progress::on_threads;
 
@@ -49,8 +50,9 @@ pub fn draw_shadows<'py>(
 ) -> PyResult<Maps<'py>> {
     let (balls, lamps, board) = (casters.balls()?, casters.lamps()?, Board(casters.board));
     let margins = Margins { silhouette_px: silhouette_margin_px, shadow_px: shadow_margin_px };
-    let map =
-        on_threads(py, threads, || Ok(shadows::draw_shadows(&balls, &lamps, &board, shape, step.max(1), margins)))?;
+    check_count("step", step)?;
+    check_room::<u8>(&[lamps.len() + 1, shape[0].div_ceil(step), shape[1].div_ceil(step)])?;
+    let map = on_threads(py, threads, || Ok(shadows::draw_shadows(&balls, &lamps, &board, shape, step, margins)))?;
     Ok((array2(py, map.hidden, [map.rows, map.cols])?, array3(py, map.count, [lamps.len(), map.rows, map.cols])?))
 }
 
@@ -110,9 +112,10 @@ pub fn measure_edges<'py>(
         angles_rad,
         sectors,
     };
-    if settings.stride_px == 0 || settings.sectors == 0 || step == 0 {
-        return Err(InputError::new_err("stride_px, sectors, step: must be at least 1"));
+    for (name, count) in [("stride_px", settings.stride_px), ("sectors", settings.sectors), ("step", step)] {
+        check_count(name, count)?;
     }
+    check_room::<Stretch>(&[balls_count, lights, sectors])?;
     let lines = settings.angles_rad.len();
     if [&settings.lamp_spread_rad, &settings.reach_px, &settings.limit].iter().any(|values| values.len() != lines) {
         return Err(InputError::new_err(
@@ -123,12 +126,10 @@ pub fn measure_edges<'py>(
     if settings.nodes < least || profiles.shape() != [lights, lines, settings.nodes, 2] {
         return Err(InputError::new_err("profiles: must have shape (lights, angles_rad, at least 2, 2)"));
     }
-    if !settings.reach_px.iter().all(|reach| reach.is_finite()) {
-        return Err(InputError::new_err("reach_px: must be finite"));
-    }
+    check_most("reach_px", settings.reach_px.iter().copied())?;
     let job = Job { silhouettes, balls, lamps, board, gains, settings };
     let edges = capture.work(py, threads, None, job)?;
-    let numbers = edges.stretches.iter().flat_map(shadows::Stretch::numbers).collect();
+    let numbers = edges.stretches.iter().flat_map(Stretch::numbers).collect();
     let shape = [balls_count, lights * sectors, STRETCH_FIELDS];
     Ok((array3(py, numbers, shape)?, array2(py, edges.noise, [balls_count, lights])?))
 }
@@ -143,7 +144,8 @@ pub fn normal_distribution<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let [rows, cols] = [values.shape()[0], values.shape()[1]];
     let values = slice2(&values, "values")?;
-    let shares = on_threads(py, threads, || Ok(distribution::normal_distribution(values)))?;
+    let work = || distribution::normal_distribution(values);
+    let shares = if values.len() <= FEW_VALUES { py.detach(work) } else { on_threads(py, threads, || Ok(work()))? };
     array2(py, shares, [rows, cols])
 }
 
@@ -169,6 +171,20 @@ impl Work for Job<'_> {
     ) -> bgars_core::Result<Edges> {
         radiometry.check(stack)?;
         let Self { silhouettes, balls, lamps, board, gains, settings } = self;
+        let Silhouettes { step, cols, hidden, count, mask } = silhouettes;
+        let cells = stack.height().div_ceil(step) * cols;
+        for (argument, expected, actual) in [
+            ("casters.lights", stack.lights(), lamps.len()),
+            ("hidden", stack.height().div_ceil(step) * stack.width().div_ceil(step), hidden.len()),
+            ("hidden", cells, hidden.len()),
+            ("count", lamps.len() * cells, count.len()),
+            ("mask", stack.pixels(), mask.map_or(stack.pixels(), <[bool]>::len)),
+            ("gains", balls.len() * lamps.len(), gains.len()),
+        ] {
+            if expected != actual {
+                return Err(bgars_core::Error::LengthMismatch { argument, expected, actual });
+            }
+        }
         Ok(shadows::measure_edges(stack, radiometry, silhouettes, &balls, &lamps, &board, gains, &settings))
     }
 }

@@ -21,6 +21,7 @@ use std::ops::ControlFlow;
 use rayon::prelude::*;
 
 use crate::normals::{self, Method, NormalMap, NormalMapMut};
+use crate::readings::Capture;
 use crate::{ImageStack, Lights, Pixel, Radiometry, Result};
 
 pub use judge::{MIN_LIGHTS, Predictions};
@@ -99,10 +100,11 @@ impl fmt::Display for Report {
     }
 }
 
-/// Estimates normals with a material fitted to the capture itself; see the [module](self).
+/// Estimates normals with a material fitted to the capture itself; see the [module](self). After an error the content of `out`
+/// means nothing.
 ///
 /// # Inputs
-/// Those of [`normals::estimate`].
+/// Those of [`normals::estimate_into`].
 ///
 /// # Method
 /// 1. Least squares and robust filter on every pixel: starts, and what is to be beaten.
@@ -117,18 +119,18 @@ impl fmt::Display for Report {
 /// one-sided.
 ///
 /// # Errors
-/// Those of [`normals::estimate`].
+/// Those of [`normals::estimate_into`].
 ///
 /// # Examples
 /// ```
-/// use bgars_core::{ImageStack, Lights, Radiometry, blind};
+/// use bgars_core::{ImageStack, Lights, Radiometry, blind, normals::NormalMap};
 /// let s = 0.5f64.sqrt();
 /// let lights = Lights::directional(&[[s, 0.0, s], [0.0, s, s], [-s, 0.0, s], [0.0, -s, s]])?;
 /// let stack = ImageStack::new(&[100u8; 4], 4, 1, 1)?;
 /// let radiometry = Radiometry::linear(4, 255.0);
-/// let (map, report) = blind::estimate(&stack, &lights, &radiometry, None, false, &mut |_| {
-///     std::ops::ControlFlow::Continue(())
-/// })?;
+/// let mut map = NormalMap::zeros(1, 0);
+/// let proceed = &mut |_| std::ops::ControlFlow::Continue(());
+/// let report = blind::estimate_into(&stack, &lights, &radiometry, None, proceed, map.as_mut())?;
 /// assert_eq!(report.choice, blind::Choice::RobustFilter); // four lights: none can be left out
 /// assert!((map.normals[2] - 1.0).abs() < 1e-6);
 /// # Ok::<(), bgars_core::Error>(())
@@ -136,23 +138,6 @@ impl fmt::Display for Report {
 ///
 /// # Cost
 /// Some 20 us a pixel on one thread with 8 lights, rayon over pixels; the same bits for any number of threads.
-pub fn estimate<P: Pixel>(
-    stack: &ImageStack<'_, P>,
-    lights: &Lights,
-    radiometry: &Radiometry<'_, P>,
-    mask: Option<&[bool]>,
-    keep_sets: bool,
-    progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
-) -> Result<(NormalMap, Report)> {
-    let mut map = NormalMap::zeros(stack.pixels(), if keep_sets { stack.lights() } else { 0 });
-    let report = estimate_into(stack, lights, radiometry, mask, progress, map.as_mut())?;
-    Ok((map, report))
-}
-
-/// [`estimate`] into memory that is there already. After an error the content means nothing.
-///
-/// # Errors
-/// Those of [`estimate`], and arrays of another length than the image needs.
 pub fn estimate_into<P: Pixel>(
     stack: &ImageStack<'_, P>,
     lights: &Lights,
@@ -161,7 +146,7 @@ pub fn estimate_into<P: Pixel>(
     progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
     mut out: NormalMapMut<'_>,
 ) -> Result<Report> {
-    out.check_with_measured(stack.pixels(), stack.lights())?;
+    out.check(stack.pixels(), stack.lights(), true)?;
     let half = AFTER_CLASSICAL / 2.0;
     // The robust filter's result is the output already: what is chosen otherwise overwrites it.
     normals::estimate_into(
@@ -180,12 +165,10 @@ pub fn estimate_into<P: Pixel>(
     let lambertian = normals::estimate(stack, lights, radiometry, mask, Method::Lambertian, false, &mut |done| {
         progress(half + done * half)
     })?;
-    let mut reader = Reader::new(stack, lights, radiometry);
-    let pixels: Vec<usize> = (0..stack.pixels()).filter(|&pixel| mask.is_none_or(|mask| mask[pixel])).collect();
-    let count = |pixels| bounded(pixels, stack.lights());
-    let sample = specimens(&mut reader, &spread(&pixels, count(SAMPLE_PIXELS)), &lambertian, out.normals);
-    let fitted = material::fit(&sample);
-    let predictions = judge::predictions(&spread(&sample, count(JUDGED_PIXELS)), &fitted);
+    let capture = Capture { stack, radiometry };
+    let mut reader = Reader::new(&capture, lights);
+    let pixels = used(stack, mask);
+    let (fitted, predictions) = fit(&mut reader, &pixels, SAMPLE_PIXELS, &lambertian, out.normals);
     if progress(AFTER_MATERIAL).is_break() {
         return Err(crate::Error::Cancelled);
     }
@@ -216,7 +199,7 @@ pub fn estimate_into<P: Pixel>(
 /// with, in grey levels of 255 at unit light intensity; `None` with fewer than five lights.
 ///
 /// # Errors
-/// Those of [`estimate`].
+/// Those of [`normals::estimate`].
 pub fn predict<P: Pixel>(
     stack: &ImageStack<'_, P>,
     lights: &Lights,
@@ -230,23 +213,29 @@ pub fn predict<P: Pixel>(
         normals::estimate(stack, lights, radiometry, mask, method, false, &mut |_| ControlFlow::Continue(()))
     });
     let (lambertian, filtered) = (lambertian?, filtered?);
-    let mut reader = Reader::new(stack, lights, radiometry);
-    let pixels: Vec<usize> = (0..stack.pixels()).filter(|&pixel| mask.is_none_or(|mask| mask[pixel])).collect();
-    let count = |pixels| bounded(pixels, stack.lights());
-    let sample = specimens(&mut reader, &spread(&pixels, count(COMPARED_PIXELS)), &lambertian, &filtered.normals);
-    let fitted = material::fit(&sample);
-    let predictions = judge::predictions(&spread(&sample, count(JUDGED_PIXELS)), &fitted);
+    let capture = Capture { stack, radiometry };
+    let mut reader = Reader::new(&capture, lights);
+    let (_, predictions) = fit(&mut reader, &used(stack, mask), COMPARED_PIXELS, &lambertian, &filtered.normals);
     Ok(Some((predictions, 255.0 * reader.albedo_scale * reader.noise)))
 }
 
-/// Some pixels as the fit sees them, with the normals of both classical methods; measures the noise on them.
-fn specimens<P: Pixel>(
-    reader: &mut Reader<'_, P>,
-    places: &[usize],
+/// The pixels of a mask.
+fn used<P: Pixel>(stack: &ImageStack<'_, P>, mask: Option<&[bool]>) -> Vec<usize> {
+    (0..stack.pixels()).filter(|&pixel| mask.is_none_or(|mask| mask[pixel])).collect()
+}
+
+/// The material of at most `most` of some pixels, from the normals of both classical methods, and how well all three predict;
+/// measures the noise.
+fn fit(
+    reader: &mut Reader<'_>,
+    pixels: &[usize],
+    most: usize,
     lambertian: &NormalMap,
     filtered: &[f32],
-) -> Vec<Specimen> {
-    reader.measure_noise(places, lambertian);
+) -> (Material, Predictions) {
+    let lights = reader.room().lights.len();
+    let places = spread(pixels, bounded(most, lights));
+    reader.measure_noise(&places, lambertian);
     let reader = &*reader;
     let one = |&pixel: &usize| {
         let mut observation = reader.room();
@@ -254,7 +243,10 @@ fn specimens<P: Pixel>(
         let starts = [&lambertian.normals[..], filtered].map(|normals| start(normals, pixel));
         Specimen { observation, starts }
     };
-    places.par_iter().map(one).collect()
+    let sample: Vec<Specimen> = places.par_iter().map(one).collect();
+    let fitted = material::fit(&sample);
+    let predictions = judge::predictions(&spread(&sample, bounded(JUDGED_PIXELS, lights)), &fitted);
+    (fitted, predictions)
 }
 
 /// The method of the lowest prediction cost, with a margin in favour of the material.

@@ -3,9 +3,10 @@
 use nalgebra::Vector3;
 
 use super::lobe::Light;
+use crate::Lights;
 use crate::median::median;
 use crate::normals::NormalMap;
-use crate::{ImageStack, Lights, Pixel, Radiometry};
+use crate::readings::Readings;
 
 /// Least standard deviation of a value that is reckoned with, of full scale: one grey level of 255.
 const NOISE: f64 = 1.0 / 255.0;
@@ -76,11 +77,10 @@ impl Observation {
     }
 }
 
-/// Reads observations from a stack.
-pub(super) struct Reader<'a, P> {
-    stack: &'a ImageStack<'a, P>,
+/// Reads observations from a capture.
+pub(super) struct Reader<'a> {
+    capture: &'a dyn Readings,
     lights: &'a Lights,
-    radiometry: &'a Radiometry<'a, P>,
     /// 1 / (intensity of a light, full scale), its mean over the lights 1 / full scale.
     scales: Vec<f64>,
     /// Mean of 1 / intensity: albedo over full scale is this many times the albedo of the fit.
@@ -91,18 +91,18 @@ pub(super) struct Reader<'a, P> {
     pub sigma: f64,
 }
 
-impl<'a, P: Pixel> Reader<'a, P> {
-    pub fn new(stack: &'a ImageStack<'a, P>, lights: &'a Lights, radiometry: &'a Radiometry<'a, P>) -> Self {
-        let inverse: Vec<f64> = radiometry.intensities.iter().map(|intensity| 1.0 / intensity).collect();
+impl<'a> Reader<'a> {
+    pub fn new(capture: &'a dyn Readings, lights: &'a Lights) -> Self {
+        let inverse: Vec<f64> = capture.intensities().iter().map(|intensity| 1.0 / intensity).collect();
         let albedo_scale = inverse.iter().sum::<f64>() / inverse.len() as f64;
-        let unit = albedo_scale * f64::from(radiometry.full_scale_of(stack));
+        let unit = albedo_scale * f64::from(capture.full_scale());
         let scales = inverse.iter().map(|scale| scale / unit).collect();
-        Self { stack, lights, radiometry, scales, albedo_scale, noise: NOISE, sigma: 0.0 }
+        Self { capture, lights, scales, albedo_scale, noise: NOISE, sigma: 0.0 }
     }
 
     /// Room for a pixel, with the lights of the image centre.
     pub fn room(&self) -> Observation {
-        let count = self.stack.lights();
+        let count = self.lights.len();
         Observation {
             values: vec![0.0; count],
             kinds: vec![Kind::Lit; count],
@@ -115,21 +115,17 @@ impl<'a, P: Pixel> Reader<'a, P> {
 
     /// Reads a pixel.
     pub fn read(&self, pixel: usize, into: &mut Observation) {
-        let offset = self.radiometry.offset(pixel);
-        let near = matches!(self.lights, Lights::Near { .. });
-        let (row, col) = (pixel / self.stack.width(), pixel % self.stack.width());
-        let x_px = col as f64 + 0.5 - self.stack.width() as f64 / 2.0;
-        let y_px = self.stack.height() as f64 / 2.0 - row as f64 - 0.5;
-        for light in 0..self.stack.lights() {
-            let code = self.stack.plane(light)[pixel];
-            let mut value = f64::from(self.radiometry.linearise(code) - offset) * self.scales[light];
-            if near {
-                let (direction, falloff): (Vector3<f64>, f64) = self.lights.at(light, x_px, y_px);
+        let offset = self.capture.offset(pixel);
+        let (x_px, y_px) = self.capture.centre(pixel);
+        for light in 0..self.lights.len() {
+            let mut value = f64::from(self.capture.level(light, pixel) - offset) * self.scales[light];
+            if let Lights::Near { .. } = self.lights {
+                let (direction, falloff) = self.lights.at(light, x_px, y_px);
                 into.lights[light] = Light::new(direction);
                 value /= falloff;
             }
             into.values[light] = value;
-            into.kinds[light] = if code.to_f32() >= self.radiometry.saturation {
+            into.kinds[light] = if self.capture.is_clipped(light, pixel) {
                 Kind::Clipped
             } else if value <= 2.0 * self.noise {
                 Kind::Black
@@ -139,14 +135,12 @@ impl<'a, P: Pixel> Reader<'a, P> {
         }
         into.weigh();
     }
-}
 
-impl<P: Pixel> Reader<'_, P> {
     /// Raises the noise to what `sample` shows, where that is more: the median second difference along the row of what a
     /// Lambertian facet leaves over. Texture and shading are smooth there or the facet's own; noise is neither.
     pub fn measure_noise(&mut self, sample: &[usize], lambertian: &NormalMap) {
-        let lights = self.stack.lights();
-        let width = self.stack.width();
+        let lights = self.lights.len();
+        let (_, width) = self.capture.size();
         // Three unknowns of each pixel follow the noise.
         let spread = (6.0 * (1.0 - 3.0 / lights as f64)).sqrt() * MEDIAN_OF_NORMAL;
         let mut differences = Vec::new();

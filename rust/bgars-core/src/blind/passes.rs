@@ -10,7 +10,7 @@ use super::neighbours::median_normal;
 use super::observation::{Reader, start};
 use super::pixel::{Source, best_facet, filter_knows_better, trust};
 use crate::normals::NormalMapMut;
-use crate::{Error, Pixel, Result};
+use crate::{Error, Result};
 
 /// Passes with a pull to the neighbours, after the one without.
 const NEIGHBOUR_PASSES: usize = 2;
@@ -29,8 +29,8 @@ const MAX_ITERS: [usize; 2] = [20, 12];
 const PULL: (f64, f64) = (1.0, 0.1);
 
 /// Everything that the passes read.
-pub(super) struct Passes<'a, P> {
-    pub reader: &'a Reader<'a, P>,
+pub(super) struct Passes<'a> {
+    pub reader: &'a Reader<'a>,
     pub material: Material,
     /// The pixels asked for, ascending.
     pub pixels: &'a [usize],
@@ -47,7 +47,7 @@ struct Found {
     source: Source,
 }
 
-impl<P: Pixel> Passes<'_, P> {
+impl Passes<'_> {
     /// Runs all passes, from and over the robust filter's result in `out`; the number of pixels of each source.
     pub fn run(
         &self,

@@ -3,13 +3,13 @@
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::matrix_free::conjugate_gradient::{CgParams, conjugate_gradient as solve, conjugate_gradient_scratch};
 use faer::matrix_free::{InitialGuessStatus, LinOp, Precond};
 use faer::{MatMut, MatRef, Par};
 
 use super::norm::norm;
-use super::vectors::{slice, slice_mut};
+use super::vectors::{slice, slice_mut, symmetric_operator};
 use crate::{Error, Result};
 
 /// What the true residual may lie above the target by, relative to it.
@@ -122,29 +122,8 @@ struct Stoppable<'a, A>(&'a A, &'a Watch);
 #[derive(Debug)]
 struct Noting<'a, P>(&'a P, &'a Watch);
 
-/// What is the same for both.
-macro_rules! forward_to_inner {
-    () => {
-        fn apply_scratch(&self, rhs_ncols: usize, par: Par) -> StackReq {
-            self.0.apply_scratch(rhs_ncols, par)
-        }
-
-        fn nrows(&self) -> usize {
-            self.0.nrows()
-        }
-
-        fn ncols(&self) -> usize {
-            self.0.ncols()
-        }
-
-        fn conj_apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, par: Par, stack: &mut MemStack) {
-            self.apply(out, rhs, par, stack);
-        }
-    };
-}
-
 impl<A: LinOp<f64>> LinOp<f64> for Stoppable<'_, A> {
-    forward_to_inner!();
+    symmetric_operator!(|watched: &Self| watched.0.nrows());
 
     fn apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, par: Par, stack: &mut MemStack) {
         if self.1.stopped.load(Ordering::Relaxed) {
@@ -156,7 +135,7 @@ impl<A: LinOp<f64>> LinOp<f64> for Stoppable<'_, A> {
 }
 
 impl<P: Precond<f64>> LinOp<f64> for Noting<'_, P> {
-    forward_to_inner!();
+    symmetric_operator!(|watched: &Self| watched.0.nrows());
 
     fn apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, par: Par, stack: &mut MemStack) {
         if self.1.stopped.load(Ordering::Relaxed) {

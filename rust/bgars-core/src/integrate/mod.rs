@@ -31,5 +31,5 @@ pub use bilateral::{BilateralParams, BilateralSurface, Pinhole, Setting, integra
 pub use components::Component;
 pub use multigrid::Multigrid;
 pub use settings::{Difference, Field, Fit, OnProgress, Params, Progress, Surface};
-pub use solve::{integrate, integrate_field, integrate_into, usable};
+pub use solve::{integrate, integrate_into, usable};
 pub use system::{Operator, System};

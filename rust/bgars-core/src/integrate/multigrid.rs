@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use faer::dyn_stack::{MemStack, StackReq};
+use faer::dyn_stack::MemStack;
 use faer::matrix_free::{LinOp, Precond};
 use faer::{MatMut, MatRef, Par};
 use rayon::prelude::*;
@@ -13,7 +13,7 @@ use super::checkerboard::{Colour, Grid, join_row, split_row};
 use super::graph::Graph;
 use super::real::Real;
 use super::stencil::Stencil;
-use super::vectors::{slice, slice_mut};
+use super::vectors::{slice, slice_mut, symmetric_operator};
 
 /// Unknowns, and rows of blocks, that are worth a task.
 const TASK: usize = 1 << 12;
@@ -232,27 +232,13 @@ fn each_task(values: &mut [f32], set: impl Fn(usize, &mut f32) + Sync) {
 }
 
 impl LinOp<f64> for Multigrid<'_> {
-    fn apply_scratch(&self, _rhs_ncols: usize, _par: Par) -> StackReq {
-        StackReq::EMPTY
-    }
-
-    fn nrows(&self) -> usize {
-        self.size
-    }
-
-    fn ncols(&self) -> usize {
-        self.nrows()
-    }
+    symmetric_operator!(|multigrid: &Self| multigrid.size);
 
     fn apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, _par: Par, _stack: &mut MemStack) {
         let mut vectors = self.vectors.lock().unwrap_or_else(PoisonError::into_inner);
         vectors[0].right[0].par_iter_mut().zip(slice(rhs)).for_each(|(rounded, &number)| *rounded = number as f32);
         v_cycle(&self.levels, &mut vectors);
         slice_mut(out).par_iter_mut().zip(&vectors[0].solution[0]).for_each(|(out, &number)| *out = f64::from(number));
-    }
-
-    fn conj_apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, par: Par, stack: &mut MemStack) {
-        self.apply(out, rhs, par, stack);
     }
 }
 

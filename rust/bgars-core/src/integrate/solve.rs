@@ -53,31 +53,14 @@ pub fn integrate(
     params: &Params,
     on_progress: OnProgress<'_>,
 ) -> Result<Surface> {
-    integrate_field(Field { normals, mask, weights, regions: None, width }, params, on_progress)
-}
-
-/// [`integrate`] with regions: pixels of different ones are not joined, so that each region floats freely.
-///
-/// # Errors
-/// Those of [`integrate`].
-///
-/// # Examples
-/// ```
-/// use bgars_core::integrate::{Field, Params, integrate_field};
-/// let (normals, mask) = ([0.0, 0.0, 1.0].repeat(4), [true; 4]);
-/// let field = Field { normals: &normals, mask: &mask, weights: None, regions: Some(&[7, 7, 8, 8]), width: 4 };
-/// let surface = integrate_field(field, &Params::default(), &mut |_| std::ops::ControlFlow::Continue(()))?;
-/// assert_eq!(surface.components.len(), 2);
-/// # Ok::<(), bgars_core::Error>(())
-/// ```
-pub fn integrate_field(field: Field<'_>, params: &Params, on_progress: OnProgress<'_>) -> Result<Surface> {
-    let (mut height_px, mut labels) = (vec![0.0; field.mask.len()], vec![0; field.mask.len()]);
-    let fit = integrate_into(field, params, on_progress, &mut height_px, &mut labels)?;
-    let Fit { components, iterations, residual } = fit;
+    let (mut height_px, mut labels) = (vec![0.0; mask.len()], vec![0; mask.len()]);
+    let field = Field { normals, mask, weights, regions: None, width };
+    let Fit { components, iterations, residual } =
+        integrate_into(field, params, on_progress, &mut height_px, &mut labels)?;
     Ok(Surface { height_px, labels, components, iterations, residual })
 }
 
-/// [`integrate_field`] into memory that is there already, which may hold anything: fresh pages cost a tenth of a large
+/// [`integrate`] of any field into memory that is there already, which may hold anything: fresh pages cost a tenth of a large
 /// integration. After an error the content means nothing.
 ///
 /// # Errors

@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use faer::dyn_stack::{MemStack, StackReq};
+use faer::dyn_stack::MemStack;
 use faer::matrix_free::LinOp;
 use faer::{MatMut, MatRef, Par};
 
@@ -11,7 +11,7 @@ use super::multigrid::Multigrid;
 use super::norm::norm;
 use super::real::Real;
 use super::stencil::Stencil;
-use super::vectors::{slice, slice_mut};
+use super::vectors::{slice, slice_mut, symmetric_operator};
 
 /// The normal equations of [`super::integrate`] on the checkerboard of pixels, `[D_red, -W; -W^T, D_black]`, and their reduced
 /// system, the blacks eliminated (Hageman and Young 1981): `S x = b`, `S = D_red - W D_black^-1 W^T`, on the reds.
@@ -74,26 +74,12 @@ pub struct Operator<'a> {
 }
 
 impl LinOp<f64> for Operator<'_> {
-    fn apply_scratch(&self, _rhs_ncols: usize, _par: Par) -> StackReq {
-        StackReq::EMPTY
-    }
-
-    fn nrows(&self) -> usize {
-        self.stencil.grid.half_pixels()
-    }
-
-    fn ncols(&self) -> usize {
-        self.nrows()
-    }
+    symmetric_operator!(|operator: &Self| operator.stencil.grid.half_pixels());
 
     fn apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, _par: Par, _stack: &mut MemStack) {
         let (x, out) = (slice(rhs), slice_mut(out));
         let mut blacks = self.blacks.lock().unwrap_or_else(PoisonError::into_inner);
         self.stencil.update(Colour::Black, x, x, &mut blacks, |y, sum, d, _| *y = sum.over(d));
         self.stencil.update(Colour::Red, &blacks, x, out, |out, sum, d, x| *out = d * x - sum);
-    }
-
-    fn conj_apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, par: Par, stack: &mut MemStack) {
-        self.apply(out, rhs, par, stack);
     }
 }

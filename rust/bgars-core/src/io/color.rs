@@ -4,7 +4,7 @@ use std::path::Path;
 
 use image::{DynamicImage, ImageDecoder};
 
-use super::decode::{check_size, open, translate};
+use super::decode::{bits_of, check_size, open, translate};
 use crate::{Error, Result};
 
 /// A decoded colour image.
@@ -44,8 +44,7 @@ pub fn read_color(path: &Path, max_megapixels: f64) -> Result<ColorImage> {
         other if color.has_alpha() => other.into_rgba32f().into_raw(),
         other => other.into_rgb32f().into_raw(),
     };
-    let channels = usize::from(color.channel_count());
-    Ok(ColorImage { data, height, width, channels, bits: color.bits_per_pixel() / u16::from(color.channel_count()) })
+    Ok(ColorImage { data, height, width, channels: usize::from(color.channel_count()), bits: bits_of(color) })
 }
 
 fn widen<T: Into<f32>>(codes: Vec<T>) -> Vec<f32> {

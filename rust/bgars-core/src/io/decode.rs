@@ -7,8 +7,10 @@ use std::path::{Path, PathBuf};
 use image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use rayon::prelude::*;
 
-use super::tiff_gray::{max_alloc_bytes, read_gray_tiff};
 use crate::{Error, Result};
+
+/// The most that a decoder asks for, RGBA of `f32`, in bytes a megapixel; what a header claims is checked before.
+const MAX_PIXEL_BYTES: f64 = 16e6;
 
 /// How a colour pixel becomes one value; always on linear values, never with a hidden gamma.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,14 +69,18 @@ struct Header {
 
 impl Header {
     fn describe(self) -> String {
-        let bits = self.color.bits_per_pixel() / u16::from(self.color.channel_count());
         let kind = if self.color.has_color() { "colour" } else { "grey" };
-        format!("{} x {} pixels, {bits} bit {kind}", self.width, self.height)
+        format!("{} x {} pixels, {} bit {kind}", self.width, self.height, bits_of(self.color))
     }
 
     fn bits(self) -> u16 {
-        self.color.bits_per_pixel() / u16::from(self.color.channel_count())
+        bits_of(self.color)
     }
+}
+
+/// Bits a channel.
+pub(super) fn bits_of(color: ColorType) -> u16 {
+    color.bits_per_pixel() / u16::from(color.channel_count())
 }
 
 /// Where the pixels of a stack go, image after image.
@@ -197,7 +203,7 @@ pub(super) fn open(path: &Path, max_megapixels: f64) -> Result<impl ImageDecoder
         return Err(Error::Decode { path: path.to_path_buf(), reason });
     }
     let mut limits = Limits::default();
-    limits.max_alloc = Some(max_alloc_bytes(max_megapixels) as u64);
+    limits.max_alloc = Some((max_megapixels * MAX_PIXEL_BYTES) as u64);
     reader.limits(limits);
     reader.into_decoder().map_err(|error| translate(path, error))
 }
@@ -243,47 +249,32 @@ struct Reader<'a> {
     max_megapixels: f64,
 }
 
-impl Reader<'_> {
-    fn read_u8(&self, out: &mut [u8], channel: Channel) -> Result<()> {
-        if read_gray_tiff(self.path, 8, out, self.max_megapixels)? {
-            return Ok(());
-        }
-        let decoder = open(self.path, self.max_megapixels)?;
-        if decoder.color_type() == ColorType::L8 {
-            return decoder.read_image(out).map_err(|error| translate(self.path, error));
-        }
-        let image = self.decode(decoder)?;
-        if image.color().has_color() {
-            let weights = channel.weights();
-            for (out, pixel) in out.iter_mut().zip(image.to_rgb8().pixels()) {
-                *out = weigh(pixel.0.map(f32::from), weights).round() as u8;
+/// Reads a file of integers: grey ones in place, colour by the weights of its channels.
+macro_rules! integer_reader {
+    ($name:ident, $code:ty, $grey:ident, $to_rgb:ident, $to_grey:ident) => {
+        fn $name(&self, out: &mut [$code], channel: Channel) -> Result<()> {
+            let decoder = open(self.path, self.max_megapixels)?;
+            if decoder.color_type() == ColorType::$grey {
+                let bytes = bytemuck::cast_slice_mut(out);
+                return decoder.read_image(bytes).map_err(|error| translate(self.path, error));
             }
-        } else {
-            out.copy_from_slice(&image.to_luma8());
+            let image = self.decode(decoder)?;
+            if image.color().has_color() {
+                let weights = channel.weights();
+                for (out, pixel) in out.iter_mut().zip(image.$to_rgb().pixels()) {
+                    *out = weigh(pixel.0.map(f32::from), weights).round() as $code;
+                }
+            } else {
+                out.copy_from_slice(&image.$to_grey());
+            }
+            Ok(())
         }
-        Ok(())
-    }
+    };
+}
 
-    fn read_u16(&self, out: &mut [u16], channel: Channel) -> Result<()> {
-        if read_gray_tiff(self.path, 16, bytemuck::cast_slice_mut(out), self.max_megapixels)? {
-            return Ok(());
-        }
-        let decoder = open(self.path, self.max_megapixels)?;
-        if decoder.color_type() == ColorType::L16 {
-            let bytes = bytemuck::cast_slice_mut(out);
-            return decoder.read_image(bytes).map_err(|error| translate(self.path, error));
-        }
-        let image = self.decode(decoder)?;
-        if image.color().has_color() {
-            let weights = channel.weights();
-            for (out, pixel) in out.iter_mut().zip(image.to_rgb16().pixels()) {
-                *out = weigh(pixel.0.map(f32::from), weights).round() as u16;
-            }
-        } else {
-            out.copy_from_slice(&image.to_luma16());
-        }
-        Ok(())
-    }
+impl Reader<'_> {
+    integer_reader!(read_u8, u8, L8, to_rgb8, to_luma8);
+    integer_reader!(read_u16, u16, L16, to_rgb16, to_luma16);
 
     fn read_f32(&self, out: &mut [f32], color: &Color<'_>, index: usize) -> Result<()> {
         let image = self.decode(open(self.path, self.max_megapixels)?)?;
@@ -300,7 +291,7 @@ impl Reader<'_> {
                     *out = weigh(pixel.0, weights);
                 }
             }
-            _ if image.color().bits_per_pixel() / u16::from(image.color().channel_count()) == 8 => {
+            _ if bits_of(image.color()) == 8 => {
                 for (out, pixel) in out.iter_mut().zip(image.to_rgb8().pixels()) {
                     *out = weigh(pixel.0.map(|code| linear(u16::from(code))), weights);
                 }

@@ -1,4 +1,4 @@
-//! A mesh as borrowed arrays, in whatever number type its owner keeps.
+//! A mesh as borrowed arrays, in the number types that Python keeps.
 
 use rayon::prelude::*;
 
@@ -8,76 +8,20 @@ use crate::{Error, Result};
 /// Vertices or faces of a piece, and faces checked at a time: they stay in the second-level cache.
 const BLOCK: usize = 1 << 14;
 
-/// A number that a coordinate may be; files hold it as `f32`.
-pub trait Coordinate: Copy + Send + Sync {
-    /// The nearest `f32`.
-    fn to_f32(self) -> f32;
-    /// The value itself.
-    fn to_f64(self) -> f64;
-}
-
-impl Coordinate for f32 {
-    #[inline]
-    fn to_f32(self) -> f32 {
-        self
-    }
-    #[inline]
-    fn to_f64(self) -> f64 {
-        f64::from(self)
-    }
-}
-
-impl Coordinate for f64 {
-    #[inline]
-    fn to_f32(self) -> f32 {
-        self as f32
-    }
-    #[inline]
-    fn to_f64(self) -> f64 {
-        self
-    }
-}
-
-/// An integer that a vertex index may be; files hold it as `u32`.
-pub trait VertexIndex: Copy + Send + Sync {
-    /// The index, its bits wrapped to 64: no vertex has a negative one.
-    fn to_u64(self) -> u64;
-    /// The value, for messages.
-    fn to_f64(self) -> f64;
-}
-
-macro_rules! vertex_index {
-    ($($integer:ty),*) => {$(
-        impl VertexIndex for $integer {
-            #[inline]
-            #[allow(clippy::cast_lossless)]
-            fn to_u64(self) -> u64 {
-                self as u64
-            }
-            #[allow(clippy::cast_lossless)]
-            fn to_f64(self) -> f64 {
-                self as f64
-            }
-        }
-    )*};
-}
-
-vertex_index!(u32, i32, i64);
-
-/// A mesh as plain slices, for the writers.
+/// A mesh as plain slices, for the writers; files hold coordinates as `f32` and indices as `u32`.
 #[derive(Clone, Copy, Debug)]
-pub struct MeshView<'a, V = f32, I = u32> {
+pub struct MeshView<'a> {
     /// `[x, y, z]` a vertex.
-    pub vertices: &'a [[V; 3]],
+    pub vertices: &'a [[f64; 3]],
     /// Three vertex indices a face.
-    pub faces: &'a [[I; 3]],
+    pub faces: &'a [[i64; 3]],
     /// Unit normal of each vertex.
-    pub normals: Option<&'a [[V; 3]]>,
+    pub normals: Option<&'a [[f64; 3]]>,
     /// Red, green, blue of each vertex.
     pub colors: Option<&'a [[u8; 3]]>,
 }
 
-impl<V: Coordinate, I: VertexIndex> MeshView<'_, V, I> {
+impl MeshView<'_> {
     /// Checks that the attributes fit the vertices and that every face names vertices that exist.
     ///
     /// # Errors
@@ -89,23 +33,23 @@ impl<V: Coordinate, I: VertexIndex> MeshView<'_, V, I> {
         };
         self.normals.map_or(Ok(()), |normals| fits("normals", normals.len()))?;
         self.colors.map_or(Ok(()), |colors| fits("colors", colors.len()))?;
-        // A file has 32 bits for an index.
+        // A file has 32 bits for an index; of a negative one the bits are those of a number far above.
         let count = expected.min(1 << 32) as u64;
-        let is_bad = |index: &I| index.to_u64() >= count;
+        let is_bad = |index: &i64| *index as u64 >= count;
         // No early way out: the sum over a block is a loop without a branch.
-        let count_bad = |faces: &[[I; 3]]| faces.as_flattened().iter().filter(|&index| is_bad(index)).count();
+        let count_bad = |faces: &[[i64; 3]]| faces.as_flattened().iter().filter(|&index| is_bad(index)).count();
         match self.faces.par_chunks(BLOCK).find_first(|faces| count_bad(faces) > 0) {
             None => Ok(()),
             Some(faces) => Err(Error::OutOfRange {
                 argument: "faces",
                 rule: "indices below the number of vertices",
-                value: faces.iter().flatten().copied().find(is_bad).map_or(f64::NAN, VertexIndex::to_f64),
+                value: faces.iter().flatten().copied().find(is_bad).map_or(f64::NAN, |index| index as f64),
             }),
         }
     }
 }
 
-impl<V: Coordinate, I: VertexIndex> MeshSource for MeshView<'_, V, I> {
+impl MeshSource for MeshView<'_> {
     fn vertex_count(&self) -> usize {
         self.vertices.len()
     }
@@ -131,9 +75,9 @@ impl<V: Coordinate, I: VertexIndex> MeshSource for MeshView<'_, V, I> {
     }
 
     fn vertices(&self, piece: usize, out: &mut Vertices) {
-        let single = |vectors: &[[V; 3]], out: &mut Vec<[f32; 3]>| {
+        let single = |vectors: &[[f64; 3]], out: &mut Vec<[f32; 3]>| {
             out.clear();
-            out.extend(part(vectors, piece).iter().map(|vector| vector.map(V::to_f32)));
+            out.extend(part(vectors, piece).iter().map(|vector| vector.map(|value| value as f32)));
         };
         single(self.vertices, &mut out.positions);
         single(self.normals.unwrap_or_default(), &mut out.normals);
@@ -143,7 +87,7 @@ impl<V: Coordinate, I: VertexIndex> MeshSource for MeshView<'_, V, I> {
 
     fn faces(&self, piece: usize, out: &mut Vec<[u32; 3]>) {
         out.clear();
-        out.extend(part(self.faces, piece).iter().map(|face| face.map(|index| index.to_u64() as u32)));
+        out.extend(part(self.faces, piece).iter().map(|face| face.map(|index| index as u32)));
     }
 }
 

@@ -9,8 +9,7 @@ mod mesh_view;
 pub mod obj;
 pub mod ply;
 pub mod rgb16;
-mod tiff_gray;
 
 pub use mesh_file::{MeshFormat, write_mesh_file};
 pub use mesh_source::{HeightSource, MeshSource, Vertices};
-pub use mesh_view::{Coordinate, MeshView, VertexIndex};
+pub use mesh_view::MeshView;

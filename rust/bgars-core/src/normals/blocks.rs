@@ -1,23 +1,21 @@
 //! The fast kernel: blocks of pixels under distant lights.
 
-use std::ops::Range;
-
 use multiversion::{multiversion, target::target_cfg_f};
 
-use super::NormalMapMut;
 use super::cutoff::cutoffs;
 use super::fit::{Equations, Fit, Results};
 use super::lanes::{LANES, Lanes};
-use super::source::{AsTheyAre, Images, Linearised, Source};
 use super::windows::{Memory, WindowFilter};
-use crate::{Lights, Pixel};
+use super::{NormalMap, NormalMapMut};
+use crate::Lights;
+use crate::readings::Readings;
 
 /// Which lights a block keeps.
 #[derive(Debug)]
 pub(super) enum Choice {
     /// All of them.
     All,
-    /// Up to the first gap of the sorted keys, in grey levels.
+    /// Up to the first gap of the sorted values, in grey levels.
     UpToGap(f32),
     /// The window that a Lambertian facet explains best.
     Window(WindowFilter),
@@ -28,6 +26,9 @@ pub(super) enum Choice {
 pub(super) struct BlockSolver {
     choice: Choice,
     equations: Equations,
+    /// 1 / intensity of each light; `None` where the values of the images are in proportion to light but for an offset: they are
+    /// then compared as they are.
+    scales: Option<Vec<f32>>,
     /// What values are multiplied by to be about 1: a power of two, which rounds nothing.
     value_scale: f32,
     /// What the albedo is multiplied by then.
@@ -36,10 +37,10 @@ pub(super) struct BlockSolver {
 
 impl BlockSolver {
     /// `None` where blocks cannot serve; see [`Equations::new`].
-    pub fn new(lights: &Lights, full_scale: f32, choice: Choice) -> Option<Self> {
+    pub fn new(lights: &Lights, full_scale: f32, choice: Choice, scales: Option<Vec<f32>>) -> Option<Self> {
         let value_scale = value_scale(full_scale);
         let albedo_scale = 1.0 / (full_scale * value_scale);
-        Some(Self { choice, equations: Equations::new(lights)?, value_scale, albedo_scale })
+        Some(Self { choice, equations: Equations::new(lights)?, scales, value_scale, albedo_scale })
     }
 }
 
@@ -59,55 +60,45 @@ pub(super) struct Left {
     pub careful: Vec<usize>,
 }
 
-/// Works on `pixels` of the image, to which `out` belongs.
-pub(super) fn run<P: Pixel>(
-    solver: &BlockSolver,
-    images: &Images<'_, P>,
-    mask: Option<&[bool]>,
-    pixels: Range<usize>,
-    out: &mut NormalMapMut<'_>,
-) -> Left {
-    if images.radiometry.is_plain() {
-        run_blocks::<P>(solver, &AsTheyAre(images), mask, pixels, out)
-    } else {
-        run_blocks::<f32>(solver, &Linearised(images), mask, pixels, out)
-    }
-}
-
-/// The hot loop, compiled for several instruction sets; one call a task.
+/// Works on some `pixels` of the image; `out` begins with pixel `first`. Compiled for several instruction sets; one call a task.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl+avx512dq+fma", "x86_64+avx2+fma"))]
-fn run_blocks<K: Pixel>(
+pub(super) fn run(
     solver: &BlockSolver,
-    source: &dyn Source<K>,
-    mask: Option<&[bool]>,
-    pixels: Range<usize>,
+    source: &dyn Readings,
+    pixels: &[usize],
+    first: usize,
     out: &mut NormalMapMut<'_>,
 ) -> Left {
     if target_cfg_f!(any(target_feature = "fma", target_arch = "aarch64")) {
-        Work::<K>::new(solver, source).run::<true>(mask, pixels, out)
+        Work::new(solver, source).run::<true>(pixels, first, out)
     } else {
-        Work::<K>::new(solver, source).run::<false>(mask, pixels, out)
+        Work::new(solver, source).run::<false>(pixels, first, out)
     }
 }
 
 /// The memory of a task.
-struct Work<'a, K> {
+struct Work<'a> {
     solver: &'a BlockSolver,
-    source: &'a dyn Source<K>,
-    keys: Vec<Lanes<K>>,
+    source: &'a dyn Readings,
+    /// What is compared, grey levels or values.
+    levels: Vec<Lanes<f32>>,
+    offsets: Lanes<f32>,
     values: Vec<Lanes<f32>>,
     clipped: Vec<Lanes<bool>>,
     windows: Option<Memory>,
     /// 1 for a light that is kept, else 0.
     weights: Vec<Lanes<f32>>,
+    keep_all: bool,
     /// Where rounding could decide between two windows.
     close: Lanes<bool>,
     fit: Fit,
+    /// Pixels for the careful kernel.
+    careful: Lanes<bool>,
 }
 
-impl<'a, K: Pixel> Work<'a, K> {
+impl<'a> Work<'a> {
     #[inline(always)]
-    fn new(solver: &'a BlockSolver, source: &'a dyn Source<K>) -> Self {
+    fn new(solver: &'a BlockSolver, source: &'a dyn Readings) -> Self {
         let lights = solver.equations.directions.len();
         let windows = match &solver.choice {
             Choice::Window(filter) => Some(Memory::new(filter, lights)),
@@ -116,128 +107,117 @@ impl<'a, K: Pixel> Work<'a, K> {
         Self {
             solver,
             source,
-            keys: vec![Lanes::of(K::ZERO); lights],
+            levels: vec![Lanes::of(0.0); lights],
+            offsets: Lanes::of(0.0),
             values: vec![Lanes::of(0.0); lights],
             clipped: vec![Lanes::of(false); if windows.is_some() { lights } else { 0 }],
             windows,
             weights: vec![Lanes::of(1.0); lights],
+            keep_all: true,
             close: Lanes::of(false),
             fit: Fit::ZERO,
+            careful: Lanes::of(false),
         }
     }
 
     #[inline(always)]
-    fn run<const FMA: bool>(mut self, mask: Option<&[bool]>, pixels: Range<usize>, out: &mut NormalMapMut<'_>) -> Left {
+    fn run<const FMA: bool>(mut self, pixels: &[usize], first: usize, out: &mut NormalMapMut<'_>) -> Left {
+        let (blocks, rest) = pixels.as_chunks::<LANES>();
         let mut left = Left { finite: true, careful: Vec::new() };
-        let set_lights = out.set_lights();
-        let mut out = out.reborrow();
-        let end = pixels.end;
-        for first in pixels.step_by(LANES) {
-            let block = first..end.min(first + LANES);
-            let used = mask.map(|mask| &mask[block.clone()]);
-            let mut part = out.take(block.len(), set_lights);
-            if used.is_some_and(|used| !used.contains(&true)) {
-                part.clear(0..block.len());
-                continue;
-            }
-            if block.len() < LANES {
-                for (lane, pixel) in block.enumerate() {
-                    if used.is_none_or(|used| used[lane]) {
-                        left.careful.push(pixel);
-                    } else {
-                        part.clear(lane..lane + 1);
-                    }
-                }
-                continue;
-            }
-            self.load(&block);
-            let keep_all = self.choose::<FMA>();
-            if keep_all {
+        let mut spare = NormalMap::zeros(LANES, out.set_lights());
+        for block in blocks {
+            self.load(block);
+            self.choose::<FMA>();
+            if self.keep_all {
                 self.solver.equations.fit_all::<FMA>(&self.values, &mut self.fit);
             } else {
                 self.solver.equations.fit_kept::<FMA>(&self.values, &self.weights, &mut self.fit);
             }
-            left.finite &= K::CODES.is_some() || self.fit.is_finite();
-            let mut careful = Lanes::of(false);
-            self.write::<FMA>(keep_all, &mut part, &mut careful);
-            for (lane, _) in used.unwrap_or_default().iter().enumerate().filter(|(_, used)| !**used) {
-                part.clear(lane..lane + 1);
-                (careful[lane], self.close[lane]) = (false, false);
+            left.finite &= self.fit.is_finite();
+            let at = block[0] - first;
+            if block[LANES - 1] - block[0] == LANES - 1 {
+                self.write::<FMA>(at, out);
+            } else {
+                self.write::<FMA>(0, &mut spare.as_mut());
+                for (lane, pixel) in block.iter().enumerate() {
+                    out.copy_pixel(pixel - first, &spare, lane);
+                }
             }
-            self.leave(&block, &careful, &mut left.careful);
+            self.leave(block, &mut left.careful);
         }
+        left.careful.extend(rest);
         left
     }
 
-    /// Keys and values of a block.
+    /// Levels and values of a block.
     #[inline(always)]
-    fn load(&mut self, block: &Range<usize>) {
-        self.source.keys(block, &mut self.keys);
-        let (scale, mut offset) = (self.solver.value_scale, Lanes::of(0.0));
-        #[allow(clippy::float_cmp)] // 1 or another power of two
-        let is_one = scale == 1.0;
-        if self.source.offset(block, &mut offset) {
-            for (value, key) in self.values.iter_mut().zip(&self.keys) {
-                for lane in 0..LANES {
-                    value[lane] = (key[lane].to_f32() - offset[lane]) * scale;
-                }
+    fn load(&mut self, pixels: &[usize; LANES]) {
+        if !self.source.has_no_offsets() {
+            for lane in 0..LANES {
+                self.offsets[lane] = self.source.offset(pixels[lane]);
             }
-        } else {
-            for (value, key) in self.values.iter_mut().zip(&self.keys) {
+        }
+        let value_scale = self.solver.value_scale;
+        for light in 0..self.levels.len() {
+            let (level, value) = (&mut self.levels[light], &mut self.values[light]);
+            self.source.levels(light, pixels, &mut **level);
+            if let Some(scales) = &self.solver.scales {
                 for lane in 0..LANES {
-                    let key = key[lane].to_f32();
-                    value[lane] = if is_one { key } else { key * scale };
+                    level[lane] = (level[lane] - self.offsets[lane]) * scales[light];
+                    value[lane] = level[lane] * value_scale;
+                }
+            } else {
+                for lane in 0..LANES {
+                    value[lane] = (level[lane] - self.offsets[lane]) * value_scale;
                 }
             }
         }
-        self.source.clipped(block, &mut self.clipped);
+        for (light, clipped) in self.clipped.iter_mut().enumerate() {
+            self.source.clipped(light, pixels, &mut **clipped);
+        }
     }
 
-    /// Chooses the lights of a block; true where every pixel keeps all of them.
+    /// Chooses the lights of a block.
     #[inline(always)]
-    fn choose<const FMA: bool>(&mut self) -> bool {
+    fn choose<const FMA: bool>(&mut self) {
         match &self.solver.choice {
-            Choice::All => true,
+            Choice::All => {}
             Choice::UpToGap(gap) => {
-                let cutoffs = cutoffs(&self.keys, K::gap(*gap));
+                let cutoffs = cutoffs(&self.levels, *gap);
+                self.keep_all = cutoffs.keep_all;
                 if !cutoffs.keep_all {
-                    for (weight, key) in self.weights.iter_mut().zip(&self.keys) {
+                    for (weight, level) in self.weights.iter_mut().zip(&self.levels) {
                         for lane in 0..LANES {
-                            let is_over = key[lane].is_over(cutoffs.largest[lane], K::ZERO);
-                            weight[lane] = if is_over { 0.0 } else { 1.0 };
+                            weight[lane] = if level[lane] > cutoffs.largest[lane] { 0.0 } else { 1.0 };
                         }
                     }
                 }
-                cutoffs.keep_all
             }
             Choice::Window(filter) => {
-                let Some(memory) = &mut self.windows else { return true };
+                let Some(memory) = &mut self.windows else { return };
                 let directions = &self.solver.equations.directions;
                 self.close = filter.choose::<FMA>(directions, &self.values, &self.clipped, &mut self.weights, memory);
-                false
+                self.keep_all = false;
             }
         }
     }
 
-    /// Results of a block.
+    /// Results of a block, from place `at` on.
     #[inline(always)]
-    fn write<const FMA: bool>(&self, keep_all: bool, out: &mut NormalMapMut<'_>, careful: &mut Lanes<bool>) {
-        let lights = self.values.len();
+    fn write<const FMA: bool>(&mut self, at: usize, out: &mut NormalMapMut<'_>) {
+        let (lights, places) = (self.values.len(), at..at + LANES);
+        let mask = &mut out.mask[places.clone()];
         if let (Ok(normals), Ok(albedo), Ok(confidence), Ok(mask), Ok(lights_kept)) = (
-            (&mut *out.normals).try_into(),
-            (&mut *out.albedo).try_into(),
-            (&mut *out.confidence).try_into(),
-            <&mut [bool; LANES]>::try_from(&mut *out.mask),
-            <&mut [u16; LANES]>::try_from(&mut *out.lights_kept),
+            (&mut out.normals[3 * at..3 * places.end]).try_into(),
+            (&mut out.albedo[places.clone()]).try_into(),
+            (&mut out.confidence[places.clone()]).try_into(),
+            <&mut [bool; LANES]>::try_from(&mut *mask),
+            <&mut [u16; LANES]>::try_from(&mut out.lights_kept[places.clone()]),
         ) {
             let mut results = Results { normals, albedo, confidence, mask };
-            self.fit.finish::<FMA>(self.solver.albedo_scale, &mut results, careful);
-            if let Ok(measured) = (&mut *out.measured).try_into() {
-                let measured: &mut [bool; LANES] = measured;
-                *measured = *mask;
-            }
+            self.fit.finish::<FMA>(self.solver.albedo_scale, &mut results, &mut self.careful);
             let mut kept = Lanes::of(lights as u16);
-            if !keep_all {
+            if !self.keep_all {
                 kept = Lanes::of(0);
                 for weight in &self.weights {
                     for lane in 0..LANES {
@@ -247,26 +227,26 @@ impl<'a, K: Pixel> Work<'a, K> {
             }
             *lights_kept = kept.0;
         }
-        for (lane, set) in out.kept_sets.chunks_exact_mut(lights).enumerate() {
+        if let Some(measured) = out.measured.get_mut(places) {
+            measured.copy_from_slice(mask);
+        }
+        let sets = out.kept_sets.chunks_exact_mut(lights).skip(at).take(LANES);
+        for (lane, set) in sets.enumerate() {
             for (kept, weight) in set.iter_mut().zip(&self.weights) {
-                *kept = keep_all || weight[lane] > 0.0;
+                *kept = self.keep_all || weight[lane] > 0.0;
             }
         }
     }
 
     /// The pixels that want the careful kernel.
     #[inline(always)]
-    fn leave(&self, block: &Range<usize>, careful: &Lanes<bool>, left: &mut Vec<usize>) {
+    fn leave(&self, block: &[usize; LANES], left: &mut Vec<usize>) {
         let mut any = false;
         for lane in 0..LANES {
-            any |= careful[lane] | self.close[lane];
+            any |= self.careful[lane] | self.close[lane];
         }
         if any {
-            for (lane, pixel) in block.clone().enumerate() {
-                if careful[lane] || self.close[lane] {
-                    left.push(pixel);
-                }
-            }
+            left.extend((0..LANES).filter(|&lane| self.careful[lane] || self.close[lane]).map(|lane| block[lane]));
         }
     }
 }

@@ -3,42 +3,31 @@
 use rayon::prelude::*;
 
 use super::Method;
-use crate::{Error, ImageStack, Lights, Pixel, Radiometry, Result};
+use crate::readings::Capture;
+use crate::{Error, ImageStack, Lights, Pixel, Result};
 
 /// Pixels that are looked through for NaN at a time.
 const FINITE_BLOCK: usize = 1 << 14;
 
 /// Refuses what the kernel cannot work on.
 pub(super) fn check<P: Pixel>(
-    stack: &ImageStack<'_, P>,
+    capture: &Capture<'_, P>,
     lights: &Lights,
-    radiometry: &Radiometry<'_, P>,
     mask: Option<&[bool]>,
     method: Method,
 ) -> Result<()> {
-    if lights.len() != stack.lights() {
-        return Err(Error::LightCountMismatch { images: stack.lights(), lights: lights.len() });
-    }
-    radiometry.check(stack)?;
-    if let Some(mask) = mask
-        && mask.len() != stack.pixels()
-    {
-        return Err(Error::LengthMismatch { argument: "mask", expected: stack.pixels(), actual: mask.len() });
-    }
-    if stack.pixels() == 0 || mask.is_some_and(|mask| !mask.contains(&true)) {
+    capture.check(lights, &[("mask", mask)])?;
+    if capture.stack.pixels() == 0 || mask.is_some_and(|mask| !mask.contains(&true)) {
         return Err(Error::EmptyMask);
     }
-    match method {
-        Method::Lambertian | Method::RobustFilter => {}
-        Method::SpecularFilter { threshold } => {
-            if !(threshold.is_finite() && threshold > 0.0) {
-                return Err(Error::OutOfRange {
-                    argument: "threshold",
-                    rule: "finite and above 0 (grey levels of 255)",
-                    value: f64::from(threshold),
-                });
-            }
-        }
+    if let Method::SpecularFilter { threshold } = method
+        && !(threshold.is_finite() && threshold > 0.0)
+    {
+        return Err(Error::OutOfRange {
+            argument: "threshold",
+            rule: "finite and above 0 (grey levels of 255)",
+            value: f64::from(threshold),
+        });
     }
     Ok(())
 }

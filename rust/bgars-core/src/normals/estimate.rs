@@ -1,6 +1,6 @@
 //! The loop over pixels: radiometry, choice of lights, least squares.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -8,20 +8,16 @@ use rayon::prelude::*;
 use super::blocks::{self, BlockSolver, Choice, Left, value_scale};
 use super::checks::{check, check_finite};
 use super::confidence::confidence;
-use super::lanes::LANES;
-use super::robust::{self, RobustFilter, RobustScratch};
+use super::robust::{self, RobustScratch};
 use super::solve::{Solution, solve};
-use super::source::Images;
 use super::specular::specular_filter;
 use super::windows::WindowFilter;
 use super::{Method, NormalMap, NormalMapMut};
+use crate::readings::{Capture, Readings};
 use crate::{Error, ImageStack, Lights, Pixel, Radiometry, Result};
 
 /// Pixels of one task. What comes out is the same for any number.
 const TASK_PIXELS: usize = 1 << 13;
-
-/// Tasks with one pixel in so many to estimate, or fewer, have these gathered.
-const SPARSE: usize = 4;
 
 /// Pixels between two calls of the progress callback.
 const BAND_PIXELS: usize = 1 << 19;
@@ -84,21 +80,15 @@ pub fn estimate_into<P: Pixel>(
     progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
     mut out: NormalMapMut<'_>,
 ) -> Result<()> {
-    check(stack, lights, radiometry, mask, method)?;
-    out.check(stack.pixels(), stack.lights())?;
-    let kernel = Kernel::new(stack, lights, radiometry, mask, method);
+    let capture = Capture { stack, radiometry };
+    check(&capture, lights, mask, method)?;
+    out.check(stack.pixels(), stack.lights(), false)?;
+    let kernel = Kernel::new(&capture, radiometry.is_plain(), lights, mask, method);
     let mut checked = P::CODES.is_some();
     let set_lights = out.set_lights();
     for first in (0..stack.pixels()).step_by(BAND_PIXELS) {
         let end = stack.pixels().min(first + BAND_PIXELS);
-        let tasks: Vec<_> = (first..end)
-            .step_by(TASK_PIXELS)
-            .map(|first| (first, out.take(TASK_PIXELS.min(end - first), set_lights)))
-            .collect();
-        let finite = tasks
-            .into_par_iter()
-            .map_init(|| Scratch::new(lights), |scratch, (first, mut out)| kernel.task(first, &mut out, scratch))
-            .reduce(|| true, |a, b| a & b);
+        let finite = kernel.band(first..end, out.take(end - first, set_lights));
         if !finite && !checked {
             // Perhaps nothing is wrong inside the mask.
             check_finite(stack, mask)?;
@@ -117,15 +107,17 @@ fn gap(threshold: f32, full_scale: f32) -> f32 {
 }
 
 /// Everything a pixel's work reads.
-struct Kernel<'a, P> {
-    stack: &'a ImageStack<'a, P>,
+struct Kernel<'a> {
+    source: &'a dyn Readings,
     lights: &'a Lights,
-    images: Images<'a, P>,
+    /// 1 / intensity of each light.
+    scales: Vec<f32>,
     /// In grey levels.
     full_scale: f32,
     mask: Option<&'a [bool]>,
     method: Method,
-    robust: Option<RobustFilter>,
+    /// Those of the robust filter; none for other methods.
+    windows: Vec<robust::Window>,
     /// The fast kernel, where it can serve.
     blocks: Option<BlockSolver>,
     /// Full scale in the unit of the scaled values: its mean over the lights.
@@ -140,6 +132,7 @@ struct Scratch {
     directions: Vec<Vector3<f64>>,
     order: Vec<usize>,
     robust: RobustScratch,
+    pixels: Vec<usize>,
 }
 
 impl Scratch {
@@ -152,103 +145,80 @@ impl Scratch {
             directions: (0..count).map(|light| lights.at(light, 0.0, 0.0).0).collect(),
             order: Vec::with_capacity(count),
             robust: RobustScratch::default(),
+            pixels: Vec::with_capacity(TASK_PIXELS),
         }
     }
 }
 
-impl<'a, P: Pixel> Kernel<'a, P> {
+impl<'a> Kernel<'a> {
     fn new(
-        stack: &'a ImageStack<'a, P>,
+        source: &'a dyn Readings,
+        is_plain: bool,
         lights: &'a Lights,
-        radiometry: &'a Radiometry<'a, P>,
         mask: Option<&'a [bool]>,
         method: Method,
     ) -> Self {
-        let robust = (method == Method::RobustFilter).then(|| RobustFilter::new(lights.len()));
-        let full_scale = radiometry.full_scale_of(stack);
-        let scales: Vec<f32> = radiometry.intensities.iter().map(|intensity| (1.0 / intensity) as f32).collect();
+        let windows = if method == Method::RobustFilter { robust::windows(lights.len()) } else { Vec::new() };
+        let full_scale = source.full_scale();
+        let scales: Vec<f32> = source.intensities().iter().map(|intensity| (1.0 / intensity) as f32).collect();
         let mean_scale = scales.iter().map(|&scale| f64::from(scale)).sum::<f64>() / scales.len() as f64;
         let scaled_full_scale = f64::from(full_scale) * mean_scale;
-        let choice = match (method, &robust) {
-            (Method::SpecularFilter { threshold }, _) => Choice::UpToGap(gap(threshold, full_scale)),
-            (_, Some(robust)) => {
+        let choice = match method {
+            Method::Lambertian => Choice::All,
+            Method::SpecularFilter { threshold } => Choice::UpToGap(gap(threshold, full_scale)),
+            Method::RobustFilter => {
                 let full_scale = scaled_full_scale * f64::from(value_scale(full_scale));
-                Choice::Window(WindowFilter::new(robust, lights.len(), full_scale))
+                Choice::Window(WindowFilter::new(&windows, lights.len(), full_scale))
             }
-            _ => Choice::All,
         };
-        let blocks = BlockSolver::new(lights, full_scale, choice);
-        let planes = (0..stack.lights()).map(|light| stack.plane(light)).collect();
-        let images = Images { planes, radiometry, scales };
-        Self { stack, lights, images, full_scale, mask, method, robust, blocks, scaled_full_scale }
+        let blocks = BlockSolver::new(lights, full_scale, choice, (!is_plain).then(|| scales.clone()));
+        Self { source, lights, scales, full_scale, mask, method, windows, blocks, scaled_full_scale }
     }
 
-    /// The pixels of `out`, of which `first` is the first one's number; false where something that was read is not finite.
+    /// The pixels of `out`; false where something that was read is not finite.
+    fn band(&self, pixels: Range<usize>, mut out: NormalMapMut<'_>) -> bool {
+        let set_lights = out.set_lights();
+        let tasks: Vec<_> = pixels
+            .clone()
+            .step_by(TASK_PIXELS)
+            .map(|first| (first, out.take(TASK_PIXELS.min(pixels.end - first), set_lights)))
+            .collect();
+        tasks
+            .into_par_iter()
+            .map_init(|| Scratch::new(self.lights), |scratch, (first, mut out)| self.task(first, &mut out, scratch))
+            .reduce(|| true, |a, b| a & b)
+    }
+
+    /// The same for one task, of which `first` is the first pixel's number.
     fn task(&self, first: usize, out: &mut NormalMapMut<'_>, scratch: &mut Scratch) -> bool {
         let pixels = first..first + out.albedo.len();
-        if let Some(solver) = &self.blocks {
-            let used: Vec<usize> = pixels.clone().filter(|&pixel| self.mask.is_some_and(|mask| mask[pixel])).collect();
-            if self.mask.is_some() && SPARSE * used.len() <= pixels.len() {
-                return self.few(solver, first, used, out, scratch);
-            }
-            let Left { mut finite, careful } = blocks::run(solver, &self.images, self.mask, pixels, out);
-            for pixel in careful {
-                self.pixel(pixel, pixel - first, out, scratch);
-                finite &= scratch.values.iter().all(|value| value.is_finite());
-            }
-            return finite;
-        }
-        let mut finite = true;
-        for pixel in pixels {
-            if self.uses(pixel) {
-                self.pixel(pixel, pixel - first, out, scratch);
-                finite &= scratch.values.iter().all(|value| value.is_finite());
-            } else {
-                out.clear(pixel - first..pixel - first + 1);
+        let mut used = std::mem::take(&mut scratch.pixels);
+        used.clear();
+        match self.mask {
+            None => used.extend(pixels),
+            Some(mask) => {
+                used.extend(pixels.filter(|&pixel| mask[pixel]));
+                out.clear(0..out.albedo.len());
             }
         }
-        finite
-    }
-
-    /// Few pixels of a task: gathered, so that no block is worked on for the sake of one of them.
-    fn few(
-        &self,
-        solver: &BlockSolver,
-        first: usize,
-        mut used: Vec<usize>,
-        out: &mut NormalMapMut<'_>,
-        scratch: &mut Scratch,
-    ) -> bool {
-        out.clear(0..out.albedo.len());
-        let Some(&last) = used.last() else { return true };
-        used.resize(used.len().next_multiple_of(LANES), last);
-        let gather = |plane: &[P]| -> Vec<P> { used.iter().map(|&pixel| plane[pixel]).collect() };
-        let planes: Vec<Vec<P>> = self.images.planes.iter().map(|plane| gather(plane)).collect();
-        let dark = self.images.radiometry.dark.map(gather);
-        let radiometry = Radiometry { dark: dark.as_deref(), ..self.images.radiometry.clone() };
-        let images = Images {
-            planes: planes.iter().map(Vec::as_slice).collect(),
-            radiometry: &radiometry,
-            scales: self.images.scales.clone(),
+        let (mut finite, careful) = match &self.blocks {
+            Some(solver) => {
+                let Left { finite, careful } = blocks::run(solver, self.source, &used, first, out);
+                scratch.pixels = used;
+                (finite, careful)
+            }
+            None => (true, used),
         };
-        let mut map = NormalMap::zeros(used.len(), out.set_lights());
-        let Left { finite, careful } = blocks::run(solver, &images, None, 0..used.len(), &mut map.as_mut());
-        for (index, &pixel) in used.iter().enumerate() {
-            out.copy_pixel(pixel - first, &map, index);
-        }
-        for index in careful {
-            self.pixel(used[index], used[index] - first, out, scratch);
+        for pixel in careful {
+            self.pixel(pixel, pixel - first, out, scratch);
+            finite &= scratch.values.iter().all(|value| value.is_finite());
         }
         finite
-    }
-
-    fn uses(&self, pixel: usize) -> bool {
-        self.mask.is_none_or(|mask| mask[pixel])
     }
 
     /// The careful kernel: one pixel in `f64`, written to place `at`.
     fn pixel(&self, pixel: usize, at: usize, out: &mut NormalMapMut<'_>, scratch: &mut Scratch) {
-        let lights = self.stack.lights();
+        let lights = self.lights.len();
         self.load(pixel, scratch);
         self.choose(scratch);
         out.lights_kept[at] = scratch.kept.iter().filter(|&&kept| kept).count() as u16;
@@ -283,17 +253,12 @@ impl<'a, P: Pixel> Kernel<'a, P> {
 
     /// The pixel's values in linear grey levels at unit light intensity, its clipped lights, and near lights' directions.
     fn load(&self, pixel: usize, scratch: &mut Scratch) {
-        let offset = self.images.radiometry.offset(pixel);
-        for light in 0..self.stack.lights() {
-            let code = self.images.planes[light][pixel];
-            scratch.clipped[light] = code.to_f32() >= self.images.radiometry.saturation;
-            scratch.values[light] = (self.images.radiometry.linearise(code) - offset) * self.images.scales[light];
-        }
-        if let Lights::Near { .. } = self.lights {
-            let (row, col) = (pixel / self.stack.width(), pixel % self.stack.width());
-            let x_px = col as f64 + 0.5 - self.stack.width() as f64 / 2.0;
-            let y_px = self.stack.height() as f64 / 2.0 - row as f64 - 0.5;
-            for light in 0..self.stack.lights() {
+        let offset = self.source.offset(pixel);
+        let (x_px, y_px) = self.source.centre(pixel);
+        for light in 0..self.lights.len() {
+            scratch.clipped[light] = self.source.is_clipped(light, pixel);
+            scratch.values[light] = (self.source.level(light, pixel) - offset) * self.scales[light];
+            if let Lights::Near { .. } = self.lights {
                 let (direction, falloff) = self.lights.at(light, x_px, y_px);
                 scratch.directions[light] = direction;
                 scratch.values[light] /= falloff as f32;
@@ -302,21 +267,21 @@ impl<'a, P: Pixel> Kernel<'a, P> {
     }
 
     fn choose(&self, scratch: &mut Scratch) {
-        match (self.method, &self.robust) {
-            (Method::SpecularFilter { threshold }, _) => {
+        match self.method {
+            Method::SpecularFilter { threshold } => {
                 let gap = gap(threshold, self.full_scale);
                 specular_filter(&scratch.values, gap, &mut scratch.order, &mut scratch.kept);
             }
-            (Method::RobustFilter, Some(filter)) => {
+            Method::RobustFilter => {
                 let pixel = robust::Pixel {
                     values: &scratch.values,
                     clipped: &scratch.clipped,
                     directions: &scratch.directions,
                     full_scale: self.scaled_full_scale,
                 };
-                filter.choose(&pixel, &mut scratch.robust, &mut scratch.kept);
+                robust::choose(&self.windows, &pixel, &mut scratch.robust, &mut scratch.kept);
             }
-            _ => scratch.kept.fill(true),
+            Method::Lambertian => scratch.kept.fill(true),
         }
     }
 }

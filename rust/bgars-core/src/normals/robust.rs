@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::solve::Gram;
+use super::solve::inverse;
 use super::specular::sort_lights;
 
 /// Most steps that the sorted values are cut into: up to 8 lights every window is tried, beyond that every eighth part.
@@ -70,7 +70,7 @@ pub fn robust_filter(values: &[f32], clipped: &[bool], directions: &[[f64; 3]], 
     let directions: Vec<Vector3<f64>> = directions.iter().map(|&direction| Vector3::from(direction)).collect();
     let pixel = Pixel { values, clipped, directions: &directions, full_scale: f64::from(full_scale) };
     let mut kept = vec![true; values.len()];
-    RobustFilter::new(values.len()).choose(&pixel, &mut RobustScratch::default(), &mut kept);
+    choose(&windows(values.len()), &pixel, &mut RobustScratch::default(), &mut kept);
     kept
 }
 
@@ -103,60 +103,46 @@ struct Ranked {
     clipped: bool,
 }
 
-/// What does not change from pixel to pixel.
-#[derive(Debug)]
-pub(super) struct RobustFilter {
-    windows: Vec<(usize, usize)>,
-}
+/// First and one-past-last rank of a window.
+pub(super) type Window = (usize, usize);
 
-impl RobustFilter {
-    /// A filter for `lights` lights.
-    pub fn new(lights: usize) -> Self {
-        Self { windows: windows(lights) }
-    }
-
-    /// First and one-past-last rank of each window, the larger windows first.
-    pub fn windows(&self) -> &[(usize, usize)] {
-        &self.windows
-    }
-
-    /// Writes the kept lights of a pixel to `kept`; see [`robust_filter`].
-    pub fn choose(&self, pixel: &Pixel<'_>, scratch: &mut RobustScratch, kept: &mut [bool]) {
-        sort_lights(pixel.values, &mut scratch.order);
-        let median = median(pixel.values, &scratch.order);
-        put_clipped_last(pixel.clipped, &mut scratch.order);
-        rank(pixel, scratch);
-        let noise = NOISE * pixel.full_scale;
-        let mut best: Option<(bool, f64, (usize, usize))> = None;
-        for &window in &self.windows {
-            let Some(facet) = fit(window, scratch) else { continue };
-            let brightness = facet.norm();
-            if !(facet.z > 0.0 && brightness.is_finite()) {
-                continue;
-            }
-            let cost = cost(window, &facet, &scratch.ranked, noise) / brightness.sqrt()
-                * (brightness / pixel.full_scale).powi(2).max(1.0);
-            let too_dark = brightness < median;
-            if best.is_none_or(|(dark, least, _)| (too_dark, cost) < (dark, least)) {
-                best = Some((too_dark, cost, window));
-            }
+/// Writes the kept lights of a pixel to `kept`, by one of the [`windows`] of so many lights; see [`robust_filter`].
+pub(super) fn choose(windows: &[Window], pixel: &Pixel<'_>, scratch: &mut RobustScratch, kept: &mut [bool]) {
+    sort_lights(pixel.values, &mut scratch.order);
+    let median = median(pixel.values, &scratch.order);
+    // Divided by different intensities, the clipped need not be the brightest.
+    scratch.order.sort_by_key(|&light| pixel.clipped[light]);
+    rank(pixel, scratch);
+    let noise = NOISE * pixel.full_scale;
+    let mut best: Option<(bool, f64, Window)> = None;
+    for &window in windows {
+        let Some(facet) = fit(window, scratch) else { continue };
+        let brightness = facet.norm();
+        if !(facet.z > 0.0 && brightness.is_finite()) {
+            continue;
         }
-        let (first, end) = best.map_or((0, kept.len()), |(_, _, window)| window);
-        for (rank, &light) in scratch.order.iter().enumerate() {
-            kept[light] = (first..end).contains(&rank);
+        let cost = cost(window, &facet, &scratch.ranked, noise) / brightness.sqrt()
+            * (brightness / pixel.full_scale).powi(2).max(1.0);
+        let too_dark = brightness < median;
+        if best.is_none_or(|(dark, least, _)| (too_dark, cost) < (dark, least)) {
+            best = Some((too_dark, cost, window));
         }
+    }
+    let (first, end) = best.map_or((0, kept.len()), |(_, _, window)| window);
+    for (rank, &light) in scratch.order.iter().enumerate() {
+        kept[light] = (first..end).contains(&rank);
     }
 }
 
 /// `rho n` of a window by least squares; `None` where its lights do not fix a normal.
-fn fit((first, end): (usize, usize), scratch: &RobustScratch) -> Option<Vector3<f64>> {
+fn fit((first, end): Window, scratch: &RobustScratch) -> Option<Vector3<f64>> {
     let (below, through) = (&scratch.sums[first], &scratch.sums[end]);
-    let gram = Gram::new(&(through.0 - below.0));
-    if gram.determinant > MIN_DETERMINANT { Some(gram.inverse? * (through.1 - below.1)) } else { None }
+    let gram = through.0 - below.0;
+    if gram.determinant() > MIN_DETERMINANT { Some(inverse(&gram)? * (through.1 - below.1)) } else { None }
 }
 
-/// The windows of a filter: starts and ends on at most 8 steps, larger first, of equal size the darker first.
-fn windows(lights: usize) -> Vec<(usize, usize)> {
+/// The windows of so many lights: starts and ends on at most 8 steps, larger first, of equal size the darker first.
+pub(super) fn windows(lights: usize) -> Vec<Window> {
     let steps = lights.min(MAX_STEPS);
     // Rounded to the nearest rank; every rank when there are at most 8.
     let edge = |step: usize| (2 * step * lights + steps) / (2 * steps);
@@ -165,13 +151,6 @@ fn windows(lights: usize) -> Vec<(usize, usize)> {
         .flat_map(|size| (0..=steps - size).map(move |start| (edge(start), edge(start + size))))
         .filter(|&(first, end)| end - first >= MIN_KEPT && MIN_SHARE * (end - first) >= lights)
         .collect()
-}
-
-/// Moves clipped lights behind all others (divided by different intensities, they need not be the brightest).
-fn put_clipped_last(clipped: &[bool], order: &mut [usize]) {
-    if clipped.contains(&true) {
-        order.sort_by_key(|&light| clipped[light]);
-    }
 }
 
 /// The median of the sorted values; the mean of the two middle ones for an even number.
@@ -201,7 +180,7 @@ fn rank(pixel: &Pixel<'_>, scratch: &mut RobustScratch) {
 }
 
 /// Cost of a window a degree of freedom, times (lights / kept)^4; see [`robust_filter`].
-fn cost((first, end): (usize, usize), facet: &Vector3<f64>, ranked: &[Ranked], noise: f64) -> f64 {
+fn cost((first, end): Window, facet: &Vector3<f64>, ranked: &[Ranked], noise: f64) -> f64 {
     let mut residuals = 0.0;
     let mut unexplained = 0.0;
     for (rank, light) in ranked.iter().enumerate() {
@@ -237,29 +216,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn windows_of_four_lights_are_all_the_darkest_and_the_brightest_three() {
+    fn windows_hold_three_lights_and_a_third_the_largest_first() {
         assert_eq!(windows(4), [(0, 4), (0, 3), (1, 4)]);
-    }
-
-    #[test]
-    fn windows_of_eight_lights_are_all_of_three_and_more() {
-        let windows = windows(8);
-        assert_eq!(windows.len(), 21);
-        assert!(windows.iter().all(|&(first, end)| end - first >= 3 && end <= 8));
-    }
-
-    #[test]
-    fn windows_of_many_lights_stay_few_and_hold_a_third() {
-        let windows = windows(96);
-        assert!(windows.len() <= 21);
-        assert!(windows.iter().all(|&(first, end)| 3 * (end - first) >= 96));
-        assert_eq!(windows[0], (0, 96));
-    }
-
-    #[test]
-    fn clipped_lights_rank_last() {
-        let mut order = [1, 3, 2, 0];
-        put_clipped_last(&[false, true, false, false], &mut order);
-        assert_eq!(order, [3, 2, 0, 1]);
+        for lights in [8, 96] {
+            let windows = windows(lights);
+            assert!(windows.len() <= 21 && windows[0] == (0, lights));
+            assert!(windows.iter().all(|&(first, end)| end - first >= 3.max(lights / 3) && end <= lights));
+        }
     }
 }

@@ -4,20 +4,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::lights::{MIN_CONDITIONING, conditioning};
 
-/// The Gram matrix `L^T L` of a subset of lights, as a solver wants it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Gram {
-    /// `(L^T L)^-1`; `None` where the lights are fewer than three or (nearly) coplanar.
-    pub inverse: Option<Matrix3<f64>>,
-    /// `det(L^T L)`.
-    pub determinant: f64,
-}
-
-impl Gram {
-    pub fn new(gram: &Matrix3<f64>) -> Self {
-        let inverse = if conditioning(gram) < MIN_CONDITIONING { None } else { gram.try_inverse() };
-        Self { inverse, determinant: gram.determinant() }
-    }
+/// `(L^T L)^-1` of a Gram matrix; `None` where the lights are fewer than three or (nearly) coplanar.
+pub(super) fn inverse(gram: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    if conditioning(gram) < MIN_CONDITIONING { None } else { gram.try_inverse() }
 }
 
 /// `rho n` and the inverse of the Gram matrix it came from.
@@ -33,6 +22,6 @@ pub(super) fn solve(values: &[f32], directions: &[Vector3<f64>], kept: &[bool]) 
         gram += direction * direction.transpose();
         right += direction * f64::from(value);
     }
-    let inverse = Gram::new(&gram).inverse?;
+    let inverse = inverse(&gram)?;
     Some(Solution { scaled_normal: inverse * right, inverse })
 }

@@ -36,30 +36,3 @@ pub(super) fn sort_lights(values: &[f32], order: &mut Vec<usize>) {
     order.extend(0..values.len());
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn kept(values: &[f32], gap: f32) -> Vec<bool> {
-        let mut kept = vec![false; values.len()];
-        specular_filter(values, gap, &mut Vec::new(), &mut kept);
-        kept
-    }
-
-    #[test]
-    fn a_gap_among_the_three_darkest_does_not_cut() {
-        assert_eq!(kept(&[0.0, 0.0, 100.0, 110.0, 120.0], 50.0), [true; 5]);
-    }
-
-    #[test]
-    fn a_gap_equal_to_the_threshold_does_not_cut() {
-        assert_eq!(kept(&[0.0, 1.0, 2.0, 52.0], 50.0), [true; 4]);
-        assert_eq!(kept(&[0.0, 1.0, 2.0, 52.5], 50.0), [true, true, true, false]);
-    }
-
-    #[test]
-    fn only_the_first_gap_counts() {
-        assert_eq!(kept(&[0.0, 1.0, 2.0, 60.0, 61.0, 120.0], 50.0), [true, true, true, false, false, false]);
-    }
-}

@@ -5,7 +5,7 @@
 
 use super::lanes::{LANES, Lanes, add_product, dot};
 use super::ranked::{Ranks, Row, WIDTH};
-use super::robust::{DROPPED_WEIGHT, MIN_DETERMINANT, NOISE, RobustFilter, cost_factor, prior_squares};
+use super::robust::{self, DROPPED_WEIGHT, MIN_DETERMINANT, NOISE, cost_factor, prior_squares};
 use super::symmetric::{adjugate, product};
 
 /// Costs that differ by less than this share are left to the careful kernel; rounding makes up to 0.6 % in the window that
@@ -47,13 +47,13 @@ struct Window {
 }
 
 impl WindowFilter {
-    /// A filter of so many lights; full scale in the unit of the values that it is to judge.
-    pub fn new(filter: &RobustFilter, lights: usize, full_scale: f64) -> Self {
+    /// A filter by some windows of so many lights; full scale in the unit of the values that it is to judge.
+    pub fn new(windows: &[robust::Window], lights: usize, full_scale: f64) -> Self {
         let noise = NOISE * full_scale;
         let prior = prior_squares(noise);
-        let windows = filter.windows().iter().map(|&(first, end)| {
+        let windows = windows.iter().map(|&(first, end)| {
             let factor = cost_factor(end - first, lights);
-            let others = filter.windows().iter().enumerate().map(|(index, &(start, end))| (index, start, end));
+            let others = windows.iter().enumerate().map(|(index, &(start, end))| (index, start, end));
             let shorter = others.filter(|&(_, start, other)| start == first && other < end).max_by_key(|other| other.2);
             Window {
                 first,

@@ -101,10 +101,3 @@ impl Circle {
         Vector3::new(self.x_px, self.y_px, CENTRE_HEIGHT * self.radius_px) + self.radius_px * normal
     }
 }
-
-/// Centre of a pixel: x right, y up, origin at the image centre.
-#[must_use]
-#[inline]
-pub fn pixel_centre(row: usize, col: usize, height: usize, width: usize) -> (f64, f64) {
-    (col as f64 + 0.5 - width as f64 / 2.0, height as f64 / 2.0 - row as f64 - 0.5)
-}

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Vector3};
 
-use super::anchor::{Circle, pixel_centre};
+use super::anchor::Circle;
 use super::ball_normal::BallPixel;
 use super::cells::CellTable;
 use super::disc::{from_disc, metric, to_disc};
@@ -13,7 +13,7 @@ use super::refine::{Minimum, Observation, Prior, deepest, nearest};
 use super::scale::bend;
 use super::spread::{Residual, Spread};
 use super::table::{GROUP, Signatures};
-use crate::{Lights, Pixel};
+use crate::Lights;
 
 /// Angle between a ball's normals and its circle's before anything is known: 1 degree.
 const FIRST_RAD: f32 = 0.0175;
@@ -91,18 +91,18 @@ enum Expected {
 }
 
 /// One ball's pixels, ready to be estimated.
-pub struct BallWork<'a, 'b, 'c, P> {
-    reader: &'a Reader<'b, 'c, P>,
+pub struct BallWork<'a> {
+    reader: &'a Reader<'a>,
     ball: &'a Ball,
     table: &'a Signatures,
     spread: &'a Spread,
     clip: &'a [f32],
 }
 
-impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
+impl<'a> BallWork<'a> {
     /// What is needed to look at the ball's pixels; `table` from [`Ball::signatures`].
     pub fn new(
-        reader: &'a Reader<'b, 'c, P>,
+        reader: &'a Reader<'a>,
         ball: &'a Ball,
         table: &'a Signatures,
         spread: &'a Spread,
@@ -158,8 +158,7 @@ impl<'a, 'b, 'c, P: Pixel> BallWork<'a, 'b, 'c, P> {
     }
 
     fn look_at(&self, pixel: usize, scratch: &mut Scratch) {
-        let (height, width) = self.reader.size();
-        let (x, y) = pixel_centre(pixel / width, pixel % width, height, width);
+        let (x, y) = self.reader.centre(pixel);
         scratch.anchor = self.ball.circle.normal(x, y).map(|normal| to_disc(&normal).map(|v| v as f32));
         self.observe(pixel, scratch);
     }

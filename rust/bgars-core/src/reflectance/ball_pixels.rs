@@ -1,10 +1,11 @@
 //! The pixels of balls, and what they show.
 
-use super::anchor::{Circle, pixel_centre};
+use super::anchor::Circle;
 use super::observe::Reader;
 use super::samples::{Samples, spaced};
 use super::shape::CommonShape;
-use crate::{Lights, Pixel};
+use crate::Lights;
+use crate::readings::pixel_centre;
 
 /// Smallest n_z on a sphere of the pixels that tell a shape: nearer the rim a mirror shows the board and the neighbours.
 const SHAPE_MIN_N_Z: f64 = 0.5;
@@ -46,8 +47,8 @@ pub fn with_shape(circles: &[Circle], common: CommonShape) -> Vec<Circle> {
 }
 
 /// Some pixels of each ball with the normals of its circle.
-pub fn samples<P: Pixel>(
-    reader: &Reader<'_, '_, P>,
+pub fn samples(
+    reader: &Reader<'_>,
     lights: &Lights,
     circles: &[Circle],
     inside: &[Vec<usize>],
@@ -57,10 +58,9 @@ pub fn samples<P: Pixel>(
 ) -> Samples {
     let mut samples = Samples::new(clip);
     let mut bent = vec![0.0; reader.lights()];
-    let (height, width) = reader.size();
     for (ball, (circle, pixels)) in circles.iter().zip(inside).enumerate() {
         for &pixel in spaced(pixels, of_each) {
-            let (x, y) = pixel_centre(pixel / width, pixel % width, height, width);
+            let (x, y) = reader.centre(pixel);
             if let Some(normal) = circle.normal(x, y).filter(|normal| normal.z > min_n_z) {
                 reader.read(pixel, &mut bent);
                 samples.push(ball, circle, normal, &bent, lights);

@@ -19,6 +19,7 @@ use super::shape::{CommonShape, EVIDENCE, PRIOR, common_shape};
 use super::spread::Spread;
 use super::variation::ball_materials;
 use crate::normals::{NormalMapMut, check_finite};
+use crate::readings::Capture;
 use crate::{Error, ImageStack, Lights, Pixel, Radiometry, Result};
 
 /// Fewest lights: two unknowns of a normal and its brightness, and one value beyond them.
@@ -167,12 +168,23 @@ pub fn estimate_into<P: Pixel>(
     radiometry: &Radiometry<'_, P>,
     request: Request<'_>,
     progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    out: NormalMapMut<'_>,
+) -> Result<Findings> {
+    let capture = Capture { stack, radiometry };
+    check(&capture, lights, &request)?;
+    out.check(stack.pixels(), stack.lights(), true)?;
+    estimate_readings(&Reader::new(&capture), lights, request, progress, out)
+}
+
+/// The same for all types of pixels.
+fn estimate_readings(
+    reader: &Reader<'_>,
+    lights: &Lights,
+    request: Request<'_>,
+    progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
     mut out: NormalMapMut<'_>,
 ) -> Result<Findings> {
-    check(stack, lights, radiometry, &request)?;
-    out.check_with_measured(stack.pixels(), stack.lights())?;
     let mut report = |done: f64| if progress(done).is_break() { Err(Error::Cancelled) } else { Ok(()) };
-    let reader = Reader::new(stack, radiometry);
     let clip = reader.clip_levels();
     let inside: Vec<Vec<usize>> = request
         .circles
@@ -182,7 +194,7 @@ pub fn estimate_into<P: Pixel>(
     let core = core_of(request.circles, &inside, reader.size());
     let balls = request.circles.len();
     let sampled = |circles: &[Circle], pixels: &[Vec<usize>], count: usize, min_n_z: f64| {
-        samples(&reader, lights, circles, pixels, &clip, count, min_n_z)
+        samples(reader, lights, circles, pixels, &clip, count, min_n_z)
     };
     let Fitted { some, fit, shape, circles } = fitted(&request, &inside, &core, &sampled);
     let material = request.material.or(fit.as_ref().map(|fit| &fit.material)).cloned().ok_or(Error::NoMaterial)?;
@@ -203,7 +215,7 @@ pub fn estimate_into<P: Pixel>(
     let mut known: Vec<Region> = Vec::with_capacity(balls + 1);
     let clip: Vec<f32> = clip.iter().map(|&level| bend(level) as f32).collect();
     let left_out =
-        if loss > DOUBTED_LOSS { left_out(&reader, lights, &clip, &material, &circles, &core) } else { Vec::new() };
+        if loss > DOUBTED_LOSS { left_out(reader, lights, &clip, &material, &circles, &core) } else { Vec::new() };
     for ((&circle, own), pixels) in circles.iter().zip(materials).zip(inside) {
         known.push(Region { ball: Ball::new(circle, own, corrections.next()), pixels, free: false });
     }
@@ -211,7 +223,7 @@ pub fn estimate_into<P: Pixel>(
     if !free.is_empty() {
         known.push(Region { ball: Ball::new(Circle::NOWHERE, material.clone(), None), pixels: free, free: true });
     }
-    let mut regions = Regions::new(&reader, lights, &clip, known);
+    let mut regions = Regions::new(reader, lights, &clip, known);
     let mut spread = Spread::constant(FIRST_SIGMA);
     for _ in 0..SPREAD_ROUNDS {
         spread = regions.learn_spread(&spread);
@@ -279,29 +291,14 @@ fn fitted(request: &Request<'_>, inside: &[Vec<usize>], core: &[Vec<usize>], sam
     Fitted { some, fit: Some(of_spheres), shape, circles: with_shape(request.circles, shape) }
 }
 
-fn check<P: Pixel>(
-    stack: &ImageStack<'_, P>,
-    lights: &Lights,
-    radiometry: &Radiometry<'_, P>,
-    request: &Request<'_>,
-) -> Result<()> {
-    if lights.len() != stack.lights() {
-        return Err(Error::LightCountMismatch { images: stack.lights(), lights: lights.len() });
-    }
+fn check<P: Pixel>(capture: &Capture<'_, P>, lights: &Lights, request: &Request<'_>) -> Result<()> {
+    capture.check(lights, &[("mask", request.mask), ("free", request.free)])?;
     if lights.len() < MIN_LIGHTS {
         return Err(Error::OutOfRange {
             argument: "lights",
             rule: "at least 4 for the reflectance estimator",
             value: lights.len() as f64,
         });
-    }
-    radiometry.check(stack)?;
-    for (argument, array) in [("mask", request.mask), ("free", request.free)] {
-        if let Some(array) = array
-            && array.len() != stack.pixels()
-        {
-            return Err(Error::LengthMismatch { argument, expected: stack.pixels(), actual: array.len() });
-        }
     }
     if let Some(material) = request.material
         && material.gains.len() != lights.len()
@@ -327,7 +324,7 @@ fn check<P: Pixel>(
             }
         }
     }
-    check_finite(stack, request.mask)
+    check_finite(capture.stack, request.mask)
 }
 
 /// Smallest radius of a ball in pixels: below, no pixel is free of the rim.

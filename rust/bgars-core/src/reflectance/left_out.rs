@@ -10,7 +10,7 @@ use super::samples::spaced;
 use super::scale::unbend;
 use super::spread::Spread;
 use super::table::Signatures;
-use crate::{Lights, Pixel};
+use crate::Lights;
 
 /// Pixels that lights are left out at, about; balls that they are taken from at most; lights at each.
 const PIXELS: usize = 500;
@@ -34,8 +34,8 @@ pub struct LeftOut {
 /// Leaves one light after the other out at some pixels of the balls: the normal comes from the others and the weak pull to the
 /// circle's. Without what was learnt from the residuals of the other balls: where all balls have the same wrong shape, these would
 /// say that it is right.
-pub fn left_out<P: Pixel>(
-    reader: &Reader<'_, '_, P>,
+pub fn left_out(
+    reader: &Reader<'_>,
     lights: &Lights,
     clip: &[f32],
     material: &Material,
@@ -63,9 +63,9 @@ pub fn left_out<P: Pixel>(
     taken.par_iter().map(of_ball).collect::<Vec<_>>().concat()
 }
 
-fn of_pixel<P: Pixel>(
-    reader: &Reader<'_, '_, P>,
-    work: &BallWork<'_, '_, '_, P>,
+fn of_pixel(
+    reader: &Reader<'_>,
+    work: &BallWork<'_>,
     clip: &[f32],
     pixel: usize,
     scratch: &mut Scratch,

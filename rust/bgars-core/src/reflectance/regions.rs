@@ -12,7 +12,7 @@ use super::spread::{Residual, Spread};
 use super::table::Signatures;
 use crate::median::median;
 use crate::normals::{NormalMapMut, confidence_of};
-use crate::{Lights, Pixel, Result};
+use crate::{Lights, Result};
 
 /// Pixels that the spread is learnt on, in all and of each region at least.
 const SPREAD_PIXELS: usize = 4000;
@@ -67,8 +67,8 @@ pub struct Region {
 }
 
 /// All regions with their tables.
-pub struct Regions<'a, 'b, 'c, P> {
-    reader: &'a Reader<'b, 'c, P>,
+pub struct Regions<'a> {
+    reader: &'a Reader<'a>,
     clip: &'a [f32],
     /// The balls in their order, then the free pixels.
     pub all: Vec<Region>,
@@ -77,9 +77,9 @@ pub struct Regions<'a, 'b, 'c, P> {
     table_of: Vec<usize>,
 }
 
-impl<'a, 'b, 'c, P: Pixel> Regions<'a, 'b, 'c, P> {
+impl<'a> Regions<'a> {
     /// Tabulates the signatures: one table for all balls of one material under distant lights, else one a ball.
-    pub fn new(reader: &'a Reader<'b, 'c, P>, lights: &Lights, clip: &'a [f32], regions: Vec<Region>) -> Self {
+    pub fn new(reader: &'a Reader<'a>, lights: &Lights, clip: &'a [f32], regions: Vec<Region>) -> Self {
         let near = matches!(lights, Lights::Near { .. });
         let mut firsts: Vec<usize> = Vec::new();
         let mut base_of = Vec::with_capacity(regions.len());
@@ -109,7 +109,7 @@ impl<'a, 'b, 'c, P: Pixel> Regions<'a, 'b, 'c, P> {
         Self { reader, clip, all: regions, tables, table_of }
     }
 
-    fn work<'s>(&'s self, region: usize, spread: &'s Spread) -> BallWork<'s, 'b, 'c, P> {
+    fn work<'s>(&'s self, region: usize, spread: &'s Spread) -> BallWork<'s> {
         let table = &self.tables[self.table_of[region]];
         BallWork::new(self.reader, &self.all[region].ball, table, spread, self.clip)
     }

@@ -1,5 +1,6 @@
 //! Which board pixels no ball hides, and how many balls shadow them under each light.
 
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::model::{Ball, Board, Lamp, Shadow, norm};
@@ -132,7 +133,7 @@ fn draw(count: &mut [u8], grid: &Grid, ball: Ball, lamp: Lamp, board: &Board, ma
         if lamp.near {
             for (cell, col) in cells.iter_mut().zip(cols.clone()) {
                 let ray = shadow.ray(grid.x(col), y);
-                *cell += u8::from(ray.distance < reach && ray.along > 0.0);
+                *cell = cell.saturating_add(u8::from(ray.distance < reach && ray.along > 0.0));
             }
         } else {
             draw_row(cells, grid.x(cols.start), grid.step, y, &shadow, ball, lamp, reach);
@@ -141,6 +142,7 @@ fn draw(count: &mut [u8], grid: &Grid, ball: Ball, lamp: Lamp, board: &Board, ma
 }
 
 /// A row of a distant light's shadow. The board is its tangent plane under the ball: a map has margins.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 #[allow(clippy::too_many_arguments)]
 fn draw_row(cells: &mut [u8], x0: f64, step: f64, y: f64, shadow: &Shadow<'_>, ball: Ball, lamp: Lamp, reach: f64) {
     let (down, slope_x, slope_y) = shadow.tangent_plane();
@@ -150,10 +152,10 @@ fn draw_row(cells: &mut [u8], x0: f64, step: f64, y: f64, shadow: &Shadow<'_>, b
     let across_y = y - ball.y;
     let (rise, way) = (slope_y * across_y - down, across_y * to_y + (slope_y * across_y - down) * to_z);
     for (index, cell) in cells.iter_mut().enumerate() {
-        let across_x = x0 + index as f64 * step - ball.x;
+        let across_x = x0 + f64::from(index as i32) * step - ball.x;
         let along = across_x * (to_x + slope_x * to_z) + way;
         let height = slope_x * across_x + rise;
         let square = across_x * across_x + across_y * across_y + height * height - along * along;
-        *cell += u8::from(square < reach * reach && along < 0.0);
+        *cell = cell.saturating_add(u8::from((square < reach * reach) & (along < 0.0)));
     }
 }

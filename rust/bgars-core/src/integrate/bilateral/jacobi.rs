@@ -1,13 +1,13 @@
 //! The whole system as published, reds and blacks in one vector, and its diagonal as a preconditioner.
 
-use faer::dyn_stack::{MemStack, StackReq};
+use faer::dyn_stack::MemStack;
 use faer::matrix_free::{LinOp, Precond};
 use faer::{MatMut, MatRef, Par};
 
 use super::super::checkerboard::Colour;
 use super::super::real::Real;
 use super::super::stencil::Stencil;
-use super::super::vectors::{slice, slice_mut};
+use super::super::vectors::{slice, slice_mut, symmetric_operator};
 
 /// `[D_red, -W; -W^T, D_black]`.
 #[derive(Debug)]
@@ -25,46 +25,18 @@ fn update(stencil: &Stencil<f64>, x: &[f64], out: &mut [f64], set: impl Fn(&mut 
 }
 
 impl LinOp<f64> for Laplacian<'_> {
-    fn apply_scratch(&self, _rhs_ncols: usize, _par: Par) -> StackReq {
-        StackReq::EMPTY
-    }
-
-    fn nrows(&self) -> usize {
-        2 * self.0.grid.half_pixels()
-    }
-
-    fn ncols(&self) -> usize {
-        self.nrows()
-    }
+    symmetric_operator!(|laplacian: &Self| 2 * laplacian.0.grid.half_pixels());
 
     fn apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, _par: Par, _stack: &mut MemStack) {
         update(self.0, slice(rhs), slice_mut(out), |out, sum, d, x| *out = d * x - sum);
     }
-
-    fn conj_apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, par: Par, stack: &mut MemStack) {
-        self.apply(out, rhs, par, stack);
-    }
 }
 
 impl LinOp<f64> for Diagonal<'_> {
-    fn apply_scratch(&self, _rhs_ncols: usize, _par: Par) -> StackReq {
-        StackReq::EMPTY
-    }
-
-    fn nrows(&self) -> usize {
-        2 * self.0.grid.half_pixels()
-    }
-
-    fn ncols(&self) -> usize {
-        self.nrows()
-    }
+    symmetric_operator!(|diagonal: &Self| 2 * diagonal.0.grid.half_pixels());
 
     fn apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, _par: Par, _stack: &mut MemStack) {
         update(self.0, slice(rhs), slice_mut(out), |out, _, d, r| *out = r.over(d));
-    }
-
-    fn conj_apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, par: Par, stack: &mut MemStack) {
-        self.apply(out, rhs, par, stack);
     }
 }
 

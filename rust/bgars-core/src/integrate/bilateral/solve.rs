@@ -32,7 +32,7 @@ pub type OnReweigh<'a> = &'a mut dyn FnMut(Progress) -> ControlFlow<()>;
 /// Integrates normals to a surface that may jump between pixels.
 ///
 /// # Inputs
-/// `field` as for [`super::super::integrate_field`]; `camera` for perspective, where any side of a normal may face the camera.
+/// `field` as for [`super::super::integrate_into`]; `camera` for perspective, where any side of a normal may face the camera.
 ///
 /// # Method
 /// Iteratively re-weighted least squares on one-sided differences (Cao et al. 2022, algorithm 1), each system solved from the
