@@ -95,9 +95,7 @@ def table(chosen: list[Case]) -> list[str]:
             cell = f"**{errors.mean_deg:.2f}** / {errors.median_deg:.2f} / {errors.p95_deg:.1f} ({errors.invalid})"
             if result.method == "reflectance" and result.measured is not None and result.coverage is not None:
                 share, within = 100 * result.measured.pixels / errors.pixels, 100 * result.coverage
-                cell += (
-                    f"; measured {share:.0f} %: {result.measured.mean_deg:.2f}, within u {within:.0f} %"
-                )
+                cell += f"; measured {share:.0f} %: {result.measured.mean_deg:.2f}, within u {within:.0f} %"
             cells.append(cell)
         rmse = " / ".join(
             "-" if result.ball_height_rmse_um is None else f"{result.ball_height_rmse_um:.1f}" for result in results
