@@ -136,6 +136,8 @@ def _band_of(levels: Levels, outline: Outline, matt: bool) -> _Band | None:
     turn = np.arctan2(places[:, 1] - outline.y_px, places[:, 0] - outline.x_px) / (2.0 * math.pi) % 1.0 * SECTORS
     sector = turn.astype(int) % SECTORS
     ground = apart > outline.radius_px + max(2.0, 2.5 * np.nan_to_num(outline.edge_px))
+    if not ground.any():
+        return None
     level = np.full((len(seen), SECTORS), np.nan)
     for index in range(SECTORS):
         here = ground & (sector == index)
