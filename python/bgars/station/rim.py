@@ -121,7 +121,9 @@ def _band_of(levels: Levels, outline: Outline, matt: bool) -> _Band | None:
     inner = outline.radius_px - max(INSIDE[0], INSIDE[1] * outline.radius_px)
     outer = outline.radius_px + max(OUTSIDE[0], OUTSIDE[1] * outline.radius_px)
     use = (apart > inner) & (apart < outer)
-    if int(use.sum()) < LEAST_PIXELS:
+    # The ground begins beyond the blur of the edge.
+    beyond_px = outline.radius_px + max(2.0, 2.5 * float(np.nan_to_num(outline.edge_px)))
+    if int(use.sum()) < LEAST_PIXELS or not (apart[use] > beyond_px).any():
         return None
     places_of = np.flatnonzero(use)[:: math.ceil(int(use.sum()) / MOST_PIXELS)]
     seen = levels.images.reshape(len(levels.images), -1)[:, places_of]
@@ -135,7 +137,7 @@ def _band_of(levels: Levels, outline: Outline, matt: bool) -> _Band | None:
         return _Band(places, mean / scale, np.full(len(mean), levels.noise / math.sqrt(len(seen)) / scale), True)
     turn = np.arctan2(places[:, 1] - outline.y_px, places[:, 0] - outline.x_px) / (2.0 * math.pi) % 1.0 * SECTORS
     sector = turn.astype(int) % SECTORS
-    ground = apart > outline.radius_px + max(2.0, 2.5 * np.nan_to_num(outline.edge_px))
+    ground = apart > beyond_px
     level = np.full((len(seen), SECTORS), np.nan)
     for index in range(SECTORS):
         here = ground & (sector == index)
