@@ -37,8 +37,8 @@ pub fn watched<T: Send>(
     callback: Option<&Py<PyAny>>,
     work: impl FnOnce(Report<'_>) -> bgars_core::Result<T> + Send,
 ) -> PyResult<T> {
-    let mut outcome = None;
-    watch(py, &pool(threads)?, callback, Box::new(|report: Report<'_>| outcome = Some(work(report))))?;
+    let (pool, mut outcome) = (pool(threads)?, None);
+    watch(py, &pool, callback, Box::new(|report: Report<'_>| outcome = Some(work(report))))?;
     // A panic of the work has gone on from its scope.
     outcome.expect("the scope ends after the work").map_err(to_python)
 }
