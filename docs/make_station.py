@@ -168,13 +168,8 @@ def photographs() -> Iterator[str]:
     one, two = (frog_ball(real / "harv_frog" / name) for name in ("chrome1", "chrome2"))
     first, second = (bgars.calibrate_lights(capture, outline=circle) for capture, circle in (one, two))
     both = bgars.calibrate_lights([one[0], two[0]], outline=[one[1], two[1]], near=False)
-    pairs = (
-        ("psm: chrome ball and matt ball", chrome, gray),
-        ("frog: either chrome ball", first, second),
-    )
-    for name, a, b in pairs:
-        off, u = apart_deg(a.rig.directions, b.rig.directions), np.hypot(a.u_deg, b.u_deg)
-        yield against(name, off, u)
+    for name, a, b in (("psm: chrome ball and matt ball", chrome, gray), ("frog: either chrome ball", first, second)):
+        yield against(name, apart_deg(a.rig.directions, b.rig.directions), np.hypot(a.u_deg, b.u_deg))
     own = np.loadtxt(real / "psm_chrome" / "light_directions.txt")
     yield against("psm: chrome ball and published", apart_deg(chrome.rig.directions, unit(own)), chrome.u_deg)
     probes = unit(np.loadtxt(real / "harv_frog" / "light_directions_probes.txt"))
@@ -247,12 +242,15 @@ def board() -> Iterator[str]:
         surface = bgars.integrate_normals(field)
         height = surface.height[5:-5, 5:-5] / (surface.pixel_pitch_um or 1.0)
         rows, cols = np.mgrid[: height.shape[0], : height.shape[1]]
-        plane = np.column_stack([np.ones(height.size), rows.ravel(), cols.ravel()])
-        inside = ndimage.binary_erosion(field.mask, iterations=5)[5:-5, 5:-5]
-        use = inside.ravel() & np.isfinite(height.ravel())
-        bend = height.ravel()[use] - plane[use] @ np.linalg.lstsq(plane[use], height.ravel()[use], rcond=None)[0]
+        use = ndimage.binary_erosion(field.mask, iterations=5)[5:-5, 5:-5] & np.isfinite(height)
         # A dome grows with the square of the width that it spans, as a share of it with the width.
-        yield f"| {name} | {float(np.ptp(bend)) * (DISC_PX / SIDE) ** 2:.1f} |"
+        yield f"| {name} | {dome(height[use], rows[use], cols[use]) * (DISC_PX / SIDE) ** 2:.1f} |"
+
+
+def dome(height: Array, x: Array, y: Array) -> float:
+    """Range of heights at places (x, y) about their best plane."""
+    plane = np.column_stack([np.ones(len(height)), x, y])
+    return float(np.ptp(height - plane @ np.linalg.lstsq(plane, height, rcond=None)[0]))
 
 
 def disc() -> Iterator[str]:
@@ -294,9 +292,7 @@ def disc() -> Iterator[str]:
             ndimage.uniform_filter(np.where(use, surface.height, 0.0), 15)[use]
             / ndimage.uniform_filter(use.astype(np.float64), 15)[use]
         )
-        plane = np.column_stack([np.ones(int(use.sum())), x[use], y[use]])
-        bend = height - plane @ np.linalg.lstsq(plane, height, rcond=None)[0]
-        yield f"| {name} | {float(np.ptp(bend)) / (surface.pixel_pitch_um or 1.0):.1f} |"
+        yield f"| {name} | {dome(height, x[use], y[use]) / (surface.pixel_pitch_um or 1.0):.1f} |"
 
 
 def parts() -> Iterator[str]:
@@ -333,16 +329,8 @@ def solder() -> Iterator[str]:
     )
 
 
-TABLES: dict[str, Callable[[], Iterator[str]]] = {
-    "balls": balls,
-    "near": near,
-    "photographs": photographs,
-    "psm": psm,
-    "board": board,
-    "disc": disc,
-    "solder": solder,
-    "parts": parts,
-}
+PARTS_OF_THE_PAGE = (balls, near, photographs, psm, board, disc, solder, parts)
+TABLES: dict[str, Callable[[], Iterator[str]]] = {one.__name__: one for one in PARTS_OF_THE_PAGE}
 
 
 def main(names: list[str]) -> None:

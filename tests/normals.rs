@@ -151,18 +151,18 @@ fn compare<P: Pixel>(images: &[P], directions: &[[f64; 3]], mask: &[bool], metho
     }
 }
 
-/// A block of the fast kernel, and as many pixels more for the careful one.
-const BOTH: [usize; 2] = [64, 6];
-const PIXELS: usize = BOTH[0] + BOTH[1];
+/// A whole block of the fast kernel, and one that is filled up.
+const BLOCKS: [usize; 2] = [64, 6];
+const PIXELS: usize = BLOCKS[0] + BLOCKS[1];
 
 /// One pixel's values as those of [`PIXELS`] pixels.
 fn repeated<P: Copy>(values: &[P]) -> Vec<P> {
     values.iter().flat_map(|&value| [value; PIXELS]).collect()
 }
 
-/// The normals of the first pixel of each kernel.
+/// The normals of the first pixel of each block.
 fn of_both(map: &NormalMap) -> [nalgebra::Vector3<f64>; 2] {
-    [0, BOTH[0]].map(|pixel| nalgebra::Vector3::from_column_slice(&map.normals[3 * pixel..3 * pixel + 3]).cast())
+    [0, BLOCKS[0]].map(|pixel| nalgebra::Vector3::from_column_slice(&map.normals[3 * pixel..3 * pixel + 3]).cast())
 }
 
 const METHODS: [Method; 3] = [Method::Lambertian, Method::SpecularFilter { threshold: 50.0 }, Method::RobustFilter];
@@ -237,6 +237,17 @@ proptest! {
 }
 
 #[test]
+fn a_block_that_is_filled_up_reads_its_own_pixels() {
+    // As far from the first pixel to the last as a whole block reaches, with gaps between.
+    let mask: Vec<bool> = (0..PIXELS).map(|pixel| pixel < BLOCKS[0] && pixel % 3 == 0).collect();
+    assert!(mask[0] && mask[BLOCKS[0] - 1]);
+    let values: Vec<u8> = (0..8 * PIXELS).map(|place| (place * 37 % 200) as u8).collect();
+    for method in METHODS {
+        compare(&values, &tilted_ring(8, 45.0), &mask, method, 255.0);
+    }
+}
+
+#[test]
 fn near_lights_give_back_the_normal_of_a_board_point_off_the_centre() {
     let positions: Vec<[f64; 3]> = tilted_ring(8, 45.0).iter().map(|direction| direction.map(|v| v * 300.0)).collect();
     let reference: Vec<f64> = vec![300.0; 8];
@@ -292,7 +303,7 @@ fn dark_frame_response_and_intensities_are_undone() {
     for found in of_both(&map) {
         assert!((found - normal).norm().to_degrees() < 0.01, "{found}");
     }
-    for albedo in [map.albedo[0], map.albedo[BOTH[0]]] {
+    for albedo in [map.albedo[0], map.albedo[BLOCKS[0]]] {
         approx::assert_relative_eq!(albedo, 30_000.0 / 65535.0, max_relative = 1e-3);
     }
 }

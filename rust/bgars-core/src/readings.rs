@@ -117,10 +117,11 @@ impl<P: Pixel> Readings for Capture<'_, P> {
     }
 }
 
-/// The codes of ascending pixels that follow each other without a gap.
+/// The codes of pixels of which each follows the one before: none is left out and none repeated.
 fn run<'a, P>(plane: &'a [P], pixels: &[usize]) -> Option<&'a [P]> {
     let (&first, &last) = (pixels.first()?, pixels.last()?);
-    (last - first + 1 == pixels.len()).then(|| &plane[first..=last])
+    let follow = last + 1 == first + pixels.len() && pixels.is_sorted_by(|one, next| one < next);
+    follow.then(|| &plane[first..=last])
 }
 
 /// Codes as floats.

@@ -126,27 +126,45 @@ impl<'a> Work<'a> {
         let mut left = Left { finite: true, careful: Vec::new() };
         let mut spare = NormalMap::zeros(LANES, out.set_lights());
         for block in blocks {
-            self.load(block);
-            self.choose::<FMA>();
-            if self.keep_all {
-                self.solver.equations.fit_all::<FMA>(&self.values, &mut self.fit);
-            } else {
-                self.solver.equations.fit_kept::<FMA>(&self.values, &self.weights, &mut self.fit);
-            }
-            left.finite &= self.fit.is_finite();
-            let at = block[0] - first;
-            if block[LANES - 1] - block[0] == LANES - 1 {
-                self.write::<FMA>(at, out);
-            } else {
-                self.write::<FMA>(0, &mut spare.as_mut());
-                for (lane, pixel) in block.iter().enumerate() {
-                    out.copy_pixel(pixel - first, &spare, lane);
-                }
-            }
-            self.leave(block, &mut left.careful);
+            self.work::<FMA>(block, LANES, first, out, &mut spare, &mut left);
         }
-        left.careful.extend(rest);
+        if let Some(&last) = rest.last() {
+            // The last block is filled up with its last pixel: every pixel is worked by the same kernel, whatever a mask leaves out.
+            let mut block = [last; LANES];
+            block[..rest.len()].copy_from_slice(rest);
+            self.work::<FMA>(&block, rest.len(), first, out, &mut spare, &mut left);
+        }
         left
+    }
+
+    /// Works on the first `count` pixels of a block.
+    #[inline(always)]
+    fn work<const FMA: bool>(
+        &mut self,
+        block: &[usize; LANES],
+        count: usize,
+        first: usize,
+        out: &mut NormalMapMut<'_>,
+        spare: &mut NormalMap,
+        left: &mut Left,
+    ) {
+        self.load(block);
+        self.choose::<FMA>();
+        if self.keep_all {
+            self.solver.equations.fit_all::<FMA>(&self.values, &mut self.fit);
+        } else {
+            self.solver.equations.fit_kept::<FMA>(&self.values, &self.weights, &mut self.fit);
+        }
+        left.finite &= self.fit.is_finite();
+        if count == LANES && block[LANES - 1] - block[0] == LANES - 1 {
+            self.write::<FMA>(block[0] - first, out);
+        } else {
+            self.write::<FMA>(0, &mut spare.as_mut());
+            for (lane, pixel) in block[..count].iter().enumerate() {
+                out.copy_pixel(pixel - first, spare, lane);
+            }
+        }
+        left.careful.extend((0..count).filter(|&lane| self.careful[lane] || self.close[lane]).map(|lane| block[lane]));
     }
 
     /// Levels and values of a block.
@@ -235,18 +253,6 @@ impl<'a> Work<'a> {
             for (kept, weight) in set.iter_mut().zip(&self.weights) {
                 *kept = self.keep_all || weight[lane] > 0.0;
             }
-        }
-    }
-
-    /// The pixels that want the careful kernel.
-    #[inline(always)]
-    fn leave(&self, block: &[usize; LANES], left: &mut Vec<usize>) {
-        let mut any = false;
-        for lane in 0..LANES {
-            any |= self.careful[lane] | self.close[lane];
-        }
-        if any {
-            left.extend((0..LANES).filter(|&lane| self.careful[lane] || self.close[lane]).map(|lane| block[lane]));
         }
     }
 }
