@@ -12,8 +12,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import scipy  # loads its modules when they are used
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from bgars.errors import InputError
 from bgars.io.recipe import RECIPE_NAME
@@ -237,7 +237,7 @@ def _noise_of(
     matrix, right = np.array(rows), np.array(seen)
     # Variances are known to a share of themselves.
     weight = 1.0 / np.maximum(right, 1e-3 * float(right.max()) + 1e-12)
-    read, gain = nnls(matrix * weight[:, None], right * weight)[0]
+    read, gain = scipy.optimize.nnls(matrix * weight[:, None], right * weight)[0]
     return _Noise(max(float(read), 1e-9 * full_scale**2), float(gain))
 
 
