@@ -113,13 +113,14 @@ def reading_budget(settled: Settled, priors: Priors, by_ball: Array) -> Budget:
             u = float(np.sqrt(odd * mixture.wide**2 + (1.0 - odd) * mixture.narrow**2))
         columns.append(with_border[:, first + term] / u)
         causes.append(COMMON_SOURCES[term])
-    # Which of shifted images are the right ones nobody knows: their spread is that of all places.
-    for axis, spread_px in enumerate(priors.shifts_px.std(axis=0)):
+    # Which of shifted images are the right ones nobody knows: where most are, or anywhere else that one is.
+    away_px = np.sqrt(np.square(priors.shifts_px).mean(axis=0))
+    for axis, spread_px in enumerate(away_px):
         columns.append(by_ball[:, axis] * spread_px)
         causes.append(SHIFTS)
     shared = np.array(columns).T
     # Mixtures are no normal distributions: where their shares come to more than the whole, they are cut to it.
-    moved = by_ball[:, :2] * priors.shifts_px.std(axis=0)  # by which of shifted images are the right ones
+    moved = by_ball[:, :2] * away_px
     whole = np.maximum((with_border * along).sum(axis=1) + np.square(moved).sum(axis=1), 1e-300)
     cut = np.sqrt(np.minimum(1.0, MOST_EXPLAINED * whole / np.square(shared).sum(axis=1)))
     shared = shared * cut[:, None]

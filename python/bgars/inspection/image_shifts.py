@@ -25,6 +25,8 @@ __all__ = [
     "check_shifts",
     "displaced_images",
     "image_shifts",
+    "seen_moves",
+    "with_texture",
 ]
 
 Array = NDArray[np.float64]
@@ -81,13 +83,32 @@ def image_shifts(outlines: Outlines) -> ImageShifts:
 
 
 def agreed_shifts(coarse: ImageShifts, fine: ImageShifts) -> ImageShifts:
-    """Coarse shifts that the outlines' shape confirms: by area alone, a shadow beside the rim looks like a shift."""
+    """Coarse shifts that the outlines' shape confirms, and that are large enough to be none of shading.
+
+    By area alone, a shadow beside the rim looks like a shift.
+    """
     size = np.hypot(*coarse.move_px.T)
     along = (coarse.move_px * fine.move_px).sum(axis=1)
     # The fine look knows the shape of an edge that lies within its spread: a pixel at most, as far as one can tell.
     near = size - CERTAIN_SIGMAS * coarse.u_px < SHIFT_ERROR_PX
     denied = np.isfinite(fine.u_px) & near & (along < AGREEING * size**2)
+    denied |= size < SHIFT_WARNING_PX
     return ImageShifts(np.where(denied[:, None], 0.0, coarse.move_px), coarse.u_px)
+
+
+def with_texture(by_outlines: ImageShifts, by_texture: ImageShifts) -> ImageShifts:
+    """Shifts by the board's texture where it is seen, but for those that are too large for it."""
+    large = np.hypot(*by_outlines.move_px.T) >= SHIFT_ERROR_PX
+    if large.any() or not np.isfinite(by_texture.u_px).all():
+        return by_outlines
+    return by_texture
+
+
+def seen_moves(shifts: ImageShifts) -> Array:
+    """(L, 2) shifts beyond doubt, 0 for the others."""
+    seen = np.hypot(*shifts.move_px.T) > SHIFT_SIGMAS * shifts.u_px
+    moves: Array = np.where(seen[:, None], shifts.move_px, 0.0)
+    return moves
 
 
 def check_shifts(shifts: ImageShifts, files: Sequence[Path] = ()) -> tuple[str, ...]:

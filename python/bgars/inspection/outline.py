@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from bgars.inspection.radiance import Radiance
     from bgars.inspection.shadow_map import ShadowMap
 
-__all__ = ["Outlines", "outline_centres"]
+__all__ = ["Outlines", "moved_back", "outline_centres"]
 
 Array = NDArray[np.float64]
 
@@ -127,6 +127,16 @@ def outline_centres(
     centres, u_centre = _centres(table, middle, shift, u_shift)
     shape = (count, lights, SECTORS)
     return Outlines(centres, u_centre, shift.reshape(shape), u_shift.reshape(shape), places, azimuths_rad)
+
+
+def moved_back(outlines: Outlines, table: Array, moves_px: Array) -> Outlines:
+    """What outlines are without the shifts (L, 2) of the images; `table` is the one that they were measured by."""
+    middle = outlines.azimuths_rad[:, None] + outlines.offset_rad[None, :]
+    along = moves_px[:, :1] * np.cos(middle) + moves_px[:, 1:] * np.sin(middle)
+    shift = outlines.shift_px - along
+    flat = (len(table), -1)
+    centres, u_centre = _centres(table, middle.reshape(-1), shift.reshape(flat), outlines.u_shift_px.reshape(flat))
+    return outlines._replace(centres=centres, u_centre=u_centre, shift_px=shift)
 
 
 def _profile(distance: Array, spread_px: float, radius: Array) -> list[Array]:

@@ -24,7 +24,7 @@ from bgars.inspection.common_terms import (
     ROUNDNESS,
     Mixture,
 )
-from bgars.inspection.image_shifts import SHIFT_SIGMAS, SHIFT_WARNING_PX
+from bgars.inspection.image_shifts import seen_moves
 from bgars.inspection.population import q_spread
 
 if TYPE_CHECKING:
@@ -74,9 +74,7 @@ RAISED_DEG = 0.5
 SWING_DEG = 1.5
 """Azimuth of all lights together: turns the part's picture of the rig, and moves no height."""
 SHIFT_PX = 0.015
-"""Images of a rig that stands still; a shift that outlines show is taken from them."""
-SHIFT_FLOOR_PX = 0.05
-"""A shift that outlines show is known no better than this."""
+"""Images of a rig that stands still; a shift that is seen is taken from them, and known no better."""
 ASIDE_PX = 0.015
 """All outlines together aside: lights of a ring cancel what shading does to a rim, but for their differences."""
 OUTLIER_SIGMAS = 3.0
@@ -236,9 +234,7 @@ def _scatter_of_lights(priors: Priors, solution: Solution) -> Array:
 
 
 def with_shifts(priors: Priors, shifts: ImageShifts) -> Priors:
-    """Shifts of images that outlines show beyond doubt, instead of none."""
-    size = np.hypot(*shifts.move_px.T)
-    seen = size > np.maximum(SHIFT_SIGMAS * shifts.u_px, SHIFT_WARNING_PX)
-    move = np.where(seen[:, None], shifts.move_px, 0.0)
-    u = np.where(seen, np.maximum(shifts.u_px, SHIFT_FLOOR_PX), SHIFT_PX)
+    """Shifts of images that are seen beyond doubt, instead of none."""
+    move = seen_moves(shifts)
+    u = np.where(move.any(axis=1), np.maximum(shifts.u_px, SHIFT_PX), SHIFT_PX)
     return priors._replace(shifts_px=move, u_shifts_px=np.repeat(u[:, None], 2, axis=1))

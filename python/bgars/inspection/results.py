@@ -34,6 +34,10 @@ MIN_CONTRAST_LEVELS = 1.5
 """Contrast of lit and shadowed board, in grey levels of 255, that is too little: it rounds to less than 2."""
 MIN_CONTRAST_NOISE = 0.7
 """Least contrast of a shadow, over the noise of the pixels at its edge."""
+MIN_DEPTH = 0.5
+"""Least share of the board's light that a shadow takes: with less, more light than the lamp's own falls into it, or the
+edge is one of the board's texture. Caps whose flanks are flatter than the lights cast no shadow at all.
+"""
 FLAT_SIGMAS = 3.0
 """Uncertainties from which on a flat top is significant."""
 FLAT_SHARE = 0.01
@@ -77,7 +81,8 @@ def judge_balls(edges: Edges) -> Usability:
     total = np.where(known, edges.contrast_levels, 0.0).sum(axis=2)
     contrast = total / np.maximum(count, 1)
     seen = count >= MIN_STRETCHES
-    strong = seen & (contrast >= MIN_CONTRAST_NOISE * edges.noise_levels)
+    low, high = (np.where(known, level, 0.0).sum(axis=2) for level in (edges.low, edges.high))
+    strong = seen & (contrast >= MIN_CONTRAST_NOISE * edges.noise_levels) & (high - low >= MIN_DEPTH * high)
     mean = np.where(seen, contrast, 0.0).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)
     usable = (strong.sum(axis=1) >= MIN_LIGHTS) & (mean >= MIN_CONTRAST_LEVELS)
     return Usability(usable, strong.sum(axis=1), np.where(seen.any(axis=1), mean, np.nan))
@@ -288,6 +293,8 @@ def _unmeasured(
         place = looked_at[index]
         lights, contrast = int(fit.usability.lights[place]), float(fit.usability.contrast_levels[place])
         reasons = _why(problem, index, lights, contrast)
+    # All outlines together are known no better than one, as in the priors of the fit.
+    u_radius_px = float(np.hypot(ball.u_radius_px, np.median(problem.u_radius)))
     return MeasuredBall(
         name=ball.name,
         row=ball.row,
@@ -301,7 +308,7 @@ def _unmeasured(
         flat_top_depth_um=nan,
         u_x_um=ball.u_centre_px * pitch,
         u_y_um=ball.u_centre_px * pitch,
-        u_diameter_um=2.0 * ball.u_radius_px * pitch,
+        u_diameter_um=2.0 * u_radius_px * pitch,
         u_centre_z_um=nan,
         u_top_um=nan,
         u_aspect_ratio=nan,
@@ -330,4 +337,7 @@ def _why(problem: Problem, index: int, lights: int, contrast: float) -> list[str
         return [f"too little contrast of shadow and board: {max(shown, 0.0):.1f} grey levels of 255, 2 are needed"]
     if lights >= MIN_LIGHTS:
         return ["too little of its shadows is in view to fit a ball to them"]
-    return [f"fewer than 2 usable lights ({lights}): shadows hidden, outside the image or without an edge"]
+    return [
+        f"fewer than 2 usable lights ({lights}): shadows hidden, outside the image or without an edge "
+        "(a bump whose flanks are flatter than the light's elevation casts none)"
+    ]

@@ -11,14 +11,15 @@ from bgars.inspection.board import Board
 from bgars.inspection.bundle import Priors, Solution, solve_bundle
 from bgars.inspection.bundle_model import State
 from bgars.inspection.common_terms import PERSPECTIVE
-from bgars.inspection.image_shifts import ImageShifts, agreed_shifts, image_shifts
-from bgars.inspection.outline import Outlines, outline_centres
+from bgars.inspection.image_shifts import ImageShifts, agreed_shifts, image_shifts, seen_moves, with_texture
+from bgars.inspection.outline import Outlines, moved_back, outline_centres
 from bgars.inspection.plateaus import edge_bias_px
 from bgars.inspection.priors import COARSE_SPREAD_PX, refined_priors, with_edges, with_shifts
 from bgars.inspection.results import Usability, judge_balls
 from bgars.inspection.shadow_edges import REACH_PX, REACH_SIGMAS, Edges, EdgeSettings, measure_edges
 from bgars.inspection.shadow_map import Casters, ShadowMap
 from bgars.inspection.spread import EdgeSpread, fit_spread
+from bgars.inspection.texture import texture_shifts
 
 if TYPE_CHECKING:
     from bgars.inspection.problem import Problem
@@ -174,12 +175,14 @@ class ShadowPasses:
         azimuths = np.arctan2(self.state.vectors[:, 1], self.state.vectors[:, 0])
         radiance, sharp_px = problem.radiance, self.spread.sharp_px
         fine = outline_centres(radiance, shadows, seen, azimuths, sharp_px)
-        self.priors = _with_outlines(problem, self.priors, fine, seen)
         # Of some balls in the middle, looked for farther off, to tell whether an image is shifted.
         few = np.argsort(np.hypot(seen[:, 0], seen[:, 1]))[:SHIFT_BALLS]
         self.outlines = outline_centres(radiance, shadows, seen[few], azimuths, sharp_px, coarse=True)
-        self.shifts = agreed_shifts(image_shifts(self.outlines), image_shifts(fine))
+        by_outlines = agreed_shifts(image_shifts(self.outlines), image_shifts(fine))
+        self.shifts = with_texture(by_outlines, texture_shifts(radiance, shadows))
+        moves_px = seen_moves(self.shifts)
         self.priors = with_shifts(self.priors, self.shifts)
+        self.priors = _with_outlines(problem, self.priors, moved_back(fine, seen, moves_px), seen, moves_px)
 
     def _know_edges(self, settings: EdgeSettings, radius: float) -> None:
         """How well edges can be known, in the priors."""
@@ -269,8 +272,9 @@ def _typical_spread_px(spread: EdgeSpread, radius: float) -> float:
     return float(np.hypot(spread.sharp_px, TYPICAL_WAY * spread.lamp_rad * radius))
 
 
-def _with_outlines(problem: Problem, priors: Priors, outlines: Outlines, table: Array) -> Priors:
-    """Centres of the priors: the finder's and the outlines', weighted."""
+def _with_outlines(problem: Problem, priors: Priors, outlines: Outlines, table: Array, moves_px: Array) -> Priors:
+    """Centres of the priors: the finder's, which sees all images as they lie, and the outlines', weighted."""
+    u_finder = np.hypot(problem.u_centre, np.sqrt(np.square(moves_px).mean()))
     centres, u_outline = outlines.centres, outlines.u_centre
     known = np.isfinite(u_outline) & ~problem.bridged
     # What outlines scatter beyond their own word shows against the shadows' centres, but for a common shift.
@@ -278,9 +282,9 @@ def _with_outlines(problem: Problem, priors: Priors, outlines: Outlines, table: 
     off = (centres - table[:, :2])[known]
     scatter = 1.4826 * np.median(np.abs(off - np.median(off, axis=0)) / u_outline[known, None]) if known.any() else 1.0
     u_outline = OUTLINE_SAFETY * max(float(scatter), 1.0) * u_outline
-    common = _apart(problem.table[:, :2] - centres, problem.u_centre, u_outline, known) ** 2
+    common = _apart(problem.table[:, :2] - centres, u_finder, u_outline, known) ** 2
     by_outline = np.where(known, 1.0 / (OUTLINE_FLOOR_PX**2 + u_outline**2 + common), 0.0)
-    by_finder = 1.0 / (problem.u_centre**2 + common)
+    by_finder = 1.0 / (u_finder**2 + common)
     given, u_given = priors.outlines.copy(), priors.u_outlines.copy()
     weight = by_outline + by_finder
     for axis in (0, 1):
