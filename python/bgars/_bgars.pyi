@@ -106,6 +106,7 @@ def estimate_reflectance(
     mask: NDArray[np.bool_] | None,
     circles: NDArray[np.float64],
     free: NDArray[np.bool_] | None,
+    wanted: NDArray[np.bool_] | None,
     material: SurfaceMaterial | None,
     threads: int | None,
     progress: Callable[[float], object] | None,
