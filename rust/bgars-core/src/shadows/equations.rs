@@ -204,6 +204,7 @@ mod tests {
         second[0] = 7.0;
         let products = edge_products(&[first, second], &[2.0, 0.0], 2);
         assert_eq!(products.len(), (TERMS + 1).pow(2));
-        assert_eq!([products[0], products[TERMS], products[products.len() - 1]], [2.0, 6.0, 18.0]);
+        let some = [products[0], products[TERMS], products[products.len() - 1]];
+        assert_eq!(some.map(f64::to_bits), [2.0, 6.0, 18.0].map(f64::to_bits));
     }
 }
