@@ -33,7 +33,8 @@ fn reflectance(criterion: &mut Criterion) {
                 group.bench_function(format!("{threads} threads"), |bencher| {
                     on_threads(threads, || {
                         let mut map = NormalMap::zeros(side * side, 0);
-                        let request = Request { mask: None, circles: &circles, free: None, material: given };
+                        let request =
+                            Request { mask: None, circles: &circles, free: None, wanted: None, material: given };
                         bencher.iter(|| {
                             let proceed = &mut |_| ControlFlow::Continue(());
                             let out = map.as_mut();

@@ -43,7 +43,7 @@ fn run(images: &[u8], lights: &Lights, request: Request<'_>) -> Result<(NormalMa
 }
 
 fn anchored(circles: &[Circle]) -> Request<'_> {
-    Request { mask: None, circles, free: None, material: None }
+    Request { mask: None, circles, free: None, wanted: None, material: None }
 }
 
 fn sphere(_: usize, normal: Vector3<f64>) -> Vector3<f64> {
@@ -151,7 +151,7 @@ fn a_given_material_serves_pixels_of_unknown_shape() {
     let pixels = SIDE * SIDE;
     let free: Vec<bool> = (0..pixels).map(|pixel| images[pixel] > 0 || images[4 * pixels + pixel] > 0).collect();
     let material = solder(8);
-    let request = Request { mask: None, circles: &[], free: Some(&free), material: Some(&material) };
+    let request = Request { mask: None, circles: &[], free: Some(&free), wanted: None, material: Some(&material) };
     let (map, findings) = run(&images, &lights, request).unwrap();
     assert!(findings.fit.is_none());
     let mut errors = errors_deg(&map, &circles[0], flattened);
@@ -219,7 +219,7 @@ proptest! {
         }
         let mut free = vec![false; SIDE * SIDE];
         free[0] = true;
-        let request = Request { mask: None, circles: &[], free: Some(&free), material: Some(&material) };
+        let request = Request { mask: None, circles: &[], free: Some(&free), wanted: None, material: Some(&material) };
         let (map, _) = run(&images, &lights, request).unwrap();
         prop_assume!(map.mask[0]);
         let bend = |level: f64| (0.03 * level).asinh() / 0.03;

@@ -21,6 +21,8 @@ __all__ = [
     "REFLECTANCE_MIN_LIGHTS",
     "decode_stack",
     "draw_shadows",
+    "edge_products",
+    "edge_rows",
     "eliminate_rims",
     "estimate_normals",
     "estimate_reflectance",
@@ -67,6 +69,16 @@ def draw_shadows(
     shadow_margin_px: float,
     threads: int | None,
 ) -> tuple[NDArray[np.bool_], NDArray[np.uint8]]: ...
+def edge_products(rows: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]: ...
+def edge_rows(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    casters: Casters,
+    *,
+    turns: NDArray[np.float64],
+    shifts_px: NDArray[np.float64],
+    waves_px: list[float],
+) -> NDArray[np.float64]: ...
 def eliminate_rims(
     pixels: RimPixels,
     circles: NDArray[np.float64],
@@ -94,6 +106,7 @@ def estimate_reflectance(
     mask: NDArray[np.bool_] | None,
     circles: NDArray[np.float64],
     free: NDArray[np.bool_] | None,
+    wanted: NDArray[np.bool_] | None,
     material: SurfaceMaterial | None,
     threads: int | None,
     progress: Callable[[float], object] | None,

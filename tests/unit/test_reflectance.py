@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import bgars
 import numpy as np
 import pytest
+from bgars.pipelines.normals import ball_normals
 from bgars.records.circle_pixels import inside_circles
 
 from experiments.measure import filled_normals
@@ -380,3 +381,14 @@ def test_bad_input_is_one_clear_line(options: dict[str, Any], words: str) -> Non
 def test_impossible_materials_are_refused(make: Callable[[], object], words: str) -> None:
     with pytest.raises(bgars.InputError, match=words):
         make()
+
+
+def test_pixels_that_are_not_wanted_change_nothing_of_the_others() -> None:
+    capture, _ = hemisphere()
+    found, shape = bgars.find_balls(capture), capture.mask.shape
+    mask, wanted = (inside_circles([(0.0, 0.0, share * RADIUS_PX)], shape) for share in (1.0, 0.8))
+    whole = bgars.estimate_normals(capture, mask=mask, anchors=found)
+    some = ball_normals(capture, found, mask, wanted=wanted, method="reflectance", material=None, threads=None)
+    np.testing.assert_array_equal(some.normals[wanted], whole.normals[wanted])
+    assert some.reflectance == whole.reflectance
+    assert not some.mask[inside_circles([(0.0, 0.0, 0.9 * RADIUS_PX)], shape) & ~wanted].any()

@@ -26,6 +26,8 @@ STEPS_PER_SCALE = 10
 MIN_SCORE = 0.13
 """Mean outward slope of a centre; a sphere that fills its disc has 0.67, a board 0."""
 MAX_CENTRES = 3000
+BLAS_ALONE = 1 << 18
+"""Multiplications of a product up to which BLAS works on one thread."""
 
 
 class Centre(NamedTuple):
@@ -72,7 +74,7 @@ def slope_field(
     else:
         board = (inverse @ rig.directions[:, 2].astype(np.float32))[:, None, None]
         board = board / np.linalg.norm(board)
-    normal = (inverse @ levels.reshape(lights, -1)).reshape(3, height, width)
+    normal = np.einsum("cl,lhw->chw", inverse, levels)
     length = np.sqrt(np.sum(normal**2, axis=0) + np.float32(floor) ** 2)
     black = normal[2] < floor
     slopes = [np.where(black & (np.abs(normal[i]) < floor), 0.0, normal[i] / length - board[i]) for i in (0, 1)]
@@ -127,10 +129,17 @@ def _outward_means(slopes: list[FloatArray], scales: list[tuple[float, float]]) 
         # Odd along one axis and even along the other: sums of sines and cosines, an eighth of a transform's time. They
         # are mirrored, because convolution mirrors: x falls along columns, y (up) grows along rows.
         down, across = (np.outer(wave, side).astype(np.float32) for wave in waves)
-        kernel_x = np.cos(down) @ (outward * side) @ np.sin(across).T
-        kernel_y = np.sin(down) @ (outward * side[:, None]) @ np.cos(across).T
+        kernel_x = _product(np.cos(down), (outward * side) @ np.sin(across).T)
+        kernel_y = _product(np.sin(down), (outward * side[:, None]) @ np.cos(across).T)
         mean = np.fft.irfft2(np.complex64(1j) * (kernel_x * along_x - kernel_y * along_y), shape)
         yield scale_px, mean[:height, :width].astype(np.float32)
+
+
+def _product(left: FloatArray, right: FloatArray) -> FloatArray:
+    """Matrix product, some rows at a time: large ones wake the threads of BLAS, which spin for longer than it takes."""
+    parts = math.ceil(left.size * right.shape[1] / BLAS_ALONE)
+    product: FloatArray = np.concatenate([rows @ right for rows in np.array_split(left, parts)])
+    return product
 
 
 def _largest_around(values: FloatArray, reach: int) -> FloatArray:

@@ -101,11 +101,11 @@ def _in_shadow(levels: Floats, usual: Floats, lights: Array) -> Mask:
     keep = (rank < top) & (rank >= top - max(3, min(count // 2, top))) & np.isfinite(levels)
     weight = keep.astype(np.float64)
     products = (lights[:, :, None] * lights[:, None, :]).reshape(count, 9)
-    matrix = (weight.T @ products).reshape(-1, 3, 3)
-    right = np.where(keep, levels, 0.0).T.astype(np.float64) @ lights
+    matrix = np.einsum("ln,lk->nk", weight, products).reshape(-1, 3, 3)
+    right = np.einsum("ln,lk->nk", np.where(keep, levels, 0.0).astype(np.float64), lights)
     solved = np.abs(np.linalg.det(matrix)) > SOLVABLE
     matrix[~solved] = np.eye(3)
-    promise = lights @ np.linalg.solve(matrix, right[..., None])[..., 0].T
+    promise = np.einsum("lk,nk->ln", lights, np.linalg.solve(matrix, right[..., None])[..., 0])
     shadowed: Mask = solved & ~keep & (levels < SHADOWED * promise) & (promise > FACES * usual) & (levels < usual)
     return shadowed
 

@@ -72,7 +72,7 @@ def _ground(view: View, lights: Array) -> _Ground | None:
         return None
     length = np.sqrt((fit.normal**2).sum(axis=0))
     unit = (fit.normal / np.maximum(length, 1e-12)).reshape(3, rows, cols)
-    facing = np.tensordot(lights, unit, axes=(1, 0))
+    facing = np.einsum("lc,c...->l...", lights, unit)
     could_be_lit = solved & (facing > FACES) & ~view.clipped
     share = view.values / np.maximum(facing * length.reshape(rows, cols), 1e-9)
     slope = np.hypot(unit[0], unit[1]) / np.maximum(unit[2], 1e-3)

@@ -168,7 +168,7 @@ def _losses(evidence: _Evidence, given: Array, lights: Array) -> _Losses:
     if not tilted or abs(np.linalg.det(linear)) < 0.2:  # noqa: PLR2004 - no map of one space onto another
         unknown = np.full(count, np.nan)
         return _Losses(photometric, unknown, unknown)
-    normal = np.tensordot(np.linalg.inv(linear), evidence.normal, axes=(1, 0))
+    normal = np.einsum("ij,j...->i...", np.linalg.inv(linear), evidence.normal)
     return _Losses(photometric, *_bending(normal, evidence))
 
 

@@ -52,8 +52,9 @@ def fit_normals(values: Array, keep: Mask, lights: Array) -> MattFit:
     """Least squares of (L, N) values under (L, 3) lights, over the lights to keep; what is left over is 0 elsewhere."""
     weight = keep.astype(np.float64)
     products = (lights[:, :, None] * lights[:, None, :]).reshape(len(lights), 9)
-    normal_matrix = (weight.T @ products).reshape(-1, 3, 3)
-    right = (weight * values).T @ lights
+    # Products this large would wake the threads of BLAS, which then spin for longer than the work takes.
+    normal_matrix = np.einsum("ln,lk->nk", weight, products).reshape(-1, 3, 3)
+    right = np.einsum("ln,lk->nk", weight * values, lights)
     number = weight.sum(axis=0)
     scale = np.maximum(number, 1.0)[:, None, None]
     determinant = np.linalg.det(normal_matrix / scale)
@@ -61,5 +62,5 @@ def fit_normals(values: Array, keep: Mask, lights: Array) -> MattFit:
     normal_matrix[~solved] = np.eye(3)
     normal = np.linalg.solve(normal_matrix, right[..., None])[..., 0].T
     mean = (weight * values).sum(axis=0) / np.maximum(number, 1.0)
-    left = weight * solved * (values - lights @ normal) / np.maximum(mean, 1e-9)
+    left = weight * solved * (values - np.einsum("lk,kn->ln", lights, normal)) / np.maximum(mean, 1e-9)
     return MattFit(np.asarray(normal, np.float64), left, solved)

@@ -32,7 +32,7 @@ def lit_everywhere(view: View, lights: Array, *, matt: bool = True) -> Mask:
     lit: Mask = view.use & (ratio.min(axis=0) > SHADOWED) & (ratio.max(axis=0) < SHINES) & ~view.clipped.any(axis=0)
     if matt and lit.any() and len(lights) > 4:  # noqa: PLR2004 - with one degree of freedom nothing tells which image is off
         left = np.eye(len(lights)) - lights @ np.linalg.pinv(lights)
-        misfit = np.square(np.tensordot(left, ratio.astype(np.float64), axes=(1, 0))).sum(axis=0)
+        misfit = np.square(np.einsum("kl,lhw->khw", left, ratio.astype(np.float64))).sum(axis=0)
         lit &= misfit <= SPREAD * float(np.median(misfit[lit])) + 1e-9
     return lit
 

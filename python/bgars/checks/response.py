@@ -47,13 +47,13 @@ def curvature(view: View, lit: Mask, lights: Array) -> tuple[float, float, float
     values = view.values.astype(np.float64)
     project = lights @ np.linalg.pinv(lights)
     relative = values / np.maximum(values.mean(axis=0), 1e-9)
-    linear = np.tensordot(project, relative, axes=(1, 0))
+    linear = np.einsum("kl,lhw->khw", project, relative)
     left = relative - linear
     square = (linear - 1.0) ** 2
     lit = lit & (square.sum(axis=0) > SHADED**2)
     if int(lit.sum()) < MIN_PIXELS:
         return 0.0, np.inf, 0.0
-    square -= np.tensordot(project, square, axes=(1, 0))
+    square -= np.einsum("kl,lhw->khw", project, square)
     top = tile_sums(view.tiles, (left * square).sum(axis=0), lit)
     bottom = tile_sums(view.tiles, (square**2).sum(axis=0), lit)
     if bottom.sum() <= 0.0:

@@ -12,7 +12,6 @@ E. Haber, J. Modersitzki, Intensity gradient based registration and fusion of mu
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -78,10 +77,12 @@ def _surfaces(patch: Patch, levels: Floats) -> Iterator[Array]:
             share = inside[row, col]
             if share.mean() < COVERED:
                 continue
-            tile = edges[..., row, col]
-            own = np.fft.rfft2(tile - tile.mean(axis=(-2, -1), keepdims=True))
-            masked = tile * share
-            whole = np.fft.rfft2(masked - masked.mean(axis=(-2, -1), keepdims=True))
+            # Transforms of float32 take longer than those of float64.
+            tile = edges[..., row, col].astype(np.float64)
+            own = whole = np.fft.rfft2(tile - tile.mean(axis=(-2, -1), keepdims=True))
+            if not share.all():
+                masked = tile * share
+                whole = np.fft.rfft2(masked - masked.mean(axis=(-2, -1), keepdims=True))
             others = whole.sum(axis=1, keepdims=True) - whole
             found = np.fft.irfft2((own * others.conj()).sum(axis=0), s=share.shape)
             yield np.roll(found, (REACH_PX, REACH_PX), axis=(1, 2))[:, : 2 * REACH_PX + 1, : 2 * REACH_PX + 1]
@@ -103,9 +104,10 @@ def edge_products(levels: Floats, passes: int) -> Floats:
 
 
 def _cuts(size: int) -> list[slice]:
+    """Tiles of equal sides, multiples of 4: a transform whose length is a large prime takes three times as long."""
     count = max(1, size // TILE_PX)
-    edges = np.linspace(0, size, count + 1).astype(int)
-    return [slice(int(first), int(end)) for first, end in pairwise(edges)]
+    side = max(size // count // 4 * 4, 1)
+    return [slice(int(first), int(first) + side) for first in np.linspace(0, size - side, count)]
 
 
 def _peaks(surfaces: Array) -> Array:

@@ -12,7 +12,7 @@ from bgars.records.circle_pixels import inside_circles
 if TYPE_CHECKING:
     from bgars.records.normal_field import NormalField
 
-__all__ = ["SHAPE_TERMS", "Board", "board_from_normals", "height_terms", "outside_balls", "slope_terms"]
+__all__ = ["SHAPE_TERMS", "Board", "board_from_normals", "outside_balls", "slope_terms"]
 
 Array = NDArray[np.float64]
 
@@ -51,11 +51,6 @@ class Board:
         """Slopes dz/dx and dz/dy at (x, y)."""
         c1, c2, c3, c4, c5 = self.coefficients
         return c1 + 2.0 * c3 * x + c4 * y, c2 + c4 * x + 2.0 * c5 * y
-
-
-def height_terms(x: Array, y: Array) -> Array:
-    """(..., 5) derivatives of the height by c1 to c5."""
-    return np.stack([x, y, x * x, x * y, y * y], axis=-1)
 
 
 def slope_terms(x: Array, y: Array) -> tuple[Array, Array]:

@@ -7,17 +7,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars import _bgars
 from bgars.inspection.board import Board
 from bgars.inspection.common_terms import COMMON_TERMS, EDGE_TERMS, OUTLINE, OUTLINE_X, OUTLINE_Y, PERSPECTIVE
-from bgars.inspection.shadow_model import (
-    Balls,
-    Lights,
-    Rays,
-    ball_derivatives,
-    board_derivatives,
-    light_derivatives,
-    rays,
-)
+from bgars.inspection.shadow_map import Casters
 
 if TYPE_CHECKING:
     from bgars.inspection.shadow_edges import Edges
@@ -50,13 +43,13 @@ class State(NamedTuple):
 class EdgeModel(NamedTuple):
     """Every measured point, (N, L, S).
 
-    Distance to its edge; derivatives (..., T) by ball, light and what is shared; its place, the angle from the tip
-    (rad).
+    Distance to its edge; its place, the angle from the tip (rad); `rows` (..., T + 2) derivatives by ball, light, board
+    and edges of all, then both of these.
     """
 
     residual: Array
-    derivatives: Array
     angle_rad: Array
+    rows: Array
 
 
 def tangents(vectors: Array) -> Array:
@@ -84,40 +77,17 @@ def turned(vectors: Array, turns: Array) -> Array:
 def linearise_edges(edges: Edges, state: State, near: bool) -> EdgeModel:
     """Distances of measured points to predicted edges, and their derivatives.
 
-    Derivatives are those of the edge, at the point of it next to the measured one: at the measured point itself they
-    would go with its error, and the products of both would not average out (errors in variables; Fuller 1987, ch. 3).
+    Method and order of the derivatives: `rust/bgars-core/src/shadows/equations.rs`.
     """
-    balls = Balls.from_table(state.balls).spread(2)
-    lamps = Lights.from_table(state.vectors, near).spread(1, 1)
-    board = Board(state.board)
-    x, y = edges.x - state.shifts_px[None, :, None, 0], edges.y - state.shifts_px[None, :, None, 1]
-    off = rays(x, y, balls, lamps, board)
-    rough = (off.distance - balls.radius) / np.maximum(off.slope, 1e-3) ** 2
-    x, y = x - rough * off.gradient_x, y - rough * off.gradient_y
-    beam = rays(x, y, balls, lamps, board)
-    slope = np.maximum(beam.slope, 1e-3)
-    # What is left at the foot, and the way to it by the mean slope: exact to second order.
-    distance = (off.distance - beam.distance) * 2.0 / (slope + np.maximum(off.slope, 1e-3))
-    distance = distance + (beam.distance - balls.radius) / slope
-    ways = tangents(state.vectors)
-    by_light = light_derivatives(beam, balls, (ways[None, :, None, 0], ways[None, :, None, 1]))
-    by_shift = np.stack([-beam.gradient_x, -beam.gradient_y], axis=-1)
-    by_common = np.zeros((*beam.distance.shape, COMMON_TERMS))
-    angle_rad = _angle(beam)
-    for wave, term in enumerate(EDGE_TERMS):
-        by_common[..., term] = -np.cos(wave * angle_rad)
-    by_board = board_derivatives(x, y, beam, balls)
-    geometry = np.concatenate([ball_derivatives(beam, balls, board), by_light, by_shift, by_board], axis=-1)
-    residual = distance + by_common @ state.common
-    return EdgeModel(residual, np.concatenate([geometry / slope[..., None], by_common], axis=-1), angle_rad)
-
-
-def _angle(beam: Rays) -> Array:
-    """Angle of the edge's normal against the way of the light on the board: 0 at the tip, +-pi/2 at the sides."""
-    along = -(beam.toward_x * beam.gradient_x + beam.toward_y * beam.gradient_y)
-    across = beam.toward_x * beam.gradient_y - beam.toward_y * beam.gradient_x
-    angle: Array = np.arctan2(across, along)
-    return angle
+    rows = _bgars.edge_rows(
+        np.ascontiguousarray(edges.x),
+        np.ascontiguousarray(edges.y),
+        Casters.of(state.balls, state.vectors, near, Board(state.board)),
+        turns=tangents(state.vectors).reshape(-1, 6),
+        shifts_px=np.ascontiguousarray(state.shifts_px),
+        waves_px=state.common[list(EDGE_TERMS)].tolist(),
+    )
+    return EdgeModel(rows[..., -2].copy(), rows[..., -1], rows)
 
 
 def outline_rows(state: State, outlines: Array) -> tuple[Array, Array, Array]:

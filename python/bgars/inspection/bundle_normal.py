@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars import _bgars
 from bgars.inspection.board import SHAPE_TERMS
 from bgars.inspection.bundle_model import EdgeModel, State, outline_rows, tangents
-from bgars.inspection.common_terms import AZIMUTH, COMMON_TERMS, ELEVATION, ROUNDNESS
+from bgars.inspection.common_terms import AZIMUTH, COMMON_TERMS, EDGE_TERMS, ELEVATION, ROUNDNESS
 from bgars.inspection.shadow_model import BALL_TERMS
 
 __all__ = ["LIGHT_TERMS", "NormalEquations", "Priors", "normal_equations"]
@@ -61,24 +62,25 @@ def normal_equations(model: EdgeModel, weight: Array, state: State, priors: Prio
     count, lights = model.residual.shape[:2]
     first_shared = LIGHT_TERMS * lights
     border = first_shared + SHARED_TERMS
-    weighted = (model.derivatives * weight[..., None]).swapaxes(-1, -2)
-    shadows = weighted @ model.derivatives  # of every shadow, (N, L, T, T)
-    sides = -(weighted @ model.residual[..., None])[..., 0]
+    products = _bgars.edge_products(model.rows, weight)  # of every shadow, (N, L, T + 1, T + 1)
     ball, lamp = slice(BALL_TERMS), slice(BALL_TERMS, BALL_TERMS + LIGHT_TERMS)
-    shared = slice(BALL_TERMS + LIGHT_TERMS, None)
-    of_balls, of_lights = shadows[:, :, ball].sum(axis=1), shadows.sum(axis=0)
-    by_light = shadows[:, :, ball, lamp].swapaxes(1, 2).reshape(count, BALL_TERMS, first_shared)
-    cross = np.concatenate([by_light, of_balls[:, :, shared]], axis=2)
-    corner = np.zeros((border, border))
+    shared = slice(BALL_TERMS + LIGHT_TERMS, -1)
+    # Of what is shared, edges know the board and how far out all of them are measured.
+    at = first_shared + np.concatenate([np.arange(SHAPE_TERMS), SHAPE_TERMS + np.array(EDGE_TERMS)])
+    of_balls, of_lights = products.sum(axis=1), products.sum(axis=0)
+    cross = np.zeros((count, BALL_TERMS, border))
+    cross[..., :first_shared] = products[:, :, ball, lamp].swapaxes(1, 2).reshape(count, BALL_TERMS, first_shared)
+    cross[..., at] = of_balls[:, ball, shared]
+    corner, right_border = np.zeros((border, border)), np.zeros(border)
     for light in range(lights):
         part = slice(LIGHT_TERMS * light, LIGHT_TERMS * (light + 1))
         corner[part, part] = of_lights[light, lamp, lamp]
-        corner[part, first_shared:] = of_lights[light, lamp, shared]
-        corner[first_shared:, part] = of_lights[light, shared, lamp]
-    corner[first_shared:, first_shared:] = of_lights[:, shared, shared].sum(axis=0)
-    border_sides = sides.sum(axis=0)
-    right_border = np.concatenate([border_sides[:, lamp].reshape(-1), border_sides[:, shared].sum(axis=0)])
-    normal = NormalEquations(of_balls[:, :, ball], cross, corner, sides[:, :, ball].sum(axis=1), right_border)
+        corner[part, at] = of_lights[light, lamp, shared]
+        corner[at, part] = of_lights[light, shared, lamp]
+        right_border[part] = -of_lights[light, lamp, -1]
+    corner[np.ix_(at, at)] = of_lights[:, shared, shared].sum(axis=0)
+    right_border[at] = -of_lights[:, shared, -1].sum(axis=0)
+    normal = NormalEquations(of_balls[:, ball, ball], cross, corner, -of_balls[:, ball, -1], right_border)
     _add_ball_priors(normal, state, priors)
     _add_light_priors(normal, state, priors)
     return normal

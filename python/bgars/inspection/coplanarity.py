@@ -111,7 +111,8 @@ def measure_coplanarity(
         noise = random.standard_normal((min(at_once, draws - first), *apexes_um.shape))
         noisy_um = quiet_um + noise * u_apexes_um
         if shared_um is not None:
-            noisy_um[:, :, 2] += random.standard_normal((len(noise), shared_um.shape[1])) @ shared_um.T
+            together = random.standard_normal((len(noise), shared_um.shape[1]))
+            noisy_um[:, :, 2] += np.einsum("dm,nm->dn", together, shared_um)
         leaned_um.append(_regression_um(quiet_um, noisy_um[:, :, 2]))
         if seating:
             stood_um.append(_seating_um(noisy_um, gravity_um))
@@ -244,7 +245,7 @@ def _seating_um(noisy_um: Array, gravity_um: Array) -> Array:
 def _regression_um(quiet_um: Array, z_um: Array) -> Array:
     """(d,) coplanarity by regression plane; (d, n) heights over the same places."""
     design = np.column_stack([quiet_um[:, :2] - quiet_um[:, :2].mean(axis=0), np.ones(len(quiet_um))])
-    planes = np.linalg.lstsq(design, z_um.T, rcond=None)[0]
-    residuals_um = z_um - (design @ planes).T
+    planes = np.einsum("kn,dn->kd", np.linalg.pinv(design), z_um)
+    residuals_um = z_um - np.einsum("nk,kd->dn", design, planes)
     largest: Array = np.ptp(residuals_um, axis=1) / np.sqrt(1.0 + planes[0] ** 2 + planes[1] ** 2)
     return largest

@@ -79,13 +79,13 @@ class Problem:
         rows[:, 2] = rows[:, 3] * float(np.median(table[:, 2] / table[:, 3]))
         return rows
 
-    def neighbours(self, index: int) -> Array:
-        """(m, 5) balls and stand-ins near a ball, itself too."""
+    def neighbours(self) -> list[Array]:
+        """Per ball the (m, 5) balls and stand-ins near it, itself too."""
         everything = np.concatenate([self.table, self.extra])
-        x, y, _, radius, _ = self.table[index]
-        reach = NEARBY_RADII * max(radius, float(np.median(self.table[:, 3])))
-        near: Array = everything[np.hypot(everything[:, 0] - x, everything[:, 1] - y) < reach + everything[:, 3]]
-        return near
+        x, y, radius = everything[:, 0], everything[:, 1], everything[:, 3]
+        reaches = NEARBY_RADII * np.maximum(self.table[:, 3], np.median(self.table[:, 3]))
+        rows = zip(self.table[:, 0], self.table[:, 1], reaches, strict=True)
+        return [everything[np.hypot(x - ball_x, y - ball_y) < reach + radius] for ball_x, ball_y, reach in rows]
 
 
 def make_problem(capture: Capture, found: FoundBalls, roundness: tuple[float, float] | None = None) -> Problem:

@@ -80,7 +80,7 @@ def fit_shadows(
         problem.near,
         Board(),
         problem.irradiance.mean(axis=0),
-        [problem.neighbours(index) for index in range(len(table))],
+        problem.neighbours(),
         threads,
     )
     table[:, 2], table[:, 3] = heights, radius_at(heights, table[:, 3])

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bgars.inspection.board import SHAPE_TERMS, Board, height_terms
+from bgars.inspection.board import Board
 
 __all__ = [
     "Balls",
@@ -29,8 +29,6 @@ __all__ = [
     "Lights",
     "Nearby",
     "Rays",
-    "ball_derivatives",
-    "board_derivatives",
     "edge_at",
     "light_derivatives",
     "near_edge",
@@ -268,19 +266,6 @@ def edge_at(angle: Array, balls: Balls, lights: Lights, board: Board) -> Edge:
     return Edge(tangent_x - way * ray_x, tangent_y - way * ray_y, tangent_z - ground)
 
 
-def ball_derivatives(beam: Rays, balls: Balls, board: Board) -> Array:
-    """(..., 5) derivatives of D - R at the edge by x, y, z, radius and q of the ball.
-
-    By q: every height shrinks together, so the closest point moves by ``-D n_z / q`` along z and D by ``-D n_z^2 / q``.
-    """
-    rise = beam.outward_z / balls.q
-    by_x, by_y = -beam.outward_x, -beam.outward_y
-    if not board.is_flat:
-        slope_x, slope_y = board.slopes(balls.x, balls.y)
-        by_x, by_y = by_x - rise * slope_x, by_y - rise * slope_y
-    return np.stack([by_x, by_y, -rise, np.full(rise.shape, -1.0), -beam.distance * beam.outward_z * rise], axis=-1)
-
-
 def light_derivatives(beam: Rays, balls: Balls, tangents: tuple[Array, Array]) -> Array:
     """(..., 2) derivatives of D by turning each light along its two tangents, in radians.
 
@@ -292,11 +277,3 @@ def light_derivatives(beam: Rays, balls: Balls, tangents: tuple[Array, Array]) -
         for way in tangents
     ]
     return np.stack(parts, axis=-1)
-
-
-def board_derivatives(x: Array, y: Array, beam: Rays, balls: Balls) -> Array:
-    """(..., 5) derivatives of D by c1 to c5 of the board."""
-    rise = beam.outward_z / balls.q
-    own = np.broadcast_to(height_terms(balls.x, balls.y), (*rise.shape, SHAPE_TERMS))
-    derivatives: Array = rise[..., None] * (beam.lever[..., None] * height_terms(x, y) - own)
-    return derivatives

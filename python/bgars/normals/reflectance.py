@@ -32,6 +32,7 @@ def add_reflectance(
     *,
     mask: NDArray[np.bool_] | None,
     free: NDArray[np.bool_] | None = None,
+    wanted: NDArray[np.bool_] | None = None,
     material: SurfaceMaterial | None = None,
     threads: int | None = None,
     progress: Callable[[float], object] | None = None,
@@ -50,6 +51,8 @@ def add_reflectance(
         Pixels to use.
     free : (H, W) bool, optional
         Pixels that may be of the same material without a known shape, such as a bridge; kept where it explains them.
+    wanted : (H, W) bool, optional
+        Pixels, of those to use, whose normals are wanted; by default all.
     material : SurfaceMaterial, optional
         A material that was fitted before; by default it is fitted to the balls.
     threads, progress
@@ -65,6 +68,7 @@ def add_reflectance(
         mask=mask,
         circles=np.ascontiguousarray(circles_px, np.float64),
         free=None if free is None else np.ascontiguousarray(free),
+        wanted=wanted,
         material=material,
         threads=threads,
         progress=progress,

@@ -18,7 +18,7 @@ from bgars.io.part_recipe import read_part_recipe
 from bgars.io.provenance import capture_files, checksums
 from bgars.normals.methods import DEFAULT_METHOD, Method
 from bgars.pipelines.check import check_before
-from bgars.pipelines.normals import estimate_normals
+from bgars.pipelines.normals import ball_normals, estimate_normals
 from bgars.pipelines.part_surface import part_surface
 from bgars.records.circle_pixels import inside_circles
 from bgars.records.part_material import part_material
@@ -43,6 +43,8 @@ __all__ = ["inspect"]
 InspectionStage = Literal["find", "measure", "judge", "surface"]
 BOARD_STEP = 4
 """Every so many rows and columns of the board give it its first shape."""
+TOPS = 0.84
+"""Share of a ball's radius within which its normals are wanted: flat tops are looked for within 0.8."""
 LAYOUT = "layout: "
 """What a complaint of the finder about a recipe begins with; its keys have the same names in the file."""
 MATERIAL_UNUSED = "material.file of the recipe is not used by method {method}"
@@ -116,7 +118,7 @@ def inspect(
         found = _found(capture, recipe, threads, report)
         report("find", 1.0)
         board = started.result()
-        measurement, field = _measured(capture, found, board, method, material, recipe, threads, report)
+        measurement, field = _measured(capture, found, board, method, material, recipe, threads, report, surface)
     report("measure", 1.0)
     files = capture_files(capture) + (() if recipe is None or recipe.file is None else (recipe.file,))
     result = judge_part(
@@ -187,6 +189,7 @@ def _measured(
     recipe: PartRecipe | None,
     threads: int | None,
     report: Callable[[InspectionStage, float], None],
+    surface: bool,
 ) -> tuple[BallMeasurement, NormalField | None]:
     """Measure the balls; their normals are made beside the fit of the shadows, which needs only those of the board.
 
@@ -197,7 +200,9 @@ def _measured(
     balls = inside_circles(((ball.x_px, ball.y_px, ball.radius_px + 1.0) for ball in found.balls), capture.mask.shape)
     if not (balls & capture.mask).any():
         return measure_balls(capture, found, field=field, threads=threads), None
-    anchors = found if method == "reflectance" else None
+    # Nothing but flat tops needs them; a little more of each ball, because its shadows may see another radius.
+    tops = [(ball.x_px, ball.y_px, TOPS * ball.radius_px + 1.0) for ball in found.balls]
+    wanted = None if surface else inside_circles(tops, capture.mask.shape)
     roundness = (
         None
         if recipe is None or recipe.aspect_ratio is None or recipe.u_aspect_ratio is None
@@ -205,13 +210,7 @@ def _measured(
     )
     with ThreadPoolExecutor(1) as background:
         normals = background.submit(
-            estimate_normals,
-            capture,
-            method=method,
-            mask=balls,
-            anchors=anchors,
-            material=material,
-            threads=threads,
+            ball_normals, capture, found, balls, wanted=wanted, method=method, material=material, threads=threads
         )
         measurement = measure_balls(
             capture,

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from bgars.records.capture import Capture
     from bgars.records.surface_material import SurfaceMaterial
 
-__all__ = ["RUNNERS", "estimate_normals"]
+__all__ = ["RUNNERS", "ball_normals", "estimate_normals"]
 
 CIRCLE_VALUES = 3
 RIM_PX = 0.01
@@ -145,6 +145,24 @@ def estimate_normals(
     return found if is_own else _within(replace(given_field(found, capture, method), method=method), use)
 
 
+def ball_normals(
+    capture: Capture,
+    found: FoundBalls,
+    mask: NDArray[np.bool_],
+    *,
+    wanted: NDArray[np.bool_] | None,
+    method: Method,
+    material: SurfaceMaterial | None,
+    threads: int | None,
+) -> NormalField:
+    """Normals of balls by a method; of ``reflectance``, which learns from all pixels of `mask`, only those wanted."""
+    if method != "reflectance":
+        return estimate_normals(capture, method=method, mask=mask, threads=threads)
+    capture = capture_of(capture, None, None, None, threads, needs_full_scale=True)
+    use = combined_mask(capture, mask)
+    return _by_reflectance(capture, mask=use, wanted=wanted, anchors=found, material=material, threads=threads)
+
+
 def _refuse_idle(method: Method, given: dict[str, object]) -> None:
     """Raise InputError where an option is given that the method has no use for."""
     for option, value in given.items():
@@ -173,6 +191,7 @@ def _by_reflectance(
     capture: Capture,
     *,
     mask: NDArray[np.bool_] | None = None,
+    wanted: NDArray[np.bool_] | None = None,
     anchors: FoundBalls | ArrayLike | None = None,
     material: SurfaceMaterial | None = None,
     keep_sets: bool = False,
@@ -223,6 +242,7 @@ def _by_reflectance(
         circles_px,
         mask=use,
         free=free,
+        wanted=wanted,
         material=material,
         threads=threads,
         progress=part(0.5, 1.0),

@@ -58,6 +58,10 @@ mod _bgars {
     #[pymodule_export]
     use crate::shadows::draw_shadows;
     #[pymodule_export]
+    use crate::shadows::edge_products;
+    #[pymodule_export]
+    use crate::shadows::edge_rows;
+    #[pymodule_export]
     use crate::shadows::measure_edges;
     #[pymodule_export]
     use crate::shadows::normal_distribution;

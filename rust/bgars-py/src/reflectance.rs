@@ -78,7 +78,7 @@ impl GivenMaterial {
 }
 
 #[pyfunction]
-#[pyo3(signature = (capture, *, mask, circles, free, material, threads, progress, out))]
+#[pyo3(signature = (capture, *, mask, circles, free, wanted, material, threads, progress, out))]
 #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)]
 pub fn estimate_reflectance<'py>(
     py: Python<'py>,
@@ -86,6 +86,7 @@ pub fn estimate_reflectance<'py>(
     mask: Option<PyReadonlyArray2<'py, bool>>,
     circles: PyReadonlyArray2<'py, f64>,
     free: Option<PyReadonlyArray2<'py, bool>>,
+    wanted: Option<PyReadonlyArray2<'py, bool>>,
     material: Option<GivenMaterial>,
     threads: Option<i64>,
     progress: Option<Py<PyAny>>,
@@ -104,6 +105,7 @@ pub fn estimate_reflectance<'py>(
         mask: mask.as_ref().map(|mask| slice2(mask, "mask")).transpose()?,
         circles: &circles,
         free: free.as_ref().map(|free| slice2(free, "free")).transpose()?,
+        wanted: wanted.as_ref().map(|wanted| slice2(wanted, "wanted")).transpose()?,
         material: material.as_ref(),
     };
     let out = out.as_map()?;

@@ -1,16 +1,22 @@
-//! `draw_shadows`, `measure_edges`, `normal_distribution`.
+//! `draw_shadows`, `measure_edges`, `edge_rows`, `edge_products`, `normal_distribution`.
 
 use std::ops::ControlFlow;
 
 use bgars_core::normal_distribution::{self as distribution, FEW_VALUES};
 use bgars_core::shadows::model::{Ball, Board, Lamp};
-use bgars_core::shadows::{EdgeSettings, Edges, Margins, STRETCH_FIELDS, Silhouettes, Stretch};
+use bgars_core::shadows::{
+    COLUMNS, EdgeSettings, Edges, LightState, Margins, STRETCH_FIELDS, Silhouettes, Stretch, TERMS, WAVES,
+};
 use bgars_core::{ImageStack, Lights, Pixel, Radiometry, shadows};
-use numpy::{PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArray4, PyUntypedArrayMethods};
+use numpy::{
+    PyArray2, PyArray3, PyArray4, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArray4, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
 use crate::capture::{Capture, Work};
-use crate::convert::{array2, array3, check_count, check_most, check_room, rows, slice2, slice3, slice4, triples};
+use crate::convert::{
+    array2, array3, array4, check_count, check_most, check_room, rows, slice2, slice3, slice4, triples,
+};
 use crate::errors::InputError;
 use crate::progress::on_threads;
 
@@ -132,6 +138,54 @@ pub fn measure_edges<'py>(
     let numbers = edges.stretches.iter().flat_map(Stretch::numbers).collect();
     let shape = [balls_count, lights * sectors, STRETCH_FIELDS];
     Ok((array3(py, numbers, shape)?, array2(py, edges.noise, [balls_count, lights])?))
+}
+
+/// Rows (N, L, S, columns) of the points (N, L, S).
+#[pyfunction]
+#[pyo3(signature = (x, y, casters, *, turns, shifts_px, waves_px))]
+#[allow(clippy::needless_pass_by_value)]
+pub fn edge_rows<'py>(
+    py: Python<'py>,
+    x: PyReadonlyArray3<'py, f64>,
+    y: PyReadonlyArray3<'py, f64>,
+    casters: Casters<'py>,
+    turns: PyReadonlyArray2<'py, f64>,
+    shifts_px: PyReadonlyArray2<'py, f64>,
+    waves_px: [f64; WAVES],
+) -> PyResult<Bound<'py, PyArray4<f64>>> {
+    let (balls, lamps, board) = (casters.balls()?, casters.lamps()?, Board(casters.board));
+    let (turns, shifts) = (rows::<f64, 6>(&turns, "turns")?, rows::<f64, 2>(&shifts_px, "shifts_px")?);
+    let shape = [balls.len(), lamps.len(), x.shape()[2]];
+    if x.shape() != shape || y.shape() != shape || turns.len() != lamps.len() || shifts.len() != lamps.len() {
+        return Err(InputError::new_err(format!(
+            "x, y, turns, shifts_px: must fit the {} balls and {} lights of casters",
+            balls.len(),
+            lamps.len()
+        )));
+    }
+    let lights: Vec<_> = (lamps.into_iter().zip(turns).zip(shifts))
+        .map(|((lamp, &[a, b, c, d, e, f]), &shift)| LightState { lamp, ways: [[a, b, c], [d, e, f]], shift })
+        .collect();
+    let places = [slice3(&x, "x")?, slice3(&y, "y")?];
+    let rows = py.detach(|| shadows::edge_rows(places, &balls, &lights, &board, waves_px));
+    array4(py, rows.into_flattened(), [shape[0], shape[1], shape[2], COLUMNS])
+}
+
+/// Products (N, L, T + 1, T + 1) of the rows of `edge_rows`, weighted (N, L, S).
+#[pyfunction]
+#[allow(clippy::needless_pass_by_value)]
+pub fn edge_products<'py>(
+    py: Python<'py>,
+    rows: PyReadonlyArray4<'py, f64>,
+    weights: PyReadonlyArray3<'py, f64>,
+) -> PyResult<Bound<'py, PyArray4<f64>>> {
+    let [balls, lights, points] = [rows.shape()[0], rows.shape()[1], rows.shape()[2]];
+    if rows.shape()[3] != COLUMNS || points == 0 || weights.shape() != [balls, lights, points] {
+        return Err(InputError::new_err("rows, weights: must have shapes (N, L, S, columns) and (N, L, S)"));
+    }
+    let (rows, weights) = (slice4(&rows, "rows")?.as_chunks().0, slice3(&weights, "weights")?);
+    let products = py.detach(|| shadows::edge_products(rows, weights, points));
+    array4(py, products, [balls, lights, TERMS + 1, TERMS + 1])
 }
 
 #[pyfunction]

@@ -60,6 +60,8 @@ pub struct Request<'a> {
     pub circles: &'a [Circle],
     /// Pixels of the same material without a known shape, such as a bridge between two balls; `None` for none.
     pub free: Option<&'a [bool]>,
+    /// Pixels, among those to use, whose normals are written; `None` for all. What is learnt does not depend on it.
+    pub wanted: Option<&'a [bool]>,
     /// A material that was fitted before; `None`: fit it on the balls.
     pub material: Option<&'a Material>,
 }
@@ -151,7 +153,7 @@ impl Findings {
 /// }
 /// let stack = ImageStack::new(&images, 6, 24, 24)?;
 /// let mut map = NormalMap::zeros(24 * 24, 0);
-/// let request = Request { mask: None, circles: &[circle], free: None, material: None };
+/// let request = Request { mask: None, circles: &[circle], free: None, wanted: None, material: None };
 /// let proceed = &mut |_| std::ops::ControlFlow::Continue(());
 /// let found = estimate_into(&stack, &lights, &Radiometry::linear(6, 255.0), request, proceed, map.as_mut())?;
 /// assert!(found.accepted && (found.material.diffuse - 120.0).abs() < 1.0);
@@ -231,6 +233,9 @@ fn estimate_readings(
     report(0.4)?;
     spread = regions.learn_deviations(&spread);
     report(0.5)?;
+    if let Some(wanted) = request.wanted {
+        regions.all.iter_mut().for_each(|region| region.pixels.retain(|&pixel| wanted[pixel]));
+    }
     regions.estimate(&spread, &mut out, &mut |done| report(0.5 + 0.5 * done))?;
     let known = &regions.all[..balls];
     Ok(Findings {
@@ -292,7 +297,7 @@ fn fitted(request: &Request<'_>, inside: &[Vec<usize>], core: &[Vec<usize>], sam
 }
 
 fn check<P: Pixel>(capture: &Capture<'_, P>, lights: &Lights, request: &Request<'_>) -> Result<()> {
-    capture.check(lights, &[("mask", request.mask), ("free", request.free)])?;
+    capture.check(lights, &[("mask", request.mask), ("free", request.free), ("wanted", request.wanted)])?;
     if lights.len() < MIN_LIGHTS {
         return Err(Error::OutOfRange {
             argument: "lights",

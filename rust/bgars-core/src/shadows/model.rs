@@ -79,6 +79,10 @@ pub struct Ray {
     pub along: f64,
     /// 1 - along / (way to the lamp); 1 for distant lights.
     pub lever: f64,
+    /// How far the closest point moves when the vector of the light changes by 1.
+    pub turn: f64,
+    /// Unit vector from the centre of the ball to the closest point.
+    pub outward: [f64; 3],
     /// Gradient of D on the board.
     pub gradient: [f64; 2],
     /// Unit vector to the light.
@@ -199,11 +203,12 @@ impl<'a> Shadow<'a> {
         let foot = [0, 1, 2].map(|axis| across[axis] + along * toward[axis]);
         let distance = norm(foot);
         let outward = foot.map(|part| part / distance.max(1e-9));
-        let lever = if self.lamp.near { 1.0 - along * inverse } else { 1.0 };
+        let turn = along * inverse;
+        let lever = if self.lamp.near { 1.0 - turn } else { 1.0 };
         let (slope_x, slope_y) = board.slopes(x, y);
         let rise = outward[2] / ball.q;
         let gradient = [lever * (outward[0] + rise * slope_x), lever * (outward[1] + rise * slope_y)];
-        Ray { distance, along, lever, gradient, toward }
+        Ray { distance, along, lever, turn, outward, gradient, toward }
     }
 
     /// Constants of the distance around a point of the edge, whose ray is `ray`.
