@@ -39,6 +39,8 @@ BETTER = 0.8
 """Ratio of misfits from which down on another table counts as better: a fifth of all that does not fit comes from the
 given one. That it is no chance is for the test over tiles to say."""
 TINY = 1e-9
+TURNS = 3
+"""Usual mistakes, one after the other, that make any turn or mirror of a ring."""
 SUSPECTS = 3
 """Images that are tried as swapped, each with all others."""
 MATT = 0.1
@@ -107,8 +109,11 @@ def judge_table(view: View) -> Verdict:
         return usual
     # Right up to a turn or a mirror of the whole table, which the usual mistakes tell apart.
     table = again.lights[order]
-    turned = _judge_usual(view.with_lights(table)).better
-    table = table if turned is None else turned.lights
+    for _ in range(TURNS):
+        turned = _judge_usual(view.with_lights(table)).better
+        if turned is None:
+            break
+        table = turned.lights
     return _judge_order(view, table, usual)
 
 

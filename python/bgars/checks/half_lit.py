@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars.checks.matt_fit import MIN_LIGHTS, promised
 from bgars.records.findings import Finding
 
 if TYPE_CHECKING:
@@ -17,14 +18,16 @@ __all__ = ["check_half_lit"]
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-STEP = 0.08
-"""Step of brightness along the rows, natural logarithm, that is told."""
+STEP = 0.2
+"""Step of brightness along the rows, natural logarithm, that is told: light on either side of it may be off its promise
+by a tenth, which highlights and light from neighbours leave (`geometry.MATT`)."""
 BESIDE = 4
 """Rows of the small copy on either side of a step."""
 STANDS_OUT = 8.0
 """Robust standard deviations of such steps over all rows of all images: shading and texture make them, too."""
-OF_OTHERS = 3.0
-"""Times the usual step of the other images at the same place: edges of parts are where they are in all."""
+OF_OTHERS = 1.5
+"""Times the largest step of the other images at the same place: edges and highlights of a part are in several, and what
+one image lacks is missing in the promise of the others, but by a share of it."""
 TRIED = 20
 """Places of an image, of the largest steps, that are looked at."""
 LASTS = 0.6
@@ -63,7 +66,7 @@ def check_half_lit(view: View) -> list[Finding]:
     """Find frames with a step along rows or columns, or with rows that belong to the image before or after."""
     found = []
     for axis, word in ((1, "row"), (2, "column")):
-        steps = _steps(view, axis)
+        steps = _steps(view, axis) if len(view.lights) > MIN_LIGHTS else []
         if not steps:
             continue
         index = int(np.argmax([abs(step.size) * (step.score > STANDS_OUT) for step in steps]))
@@ -90,8 +93,11 @@ def check_half_lit(view: View) -> list[Finding]:
 
 def _steps(view: View, axis: int) -> list[Step]:
     """The largest step of each image along rows (axis 1) or columns (axis 2)."""
+    promise = promised(view)
     usual = np.median(view.values, axis=0)
-    ratio, use = (view.values / np.maximum(usual, np.float32(1e-6))).astype(np.float64), view.use
+    # Shading and shadows on the side away from the light are in the promise: what steps there is no shutter.
+    ratio = np.where(promise > LIT * usual, view.values / np.maximum(promise, 1e-6), np.nan)
+    use = view.use
     if axis == 2:  # noqa: PLR2004 - columns
         ratio, use = ratio.transpose(0, 2, 1), use.T
     ratio, use = _pooled(ratio, use)
@@ -102,7 +108,7 @@ def _steps(view: View, axis: int) -> list[Step]:
     count = len(use)
     if count < 4 * BESIDE:
         return []
-    change = _changes(ratio, use)
+    change = _sharp(_changes(ratio, use))
     jump = np.array([_medians(each) for each in change])
     known = np.isfinite(jump).any(axis=0)
     if known.mean() < 0.5:  # noqa: PLR2004 - most rows are empty
@@ -112,10 +118,10 @@ def _steps(view: View, axis: int) -> list[Step]:
     steps = []
     for index, own in enumerate(jump):
         others = np.abs(np.delete(jump, index, axis=0))
-        usual_step = np.nan_to_num(np.nanmedian(others, axis=0)) if len(others) else np.zeros_like(own)
+        largest = np.nan_to_num(others).max(axis=0)
         found = Step(0.0, 0.0, 0.0)
         sizes = np.nan_to_num(np.abs(own))
-        clear = (sizes >= max(STEP, STANDS_OUT * spread)) & (sizes > OF_OTHERS * usual_step)
+        clear = (sizes >= max(STEP, STANDS_OUT * spread)) & (sizes > OF_OTHERS * largest)
         # Of the clearest first: shading and shadows make steps, too, which do not run through or do not last.
         for place in np.flatnonzero(clear)[np.argsort(-sizes[clear])][:TRIED]:
             size = float(own[place])
@@ -139,11 +145,19 @@ def _there(use: Mask) -> Array:
 
 
 def _pooled(ratio: Array, use: Mask) -> tuple[Array, Mask]:
-    """Means over `BESIDE` columns, which noise less, where all of them are used."""
+    """Means over `BESIDE` columns, which noise less, where half of them tell."""
     wide = use.shape[1] // BESIDE * BESIDE
     blocks = use[:, :wide].reshape(len(use), -1, BESIDE).all(axis=2)
-    means: Array = ratio[:, :, :wide].reshape(len(ratio), len(use), -1, BESIDE).mean(axis=3)
-    return means, np.asarray(blocks)
+    return _known_mean(ratio[:, :, :wide].reshape(len(ratio), len(use), -1, BESIDE), 3), np.asarray(blocks)
+
+
+def _known_mean(values: Array, axis: int) -> Array:
+    """Mean over an axis of what is known; NaN where less than half is."""
+    known = np.isfinite(values)
+    count = known.sum(axis=axis)
+    total = np.where(known, values, 0.0).sum(axis=axis)
+    mean: Array = np.where(2 * count >= values.shape[axis], total / np.maximum(count, 1), np.nan)
+    return mean
 
 
 def _changes(ratio: Array, use: Mask) -> Array:
@@ -157,14 +171,22 @@ def _changes(ratio: Array, use: Mask) -> Array:
     return change
 
 
+def _sharp(change: Array) -> Array:
+    """What of a change is abrupt: without what goes on before and after it, as shading of a curved surface does."""
+    apart = 2 * BESIDE
+    beside = np.full((2, *change.shape), np.nan)
+    beside[0, :, apart:] = change[:, :-apart]
+    beside[1, :, :-apart] = change[:, apart:]
+    known = np.isfinite(beside)
+    trend = np.where(known, beside, 0.0).sum(axis=0) / np.where(known.any(axis=0), known.sum(axis=0), np.nan)
+    sharp: Array = change - trend
+    return sharp
+
+
 def _means(values: Array, part: slice) -> Array:
-    """Means of `BESIDE` rows from each row on; NaN where one of them is."""
-    rows = values.shape[1] - BESIDE + 1
-    total = np.zeros((values.shape[0], rows, values.shape[2]))
-    for step in range(BESIDE):
-        total += values[:, step : step + rows]
-    means: Array = total[:, part] / BESIDE
-    return means
+    """Means of `BESIDE` rows from each row on."""
+    windows = np.lib.stride_tricks.sliding_window_view(values, BESIDE, axis=1)
+    return _known_mean(windows, 3)[:, part]
 
 
 def _medians(change: Array) -> Array:
@@ -181,10 +203,11 @@ def _overall(ratio: Array, use: Mask, place: int) -> float:
     """What is left of a step between all rows above and all below; median over the columns."""
     sides = []
     for part in (slice(None, place), slice(place, None)):
-        total = np.where(use[part], ratio[part], 0.0).sum(axis=0)
-        sides.append(total / np.maximum(use[part].sum(axis=0), 1))
+        told = use[part] & np.isfinite(ratio[part])
+        total = np.where(told, ratio[part], 0.0).sum(axis=0)
+        sides.append(np.where(told.any(axis=0), total / np.maximum(told.sum(axis=0), 1), np.nan))
     above, below = sides
-    lit = (np.maximum(above, below) > LIT) & use[:place].any(axis=0) & use[place:].any(axis=0)
+    lit = np.maximum(above, below) > LIT
     return float(np.median(np.log(np.maximum(below[lit], 1e-3) / np.maximum(above[lit], 1e-3)))) if lit.any() else 0.0
 
 

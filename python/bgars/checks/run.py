@@ -90,7 +90,7 @@ def _between(capture: Capture, view: View, gone: list[int]) -> list[Finding]:
         return []
     found, lights = check_table(view)
     # A frame that is lit in part upsets all that follows, as it does the comparison of tables.
-    halves = check_half_lit(view)
+    halves = check_half_lit(view.with_lights(lights))
     if halves:
         return _renumbered(halves + [each for each in found if each.kind != "order"], kept)
     found += _single(capture, view, lights, kept)
