@@ -83,6 +83,31 @@ def test_cast_shadows_tell_a_half_turn(balls: bgars.Capture) -> None:
     assert kinds(with_lights(balls, balls.rig.directions * [-1, -1, 1])) == ["order"]
 
 
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_any_order_of_the_images_is_found(seed: int, relief: bgars.Capture) -> None:
+    order = np.random.default_rng(seed).permutation(8)
+    told = bgars.check(replace(relief, images=relief.images[order])).told
+    assert [each.kind for each in told] == ["order"]
+    # Image `i` shows light `order[i]`: the table fits the images in the order that undoes it, or, where nothing casts a
+    # shadow, in that after half a turn.
+    undone = np.argsort(order)
+    fitting = [", ".join(f"image {index}" for index in each) for each in (undone, np.roll(undone, 4))]
+    assert any(each in told[0].message for each in fitting)
+
+
+def test_one_line_of_the_table_with_a_wrong_sign(relief: bgars.Capture) -> None:
+    lights = relief.rig.directions.copy()
+    lights[1] *= [1, -1, 1]
+    told = bgars.check(with_lights(relief, lights)).told
+    assert told[0].image is None
+    assert "image 1 shows its light on the other side in y" in told[0].message
+
+
+def test_of_a_capture_that_is_clipped_nothing_else_is_said(balls: bgars.Capture) -> None:
+    bright = np.clip(balls.images * 30.0, 0, 255).astype(np.uint8)
+    assert kinds(with_lights(replace(balls, images=bright), balls.rig.directions * [1, -1, 1])) == ["clipped"]
+
+
 def spoilt(capture: bgars.Capture, index: int, change: object) -> bgars.Capture:
     levels = capture.images.astype(np.float64)
     levels[index] = change(levels)  # type: ignore[operator]
@@ -99,6 +124,15 @@ def rows_of_the_next(levels: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def rows_dark(levels: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate([levels[5, :90], 0.6 * levels[5, 90:]])
+
+
+def test_a_frame_lit_in_part_is_seen_through_cast_shadows(balls: bgars.Capture) -> None:
+    def half_dark(levels: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.concatenate([levels[5, :120], 0.3 * levels[5, 120:]])
+
+    told = bgars.check(spoilt(balls, 5, half_dark)).told
+    assert told[0].kind == "half-lit"
+    assert told[0].image == 5
 
 
 def noisy(levels: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -67,7 +67,7 @@ def shadow_floor(capture: Capture, lights: Array) -> ShadowFloor | None:
     gains = capture.rig.intensities.astype(np.float32)
     if len(gains) != len(lights):
         return None
-    shadows, lit, pairs = [], [], 0
+    shadows, shares, lit, pairs = [], [], [], 0
     for patch in cut_patches(capture):
         if min(patch.inside.shape) < BLOCK_PX:
             continue
@@ -77,7 +77,9 @@ def shadow_floor(capture: Capture, lights: Array) -> ShadowFloor | None:
         usual = np.quantile(levels, LIT_QUANTILE, axis=0, method="lower")
         used = np.isfinite(usual) & (usual > FAINT)
         levels, usual = levels[:, used], usual[used]
-        shadows.append((levels * gains[:, None])[_in_shadow(levels, usual, lights)])
+        shadowed = _in_shadow(levels, usual, lights)
+        shadows.append((levels * gains[:, None])[shadowed])
+        shares.append((levels * gains[:, None] / usual)[shadowed])
         lit.append(usual)
         pairs += levels.size
     if not lit or pairs == 0:
@@ -87,10 +89,18 @@ def shadow_floor(capture: Capture, lights: Array) -> ShadowFloor | None:
     if dark.size < MIN_SHARE * pairs or percent > MOST_LOW_PERCENT:
         return None
     percents = (percent, (percent * HIGH_PERCENT) ** 0.5, HIGH_PERCENT)
-    low, middle, high = (float(each) for each in np.percentile(dark, percents))
+    usual_lit = float(np.median(np.concatenate(lit)))
+    # Light in the lens is the same on all pixels; light on the part goes with what they reflect.
+    floor = max(_lower_end(dark, percents), usual_lit * _lower_end(np.concatenate(shares), percents))
+    return ShadowFloor(floor, usual_lit, int(dark.size))
+
+
+def _lower_end(values: Floats, percents: tuple[float, float, float]) -> float:
+    """Where a distribution begins, from three of its percentiles."""
+    low, middle, high = (float(each) for each in np.percentile(values, percents))
     bend = low + high - 2.0 * middle
     floor = (low * high - middle**2) / bend if bend > 0.0 else low - (high - low)
-    return ShadowFloor(min(floor, low), float(np.median(np.concatenate(lit))), int(dark.size))
+    return min(floor, low)
 
 
 def _in_shadow(levels: Floats, usual: Floats, lights: Array) -> Mask:

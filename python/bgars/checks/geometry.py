@@ -22,8 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.checks.evidence import critical_t, paired_t
-from bgars.checks.hypotheses import Hypothesis, alternatives
+from bgars.checks.hypotheses import Hypothesis, alternatives, reordered
 from bgars.checks.matt_fit import MIN_LIGHTS, STEEP, fit_normals, matt_lights
+from bgars.checks.reordered import TRIED, image_order
 from bgars.checks.view import TILES, tile_sums
 
 if TYPE_CHECKING:
@@ -38,6 +39,8 @@ BETTER = 0.8
 """Ratio of misfits from which down on another table counts as better: a fifth of all that does not fit comes from the
 given one. That it is no chance is for the test over tiles to say."""
 TINY = 1e-9
+TURNS = 3
+"""Usual mistakes, one after the other, that make any turn or mirror of a ring."""
 SUSPECTS = 3
 """Images that are tried as swapped, each with all others."""
 MATT = 0.1
@@ -89,7 +92,7 @@ class _Losses:
 
 
 def judge_table(view: View) -> Verdict:
-    """Compare the given table with the usual mistakes.
+    """Compare the given table with the usual mistakes, and with any other order of the lights.
 
     Parameters
     ----------
@@ -99,6 +102,38 @@ def judge_table(view: View) -> Verdict:
     -------
     Verdict
     """
+    usual = _judge_usual(view)
+    again = view if usual.better is None else view.with_lights(usual.better.lights)
+    order = image_order(again)
+    if order is None:
+        return usual
+    # Right up to a turn or a mirror of the whole table, which the usual mistakes tell apart.
+    table = again.lights[order]
+    for _ in range(TURNS):
+        turned = _judge_usual(view.with_lights(table)).better
+        if turned is None:
+            break
+        table = turned.lights
+    return _judge_order(view, table, usual)
+
+
+def _judge_order(view: View, table: Array, usual: Verdict) -> Verdict:
+    """Compare the given order of the lights with any other, which is believed where photometry is sure of it."""
+    evidence = _evidence(view)
+    if evidence is None:
+        return usual
+    given, other = _losses(evidence, view.lights, view.lights), _losses(evidence, view.lights, table)
+    weight = given.photometric + other.photometric
+    there = weight > 0.0
+    ratio = float(other.photometric.sum() / max(given.photometric.sum(), TINY))
+    t, count = paired_t((given.photometric - other.photometric)[there] / weight[there], weight[there])
+    if ratio >= BETTER or t < critical_t(count, TRIED):
+        return usual
+    return Verdict(reordered(view.lights, view.names, table), t, count, usual.losses)
+
+
+def _judge_usual(view: View) -> Verdict:
+    """Compare the given table with the usual mistakes."""
     evidence = _evidence(view)
     if evidence is None:
         return Verdict(None, 0.0, 0.0, (0.0, 0.0))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars.checks.matt_fit import MIN_LIGHTS, promised
 from bgars.records.findings import Finding
 
 if TYPE_CHECKING:
@@ -17,16 +18,26 @@ __all__ = ["check_half_lit"]
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-STEP = 0.08
-"""Step of brightness along the rows, natural logarithm, that is told."""
+STEP = 0.2
+"""Step of brightness along the rows, natural logarithm, that is told: light on either side of it may be off its promise
+by a tenth, which highlights and light from neighbours leave (`geometry.MATT`)."""
 BESIDE = 4
 """Rows of the small copy on either side of a step."""
 STANDS_OUT = 8.0
 """Robust standard deviations of such steps over all rows of all images: shading and texture make them, too."""
+OF_OTHERS = 1.5
+"""Times the largest step of the other images at the same place: edges and highlights of a part are in several, and what
+one image lacks is missing in the promise of the others, but by a share of it."""
+TRIED = 20
+"""Places of an image, of the largest steps, that are looked at."""
 LASTS = 0.6
 """Share of a step that is left between all rows above and all below."""
 AGREEING = 0.7
 """Share of the columns in which a step of the shutter must be seen for itself: it runs straight across the image."""
+LIT = 0.4
+"""Of a pixel's usual light, from which on it is lit: shadows show no light that could change."""
+SEEN = 0.3
+"""Share of the most columns that tell of any row, from which on a row is judged."""
 BANDS = 24
 MIN_BANDS = 4
 """Bands, of `BANDS`, that must show another light, and that must not."""
@@ -55,7 +66,7 @@ def check_half_lit(view: View) -> list[Finding]:
     """Find frames with a step along rows or columns, or with rows that belong to the image before or after."""
     found = []
     for axis, word in ((1, "row"), (2, "column")):
-        steps = _steps(view, axis)
+        steps = _steps(view, axis) if len(view.lights) > MIN_LIGHTS else []
         if not steps:
             continue
         index = int(np.argmax([abs(step.size) * (step.score > STANDS_OUT) for step in steps]))
@@ -82,68 +93,122 @@ def check_half_lit(view: View) -> list[Finding]:
 
 def _steps(view: View, axis: int) -> list[Step]:
     """The largest step of each image along rows (axis 1) or columns (axis 2)."""
+    promise = promised(view)
     usual = np.median(view.values, axis=0)
-    ratio = view.values / np.maximum(usual, np.float32(1e-6))
-    profiles = np.array([_profile(image, view.use, axis) for image in ratio])
-    if profiles.shape[1] < 4 * BESIDE or np.isnan(profiles).mean() > 0.5:  # noqa: PLR2004 - most rows are empty
+    # Shading and shadows on the side away from the light are in the promise: what steps there is no shutter.
+    ratio = np.where(promise > LIT * usual, view.values / np.maximum(promise, 1e-6), np.nan)
+    use = view.use
+    if axis == 2:  # noqa: PLR2004 - columns
+        ratio, use = ratio.transpose(0, 2, 1), use.T
+    ratio, use = _pooled(ratio, use)
+    rows, length = np.flatnonzero(use.any(axis=1)), len(use)
+    if len(rows) < 4 * BESIDE:
         return []
-    profiles = np.log(np.maximum(profiles, 1e-3))
-    profiles = profiles - np.nanmedian(profiles, axis=1, keepdims=True)
-    known = np.isfinite(profiles).all(axis=0)
-    profiles = profiles[:, known]
-    count = profiles.shape[1]
+    ratio, use = ratio[:, rows[0] : rows[-1] + 1], use[rows[0] : rows[-1] + 1]
+    count = len(use)
     if count < 4 * BESIDE:
         return []
-    jump = _jumps(profiles, 1)
-    at = np.arange(BESIDE, count - BESIDE + 1)
-    spread = 1.4826 * np.median(np.abs(jump - np.median(jump)))
+    change = _sharp(_changes(ratio, use))
+    jump = np.array([_medians(each) for each in change])
+    known = np.isfinite(jump).any(axis=0)
+    if known.mean() < 0.5:  # noqa: PLR2004 - most rows are empty
+        return []
+    spread = 1.4826 * float(np.nanmedian(np.abs(jump - np.nanmedian(jump))))
+    there = _there(use)
     steps = []
-    for index in range(len(profiles)):
-        best = int(np.argmax(np.abs(jump[index])))
-        size, place = float(jump[index, best]), int(at[best])
-        overall = float(np.median(profiles[index, place:]) - np.median(profiles[index, :place]))
-        lasting = abs(overall) >= LASTS * abs(size) and overall * size > 0
-        score = abs(size) / max(float(spread), 1e-4)
-        if not lasting or score < STANDS_OUT or _agreeing(ratio[index], view.use, axis, known, place, size) < AGREEING:
-            score = 0.0
-        steps.append(Step(size, place / count, score))
+    for index, own in enumerate(jump):
+        others = np.abs(np.delete(jump, index, axis=0))
+        largest = np.nan_to_num(others).max(axis=0)
+        found = Step(0.0, 0.0, 0.0)
+        sizes = np.nan_to_num(np.abs(own))
+        clear = (sizes >= max(STEP, STANDS_OUT * spread)) & (sizes > OF_OTHERS * largest)
+        # Of the clearest first: shading and shadows make steps, too, which do not run through or do not last.
+        for place in np.flatnonzero(clear)[np.argsort(-sizes[clear])][:TRIED]:
+            size = float(own[place])
+            agree = change[index, place] / size
+            told = np.isfinite(agree)
+            agreeing = float(((agree > 0.5) & (agree < 2.0)).sum() / told.sum()) * there[place]  # noqa: PLR2004 - a factor of two
+            overall = _overall(ratio[index], use, int(place) + BESIDE)
+            if agreeing >= AGREEING and abs(overall) >= LASTS * abs(size) and overall * size > 0:
+                where = float(rows[0] + place + BESIDE) / length
+                found = Step(size, where, abs(size) / max(spread, 1e-4))
+                break
+        steps.append(found)
     return steps
 
 
-def _jumps(profiles: Array, axis: int) -> Array:
-    """Means of `BESIDE` values after each place, less those of as many before it."""
-    padded = np.cumsum(np.insert(profiles, 0, 0.0, axis=axis), axis=axis)
-    count = profiles.shape[axis]
-    at = np.arange(BESIDE, count - BESIDE + 1)
-    after, here, before = (np.take(padded, at + offset, axis=axis) for offset in (BESIDE, 0, -BESIDE))
-    difference: Array = (after - 2.0 * here + before) / BESIDE
-    return difference
+def _there(use: Mask) -> Array:
+    """(places,) share of the columns that the part has which it has on both sides of each place."""
+    whole = np.array([use[at : at + 2 * BESIDE].all(axis=0).sum() for at in range(len(use) - 2 * BESIDE + 1)])
+    share: Array = whole / max(int(use.any(axis=0).sum()), 1)
+    return share
 
 
-def _agreeing(ratio: NDArray[np.float32], use: Mask, axis: int, known: Mask, place: int, size: float) -> float:
-    """Share of the columns (of an axis of rows) whose own step at one place is half to twice as large."""
-    turned, used = (ratio, use) if axis == 1 else (ratio.T, use.T)
-    turned, used = turned[known], used[known]
-    rows = slice(place - BESIDE, place + BESIDE)
-    whole = used[rows].all(axis=0)
-    if whole.sum() < 2 * BESIDE:
-        return 0.0
-    logs = np.log(np.maximum(turned[rows][:, whole], 1e-3))
-    own = (np.median(logs[BESIDE:], axis=0) - np.median(logs[:BESIDE], axis=0)) / size
-    # Columns without anything to see on this side of the part do not count for it either.
-    return float(((own > 0.5) & (own < 2.0)).sum() / max(used.any(axis=0).sum(), 1))  # noqa: PLR2004 - a factor of two
+def _pooled(ratio: Array, use: Mask) -> tuple[Array, Mask]:
+    """Means over `BESIDE` columns, which noise less, where half of them tell."""
+    wide = use.shape[1] // BESIDE * BESIDE
+    blocks = use[:, :wide].reshape(len(use), -1, BESIDE).all(axis=2)
+    return _known_mean(ratio[:, :, :wide].reshape(len(ratio), len(use), -1, BESIDE), 3), np.asarray(blocks)
 
 
-def _profile(image: NDArray[np.float32], use: Mask, axis: int) -> Array:
-    """Median of each row (axis 1) or column (axis 2), NaN where hardly anything is used."""
-    across = 1 if axis == 1 else 0
-    enough = use.mean(axis=across) > 0.3  # noqa: PLR2004 - a third of the row
-    profile = np.full(len(enough), np.nan)
+def _known_mean(values: Array, axis: int) -> Array:
+    """Mean over an axis of what is known; NaN where less than half is."""
+    known = np.isfinite(values)
+    count = known.sum(axis=axis)
+    total = np.where(known, values, 0.0).sum(axis=axis)
+    mean: Array = np.where(2 * count >= values.shape[axis], total / np.maximum(count, 1), np.nan)
+    return mean
+
+
+def _changes(ratio: Array, use: Mask) -> Array:
+    """(L, places, columns) logarithm of what follows on each place over what is before it, NaN where nothing is lit.
+
+    Each column is compared with itself: a step of the shutter runs through all, edges of shadows through a few.
+    """
+    before, after = (_means(np.where(use, ratio, np.nan), part) for part in (slice(None, -BESIDE), slice(BESIDE, None)))
+    lit = np.maximum(before, after) > LIT
+    change: Array = np.where(lit, np.log(np.maximum(after, 1e-3) / np.maximum(before, 1e-3)), np.nan)
+    return change
+
+
+def _sharp(change: Array) -> Array:
+    """What of a change is abrupt: without what goes on before and after it, as shading of a curved surface does."""
+    apart = 2 * BESIDE
+    beside = np.full((2, *change.shape), np.nan)
+    beside[0, :, apart:] = change[:, :-apart]
+    beside[1, :, :-apart] = change[:, apart:]
+    known = np.isfinite(beside)
+    trend = np.where(known, beside, 0.0).sum(axis=0) / np.where(known.any(axis=0), known.sum(axis=0), np.nan)
+    sharp: Array = change - trend
+    return sharp
+
+
+def _means(values: Array, part: slice) -> Array:
+    """Means of `BESIDE` rows from each row on."""
+    windows = np.lib.stride_tricks.sliding_window_view(values, BESIDE, axis=1)
+    return _known_mean(windows, 3)[:, part]
+
+
+def _medians(change: Array) -> Array:
+    """(places,) median over the columns, NaN where few of them tell."""
+    told = np.isfinite(change)
+    enough = told.sum(axis=1) >= max(SEEN * told.sum(axis=1).max(initial=0), 4)
+    medians = np.full(len(change), np.nan)
     if enough.any():
-        masked = np.where(use, image, np.nan)
-        chosen = masked[enough] if axis == 1 else masked[:, enough]
-        profile[enough] = np.nanmedian(chosen, axis=across)
-    return profile
+        medians[enough] = np.nanmedian(change[enough], axis=1)
+    return medians
+
+
+def _overall(ratio: Array, use: Mask, place: int) -> float:
+    """What is left of a step between all rows above and all below; median over the columns."""
+    sides = []
+    for part in (slice(None, place), slice(place, None)):
+        told = use[part] & np.isfinite(ratio[part])
+        total = np.where(told, ratio[part], 0.0).sum(axis=0)
+        sides.append(np.where(told.any(axis=0), total / np.maximum(told.sum(axis=0), 1), np.nan))
+    above, below = sides
+    lit = np.maximum(above, below) > LIT
+    return float(np.median(np.log(np.maximum(below[lit], 1e-3) / np.maximum(above[lit], 1e-3)))) if lit.any() else 0.0
 
 
 def _late(view: View) -> list[Finding]:

@@ -13,12 +13,19 @@ if TYPE_CHECKING:
 
     from bgars.records.findings import Kind
 
-__all__ = ["Hypothesis", "alternatives"]
+__all__ = ["Hypothesis", "alternatives", "reordered"]
 
 Array = NDArray[np.float64]
 
 SAME = 0.1
 """Largest distance of unit vectors of tables that are the same: 6 degrees, see `geometry.LINEAR`."""
+NAMED = 12
+ONE_TURNED = (
+    ("x", "mirrored left to right", (-1.0, 1.0, 1.0)),
+    ("y", "mirrored top to bottom", (1.0, -1.0, 1.0)),
+    ("x and y", "turned by 180 degrees", (-1.0, -1.0, 1.0)),
+)
+"""What a turn or a mirror of one image does to the light that it shows."""
 TURNS_DEG = (45.0, -45.0, 90.0, -90.0, 135.0, -135.0)
 
 
@@ -99,6 +106,7 @@ def alternatives(lights: Array, names: Sequence[str], suspects: Sequence[int]) -
         )
         for shift in sorted((each for each in range(-(count // 2), count // 2 + 1) if each), key=abs)
     ]
+    found += _one_turned(lights, names, suspects)
     pairs = {(min(one, two), max(one, two)) for one in suspects for two in range(count) if one != two}
     for first, second in sorted(pairs):
         order = np.arange(count)
@@ -121,6 +129,33 @@ def alternatives(lights: Array, names: Sequence[str], suspects: Sequence[int]) -
         for turn in TURNS_DEG
     ]
     return _distinct(lights, found)
+
+
+def _one_turned(lights: Array, names: Sequence[str], suspects: Sequence[int]) -> list[Hypothesis]:
+    """One image turned or mirrored, or one line of the table."""
+    return [
+        Hypothesis(
+            "orientation",
+            f"{names[index]} shows its light on the other side in {axes}: the image is {how}, or {axes} has the wrong "
+            "sign in its line of the table",
+            "turn the image back, or change the sign",
+            np.where(np.arange(len(lights))[:, None] == index, lights * np.array(signs), lights),
+        )
+        for index in suspects
+        for axes, how, signs in ONE_TURNED
+    ]
+
+
+def reordered(lights: Array, names: Sequence[str], table: Array) -> Hypothesis:
+    """The same lights in any other order: that of `table`."""
+    nearest = np.argmax(lights @ table.T, axis=1)
+    listed = ", ".join(names[index] for index in nearest[:NAMED]) + (", ..." if len(nearest) > NAMED else "")
+    return Hypothesis(
+        "order",
+        f"images and lights are not in the same order: the table of lights fits {listed}",
+        "list the images in that order (img2 comes before img10), or name the image of each light, as .lp files do",
+        table,
+    )
 
 
 def _images(shift: int) -> str:

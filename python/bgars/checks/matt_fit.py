@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from bgars.checks.view import View
 
-__all__ = ["MIN_LIGHTS", "STEEP", "MattFit", "fit_normals", "matt_lights"]
+__all__ = ["MIN_LIGHTS", "STEEP", "MattFit", "fit_normals", "matt_lights", "promised"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -22,6 +22,8 @@ DROPPED = 4
 DROPS_FROM = 6
 MIN_LIGHTS = 4
 """Lights of a pixel that takes part: one more than there are unknowns."""
+MOST_LEVERAGE = 0.9
+"""Of one light: where the others hardly fix the normal, they promise nothing."""
 COPLANAR = 1e-5
 """Determinant of the mean product of directions below which they lie in one plane, to about 5 degrees."""
 STEEP = 4.0
@@ -64,3 +66,25 @@ def fit_normals(values: Array, keep: Mask, lights: Array) -> MattFit:
     mean = (weight * values).sum(axis=0) / np.maximum(number, 1.0)
     left = weight * solved * (values - np.einsum("lk,kn->ln", lights, normal)) / np.maximum(mean, 1e-9)
     return MattFit(np.asarray(normal, np.float64), left, solved)
+
+
+def promised(view: View) -> Array:
+    """(L, h, w) light that the other images promise each image; NaN where they do not tell.
+
+    Least squares without one row, by the inverse with it (W. W. Hager, Updating the inverse of a matrix, SIAM Review 31
+    (1989), eq. 2).
+    """
+    lights, count = view.lights, len(view.lights)
+    keep = matt_lights(view).reshape(count, -1)
+    values = view.values.reshape(count, -1).astype(np.float64)
+    fit = fit_normals(values, keep, lights)
+    weight = keep.astype(np.float64)
+    products = (lights[:, :, None] * lights[:, None, :]).reshape(count, 9)
+    matrix = (weight.T @ products).reshape(-1, 3, 3)
+    matrix[~fit.solved] = np.eye(3)
+    leverage = weight * np.einsum("li,nij,lj->ln", lights, np.linalg.inv(matrix), lights, optimize=True)
+    told = lights @ fit.normal
+    known = fit.solved & (leverage < MOST_LEVERAGE)
+    without = told - leverage / np.maximum(1.0 - leverage, 1.0 - MOST_LEVERAGE) * (values - told)
+    promise: Array = np.where(known, without, np.nan).reshape(view.values.shape)
+    return promise

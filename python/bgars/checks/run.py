@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
 __all__ = ["check_capture"]
 
+MOST_CLIPPED = 0.5
+"""Share of the image that is overexposed from which on images are not compared with each other."""
 FEW_LIT = 200
 """Pixels of the small copy, lit and matt, below which single images are not judged."""
 
@@ -62,6 +64,8 @@ def check_capture(capture: Capture) -> Findings:
         return Findings.of(below + check_dark(view, inside))
     found = below + dead_lamps(view, inside) + check_bit_depth(capture)
     found += check_dark(view, inside) + check_clipped(view, inside)
+    if any(each.kind == "clipped" and (each.value or 0.0) > MOST_CLIPPED for each in found):
+        return Findings.of(found)  # what is clipped cannot be compared
     gone = [each.image for each in found if each.kind == "lamp-dead" and each.image is not None]
     found += _between(capture, view, gone)
     return Findings.of([_with_file(each, capture) for each in found])
@@ -86,7 +90,7 @@ def _between(capture: Capture, view: View, gone: list[int]) -> list[Finding]:
         return []
     found, lights = check_table(view)
     # A frame that is lit in part upsets all that follows, as it does the comparison of tables.
-    halves = check_half_lit(view)
+    halves = check_half_lit(view.with_lights(lights))
     if halves:
         return _renumbered(halves + [each for each in found if each.kind != "order"], kept)
     found += _single(capture, view, lights, kept)

@@ -122,8 +122,9 @@ def read_intensities(path: Path) -> NDArray[np.float64]:
 
 
 def read_filenames(path: Path) -> list[str]:
-    """Read image file names, one a line."""
-    names = [line.strip().strip('"') for line in read_text(path).splitlines() if line.strip()]
+    """Read image file names, one a line, plain or in quotes; a line that begins with ``# `` is a comment."""
+    lines = [line.strip() for line in read_text(path).splitlines()]
+    names = [line.strip("\"'") for line in lines if line and not line.startswith("# ")]
     if not names:
         msg = f"{path}: is empty; expected one image file name a line"
         raise FileFormatError(msg)

@@ -64,19 +64,24 @@ def need_regular(path: str | os.PathLike[str], what: str = "file") -> int:
     try:
         found = Path(path).stat()
     except FileNotFoundError as error:
-        msg = f"{shown(path)}: no such {what}"
+        is_link = Path(path).is_symlink()
+        msg = f"{shown(path)}: is a link to what is not there" if is_link else f"{shown(path)}: no such {what}"
         raise FileFormatError(msg) from error
     except OSError as error:
         msg = f"{shown(path)}: cannot be read ({error.strerror or error})"
         raise FileFormatError(msg) from error
     except ValueError as error:  # a NUL in the name
-        msg = f"{shown(path)}: is no possible name of a {what} ({error})"
+        msg = f"{shown(path)}: is no possible name of {_a(what)} ({error})"
         raise FileFormatError(msg) from error
     if not stat.S_ISREG(found.st_mode):
         kind = next((name for is_kind, name in KINDS.items() if is_kind(found.st_mode)), "no regular file")
-        msg = f"{shown(path)}: is {kind}, not a {what}"
+        msg = f"{shown(path)}: is {kind}, not {_a(what)}"
         raise FileFormatError(msg)
     return found.st_size
+
+
+def _a(what: str) -> str:
+    return f"an {what}" if what[:1] in "aeiou" else f"a {what}"
 
 
 def shown(path: str | os.PathLike[str]) -> str:
@@ -117,7 +122,7 @@ def read_bounded(path: str | os.PathLike[str], max_bytes: int = MAX_TEXT_BYTES, 
         if len(content) <= max_bytes:
             return content
         size = len(content)
-    msg = f"{path}: is larger than a {what} of this kind may be ({size} bytes, at most {max_bytes})"
+    msg = f"{path}: is larger than {_a(what)} of this kind may be ({size} bytes, at most {max_bytes})"
     raise FileFormatError(msg)
 
 

@@ -323,7 +323,7 @@ def _channel_gains(intensities: NDArray[np.float64]) -> FloatArray | None:
     """(L, 3) factors where red, green and blue differ in their lights, else None."""
     if intensities.shape[1] != RGB or np.allclose(intensities, intensities[:, :1], rtol=1e-6):
         return None
-    return (1.0 / intensities).astype(np.float32)
+    return np.ascontiguousarray(1.0 / intensities, dtype=np.float32)
 
 
 def _one_intensity(intensities: NDArray[np.float64], channel: ChannelName) -> NDArray[np.float64]:

@@ -82,9 +82,16 @@ def choose_images(
         return below
     msg = (
         f"{folder}: {len(images)} images ({some_of(images) or 'none found'}), but {lights.source} gives {count} lights"
-        f"; seen: {listing.in_words()}"
+        f"; seen: {listing.in_words(without_images=bool(images))}{_unread(listing, count)}"
     )
     raise InputError(msg)
+
+
+def _unread(listing: Listing, count: int) -> str:
+    """What to do with as many files as lights of an ending that no image has here."""
+    endings = [Path(name).suffix.lower() for name in listing.others]
+    unknown = next((ending for ending in endings if ending and endings.count(ending) == count), None)
+    return "" if unknown is None else f"; {unknown} is not read as images: convert them to PNG or TIFF"
 
 
 def _files_of(recipe: CaptureRecipe) -> set[str]:

@@ -11,6 +11,7 @@ import numpy as np
 from bgars.errors import FileFormatError, InputError
 from bgars.files.light_files import read_intensities, read_numbers
 from bgars.files.light_formats import LightTable, read_light_file
+from bgars.files.light_formats.angles import read_angle_table
 from bgars.files.light_names import light_name
 from bgars.io.recipe import RECIPE_NAME
 from bgars.records.rig import LightRig
@@ -100,7 +101,11 @@ def _rig(
     if lights.ring is not None:
         return LightRig.ring(**lights.ring.model_dump()), None, None
     if lights.angles_deg is not None:
-        angles = read_numbers(path, (2,), "azimuth and elevation in degrees") if path is not None else lights.angles_deg
+        of_angles = None if path is None or path.suffix.lower() == ".npy" else read_angle_table(path)
+        if path is not None and of_angles is not None:
+            notes.extend(f"{path.name}: {note}" for note in of_angles.notes)
+            return LightRig.from_directions(of_angles.vectors, files=of_angles.files), None, None
+        angles = lights.angles_deg if path is None else read_numbers(path, (2,), "azimuth and elevation in degrees")
         return LightRig.from_angles(angles), None, None
     if path is None:
         table = LightTable(np.array(lights.directions or lights.positions_mm, dtype=np.float64).reshape(-1, 3))

@@ -83,8 +83,11 @@ NOT_READ = {
     b"\0\0\0\x0cJXL ": "JPEG XL",
     b"<svg": "SVG",
     b"<?xml": "XML",
+    b"<!DOCTYPE": "a web page",
+    b"<html": "a web page",
 }
 """Formats that are recognised in order to name them."""
+LFS_POINTER = b"version https://git-lfs"
 
 
 def format_of(path: Path) -> ImageFormat:
@@ -111,6 +114,9 @@ def format_of(path: Path) -> ImageFormat:
     name = next((name for magic, name in NOT_READ.items() if head.startswith(magic)), None)
     if head[4:8] == b"ftyp":
         name = "HEIF, AVIF or a film"
+    if head.startswith(LFS_POINTER):
+        msg = f"{path}: cannot be decoded as an image (it only names one that Git LFS keeps: git lfs pull fetches it)"
+        raise FileFormatError(msg)
     told = "unknown file format" if name is None else f"it is {name}, which is not read; convert it to PNG or TIFF"
     msg = f"{path}: cannot be decoded as an image ({told})"
     raise FileFormatError(msg)

@@ -57,7 +57,7 @@ class Listing:
     special : tuple of str
         Images whose names say that they are something else.
     hidden : tuple of str
-        Hidden files with the ending of an image.
+        Hidden files.
     others : tuple of str
         Other files.
     folders : tuple of str
@@ -71,12 +71,12 @@ class Listing:
     others: tuple[str, ...]
     folders: tuple[str, ...]
 
-    def in_words(self) -> str:
+    def in_words(self, *, without_images: bool = False) -> str:
         """What is there, for a message about what is not."""
         parts = [
             f"{len(names)} {what} ({some_of(names)})"
             for what, names in (
-                ("images", self.images),
+                ("images", () if without_images else self.images),
                 ("masks", self.masks),
                 ("images of other use", self.special),
                 ("hidden files", self.hidden),
@@ -85,7 +85,7 @@ class Listing:
             )
             if names
         ]
-        return "; ".join(parts) or "nothing at all"
+        return "; ".join(parts) or ("nothing else" if without_images else "nothing at all")
 
 
 def natural_key(name: str) -> list[tuple[int, int | str]]:
@@ -144,10 +144,11 @@ def _group(path: Path) -> str:
     name = path.name
     is_image = path.suffix.lower() in IMAGE_SUFFIXES
     if name.startswith((".", "~$", "__MACOSX")):
-        return "hidden" if is_image else "others"
+        return "hidden"
     if path.is_dir():
         return "folders"
-    if not is_image or not path.is_file() or _is_array_of_lights(path):
+    # By name only: a pipe, or a link to nowhere, called mask.png is refused when it is read, not passed over.
+    if not is_image or _is_array_of_lights(path):
         return "others"
     role = role_of(name)
     return "images" if role is None else "masks" if role == "a mask" else "special"

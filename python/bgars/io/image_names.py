@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import posixpath
+import unicodedata
 from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import unquote
 
 from bgars.errors import FileFormatError
 from bgars.files.safe_files import shown
@@ -33,16 +36,15 @@ def find_named_images(
     FileFormatError
         An image is nowhere, or a name fits several.
     """
-    plain = [name.replace("\\", "/") for name in names]
     if not any(_is_absolute(name) for name in names):
-        for written in (list(names), plain):
+        for written in (list(names), [name.replace("\\", "/") for name in names]):
             if all(_is_file(folder / name) for name in written):
-                return written, []
+                return [posixpath.normpath(name) for name in written], []
     bases = [_base_name(name) for name in names]
     best: tuple[int, str] = (-1, "")
     for place in _places(folder, source, subfolders):
         files = _image_files(place)
-        for rule, find in (("", _as_written), ("whatever the case of their letters", _any_case), ("by stem", _by_stem)):
+        for rule, find in RULES.items():
             found, missing = find(bases, files)
             if not missing and len(set(found)) == len(found):
                 return _told(folder, place, names, found, rule, source)
@@ -52,6 +54,8 @@ def find_named_images(
     count, first = best
     where = "" if source is None else f"{source.name} names it; "
     listing = f"{where}{max(count, 0)} of {len(names)} named images found in {folder}"
+    if count <= 0 and source is not None and not any(Path(name).suffix.lower() in IMAGE_SUFFIXES for name in bases):
+        listing += "; if these are no files, take them out, and lights go to images in their order"
     msg = f"{shown(folder / _base_name(first))}: no such image file ({listing})"
     raise FileFormatError(msg)
 
@@ -97,13 +101,27 @@ def _as_written(bases: list[str], files: list[str]) -> tuple[list[str], list[str
     return [name for name in bases if name in known], [name for name in bases if name not in known]
 
 
+def _any_form(bases: list[str], files: list[str]) -> tuple[list[str], list[str]]:
+    """Letters with accents may be one character or two: macOS writes two, others one (Unicode forms NFD and NFC)."""
+    return _by_key(bases, files, lambda name: unicodedata.normalize("NFC", name))
+
+
 def _any_case(bases: list[str], files: list[str]) -> tuple[list[str], list[str]]:
-    return _by_key(bases, files, str.lower)
+    return _by_key(bases, files, lambda name: unicodedata.normalize("NFC", name).lower())
 
 
 def _by_stem(bases: list[str], files: list[str]) -> tuple[list[str], list[str]]:
     images = [name for name in files if Path(name).suffix.lower() in IMAGE_SUFFIXES]
-    return _by_key(bases, images, lambda name: _stem(name).lower())
+    return _by_key(bases, images, lambda name: unicodedata.normalize("NFC", _stem(name)).lower())
+
+
+RULES = {
+    "": _as_written,
+    "by letters with accents written another way": _any_form,
+    "whatever the case of their letters": _any_case,
+    "by stem": _by_stem,
+}
+"""How names are looked for in a folder, in this order, each in the words of a note."""
 
 
 def _by_key(bases: list[str], files: list[str], key: Callable[[str], str]) -> tuple[list[str], list[str]]:
@@ -127,6 +145,7 @@ def _stem(name: str) -> str:
 
 
 def _base_name(name: str) -> str:
+    name = unquote(name) if name.startswith("file:") else name
     return name.replace("\\", "/").rstrip("/").rpartition("/")[2]
 
 

@@ -42,11 +42,14 @@ class ImageTags(NamedTuple):
         Full images in the file.
     alpha : bool
         The file has a channel of opacity.
+    preview_first : bool
+        The first page is a reduced copy.
     """
 
     orientation: int = UPRIGHT
     pages: int = 1
     alpha: bool = False
+    preview_first: bool = False
 
 
 def read_tags(path: Path, kind: ImageFormat) -> ImageTags:
@@ -83,7 +86,8 @@ def _tiff_tags(file: BinaryIO) -> ImageTags:
     pages = list(_directories(file))
     full = [page for page in pages if not page.get(SUBFILE, 0) & REDUCED] or pages
     first = full[0] if full else {}
-    return ImageTags(_valid(first.get(ORIENTATION, UPRIGHT)), max(len(full), 1), EXTRA_SAMPLES in first)
+    orientation, count = _valid(first.get(ORIENTATION, UPRIGHT)), max(len(full), 1)
+    return ImageTags(orientation, count, EXTRA_SAMPLES in first, preview_first=bool(pages) and first is not pages[0])
 
 
 def _directories(file: BinaryIO, only_first: bool = False) -> Iterator[dict[int, int]]:

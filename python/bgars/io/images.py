@@ -10,6 +10,7 @@ from bgars import _bgars
 from bgars.errors import FileFormatError, InputError, UnsupportedImageError
 from bgars.io.image_formats import format_of, read_pixels
 from bgars.io.image_stacks import read_stack
+from bgars.io.image_tags import read_tags
 from bgars.records.plain_arrays import integer_full_scale
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ def decode_stack(
     FileFormatError
         Missing, truncated, oversized or mismatched files, each named.
     """
-    if not all(format_of(path).core for path in paths):
+    if not all(_core_reads(path) for path in paths):
         return _decode_arrays(paths, channel, response, gains, max_megapixels)
     try:
         images, linear, bits = _bgars.decode_stack(
@@ -104,6 +105,12 @@ def decode_stack(
     except FileFormatError as error:  # some decoders end their reasons in a line feed
         raise FileFormatError("".join(str(error).splitlines())) from error
     return DecodedStack(images, linear, None if bits > MAX_INTEGER_BITS else 2.0**bits - 1.0)
+
+
+def _core_reads(path: Path) -> bool:
+    """Whether the compiled decoder reads the image of a file: of a TIFF it takes the first page."""
+    kind = format_of(path)
+    return kind.core and not (kind.stack and read_tags(path, kind).preview_first)
 
 
 def decode_pages(

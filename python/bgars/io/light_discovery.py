@@ -78,9 +78,13 @@ def is_about_lights(name: str) -> bool:
     """
     path = Path(name)
     suffix = path.suffix.lower()
-    words = re.sub(r"[\W_\d]+", " ", path.stem.lower()).strip()
-    is_said = suffix in SUFFIXES and ABOUT_LIGHTS.search(words) is not None and not ABOUT_STRENGTH.search(words)
-    return not name.startswith(".") and (is_said or suffix == ".dome")
+    return not name.startswith(".") and ((suffix in SUFFIXES and _says_lights(path.stem)) or suffix == ".dome")
+
+
+def _says_lights(stem: str) -> bool:
+    apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", stem)  # LightDirections
+    words = re.sub(r"[\W_\d]+", " ", apart.lower()).strip()
+    return ABOUT_LIGHTS.search(words) is not None and not ABOUT_STRENGTH.search(words)
 
 
 def _rti_files(folder: Path, listing: Listing, notes: list[str]) -> list[str]:
@@ -109,6 +113,11 @@ def _other_file(folder: Path, listing: Listing, notes: list[str]) -> str:
     if len(about) == 1:
         notes.append(f"lights taken from {about[0]}")
         return about[0]
+    if not about and listing.images:
+        about = _below(folder, listing)
+        if len(about) == 1:
+            notes.append(f"lights taken from {about[0]}")
+            return about[0]
     if about:
         msg = f"{folder}: holds {len(about)} files about lights ({some_of(about)}); name one in {RECIPE_NAME}"
         raise InputError(msg)
@@ -119,6 +128,10 @@ def _other_file(folder: Path, listing: Listing, notes: list[str]) -> str:
         )
         raise InputError(msg)
     almost = [name for name in listing.others if name.lower().startswith(RECIPE_NAME) and name != RECIPE_NAME]
+    foreign = [name for name in listing.others if name.lower() in ("capture.yaml", "capture.yml", "capture.json")]
+    if foreign:
+        msg = f"{folder}: {foreign[0]} is not read: write what it says as TOML into {RECIPE_NAME}"
+        raise InputError(msg)
     if almost:
         msg = f"{folder}: {almost[0]} is not read: it must be called {RECIPE_NAME}"
         raise InputError(msg)
@@ -127,6 +140,18 @@ def _other_file(folder: Path, listing: Listing, notes: list[str]) -> str:
         f"or one .lp file; seen: {listing.in_words()}{_hint(folder, listing)}"
     )
     raise InputError(msg)
+
+
+def _below(folder: Path, listing: Listing) -> list[str]:
+    """Files about lights in folders without images, beside the images; with images they would be another capture."""
+    inner = {name: list_folder(folder / name) for name in listing.folders}
+    return [
+        f"{name}/{file}"
+        for name, within in inner.items()
+        if not within.images
+        for file in within.others
+        if is_about_lights(file) and not ABOUT_PLACES.search(file.lower())
+    ]
 
 
 FOREIGN = {
@@ -147,6 +172,10 @@ def _hint(folder: Path, listing: Listing) -> str:
     for name in listing.others:
         if Path(name).suffix.lower() in FOREIGN:
             return f". {name} {FOREIGN[Path(name).suffix.lower()]}"
+    unread = [name for name in listing.others if _says_lights(Path(name).stem)]
+    if unread:
+        known = ", ".join(sorted(SUFFIXES))
+        return f". {unread[0]} is not read: lights come as {known} (docs/captures.md)"
     tables = [name for name in listing.others if Path(name).suffix.lower() in SUFFIXES]
     if len(tables) == 1:
         return f". Should {tables[0]} hold the lights: write {RECIPE_NAME} with [lights] and directions = '{tables[0]}'"

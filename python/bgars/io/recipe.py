@@ -125,6 +125,16 @@ class CaptureRecipe(Strict):
             raise ValueError(msg)
         return value
 
+    @field_validator("response", mode="before")
+    @classmethod
+    def _named_response(cls, value: Any) -> Any:  # noqa: ANN401 - whatever the file holds
+        if isinstance(value, str) and value.lower() in ("linear", "srgb"):
+            return value.lower()
+        if not isinstance(value, dict):
+            msg = 'must be "linear", "srgb", { gamma = 2.2 } or { table = "response.csv" }'
+            raise ValueError(msg)
+        return value
+
     @model_validator(mode="after")
     def _bracket_is_named(self) -> CaptureRecipe:
         if self.exposures_ms is None:

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 __all__ = ["Strict", "checked", "read_values"]
 
 Model = TypeVar("Model", bound=BaseModel)
+PLAIN = {
+    r"Input should be a valid dictionary( or instance of \w+)?": "must be a table, { key = value, ... }",
+    r"Tuple should have at \w+ (\d+) items? after validation, not \d+": r"must hold \1 numbers",
+}
 SCALARS = {"str", "int", "float", "bool"}
 SCALAR_WANTED = {"string_type", "float_type", "int_type", "bool_type", "literal_error"}
 
@@ -67,10 +71,17 @@ def _explain(model: type[BaseModel], path: Path, error: ValidationError) -> str:
         nearest = difflib.get_close_matches(name, known, n=1, cutoff=0.0)
         hint = f"; the nearest known key is '{nearest[0]}'" if nearest else ""
         return f"{path}: unknown key '{_short('.'.join([*keys, name]))}'{hint} (known: {', '.join(known)})"
-    reason = first["msg"].removeprefix("Value error, ")
+    reason = _plain(first["msg"].removeprefix("Value error, "))
     value = "" if isinstance(first["input"], dict) else f", got {_shown(first['input'])}"
     # A rule over several keys names them itself.
     return ": ".join([str(path), *([".".join(keys)] if keys else []), f"{reason}{value}"])
+
+
+def _plain(reason: str) -> str:
+    """The words of pydantic without those of Python."""
+    for words, plain in PLAIN.items():
+        reason = re.sub(words, plain, reason)
+    return reason
 
 
 def _short(name: str) -> str:

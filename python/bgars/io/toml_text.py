@@ -29,6 +29,8 @@ BETWEEN_WORDS = re.compile(r"[\s,={}\[\]]+")
 MAX_DEPTH = 20
 """Deepest nesting of tables and lists; the recipes need four."""
 BACKSLASH = re.compile(r'"[^"\n]*\\[^"\n]*"')
+CURLED = re.compile("[\u201c\u201d\u201e\u2018\u2019\u00ab\u00bb]")
+"""Quotes of word processors."""
 DECIMAL_COMMA = re.compile(r"=\s*[-+]?\d+,\d+\s*(#.*)?$", re.ASCII)
 BARE_WORD = re.compile(r"^\s*[\w.\"-]+\s*=\s*(?P<word>[A-Za-z_./\\~][^\s\"'#]*)\s*(#.*)?$")
 WORDS = {"true", "false", "inf", "nan"}
@@ -101,6 +103,8 @@ def _cure(content: str, reason: str) -> str:
     lines = content.splitlines()
     number = int(found[1]) if found else len(lines)
     line = lines[number - 1] if 0 < number <= len(lines) else ""
+    if CURLED.search(line):
+        return f"; write straight quotes: {_shown(CURLED.sub(chr(34), line.strip()))}"
     if BACKSLASH.search(line):
         return (
             f"; write the path with / instead of \\, or in single quotes: {_shown(line.strip().replace(chr(92), '/'))}"

@@ -9,6 +9,7 @@ import numpy as np
 
 from bgars.errors import FileFormatError
 from bgars.files.light_formats.columns import data_lines, find_style, parse_row
+from bgars.files.light_formats.headed import axes_of
 from bgars.files.light_formats.table import MAX_LIGHTS, LightTable, checked_vectors
 from bgars.files.safe_files import read_text
 
@@ -41,6 +42,8 @@ def read_angle_table(path: Path) -> LightTable | None:
     units = {match[1][:3] for field in header if (match := UNIT.search(field))}
     names = [UNIT.sub("", field).strip(" _") for field in header]
     angles = [name for name in names if _kind(name)]
+    if {"x", "y", "z"} <= set(axes_of(header)):  # the vectors stand there, too
+        return None
     if len(angles) != ANGLES or {_kind(name) for name in angles} not in ({"azimuth", "up"}, {"azimuth", "down"}):
         return None
     if len(lines) > MAX_LIGHTS + 1:

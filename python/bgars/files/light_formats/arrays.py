@@ -130,7 +130,7 @@ def _mat_arrays(content: bytes, path: Path) -> dict[str, NDArray[Any]]:
         if MATLAB_73 in content[:128]:
             msg = f"{path}: is a MATLAB 7.3 (HDF5) file, which is not read; save it in MATLAB with save(..., '-v7')"
         else:
-            msg = f"{path}: is not a MATLAB file ({error})"
+            msg = f"{path}: is not a MATLAB file ({error}); save it in MATLAB with save(..., '-v7')"
         raise FileFormatError(msg) from error
 
 

@@ -7,6 +7,8 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
+from bgars.files.light_formats.matrices import as_lines
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -16,6 +18,7 @@ NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf)", re.
 DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?", re.ASCII)
 PLAIN_INTEGER = re.compile(r"[-+]?\d+", re.ASCII)
 NAME_WITH_SUFFIX = re.compile(r".*\.[A-Za-z][A-Za-z0-9]{1,4}")
+SUFFIX_AND_NUMBER = re.compile(rf"(?P<name>{NAME_WITH_SUFFIX.pattern})\s+(?P<number>{NUMBER.pattern})", re.IGNORECASE)
 QUOTED = re.compile(r"(?P<quote>[\"'])(?P<name>.*?)(?P=quote)\s*[,;\t ]?(?P<rest>.*)")
 QUOTED_DECIMAL_COMMA = re.compile(r"\"[-+]?\d+,\d+\"", re.ASCII)
 BRACKETED = re.compile(r"(?P<name>.*?)[\s,;]*[\[({](?P<vector>[^\[\](){}]*)[\])}]")
@@ -48,13 +51,16 @@ class Style:
 
 
 def data_lines(text: str) -> list[Line]:
-    """Return the lines that are neither empty nor comments."""
+    """Return the lines that are neither empty nor comments, without a separator at their ends; or rows of a matrix."""
     lines = []
     for number, line in enumerate(text.splitlines(), start=1):
         content = re.split(r"(?:^|\s)#", line, maxsplit=1)[0].strip().strip("\x1a")
         if content and not content.startswith(COMMENTS):
             lines.append(Line(number, content))
-    return lines
+    rows = as_lines("\n".join(line.text for line in lines))
+    if rows is not None:
+        return [Line(lines[place].number, row) for place, row in rows]
+    return [Line(line.number, line.text.rstrip(";, ") or line.text) for line in lines]
 
 
 def find_style(lines: Sequence[Line], least: int = AXES) -> Style:
@@ -102,6 +108,9 @@ def parse_row(text: str, style: Style) -> Row | None:
         return None if bracketed is None else parse_row(f"{bracketed['name']}{between}{bracketed['vector']}", style)
     if first == 0:
         return Row("", _all(numbers))
+    glued = SUFFIX_AND_NUMBER.fullmatch(fields[0]) if first == 1 and len(fields) == AXES else None
+    if glued is not None:  # a.png 0.1, 0.2, 0.9
+        return parse_row(style.separator.join([glued["name"], glued["number"], *fields[1:]]), style)  # type: ignore[union-attr]
     if style.separator is not None:
         return Row(fields[0].strip("\"'"), _all(numbers[1:])) if first == 1 else None
     # Names may hold blanks and end in a number; one with a suffix is whole.

@@ -50,6 +50,14 @@ def read_json_table(path: Path) -> LightTable:
         files = tuple(str(name) for name in values)
         vectors = np.array([_vector(vector, path) for vector in values.values()]).reshape(-1, 3)
         return LightTable(checked_vectors(vectors, path, files), files=files)
+    if (
+        len(values) == len(AXES)
+        and all(isinstance(row, list) and len(row) > len(AXES) for row in values)
+        and (len({len(row) for row in values}) == 1)
+    ):
+        lists, told = [_vector(each, path) for each in zip(*values, strict=True)], len(values[0])
+        note = f"3 rows of {told} numbers taken as x, y and z of the lights"
+        return LightTable(checked_vectors(np.array(lists).reshape(-1, 3), path), notes=(note,))
     vectors = np.array([_vector(vector, path) for vector in values]).reshape(-1, 3)
     return LightTable(checked_vectors(vectors, path))
 
@@ -94,10 +102,9 @@ def _meshroom(lights: list[Any] | dict[str, Any], path: Path) -> LightTable:
     entries = list(lights.values()) if isinstance(lights, dict) else lights
     files = tuple(str(name) for name in lights) if isinstance(lights, dict) else _names(entries)
     if not all(isinstance(entry, dict) and "direction" in entry for entry in entries):
-        if isinstance(lights, list) and all(isinstance(entry, list) for entry in entries):
-            return LightTable(
-                checked_vectors(np.array([_vector(entry, path) for entry in entries]).reshape(-1, 3), path)
-            )
+        if all(isinstance(entry, list) or (isinstance(entry, dict) and set(AXES) <= set(entry)) for entry in entries):
+            vectors = np.array([_vector(entry, path) for entry in entries]).reshape(-1, 3)
+            return LightTable(checked_vectors(vectors, path, files), files=files)
         msg = f"{path}: lights without a direction; {EXPECTED}"
         raise FileFormatError(msg)
     vectors = np.array([_vector(entry["direction"], path) for entry in entries]).reshape(-1, 3)
@@ -128,7 +135,7 @@ def _names(entries: list[Any]) -> tuple[str, ...]:
 def _vector(value: Any, path: Path, keys: tuple[str, ...] = AXES) -> list[float]:  # noqa: ANN401 - whatever a file held
     if isinstance(value, dict):
         value = [value.get(key) for key in keys]
-    if isinstance(value, list) and len(value) >= len(keys):
+    if isinstance(value, list | tuple) and len(value) >= len(keys):
         numbers = value[: len(keys)]
         if all(isinstance(number, int | float) and not isinstance(number, bool) for number in numbers):
             try:

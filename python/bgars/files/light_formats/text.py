@@ -10,6 +10,7 @@ import numpy as np
 from bgars.errors import FileFormatError
 from bgars.files.light_formats.angles import read_angle_table
 from bgars.files.light_formats.columns import AXES, Line, Row, Style, as_number, data_lines, find_style, parse_row
+from bgars.files.light_formats.headed import axes_of, rows_under
 from bgars.files.light_formats.table import MAX_LIGHTS, LightTable, checked_vectors
 from bgars.files.safe_files import read_text
 
@@ -27,7 +28,7 @@ ENCODINGS_TO_SAY = {"cp1252": "Windows-1252 (no valid UTF-8)", "utf-16": "UTF-16
     "utf-32-be": "UTF-32",
 }
 NUMBERED = re.compile(r"(?P<index>\d{1,6})\s+(?P<name>\S.*\.[A-Za-z]\w{1,4})", re.ASCII)
-AXIS = re.compile(r"(?:.*[^a-z])?[a-z]?([xyz])")
+VECTOR = "x y z of a light, or its file and x y z"
 WITH_INTENSITY, WITH_RGB, ANGLES = 4, 6, 2
 
 
@@ -61,14 +62,19 @@ def read_rows(path: Path, *, named: bool = False) -> Rows:
     if counted:
         lines = lines[1:]
         if int(first.text) != len(lines):
-            msg = f"{path}: line {first.number} announces {first.text} lights, but {len(lines)} follow"
+            commented = text.content.count("\n#")
+            hidden = f" (lines that begin with # are comments: {commented})" if commented else ""
+            msg = f"{path}: line {first.number} announces {first.text} lights, but {len(lines)} follow{hidden}"
             raise FileFormatError(msg)
     style = find_style(lines)
     if style.decimal_comma:
         notes.append("commas taken as decimal commas")
     if lines and _is_header(lines[0], style):
         _refuse_order(path, lines[0])
-        lines = lines[1:]
+        header, lines = lines[0], lines[1:]
+        headed = rows_under(header, lines, style)
+        if headed is not None and lines:
+            return Rows(headed[0], lines, (*notes, *headed[1]), counted)
     if not lines:
         msg = f"{path}: holds no light"
         raise FileFormatError(msg)
@@ -77,8 +83,10 @@ def read_rows(path: Path, *, named: bool = False) -> Rows:
         row = parse_row(line.text, style)
         if row is None:
             is_first = named and not counted and not rows
-            expected = "be the number of lights" if is_first else f"read {ROW}"
+            expected = "be the number of lights" if is_first else f"read {ROW}" if named else f"hold {VECTOR}"
             msg = f"{path}: line {line.number} must {expected}, got {_short(line.text)}"
+            if not rows and not any(character.isdigit() for character in line.text):
+                msg += "; columns are known by the names x, y, z, or azimuth, elevation (slant, tilt, zenith)"
             raise FileFormatError(msg)
         rows.append(row)
     return Rows(rows, lines, tuple(notes), counted)
@@ -113,6 +121,8 @@ def read_text_table(path: Path, *, names_needed: bool = False) -> LightTable:
     parsed = read_rows(path, named=names_needed)
     notes = list(parsed.notes)
     rows = _without_index(parsed.rows, notes)
+    if names_needed:
+        rows = _with_names_of_digits(rows, parsed.lines)
     columns = len(rows[0].numbers) if rows else 0
     named = bool(rows) and bool(rows[0].name)
     if not named and not names_needed and len(rows) == AXES and columns > AXES and _equal(rows):
@@ -154,6 +164,14 @@ def _without_index(rows: list[Row], notes: list[str]) -> list[Row]:
     return [Row(number["name"], row.numbers) for number, row in zip(numbers, rows, strict=True) if number]
 
 
+def _with_names_of_digits(rows: list[Row], lines: list[Line]) -> list[Row]:
+    """Rows ``1 x y z``: a name is needed, and 1 may be that of 1.png."""
+    names = [re.split(r"[\s,;]", line.text, maxsplit=1)[0] for line in lines]
+    if all(not row.name and len(row.numbers) == WITH_INTENSITY for row in rows) and all(map(str.isdecimal, names)):
+        return [Row(name, row.numbers[1:]) for name, row in zip(names, rows, strict=True)]
+    return rows
+
+
 def _refuse_line(path: Path, line: Line, named: bool) -> None:
     expected = f"read {ROW}" if named else "hold 3 numbers (x y z of a light, not all zero)"
     msg = f"{path}: line {line.number} must {expected}, got {_short(line.text)}"
@@ -180,14 +198,12 @@ def _is_header(line: Line, style: Style) -> bool:
     """True for a line of names only, such as ``x,y,z``."""
     fields = line.text.replace(style.separator or " ", " ").split()
     words = all(as_number(field, style) is None for field in fields)
-    axes = {field.strip("\"'").lower()[-1:] for field in fields}
-    return words and len(fields) >= AXES and {"x", "y", "z"} <= axes
+    return words and len(fields) >= AXES and {"x", "y", "z"} <= set(axes_of([field.strip("\"'") for field in fields]))
 
 
 def _refuse_order(path: Path, header: Line) -> None:
     """Refuse columns that are named in another order, such as y, x, z."""
-    fields = [field.strip("\"'").lower() for field in re.split(r"[\s,;]+", header.text)]
-    order = [match[1] for field in fields if (match := AXIS.fullmatch(field))]
+    order = axes_of([field.strip("\"'") for field in re.split(r"[\s,;]+", header.text)])
     if sorted(order[:AXES]) == ["x", "y", "z"] != order[:AXES]:
         msg = f"{path}: line {header.number}: the columns must stand in the order x, y, z, got {_short(header.text)}"
         raise FileFormatError(msg)

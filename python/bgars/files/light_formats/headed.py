@@ -1,0 +1,67 @@
+"""Columns under a header that names them: the file of a light and its x, y, z, wherever they stand."""
+
+from __future__ import annotations
+
+import csv
+import re
+from typing import TYPE_CHECKING
+
+from bgars.files.light_formats.columns import Line, Row, Style, as_number
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+__all__ = ["axes_of", "fields_of", "rows_under"]
+
+AXIS = re.compile(r"(?:.*[^a-z])?[a-z]?([xyz])")
+NAMES = ("file", "filename", "file_name", "image", "image_name", "img", "name", "path", "photo", "picture")
+STRENGTHS = ("intensity", "strength", "brightness")
+COLORS = (("r", "g", "b"), ("red", "green", "blue"))
+INDICES = ("", "#", "id", "index", "light", "led", "no", "no.", "nr", "number")
+
+
+def fields_of(text: str, style: Style) -> list[str]:
+    """Fields of a line, the empty ones too, without their quotes."""
+    if style.separator is None:
+        parts = text.split()
+    else:
+        try:
+            parts = next(csv.reader([text], delimiter=style.separator, skipinitialspace=True), [])
+        except csv.Error:  # a field of more than 100,000 characters
+            return [text]
+    return [part.strip().strip("\"'") for part in parts]
+
+
+def axes_of(header: Sequence[str]) -> list[str]:
+    """x, y and z in the order in which a header names them.
+
+    Examples
+    --------
+    >>> axes_of(["file", "Lx", "Ly", "Lz"]), axes_of(["azimuth", "elevation"])
+    (['x', 'y', 'z'], [])
+    """
+    return [match[1] for field in header if (match := AXIS.fullmatch(field.lower()))]
+
+
+def rows_under(header: Line, lines: Sequence[Line], style: Style) -> tuple[list[Row], tuple[str, ...]] | None:
+    """Return the rows of a table and what was left out; None where its columns are not those of its header."""
+    names = [field.lower() for field in fields_of(header.text, style)]
+    axes = {match[1]: place for place, name in enumerate(names) if (match := AXIS.fullmatch(name))}
+    fields = [fields_of(line.text, style) for line in lines]
+    if len(axes) != len(axes_of(names)) or len(axes) != 3 or any(len(each) != len(names) for each in fields):  # noqa: PLR2004 - x, y, z
+        return None
+    file = next((names.index(name) for name in NAMES if name in names), None)
+    strengths = [names.index(name) for name in STRENGTHS if name in names][:1]
+    for colors in COLORS:
+        if set(colors) <= set(names):
+            strengths = [names.index(name) for name in colors]
+    places = [*(axes[axis] for axis in "xyz"), *strengths]
+    rows = []
+    for each in fields:
+        numbers = [as_number(each[place], style) for place in places]
+        if None in numbers or (file is not None and not each[file]):
+            return None
+        rows.append(Row("" if file is None else each[file], tuple(number for number in numbers if number is not None)))
+    used = {*places, *([] if file is None else [file])}
+    left = [name for place, name in enumerate(names) if place not in used and name not in INDICES]
+    return rows, ((f"columns that are not used: {', '.join(left)[:200]}",) if left else ())

@@ -1,0 +1,214 @@
+"""Light files, lists and folders as programs and other systems write them: read right, or refused with the cure."""
+
+from __future__ import annotations
+
+import json
+import os
+import unicodedata
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tifffile
+from case_captures import (
+    COUNT,
+    LIGHTS,
+    levels,
+    lp_lines,
+    names_of,
+    reads_right,
+    recipe,
+    refused,
+    write_directions,
+    write_images,
+    write_lp,
+)
+
+ROWS = ["{:.6f} {:.6f} {:.6f}".format(*vector) for vector in LIGHTS]
+WITH_COMMAS = [row.replace(" ", ", ") for row in ROWS]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        np.array2string(LIGHTS),
+        repr(LIGHTS),
+        repr(LIGHTS.astype(np.float32)),
+        f"lights = np.array({LIGHTS.tolist()})",
+        str(LIGHTS.tolist()),
+        "L = [\n" + ";\n".join(ROWS) + "];",
+        "L=[" + "; ".join(WITH_COMMAS) + "]",
+        "\n".join(f"{row};" for row in WITH_COMMAS),
+        "{" + ",\n".join("{" + row.replace(",", "f,") + "f}" for row in WITH_COMMAS) + "}",
+        "# measured in March\n(" + "),\n(".join(WITH_COMMAS) + ")\n",
+    ],
+    ids=["printed", "repr", "float32", "assigned", "list", "MATLAB", "one line", "semicolons", "C", "tuples"],
+)
+def test_matrices_as_programs_write_them(text: str, tmp_path: Path) -> None:
+    write_images(tmp_path)
+    (tmp_path / "light_directions.txt").write_text(text, encoding="utf-8")
+    reads_right(tmp_path)
+
+
+def table(header: str, pattern: str, order: slice = slice(None)) -> str:
+    names = names_of("img_{:02d}.png")
+    lines = [
+        pattern.format(i=index, n=name, x=x, y=y, z=z)
+        for index, (name, (x, y, z)) in enumerate(zip(names, LIGHTS, strict=True))
+    ]
+    return "\n".join([header, *lines[order]]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (table(",filename,x,y,z", "{i},{n},{x},{y},{z}"), "lights taken"),
+        (table("x,y,z,filename", "{x},{y},{z},{n}", slice(None, None, -1)), "lights taken"),
+        (table("intensity;Lx;Ly;Lz", "1.0;{x};{y};{z}"), "fourth number"),
+        (table("x,y,z,azimuth,elevation", "{x},{y},{z},10,20"), "not used: azimuth, elevation"),
+    ],
+    ids=["index of pandas", "name last, reversed", "intensity first", "angles besides"],
+)
+def test_columns_are_found_by_their_header(text: str, said: str, tmp_path: Path) -> None:
+    write_images(tmp_path)
+    (tmp_path / "LightDirs.csv").write_text(text, encoding="utf-8")
+    reads_right(tmp_path, said)
+
+
+def test_rows_of_an_lp_file_that_look_like_numbers(tmp_path: Path) -> None:
+    write_images(tmp_path, names_of("{}.png"))
+    write_lp(tmp_path, lp_lines(names_of("{}")))
+    reads_right(tmp_path, "by stem")
+    write_lp(tmp_path, [line.replace(" ", ", ").replace(", ", " ", 1) for line in lp_lines(names_of("{}.png"))])
+    reads_right(tmp_path)
+
+
+@pytest.mark.parametrize("form", ["NFC", "NFD"])
+def test_accents_of_another_system(form: str, tmp_path: Path) -> None:
+    names = [unicodedata.normalize("NFC" if form == "NFD" else "NFD", name) for name in names_of("Münze_{}.png")]
+    write_images(tmp_path, names)
+    write_lp(tmp_path, lp_lines([unicodedata.normalize(form, name) for name in names]))
+    reads_right(tmp_path, "accents")
+
+
+def test_an_archive_of_macos(tmp_path: Path) -> None:
+    write_lp(tmp_path, lp_lines(write_images(tmp_path)))
+    (tmp_path / "._lights.lp").write_bytes(b"\0\5\x16\7" * 9)
+    reads_right(tmp_path)
+
+
+def test_names_with_a_dot_before_them(tmp_path: Path) -> None:
+    write_lp(tmp_path, lp_lines([f"./{name}" for name in write_images(tmp_path)]))
+    reads_right(tmp_path)
+
+
+def test_a_list_of_names_with_quotes_and_a_comment(tmp_path: Path) -> None:
+    names = write_images(tmp_path)
+    write_directions(tmp_path)
+    (tmp_path / "filenames.txt").write_text("# images\n" + "\n".join(f"'{name}'" for name in names), encoding="utf-8")
+    reads_right(tmp_path)
+
+
+def test_lights_in_a_folder_beside_the_images(tmp_path: Path) -> None:
+    write_images(tmp_path)
+    (tmp_path / "calibration").mkdir()
+    write_directions(tmp_path / "calibration")
+    reads_right(tmp_path, "lights taken from calibration/light_directions.txt")
+
+
+def test_angles_of_a_recipe_are_read_by_their_header(tmp_path: Path) -> None:
+    names = write_images(tmp_path)
+    angles = np.degrees(np.column_stack([np.arcsin(LIGHTS[:, 2]), np.arctan2(LIGHTS[:, 1], LIGHTS[:, 0])]))
+    lines = [f"{name},{up:.5f},{around:.5f}" for name, (up, around) in zip(names, angles, strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join(["file,elevation,azimuth", *lines[::-1]]), encoding="utf-8")
+    recipe(tmp_path, '[lights]\nangles_deg = "a.csv"\n')
+    reads_right(tmp_path, "in degrees")
+
+
+def test_json_in_three_rows_and_with_axes(tmp_path: Path) -> None:
+    write_images(tmp_path)
+    (tmp_path / "lights.json").write_text(json.dumps(LIGHTS.T.tolist()), encoding="utf-8")
+    reads_right(tmp_path, "3 rows of 8 numbers")
+    values = {"lights": [dict(zip("xyz", vector, strict=True)) for vector in LIGHTS.tolist()]}
+    (tmp_path / "lights.json").write_text(json.dumps(values), encoding="utf-8")
+    reads_right(tmp_path, "lights taken")
+
+
+def test_intensities_of_colours_in_three_rows(tmp_path: Path) -> None:
+    gains = np.column_stack([np.linspace(0.6, 1.1, COUNT), np.linspace(1.1, 0.6, COUNT), np.full(COUNT, 0.8)])
+    colored = levels()[..., None] * gains[:, None, None, :]
+    write_images(tmp_path, images=np.rint(colored).astype(np.uint8))
+    write_directions(tmp_path)
+    np.savetxt(tmp_path / "light_intensities.txt", gains.T)
+    reads_right(tmp_path)
+
+
+def test_a_tiff_whose_preview_comes_first(tmp_path: Path) -> None:
+    write_directions(tmp_path)
+    for name, image in zip(names_of("a{}.tif"), levels(16), strict=True):
+        with tifffile.TiffWriter(tmp_path / name) as file:
+            file.write(image[::4, ::4], subfiletype=1, metadata=None)
+            file.write(image, metadata=None)
+    reads_right(tmp_path)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes")
+def test_a_mask_that_is_no_file_is_not_passed_over(tmp_path: Path) -> None:
+    write_images(tmp_path)
+    write_directions(tmp_path)
+    os.mkfifo(tmp_path / "mask.png")
+    refused(tmp_path, "mask.png", "named pipe, not an image file")
+    (tmp_path / "mask.png").unlink()
+    (tmp_path / "mask.png").symlink_to("nowhere.png")
+    refused(tmp_path, "mask.png", "a link to what is not there")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("dark = \u201cdark.png\u201d\n", ["capture.toml", 'straight quotes: dark = "dark.png"']),
+        ('lights = "x.lp"\n', ["lights: must be a table", "'x.lp'"]),
+        ("[lights]\nangles_deg = [[1, 2, 3]]\n", ["lights.angles_deg.0: must hold 2 numbers", "[1, 2, 3]"]),
+        ("response = 2.2\n[lights]\nring = { count = 8 }\n", ["response", "{ gamma = 2.2 }", "got 2.2"]),
+    ],
+)
+def test_a_recipe_says_what_to_write(text: str, words: list[str], tmp_path: Path) -> None:
+    write_images(tmp_path)
+    recipe(tmp_path, text)
+    refused(tmp_path, *words)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("lights.yaml", b"lights: []\n", ["lights.yaml is not read", ".lp"]),
+        ("capture.yaml", b"lights: []\n", ["capture.yaml is not read", "TOML into capture.toml"]),
+        ("light_directions.txt", b"0 0 1\noops\n", ["line 2", "x y z of a light", "'oops'"]),
+        ("lights.csv", b"phi,theta\n1,2\n", ["line 1", "azimuth, elevation"]),
+        ("lights.lp", b"8\n#1.png 0 0 1\n", ["announces 8", "begin with # are comments"]),
+        (
+            "light_directions.txt",
+            "".join(f"LED{i} 0 0.{i} 0.9\n" for i in range(8)).encode(),
+            ["0 of 8", "take them out"],
+        ),
+    ],
+)
+def test_a_light_file_that_is_not_read_says_why(name: str, content: bytes, words: list[str], tmp_path: Path) -> None:
+    write_images(tmp_path)
+    (tmp_path / name).write_bytes(content)
+    refused(tmp_path, *words)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "content", "words"),
+    [
+        ("IMG_{}.heic", b"\0\0\0\x18ftypheic", [".heic is not read as images", "PNG or TIFF"]),
+        ("a{}.png", b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n", ["a1.png", "git lfs pull"]),
+        ("a{}.jpg", b"<!DOCTYPE html><html>", ["a1.jpg", "a web page"]),
+    ],
+)
+def test_images_that_are_none_say_what_they_are(pattern: str, content: bytes, words: list[str], tmp_path: Path) -> None:
+    write_directions(tmp_path)
+    for name in names_of(pattern):
+        (tmp_path / name).write_bytes(content)
+    refused(tmp_path, *words)
