@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 SOURCE = Path(__file__).parents[2] / "rust" / "bgars-core" / "src"
-ORDER = ["error", "pixel", "median", "lights", "stack", "radiometry", "readings", "normals", "reflectance", "blind"]
-"""Each may name those before it; what is not here stands by itself on the first seven."""
-INPUTS = 7
+ORDER = ["error", "pixel", "median", "components", "lights", "stack", "radiometry", "readings", "normals", "reflectance", "blind"]
+"""Each may name those before it; what is not here stands by itself on the first eight."""
+INPUTS = 8
 NAMES = {
     "Error": "error",
     "Result": "error",

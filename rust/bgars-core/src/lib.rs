@@ -9,6 +9,7 @@
 #![forbid(unsafe_code)]
 
 pub mod blind;
+mod components;
 pub mod error;
 pub mod integrate;
 pub mod io;

@@ -139,33 +139,19 @@ impl<'a> HeightMesh<'a> {
 /// ```
 pub fn triangulate(height_px: &[f32], mask: &[bool], width: usize, pitch: f64) -> Result<TriangleMesh> {
     let source = HeightMesh::new(height_px, mask, width, pitch)?;
-    let mut mesh = TriangleMesh {
-        vertices: vec![[0.0; 3]; source.vertex_count()],
-        faces: vec![[0; 3]; source.face_count()],
-        pixels: vec![0; source.vertex_count()],
+    let rows = || (0..source.rows()).into_par_iter();
+    let of_row = |row: usize| {
+        let mut vertices = Vec::new();
+        source.row_vertices(row, |pixel, position| vertices.push((position, pixel as u32)));
+        vertices
     };
-    (
-        split(&mut mesh.vertices, &source.vertex_starts),
-        split(&mut mesh.pixels, &source.vertex_starts),
-        split(&mut mesh.faces, &source.face_starts),
-    )
-        .into_par_iter()
-        .enumerate()
-        .for_each(|(row, (vertices, pixels, faces))| {
-            let mut places = vertices.iter_mut().zip(pixels);
-            source.row_vertices(row, |pixel, position| {
-                if let Some((vertex, place)) = places.next() {
-                    (*vertex, *place) = (position, pixel as u32);
-                }
-            });
-            let mut places = faces.iter_mut();
-            source.row_faces(row, |corners| {
-                if let Some(face) = places.next() {
-                    *face = corners;
-                }
-            });
-        });
-    Ok(mesh)
+    let (vertices, pixels) = rows().flat_map_iter(of_row).unzip();
+    let faces_of_row = |row: usize| {
+        let mut faces = Vec::new();
+        source.row_faces(row, |corners| faces.push(corners));
+        faces
+    };
+    Ok(TriangleMesh { vertices, faces: rows().flat_map_iter(faces_of_row).collect(), pixels })
 }
 
 /// Corners of the faces in a square of four pixels, by which of them are in the mask.
@@ -189,14 +175,4 @@ fn starts(lengths: &[usize]) -> Vec<usize> {
             sum
         }))
         .collect()
-}
-
-/// The parts of `items` between neighbouring starts.
-fn split<'a, T>(mut items: &'a mut [T], starts: &[usize]) -> Vec<&'a mut [T]> {
-    let part = |ends: &[usize]| {
-        let (part, rest) = std::mem::take(&mut items).split_at_mut(ends[1] - ends[0]);
-        items = rest;
-        part
-    };
-    starts.windows(2).map(part).collect()
 }

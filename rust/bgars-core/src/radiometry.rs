@@ -92,7 +92,7 @@ impl<P: Pixel> Radiometry<'_, P> {
     pub fn full_scale_of(&self, stack: &ImageStack<'_, P>) -> f32 {
         self.full_scale.unwrap_or_else(|| match P::CODES {
             Some(codes) => (codes - 1) as f32,
-            None => full_scale_from(stack.largest_finite()),
+            None => stack.largest_finite().max(LEAST_FULL_SCALE),
         })
     }
 
@@ -127,12 +127,8 @@ impl<P: Pixel> Radiometry<'_, P> {
     }
 }
 
-/// Full scale of floats whose largest finite value is this.
-pub(crate) fn full_scale_from(largest: f32) -> f32 {
-    /// Of images without light.
-    const LEAST: f32 = 1e-30;
-    largest.max(LEAST)
-}
+/// Full scale of floats that show no light.
+const LEAST_FULL_SCALE: f32 = 1e-30;
 
 /// The response table at a grey level between two codes.
 fn interpolate(table: &[f32], level: f32) -> f32 {

@@ -46,7 +46,6 @@ pub(crate) trait Readings: Sync {
     fn offset(&self, pixel: usize) -> f32;
     /// True where [`Self::offset`] is zero everywhere.
     fn has_no_offsets(&self) -> bool;
-    /// Whether a light is clipped at a pixel.
     fn is_clipped(&self, light: usize, pixel: usize) -> bool;
     /// Writes [`Self::is_clipped`] of some pixels.
     fn clipped(&self, light: usize, pixels: &[usize], clipped: &mut [bool]);

@@ -1,6 +1,5 @@
 //! A stack of images, one a light, borrowed as it lies in memory.
 
-use multiversion::multiversion;
 use rayon::prelude::*;
 
 use crate::{Error, Pixel, Result};
@@ -71,7 +70,7 @@ impl<'a, P: Pixel> ImageStack<'a, P> {
 }
 
 impl<P: Pixel> ImageStack<'_, P> {
-    /// The largest value that is finite, 0 where none is above; of many values ([`Self::is_large`]) each thread looks through a part.
+    /// The largest value that is finite, 0 where none is above; of many values each thread looks through a part.
     ///
     /// # Examples
     /// ```
@@ -97,20 +96,11 @@ impl<P: Pixel> ImageStack<'_, P> {
 /// Values that one thread has seen before others are awake.
 const FEW_VALUES: usize = 1 << 19;
 
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 fn largest_finite<P: Pixel>(values: &[P]) -> f32 {
-    /// Enough for several vectors of any processor.
-    const LANES: usize = 64;
-    let mut largest = [0.0f32; LANES];
-    // Neither comparison is true of NaN.
-    let larger = |a: f32, b: f32| if b > a && b < f32::INFINITY { b } else { a };
-    let (blocks, rest) = values.as_chunks::<LANES>();
-    for block in blocks {
-        for (largest, value) in largest.iter_mut().zip(block) {
-            *largest = larger(*largest, value.to_f32());
-        }
-    }
-    rest.iter().map(|value| value.to_f32()).chain(largest).fold(0.0, larger)
+    // The bits of numbers that are not negative are in their order, those of NaN beyond infinity's.
+    let finite = |bits: i32| if bits < f32::INFINITY.to_bits() as i32 { bits } else { 0 };
+    let largest = values.iter().fold(0, |largest, value| finite(value.to_f32().to_bits() as i32).max(largest));
+    f32::from_bits(largest as u32)
 }
 
 #[cfg(test)]

@@ -40,11 +40,19 @@ pub(super) struct Pull {
     pub width: f64,
 }
 
-/// Normal equations of a pixel over (two turns of the normal, ln albedo), robustly weighted.
-#[derive(Clone, Copy, Debug)]
+/// Normal equations of three unknowns; of a pixel: two turns of the normal and ln albedo, robustly weighted.
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Equations {
     pub matrix: Matrix3<f64>,
     pub right: Vector3<f64>,
+}
+
+impl Equations {
+    /// The inverse of the matrix with its diagonal raised by a share of itself (Marquardt 1963).
+    pub fn damped_inverse(&self, damping: f64) -> Option<Matrix3<f64>> {
+        let raise = |value: f64| value * damping + 1e-6;
+        (self.matrix + Matrix3::from_diagonal(&self.matrix.diagonal().map(raise))).try_inverse()
+    }
 }
 
 /// Two unit vectors across a normal.
@@ -129,8 +137,7 @@ pub(super) fn equations(
     facet: &Facet,
     frame: &(Vector3<f64>, Vector3<f64>),
 ) -> Equations {
-    let mut matrix = Matrix3::zeros();
-    let mut right = Vector3::zeros();
+    let Equations { mut matrix, mut right } = Equations::default();
     for light in 0..observation.values.len() {
         let (slope, residual) = linearised(observation, light, material, facet, frame);
         let weight = robust_weight(observation, light, residual);
@@ -190,11 +197,7 @@ pub(super) fn fit(
         let mut moved = f64::INFINITY;
         let mut better = false;
         for _ in 0..MAX_TRIES {
-            let mut damped = system.matrix;
-            for axis in 0..3 {
-                damped[(axis, axis)] = damped[(axis, axis)] * (1.0 + damping) + 1e-6;
-            }
-            let Some(inverse) = damped.try_inverse() else { break };
+            let Some(inverse) = system.damped_inverse(damping) else { break };
             let mut step = inverse * system.right;
             let turn = step.x.hypot(step.y);
             if turn > MAX_TURN {

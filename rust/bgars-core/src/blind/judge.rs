@@ -1,13 +1,13 @@
 //! Which method a capture is given to: the one that predicts light it has not seen.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::facet;
 use super::lobe::Material;
 use super::material::Specimen;
 use super::observation::{Kind, Observation, SCALE};
-use crate::normals::robust_filter;
+use super::pixel::best_facet;
+use crate::normals::{robust_filter, solve};
 
 /// Most lights that are left out in turn at a pixel.
 const MAX_LEFT_OUT: usize = 8;
@@ -52,26 +52,20 @@ fn of_pixel(specimen: &Specimen, material: &Material) -> ([f64; 3], f64) {
         let light = &observation.lights[left_out];
         let values: Vec<f32> = rest.values.iter().map(|&value| value as f32).collect();
         let clipped: Vec<bool> = rest.kinds.iter().map(|&kind| kind == Kind::Clipped).collect();
-        let directions: Vec<[f64; 3]> = rest.lights.iter().map(|light| light.direction.into()).collect();
-        let kept = robust_filter(&values, &clipped, &directions, 1.0);
-        let all = least_squares(&rest, &vec![true; values.len()]);
-        let robust = least_squares(&rest, &kept);
+        let directions: Vec<Vector3<f64>> = rest.lights.iter().map(|light| light.direction).collect();
+        let components: Vec<[f64; 3]> = directions.iter().map(|&direction| direction.into()).collect();
+        let kept = robust_filter(&values, &clipped, &components, 1.0);
+        let [all, robust] = [&vec![true; values.len()], &kept]
+            .map(|kept| solve(&values, &directions, kept).map_or_else(Vector3::zeros, |found| found.scaled_normal));
         let lambertian = |scaled: &Vector3<f64>| scaled.dot(&light.direction).max(0.0);
         let start = |scaled: &Vector3<f64>| {
             let mut normal = *scaled;
             normal.z = normal.z.max(0.01 * normal.norm()).max(1e-9);
             normal.normalize()
         };
-        let mut best: Option<(f64, f64)> = None;
-        for normal in [start(&all), start(&robust)] {
-            for candidate in [material, &Material::MATTE] {
-                let fitted = facet::fit(&rest, candidate, &normal, None, None, 12);
-                if best.is_none_or(|(least, _)| fitted.cost < least) {
-                    best = Some((fitted.cost, fitted.log_albedo.exp() * candidate.shade(&fitted.normal, light)));
-                }
-            }
-        }
-        let reflectance = best.map_or(0.0, |(_, predicted)| predicted);
+        let starts = [(start(&all), None), (start(&robust), None)];
+        let (fitted, source) = best_facet(&rest, material, &starts, None, 12);
+        let reflectance = fitted.log_albedo.exp() * source.material(material).shade(&fitted.normal, light);
         for (cost, predicted) in costs.iter_mut().zip([lambertian(&all), lambertian(&robust), reflectance]) {
             *cost += cost_of(observation, left_out, predicted);
         }
@@ -83,15 +77,4 @@ fn of_pixel(specimen: &Specimen, material: &Material) -> ([f64; 3], f64) {
 fn cost_of(observation: &Observation, light: usize, predicted: f64) -> f64 {
     let ratio = observation.residual(light, predicted) / SCALE;
     observation.share(light) * (ratio * ratio).ln_1p()
-}
-
-/// `rho n` of the kept lights; zero where they do not fix it.
-fn least_squares(observation: &Observation, kept: &[bool]) -> Vector3<f64> {
-    let (mut gram, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    for ((light, &value), _) in observation.lights.iter().zip(&observation.values).zip(kept).filter(|(_, kept)| **kept)
-    {
-        gram += light.direction * light.direction.transpose();
-        right += light.direction * value;
-    }
-    gram.try_inverse().map_or_else(Vector3::zeros, |inverse| inverse * right)
 }

@@ -60,7 +60,7 @@ impl Material {
         }
         let n_z = normal.z.max(MIN_N_Z);
         let lobe = Lobe { strength: self.strength, roughness: self.roughness, tail: self.tail };
-        let [facets, log_slope] = lobe.distribution_by_cosine(cosine);
+        let [facets, .., log_slope] = lobe.distribution(cosine);
         let view_half = light.half.z;
         let (toward_view, away) = (2.0 * cosine * n_z / view_half, 2.0 * cosine * toward_light / view_half);
         // ln G over the cosine of the half vector, n_z and n.l.

@@ -1,9 +1,9 @@
 //! The material of a capture, fitted together with the unknown normals and albedos of a sample of its pixels.
 
-use nalgebra::{Matrix3, Matrix3x2, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-use super::facet::{self, Facet, equations, linearised, robust_weight, tangents};
+use super::facet::{self, Equations, Facet, equations, linearised, robust_weight, tangents};
 use super::lobe::Material;
 use super::observation::Observation;
 
@@ -76,7 +76,6 @@ pub(super) fn fit(sample: &[Specimen]) -> Material {
     best.map_or(Material::MATTE, |best| fit_from(sample, best.material).material)
 }
 
-/// The fit from one start.
 fn fit_from(sample: &[Specimen], start: Material) -> Fitted {
     let mut parameters = bounded(to_parameters(start));
     let start = to_material(&parameters);
@@ -87,12 +86,8 @@ fn fit_from(sample: &[Specimen], start: Material) -> Fitted {
         let system = reduced_system(sample, &facets, &parameters);
         let mut accepted = None;
         for _ in 0..MAX_TRIES {
-            let mut damped = system.matrix;
-            for axis in 0..3 {
-                damped[(axis, axis)] += damped[(axis, axis)] * damping + 1e-6;
-            }
-            let change =
-                damped.try_inverse().map_or_else(Vector3::zeros, |inverse| inverse * system.right).map(clamp_change);
+            let Some(inverse) = system.damped_inverse(damping) else { break };
+            let change = (inverse * system.right).map(|change| change.clamp(-MAX_CHANGE, MAX_CHANGE));
             let next = bounded(parameters + change);
             let material = to_material(&next);
             let refitted: Vec<Facet> = sample
@@ -140,10 +135,6 @@ fn sum_of_costs(facets: &[Facet]) -> f64 {
     facets.iter().map(|facet| facet.cost).sum()
 }
 
-fn clamp_change(change: f64) -> f64 {
-    change.clamp(-MAX_CHANGE, MAX_CHANGE)
-}
-
 fn to_parameters(material: Material) -> Vector3<f64> {
     Vector3::new(material.strength.ln(), material.roughness.ln(), material.tail)
 }
@@ -162,48 +153,39 @@ fn bounded(parameters: Vector3<f64>) -> Vector3<f64> {
 }
 
 /// The normal equations of the parameters, those of the pixels eliminated.
-struct Reduced {
-    matrix: Matrix3<f64>,
-    right: Vector3<f64>,
-}
-
-fn reduced_system(sample: &[Specimen], facets: &[Facet], parameters: &Vector3<f64>) -> Reduced {
+fn reduced_system(sample: &[Specimen], facets: &[Facet], parameters: &Vector3<f64>) -> Equations {
     let material = to_material(parameters);
     let changed: [Material; 3] = std::array::from_fn(|axis| {
         let mut parameters = *parameters;
         parameters[axis] += DIFFERENCE;
         to_material(&parameters)
     });
-    let parts: Vec<Reduced> = sample
+    let parts: Vec<Equations> = sample
         .par_chunks(TASK_PIXELS)
         .zip(facets.par_chunks(TASK_PIXELS))
         .map(|(specimens, facets)| {
-            let mut part = Reduced { matrix: Matrix3::zeros(), right: Vector3::zeros() };
+            let mut part = Equations::default();
             for (specimen, facet) in specimens.iter().zip(facets) {
                 add_pixel(&mut part, &specimen.observation, facet, &material, &changed);
             }
             part
         })
         .collect();
-    parts.into_iter().fold(Reduced { matrix: Matrix3::zeros(), right: Vector3::zeros() }, |sum, part| Reduced {
-        matrix: sum.matrix + part.matrix,
-        right: sum.right + part.right,
-    })
+    let add =
+        |sum: Equations, part: Equations| Equations { matrix: sum.matrix + part.matrix, right: sum.right + part.right };
+    parts.into_iter().fold(Equations::default(), add)
 }
 
 fn add_pixel(
-    sum: &mut Reduced,
+    sum: &mut Equations,
     observation: &Observation,
     facet: &Facet,
     material: &Material,
     changed: &[Material; 3],
 ) {
     let frame = tangents(&facet.normal);
-    let mut own = equations(observation, material, facet, &frame);
-    for axis in 0..3 {
-        own.matrix[(axis, axis)] = own.matrix[(axis, axis)] * 1.001 + 1e-6;
-    }
-    let Some(inverse) = own.matrix.try_inverse() else { return };
+    let own = equations(observation, material, facet, &frame);
+    let Some(inverse) = own.damped_inverse(1e-3) else { return };
     let gain = facet.log_albedo.exp() * observation.weight;
     let mut coupling = Matrix3::zeros();
     for light in 0..observation.values.len() {
@@ -227,7 +209,6 @@ fn add_pixel(
 /// Turning part of a pixel's covariance: the inverse of its information without the albedo.
 pub(super) fn turning_variance(information: &Matrix3<f64>) -> Option<f64> {
     let inverse = information.try_inverse()?;
-    let turning: Matrix3x2<f64> = inverse.fixed_columns::<2>(0).into();
-    let variance = turning[(0, 0)] + turning[(1, 1)];
+    let variance = inverse[(0, 0)] + inverse[(1, 1)];
     (variance.is_finite() && variance >= 0.0).then_some(variance)
 }

@@ -219,7 +219,6 @@ pub fn predict<P: Pixel>(
     Ok(Some((predictions, 255.0 * reader.albedo_scale * reader.noise)))
 }
 
-/// The pixels of a mask.
 fn used<P: Pixel>(stack: &ImageStack<'_, P>, mask: Option<&[bool]>) -> Vec<usize> {
     (0..stack.pixels()).filter(|&pixel| mask.is_none_or(|mask| mask[pixel])).collect()
 }

@@ -62,7 +62,6 @@ impl Observation {
         if self.kinds[light] == Kind::Black { BLACK_WEIGHT } else { 1.0 }
     }
 
-    /// This pixel without one of its lights.
     pub fn without(&self, light: usize) -> Self {
         let mut rest = self.clone();
         rest.values.remove(light);
@@ -113,7 +112,6 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Reads a pixel.
     pub fn read(&self, pixel: usize, into: &mut Observation) {
         let offset = self.capture.offset(pixel);
         let (x_px, y_px) = self.capture.centre(pixel);

@@ -41,11 +41,7 @@ pub(super) struct Passes<'a> {
 }
 
 /// A pixel after a pass.
-#[derive(Clone, Copy, Debug)]
-struct Found {
-    facet: Facet,
-    source: Source,
-}
+type Found = (Facet, Source);
 
 impl Passes<'_> {
     /// Runs all passes, from and over the robust filter's result in `out`; the number of pixels of each source.
@@ -63,25 +59,21 @@ impl Passes<'_> {
             let mut observation = self.reader.room();
             self.reader.read(pixel, &mut observation);
             let starts = [(start(self.lambertian, pixel), None), (start(filtered, pixel), None)];
-            let (facet, source) = best_facet(&observation, &self.material, &starts, None, MAX_ITERS[0]);
-            Found { facet, source }
+            best_facet(&observation, &self.material, &starts, None, MAX_ITERS[0])
         })?;
         let mut normals = vec![f32::NAN; out.normals.len()];
         for pass in 1..=NEIGHBOUR_PASSES {
-            for (&pixel, found) in self.pixels.iter().zip(&found) {
-                let normal = found.facet.normal;
-                normals[3 * pixel..3 * pixel + 3].copy_from_slice(&[normal.x as f32, normal.y as f32, normal.z as f32]);
+            for (&pixel, (facet, _)) in self.pixels.iter().zip(&found) {
+                normals[3 * pixel..3 * pixel + 3].copy_from_slice(facet.normal.map(|value| value as f32).as_slice());
             }
             let next = self.banded(&mut |done| part(pass, done), &|index, pixel| {
                 let mut observation = self.reader.room();
                 self.reader.read(pixel, &mut observation);
-                let before = found[index].facet.normal;
-                let starts = |toward| [(before, Some(found[index].source)), (toward, None)];
+                let (Facet { normal: before, .. }, source) = found[index];
+                let starts = |toward| [(before, Some(source)), (toward, None)];
                 let toward = median_normal(&normals, self.shape, pixel).unwrap_or(before);
                 let pull = Pull { toward, strength: PULL.0, width: PULL.1 };
-                let (facet, source) =
-                    best_facet(&observation, &self.material, &starts(toward), Some(&pull), MAX_ITERS[1]);
-                Found { facet, source }
+                best_facet(&observation, &self.material, &starts(toward), Some(&pull), MAX_ITERS[1])
             })?;
             found = next;
         }
@@ -120,28 +112,27 @@ impl Passes<'_> {
         let lights = self.reader.room().lights.len();
         let (filtered, albedo, valid) = (&*out.normals, &*out.albedo, &*out.mask);
         let written = self.banded(progress, &|index, pixel| {
-            let Found { facet, source } = found[index];
+            let (facet, source) = found[index];
             let mut observation = self.reader.room();
             self.reader.read(pixel, &mut observation);
-            let material = if source == Source::Matte { Material::MATTE } else { self.material };
+            let material = source.material(&self.material);
             let scaled = start(filtered, pixel) * (f64::from(albedo[pixel]) / self.reader.albedo_scale);
-            if valid[pixel] && filter_knows_better(&observation, &scaled, &facet, &material) {
+            if valid[pixel] && filter_knows_better(&observation, &scaled, &facet, material) {
                 return None;
             }
             let mut used = vec![false; lights];
-            let trust = trust(&observation, &material, &facet, &mut used);
+            let trust = trust(&observation, material, &facet, &mut used);
             Some((trust, used))
         })?;
         let mut counts = [0; 3];
-        for ((&pixel, found), written) in self.pixels.iter().zip(found).zip(written) {
+        for ((&pixel, (facet, source)), written) in self.pixels.iter().zip(found).zip(written) {
             let Some((trust, used)) = written else {
                 counts[Source::RobustFilter as usize] += 1;
                 continue;
             };
-            counts[found.source as usize] += 1;
-            let normal = found.facet.normal;
-            out.normals[3 * pixel..3 * pixel + 3].copy_from_slice(&[normal.x as f32, normal.y as f32, normal.z as f32]);
-            out.albedo[pixel] = (found.facet.log_albedo.exp() * self.reader.albedo_scale) as f32;
+            counts[*source as usize] += 1;
+            out.normals[3 * pixel..3 * pixel + 3].copy_from_slice(facet.normal.map(|value| value as f32).as_slice());
+            out.albedo[pixel] = (facet.log_albedo.exp() * self.reader.albedo_scale) as f32;
             out.mask[pixel] = true;
             out.confidence[pixel] = trust.confidence;
             out.measured[pixel] = trust.measured;

@@ -39,6 +39,13 @@ pub(super) enum Source {
     RobustFilter,
 }
 
+impl Source {
+    /// The material of a facet, where the other one is `material`.
+    pub fn material(self, material: &Material) -> &Material {
+        if self == Self::Matte { &Material::MATTE } else { material }
+    }
+}
+
 /// The facet of least cost over the starts, under both materials or only under the one that stands beside the start.
 pub(super) fn best_facet(
     observation: &Observation,

@@ -9,11 +9,9 @@ use super::stencil::Stencil;
 /// What aggregation needs to know of a fine operator.
 pub(super) trait Adjacency: Sync {
     fn grid(&self) -> Grid;
-    /// Unknowns of one colour.
     fn len(&self, colour: Colour) -> usize;
     /// Those of a row of pixels.
     fn row(&self, colour: Colour, row: usize) -> Range<usize>;
-    /// The column of an unknown of a row.
     fn col(&self, colour: Colour, row: usize, unknown: usize) -> usize;
     /// The edges of an unknown of a row that conduct.
     fn edges(&self, colour: Colour, row: usize, unknown: usize) -> impl Iterator<Item = (usize, f32)>;

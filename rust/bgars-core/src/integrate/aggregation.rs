@@ -52,12 +52,11 @@ struct RowOfBlocks {
 pub(super) fn aggregate(fine: &impl Adjacency) -> (Graph, Aggregates) {
     let grid = fine.grid().coarse();
     let rows: Vec<RowOfBlocks> = (0..grid.height).into_par_iter().map(|row| aggregates_of(fine, row)).collect();
-    let (firsts, counts) = number(&rows);
-    let parents = parents(fine, &rows, &firsts);
+    let (parents, starts) = number(fine, &rows);
     let row_parts: Vec<([Part; 2], [Members; 2])> =
         (0..grid.height).into_par_iter().map(|row| coarse_row(fine, row, &rows[row], &parents)).collect();
     let mut parts = COLOURS.map(|colour| Part {
-        rows: firsts.iter().map(|first| first[colour as usize]).chain([counts[colour as usize]]).collect(),
+        rows: starts.iter().map(|start| start[colour as usize]).collect(),
         starts: vec![0],
         ..Part::default()
     });
@@ -129,53 +128,22 @@ impl RowOfBlocks {
     }
 }
 
-/// The number of the first aggregate of each row of blocks, for either colour, and how many there are.
-fn number(rows: &[RowOfBlocks]) -> (Vec<[u32; 2]>, [u32; 2]) {
-    let mut counts = [0; 2];
-    let mut firsts = Vec::with_capacity(rows.len());
-    for (row, blocks) in rows.iter().enumerate() {
-        firsts.push(counts);
-        for nodes in blocks.aggregates() {
-            counts[Colour::at(row, nodes[0].block as usize) as usize] += 1;
-        }
-    }
-    (firsts, counts)
-}
-
-/// The coarse unknown of each unknown, `2 index + colour`, for either colour of the fine operator.
-fn parents(fine: &impl Adjacency, rows: &[RowOfBlocks], firsts: &[[u32; 2]]) -> [Vec<u32>; 2] {
+/// The coarse unknown of each unknown, `2 index + colour`, for either colour of the fine operator; and the number of the first of
+/// each row of blocks, for either colour, and how many there are.
+fn number(fine: &impl Adjacency, rows: &[RowOfBlocks]) -> ([Vec<u32>; 2], Vec<[u32; 2]>) {
     let mut parents = COLOURS.map(|colour| vec![0; fine.len(colour)]);
-    let starts = COLOURS.map(|colour| {
-        let start = |row: usize| if row < rows.len() { fine.row(colour, 2 * row).start } else { fine.len(colour) };
-        (0..=rows.len()).map(start).collect::<Vec<usize>>()
-    });
-    let [reds, blacks] = &mut parents;
-    let tasks = split(reds, &starts[0]).into_par_iter().zip(split(blacks, &starts[1])).zip(rows).zip(firsts);
-    tasks.enumerate().for_each(|(row, (((reds, blacks), blocks), &firsts))| {
-        let (mut next, slices) = (firsts, [reds, blacks]);
+    let (mut next, mut starts) = ([0; 2], vec![[0; 2]]);
+    for (row, blocks) in rows.iter().enumerate() {
         for nodes in blocks.aggregates() {
             let colour = Colour::at(row, nodes[0].block as usize) as usize;
             for node in nodes {
-                let fine_colour = node.colour as usize;
-                slices[fine_colour][node.unknown as usize - starts[fine_colour][row]] =
-                    2 * next[colour] + colour as u32;
+                parents[node.colour as usize][node.unknown as usize] = 2 * next[colour] + colour as u32;
             }
             next[colour] += 1;
         }
-    });
-    parents
-}
-
-/// A slice in parts that begin at `starts`, whose last is the end.
-fn split<'a, T>(mut values: &'a mut [T], starts: &[usize]) -> Vec<&'a mut [T]> {
-    let lengths = starts.windows(2).map(|ends| ends[1] - ends[0]);
-    lengths
-        .map(|length| {
-            let (part, rest) = std::mem::take(&mut values).split_at_mut(length);
-            values = rest;
-            part
-        })
-        .collect()
+        starts.push(next);
+    }
+    (parents, starts)
 }
 
 /// The coarse unknowns of a row of blocks with their edges, and the blacks that belong to them; numbers count from the row's first.
@@ -214,80 +182,4 @@ fn coarse_row(
         members.starts.push(members.blacks.len() as u32);
     }
     found
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::checkerboard::Grid;
-    use super::super::stencil::{EdgeRow, Stencil};
-    use super::*;
-
-    /// The grid of a mask, given as rows of `#` and `.`, all weights one.
-    fn stencil(rows: &[&str]) -> Stencil {
-        let grid = Grid { height: rows.len(), width: rows[0].len() };
-        let used = |row: usize, col: usize| {
-            rows.get(row).and_then(|row| row.as_bytes().get(col)).is_some_and(|&mark| mark == b'#')
-        };
-        let rows_of = || {
-            |row: usize, along: &mut EdgeRow<f32>, below: &mut EdgeRow<f32>| {
-                for col in 0..grid.width {
-                    along.weight[col] = f32::from(u8::from(used(row, col) && used(row, col + 1)));
-                    below.weight[col] = f32::from(u8::from(used(row, col) && used(row + 1, col)));
-                }
-            }
-        };
-        Stencil::from_edges(grid, rows_of, None)
-    }
-
-    /// Sums of weights of all unknowns.
-    fn diagonals(of: &impl Adjacency) -> Vec<(usize, usize, f32)> {
-        let mut found = Vec::new();
-        for row in 0..of.grid().height {
-            for colour in COLOURS {
-                for unknown in of.row(colour, row) {
-                    let weight: f32 = of.edges(colour, row, unknown).map(|(_, weight)| weight).sum();
-                    if weight > 0.0 {
-                        found.push((row, of.col(colour, row, unknown), weight));
-                    }
-                }
-            }
-        }
-        found.sort_by_key(|&(row, col, _)| (row, col));
-        found
-    }
-
-    #[test]
-    fn a_grid_that_does_not_fall_apart_is_coarsened_alike_either_way() {
-        for rows in [
-            &["#######", "#######", "###.###", "#######", "#######"][..],
-            &["######", "##..##", "##..##", "######"],
-            &["##", "##"],
-        ] {
-            let fine = stencil(rows);
-            let (graph, _) = aggregate(&fine);
-            assert_eq!(diagonals(&fine.coarse().unwrap()), diagonals(&graph), "{rows:?}");
-        }
-    }
-
-    #[test]
-    fn blocks_fall_apart_along_walls() {
-        // A wall from corner to corner, joined far away.
-        let fine = stencil(&[".#####", "#.####", "##.###", "###.##", "######", "######"]);
-        assert!(fine.coarse().is_none());
-        let (graph, aggregates) = aggregate(&fine);
-        // The upper left block has two pixels that do not touch, the one beside the wall's end is whole.
-        let sizes = graph.parts.each_ref().map(Part::len);
-        assert_eq!(sizes.iter().sum::<usize>(), 9 + 2);
-        let blacks: usize = aggregates.members.iter().map(|members| members.blacks.len()).sum();
-        assert_eq!(blacks, 18, "every pixel with row + col odd");
-        for (colour, part) in COLOURS.into_iter().zip(&graph.parts) {
-            for unknown in 0..part.len() {
-                for edge in part.edges(unknown) {
-                    let other = &graph.parts[colour.other() as usize];
-                    let back = other.edges(part.ends[edge] as usize).find(|&back| other.ends[back] as usize == unknown);
-                    assert_eq!(back.map(|back| other.weights[back]), Some(part.weights[edge]));
-                }
-            }
-        }
-    }
 }

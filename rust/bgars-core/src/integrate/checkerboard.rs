@@ -37,7 +37,6 @@ impl Colour {
     }
 }
 
-/// Size of a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Grid {
     pub height: usize,
@@ -50,7 +49,6 @@ impl Grid {
         self.width.div_ceil(2)
     }
 
-    /// Pixels of one colour.
     pub fn half_pixels(self) -> usize {
         self.height * self.half()
     }
@@ -112,34 +110,5 @@ pub(super) fn join_row<T: Copy>(row: usize, [reds, blacks]: [&[T]; 2], pixels: &
     let last = pixels.len() / 2;
     if let Some(pixel) = pixels.chunks_exact_mut(2).into_remainder().first_mut() {
         *pixel = first[last];
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rows_come_back_from_their_colours() {
-        for (row, width) in [(0, 1), (1, 1), (0, 6), (1, 6), (4, 7), (5, 7)] {
-            let pixels: Vec<usize> = (10..10 + width).collect();
-            let half = width.div_ceil(2);
-            let [mut reds, mut blacks] = [vec![9; half], vec![9; half]];
-            split_row(row, &pixels, [&mut reds, &mut blacks]);
-            for (col, &pixel) in pixels.iter().enumerate() {
-                assert_eq!([&reds, &blacks][Colour::at(row, col) as usize][col / 2], pixel);
-            }
-            let mut joined = vec![0; width];
-            join_row(row, [&reds, &blacks], &mut joined);
-            assert_eq!(joined, pixels);
-        }
-    }
-
-    #[test]
-    fn the_box_is_the_smallest() {
-        let rows = ["......", "...#..", ".#....", "......"];
-        let mask: Vec<bool> = rows.concat().chars().map(|mark| mark == '#').collect();
-        let Crop { row, col, grid } = Crop::around(&mask, 6);
-        assert_eq!((row, col, grid), (1, 1, Grid { height: 2, width: 3 }));
     }
 }

@@ -14,7 +14,7 @@ use crate::Result;
 const MIN_N_Z: f64 = 1e-3;
 
 /// One row of the field with its components apart; pixels outside the mask face the camera and are not trusted.
-#[derive(Debug, Default, Clone)]
+#[derive(Default)]
 struct FieldRow {
     along: [Vec<f32>; 2],
     n_z: Vec<f32>,
@@ -26,34 +26,18 @@ impl FieldRow {
     /// `unit` brings the weights to the size of 1.
     fn load(&mut self, field: Field<'_>, crop: Crop, unit: f64, row: usize) {
         let first = (crop.row + row) * field.width + crop.col;
-        let span = first..first + crop.grid.width;
-        let mask = &field.mask[span.clone()];
-        let [n_x, n_y] = &mut self.along;
-        for component in [&mut *n_x, n_y, &mut self.n_z] {
-            component.resize(mask.len(), 0.0);
+        let width = crop.grid.width;
+        let trust = |pixel: usize| field.weights.map_or(1.0, |weights| (f64::from(weights[pixel]) * unit).sqrt());
+        let Self { along: [n_x, n_y], n_z, trust: trusts } = self;
+        for component in [&mut *n_x, n_y, n_z] {
+            component.resize(width, 0.0);
         }
-        self.trust.resize(mask.len(), 0.0);
-        let normals = &field.normals[span.start * 3..span.end * 3];
-        split_normals(normals, mask, [n_x, n_y, &mut self.n_z], &mut self.trust);
-        if let Some(weights) = field.weights {
-            for ((trust, &weight), &used) in self.trust.iter_mut().zip(&weights[span]).zip(mask) {
-                *trust = if used { (f64::from(weight) * unit).sqrt() } else { 0.0 };
-            }
+        trusts.resize(width, 0.0);
+        let normals = field.normals[3 * first..3 * (first + width)].as_chunks::<3>().0;
+        for (k, (&[x, y, z], &used)) in normals.iter().zip(&field.mask[first..first + width]).enumerate() {
+            (n_x[k], n_y[k], n_z[k]) = if used { (x, y, z) } else { (0.0, 0.0, 1.0) };
+            trusts[k] = if used { trust(first + k) } else { 0.0 };
         }
-    }
-}
-
-/// The components of a row of normals, and 1 in the mask.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-fn split_normals(normals: &[f32], mask: &[bool], [n_x, n_y, n_z]: [&mut [f32]; 3], inside: &mut [f64]) {
-    let (normals, n) = (normals.as_chunks::<3>().0, mask.len());
-    let (normals, n_x, n_y, n_z) = (&normals[..n], &mut n_x[..n], &mut n_y[..n], &mut n_z[..n]);
-    for k in 0..n {
-        let [x, y, z] = normals[k];
-        (n_x[k], n_y[k], n_z[k]) = if mask[k] { (x, y, z) } else { (0.0, 0.0, 1.0) };
-    }
-    for (inside, &used) in inside.iter_mut().zip(mask) {
-        *inside = f64::from(u8::from(used));
     }
 }
 
@@ -102,23 +86,6 @@ fn weigh([c, d]: [Ends<'_>; 2], trust: [&[f64]; 2], sign: f64, weight: &mut [f32
     }
 }
 
-/// The last two rows of a field that were asked for.
-#[derive(Default)]
-struct FieldRows {
-    rows: [FieldRow; 2],
-    loaded: [Option<usize>; 2],
-}
-
-impl FieldRows {
-    fn load(&mut self, field: Field<'_>, crop: Crop, unit: f64, row: usize) {
-        if self.loaded[row % 2] != Some(row) {
-            self.rows[row % 2].load(field, crop, unit, row);
-            self.loaded[row % 2] = Some(row);
-        }
-    }
-}
-
-/// The largest weight in the mask.
 fn largest(weights: &[f32], mask: &[bool]) -> f64 {
     let inside = weights.par_iter().zip(mask).map(|(&weight, &used)| if used { weight } else { 0.0 });
     f64::from(inside.reduce(|| 0.0, f32::max))
@@ -134,11 +101,13 @@ pub(super) fn to_unit(weight: f64) -> f64 {
 pub(super) fn assemble(field: Field<'_>, crop: Crop, difference: Difference) -> System {
     let unit = field.weights.map_or(1.0, |weights| to_unit(largest(weights, field.mask)));
     let rows_of = || {
-        let mut rows = FieldRows::default();
+        let (mut rows, mut loaded) = (<[FieldRow; 2]>::default(), None);
         move |row: usize, right: &mut EdgeRow<f32>, below: &mut EdgeRow<f32>| {
             let first = (crop.row + row) * field.width + crop.col;
-            rows.load(field, crop, unit, row);
-            let FieldRow { along, n_z, trust } = &rows.rows[row % 2];
+            if loaded != Some(row) {
+                rows[0].load(field, crop, unit, row);
+            }
+            let FieldRow { along, n_z, trust } = &rows[0];
             let ends = [(&along[0][..], &n_z[..], &trust[..]), (&along[0][1..], &n_z[1..], &trust[1..])];
             join(right, ends, 1.0, difference, true);
             cut(right, field, first, 1);
@@ -146,12 +115,13 @@ pub(super) fn assemble(field: Field<'_>, crop: Crop, difference: Difference) -> 
                 below.clear();
                 return;
             }
-            rows.load(field, crop, unit, row + 1);
-            let [upper, lower] = [&rows.rows[row % 2], &rows.rows[(row + 1) % 2]];
-            let ends = [upper, lower].map(|row| (&row.along[1][..], &row.n_z[..], &row.trust[..]));
+            rows[1].load(field, crop, unit, row + 1);
+            let ends = rows.each_ref().map(|row| (&row.along[1][..], &row.n_z[..], &row.trust[..]));
             // y grows upward: the forward difference starts at the lower pixel.
             join(below, ends, -1.0, difference, false);
             cut(below, field, first, field.width);
+            rows.swap(0, 1);
+            loaded = Some(row + 1);
         }
     };
     let mut right = [(); 2].map(|()| vec![0.0; crop.grid.half_pixels()]);

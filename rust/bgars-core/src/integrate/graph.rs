@@ -56,22 +56,26 @@ impl Graph {
         set: impl Fn(&mut T, T, T, T) + Sync,
     ) {
         let part = &self.parts[colour as usize];
-        let update = |(task, values): (usize, &mut [T])| {
-            for (unknown, value) in (task * TASK..).zip(values) {
-                let edges = part.edges(unknown);
-                let (mut sum, mut diagonal) = (T::default(), T::default());
-                for (&end, &weight) in part.ends[edges.clone()].iter().zip(&part.weights[edges]) {
-                    sum += T::from(weight) * neighbours[end as usize];
-                    diagonal += T::from(weight);
-                }
-                set(value, sum, diagonal, input[unknown]);
+        each(values, |unknown, value| {
+            let edges = part.edges(unknown);
+            let (mut sum, mut diagonal) = (T::default(), T::default());
+            for (&end, &weight) in part.ends[edges.clone()].iter().zip(&part.weights[edges]) {
+                sum += T::from(weight) * neighbours[end as usize];
+                diagonal += T::from(weight);
             }
-        };
-        // A W-cycle visits small graphs often: they are not worth waking threads.
-        if values.len() <= TASK {
-            update((0, values));
-        } else {
-            values.par_chunks_mut(TASK).enumerate().for_each(update);
-        }
+            set(value, sum, diagonal, input[unknown]);
+        });
+    }
+}
+
+/// Sets every value by its place, on all threads where that is worth waking them: a W-cycle visits small graphs often.
+pub(super) fn each<T: Send>(values: &mut [T], set: impl Fn(usize, &mut T) + Sync) {
+    let set_all = |(task, values): (usize, &mut [T])| {
+        values.iter_mut().enumerate().for_each(|(k, value)| set(task * TASK + k, value));
+    };
+    if values.len() <= TASK {
+        set_all((0, values));
+    } else {
+        values.par_chunks_mut(TASK).enumerate().for_each(set_all);
     }
 }

@@ -14,7 +14,6 @@ mod bilateral;
 mod checkerboard;
 mod checks;
 mod coarse_grid;
-mod components;
 mod conjugate_gradient;
 mod field;
 mod graph;
@@ -27,8 +26,8 @@ mod stencil;
 mod system;
 mod vectors;
 
+pub use crate::components::Component;
 pub use bilateral::{BilateralParams, BilateralSurface, Pinhole, Setting, integrate_bilateral};
-pub use components::Component;
 pub use multigrid::Multigrid;
 pub use settings::{Difference, Field, Fit, OnProgress, Params, Progress, Surface};
 pub use solve::{integrate, integrate_into, usable};

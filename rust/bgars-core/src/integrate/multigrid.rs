@@ -1,5 +1,6 @@
 //! Multigrid (Brandt 1977; Trottenberg, Oosterlee, Schüller 2001) as a preconditioner: one symmetric V-cycle in `f32`.
 
+use std::borrow::Cow;
 use std::sync::{Mutex, PoisonError};
 
 use faer::dyn_stack::MemStack;
@@ -10,13 +11,12 @@ use rayon::prelude::*;
 use super::adjacency::Adjacency;
 use super::aggregation::{Aggregates, aggregate};
 use super::checkerboard::{Colour, Grid, join_row, split_row};
-use super::graph::Graph;
+use super::graph::{Graph, each};
 use super::real::Real;
 use super::stencil::Stencil;
 use super::vectors::{slice, slice_mut, symmetric_operator};
 
-/// Unknowns, and rows of blocks, that are worth a task.
-const TASK: usize = 1 << 12;
+/// Rows of blocks that are worth a task.
 const TASK_ROWS: usize = 16;
 
 /// How much of a second cycle counts. By less than one, the whole stays positive where a cycle overshoots, up to threefold.
@@ -25,8 +25,7 @@ const SECOND_CYCLE: f32 = 0.5;
 /// The operator of a level: a grid as long as no block of pixels falls apart, a graph from there on.
 #[derive(Debug)]
 enum Operator<'a> {
-    Finest(&'a Stencil),
-    Grid(Stencil),
+    Grid(Cow<'a, Stencil>),
     Graph(Graph),
 }
 
@@ -51,7 +50,6 @@ struct Level<'a> {
 /// Reds and blacks.
 type Values = [Vec<f32>; 2];
 
-/// The vectors of a level.
 #[derive(Debug)]
 struct Vectors {
     right: Values,
@@ -72,7 +70,7 @@ pub struct Multigrid<'a> {
 
 impl<'a> Multigrid<'a> {
     pub(super) fn new(finest: &'a Stencil) -> Self {
-        let mut levels = vec![Level { operator: Operator::Finest(finest), transfer: None }];
+        let mut levels = vec![Level { operator: Operator::Grid(Cow::Borrowed(finest)), transfer: None }];
         while let Some(finer) = levels.last_mut()
             && let Some((transfer, operator)) = finer.operator.coarse()
         {
@@ -130,7 +128,6 @@ impl Operator<'_> {
         set: impl Fn(&mut f32, f32, f32, f32) + Sync,
     ) {
         match self {
-            Self::Finest(stencil) => stencil.update(colour, neighbours, input, values, set),
             Self::Grid(stencil) => stencil.update(colour, neighbours, input, values, set),
             Self::Graph(graph) => graph.update(colour, neighbours, input, values, set),
         }
@@ -139,12 +136,13 @@ impl Operator<'_> {
     /// The next coarser operator and the way to it; `None` where no edges would be left.
     fn coarse(&self) -> Option<(Transfer, Self)> {
         let stencil = match self {
-            Self::Finest(stencil) => *stencil,
-            Self::Grid(stencil) => stencil,
+            Self::Grid(stencil) => stencil.as_ref(),
             Self::Graph(graph) => return components(graph),
         };
         match stencil.coarse() {
-            Some(coarse) if coarse.has_edges() => Some((Transfer::Blocks(stencil.grid), Self::Grid(coarse))),
+            Some(coarse) if coarse.has_edges() => {
+                Some((Transfer::Blocks(stencil.grid), Self::Grid(Cow::Owned(coarse))))
+            }
             Some(_) => None,
             None => components(stencil),
         }
@@ -152,7 +150,6 @@ impl Operator<'_> {
 
     fn vectors(&self) -> Vectors {
         let lengths = [Colour::Red, Colour::Black].map(|colour| match self {
-            Self::Finest(stencil) => stencil.len(colour),
             Self::Grid(stencil) => stencil.len(colour),
             Self::Graph(graph) => graph.len(colour),
         });
@@ -188,7 +185,7 @@ impl Transfer {
             }
             Self::Components(Aggregates { members, .. }) => {
                 for (values, members) in [coarse_reds, coarse_blacks].into_iter().zip(members) {
-                    each_task(values, |unknown, value| {
+                    each(values, |unknown, value| {
                         *value = members.of(unknown).iter().map(|&black| blacks[black as usize]).sum();
                     });
                 }
@@ -210,24 +207,12 @@ impl Transfer {
             }
             Self::Components(Aggregates { parents, .. }) => {
                 let coarse = [coarse_reds, coarse_blacks];
-                each_task(blacks, |unknown, black| {
+                each(blacks, |unknown, black| {
                     let parent = parents[unknown] as usize;
                     *black = coarse[parent % 2].get(parent / 2).copied().unwrap_or_default();
                 });
             }
         }
-    }
-}
-
-/// Sets every value by its place, on all threads where that is worth it.
-fn each_task(values: &mut [f32], set: impl Fn(usize, &mut f32) + Sync) {
-    let set_all = |(task, values): (usize, &mut [f32])| {
-        values.iter_mut().enumerate().for_each(|(k, value)| set(task * TASK + k, value));
-    };
-    if values.len() <= TASK {
-        set_all((0, values));
-    } else {
-        values.par_chunks_mut(TASK).enumerate().for_each(set_all);
     }
 }
 

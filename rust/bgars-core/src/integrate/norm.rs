@@ -8,7 +8,6 @@ const PART: usize = 1 << 13;
 /// Sums in flight.
 const LANES: usize = 8;
 
-/// Euclidean norm.
 pub(super) fn norm(values: &[f64]) -> f64 {
     let squares: Vec<f64> = values.par_chunks(PART).map(|part| sum_of(part, |value| value * value)).collect();
     squares.iter().sum::<f64>().sqrt()
@@ -29,18 +28,4 @@ fn sum_of<F: Fn(f64) -> f64>(values: &[f64], term: F) -> f64 {
         }
     }
     sums.iter().sum::<f64>() + rest.iter().map(|&value| term(value)).sum::<f64>()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn norms_and_sums_are_those_of_the_numbers() {
-        let values: Vec<f64> = (0..3 * PART + 5).map(|k| (k as f64 * 0.1).sin()).collect();
-        let (squares, plain) = (values.iter().map(|value| value * value).sum::<f64>(), values.iter().sum::<f64>());
-        assert!((norm(&values) - squares.sqrt()).abs() < 1e-9 * squares.sqrt());
-        assert!((sum(&values) - plain).abs() < 1e-9);
-        assert!(norm(&[]).abs() < f64::MIN_POSITIVE);
-    }
 }

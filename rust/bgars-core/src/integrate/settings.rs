@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use super::checkerboard::{Crop, Grid};
-use super::components::Component;
+use crate::components::Component;
 
 /// How the slope of an edge follows from the normals of its two pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,12 +4,12 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::checkerboard::{Crop, by_column, join_row};
-use super::checks::{CHECK_PIXELS, check, check_length, check_memory};
-use super::components::Runs;
+use super::checks::{check, check_length, check_memory};
 use super::conjugate_gradient::{Limits, conjugate_gradient};
 use super::field::assemble;
 use super::norm::sum;
 use super::settings::{Field, Fit, OnProgress, Params, Progress, Surface};
+use crate::components::Runs;
 use crate::{Error, Result};
 
 /// Integrates `normals` over `mask` to a height map in pixels.
@@ -87,20 +87,12 @@ pub fn integrate_into(
         max_iters: params.max_iters,
     };
     let mut reds = vec![0.0; crop.grid.half_pixels()];
-    let solution = {
-        let mut report = |iteration, norm: f64| {
-            on_progress(Progress { iteration, residual: if norm > 0.0 { norm / scale } else { 0.0 } })
-        };
-        conjugate_gradient(
-            &system.operator(),
-            || system.preconditioner(),
-            system.right_side(),
-            &mut reds,
-            limits,
-            &mut report,
-        )?
-    };
-    let (iterations, residual) = (solution.iterations, if solution.norm > 0.0 { solution.norm / scale } else { 0.0 });
+    let relative = |norm: f64| if norm > 0.0 { norm / scale } else { 0.0 };
+    let mut report = |iteration, norm| on_progress(Progress { iteration, residual: relative(norm) });
+    let (operator, right) = (system.operator(), system.right_side());
+    let solution = conjugate_gradient(&operator, || system.preconditioner(), right, &mut reds, limits, &mut report)?;
+    drop(operator);
+    let (iterations, residual) = (solution.iterations, relative(solution.norm));
     if !solution.solved {
         return Err(Error::NoConvergence { iterations, residual, tolerance: params.relative_tolerance });
     }
@@ -157,12 +149,6 @@ fn without_weightless(field: Field<'_>) -> Option<Vec<bool>> {
 /// ```
 #[must_use]
 pub fn usable(normals: &[f32]) -> Vec<bool> {
-    let mut usable = vec![false; normals.len() / 3];
-    usable.par_chunks_mut(CHECK_PIXELS).zip(normals.par_chunks(3 * CHECK_PIXELS)).for_each(|(usable, normals)| {
-        for (usable, normal) in usable.iter_mut().zip(normals.chunks_exact(3)) {
-            // NaN and infinity spread into the sum of their products with zero.
-            *usable = normal[2] > 0.0 && (normal[0] * 0.0 + normal[1] * 0.0) + normal[2] * 0.0 == 0.0;
-        }
-    });
-    usable
+    let usable = |normal: &[f32; 3]| normal[2] > 0.0 && normal.iter().all(|component| component.is_finite());
+    normals.as_chunks().0.par_iter().map(usable).collect()
 }

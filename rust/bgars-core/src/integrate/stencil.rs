@@ -33,7 +33,7 @@ impl<W: Real> EdgeRow<W> {
 }
 
 /// The weights of the edges between neighbouring pixels, kept at the red end of each: in `f32` 8 bytes a pixel.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Stencil<W = f32> {
     pub grid: Grid,
     /// From each red to the left, right, up and down; a zero before each row and after the last.
@@ -186,80 +186,5 @@ fn update_row<W: Copy, T: Real + From<W>, F: Fn(&mut T, T, T, T)>(
         let [l, r, u, d] = [w_left[k], w_right[k], w_up[k], w_down[k]].map(<T as From<W>>::from);
         let sum = (l * left[k] + r * right[k]) + (u * up[k] + d * down[k]);
         set(&mut values[k], sum, (l + r) + (u + d), input[k]);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Weight and push of the edge from pixel (row, col) to the right (0) or down (1).
-    fn edge(grid: Grid, row: usize, col: usize, axis: usize) -> (f64, f64) {
-        let inside = if axis == 0 { col + 1 < grid.width } else { row + 1 < grid.height };
-        let number = (((row * 991 + col * 4 + axis) * 2_654_435_761) >> 9) % 7;
-        if inside { (number as f64, (number * number) as f64 - 3.0) } else { (0.0, 0.0) }
-    }
-
-    fn stencil(grid: Grid, right: &mut [Vec<f64>; 2]) -> Stencil {
-        let rows_of = || {
-            |row: usize, along: &mut EdgeRow<f32>, below: &mut EdgeRow<f32>| {
-                for (axis, edges) in [along, below].into_iter().enumerate() {
-                    for col in 0..grid.width {
-                        let (weight, push) = edge(grid, row, col, axis);
-                        (edges.weight[col], edges.push[col]) = (weight as f32, push);
-                    }
-                }
-            }
-        };
-        Stencil::from_edges(grid, rows_of, Some(right))
-    }
-
-    /// Sums over edges and pushes, against one edge at a time.
-    #[test]
-    fn sums_and_right_sides_are_those_of_the_edges() {
-        for (height, width) in [(1, 1), (1, 2), (2, 1), (3, 7), (33, 16), (34, 31), (65, 33)] {
-            let grid = Grid { height, width };
-            let mut right = [(); 2].map(|()| vec![0.0; grid.half_pixels()]);
-            let stencil = stencil(grid, &mut right);
-            let place = |row: usize, col: usize| row * grid.half() + col / 2;
-            let value = |row: usize, col: usize| (row * 17 + col * 5) as f64 % 11.0;
-            let mut values = [(); 2].map(|()| vec![100.0; grid.half_pixels()]);
-            for (row, col) in (0..height * width).map(|at| (at / width, at % width)) {
-                values[Colour::at(row, col) as usize][place(row, col)] = value(row, col);
-            }
-            let mut sums = values.clone();
-            let mut diagonals = values.clone();
-            for colour in [Colour::Red, Colour::Black] {
-                let (own, other) = (&values[colour as usize], &values[colour.other() as usize]);
-                stencil.update(colour, other, own, &mut sums[colour as usize], |out, sum, _, x| *out = sum + x);
-                stencil.update(colour, other, own, &mut diagonals[colour as usize], |out, _, d, _| *out = d);
-            }
-            for (row, col) in (0..height * width).map(|at| (at / width, at % width)) {
-                let mut expected = [value(row, col), 0.0, 0.0];
-                for (axis, ahead) in [(0, [row, col + 1]), (1, [row + 1, col])] {
-                    let (weight, push) = edge(grid, row, col, axis);
-                    expected[0] += weight * value(ahead[0], ahead[1]);
-                    expected[1] += weight;
-                    expected[2] -= push;
-                    let behind = if axis == 0 {
-                        col.checked_sub(1).map(|col| [row, col])
-                    } else {
-                        row.checked_sub(1).map(|row| [row, col])
-                    };
-                    if let Some([row, col]) = behind {
-                        let (weight, push) = edge(grid, row, col, axis);
-                        expected[0] += weight * value(row, col);
-                        expected[1] += weight;
-                        expected[2] += push;
-                    }
-                }
-                let colour = Colour::at(row, col) as usize;
-                let found = [&sums, &diagonals, &right].map(|vector| vector[colour][place(row, col)]);
-                assert!(
-                    found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12),
-                    "{height} x {width}: {row}, {col}"
-                );
-            }
-        }
     }
 }

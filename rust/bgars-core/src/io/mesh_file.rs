@@ -1,12 +1,12 @@
 //! Mesh files by their names.
 
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::Write;
 use std::path::Path;
 
 use super::MeshSource;
 use super::obj::write_obj;
-use super::ply::{ply_bytes, write_ply};
+use super::ply::write_ply;
 use crate::{Error, Result};
 
 /// Formats of a mesh file.
@@ -19,10 +19,6 @@ pub enum MeshFormat {
 }
 
 /// Writes `mesh` to a new file, or over an old one.
-///
-/// # Method
-/// Room for a PLY file, whose size is known, is asked for at once: a full disk is noticed before the work, and the file system
-/// has less to keep account of.
 ///
 /// # Errors
 /// [`Error::Io`], naming the file.
@@ -41,28 +37,10 @@ pub fn write_mesh_file(mesh: &impl MeshSource, format: MeshFormat, comments: &[S
     let write = || {
         let mut file = File::create(path)?;
         match format {
-            MeshFormat::Ply => {
-                reserve(&file, ply_bytes(mesh, comments))?;
-                write_ply(mesh, comments, &mut file)?;
-            }
+            MeshFormat::Ply => write_ply(mesh, comments, &mut file)?,
             MeshFormat::Obj => write_obj(mesh, comments, &mut file)?,
         }
         file.flush()
     };
     write().map_err(|source| Error::Io { path: path.to_path_buf(), source })
-}
-
-/// Asks for room, where the system knows how.
-fn reserve(file: &File, bytes: u64) -> io::Result<()> {
-    #[cfg(target_os = "linux")]
-    {
-        use rustix::{fs, io::Errno};
-        // Any other answer comes from a pipe or a file system without this service: writing will show.
-        if let Err(full @ (Errno::NOSPC | Errno::DQUOT)) = fs::fallocate(file, fs::FallocateFlags::empty(), 0, bytes) {
-            return Err(full.into());
-        }
-    }
-    #[cfg(not(target_os = "linux"))]
-    let _ = (file, bytes);
-    Ok(())
 }

@@ -17,20 +17,25 @@ pub struct Vertices {
     pub colors: Vec<[u8; 3]>,
 }
 
+/// How much there is of a mesh.
+#[derive(Clone, Copy, Debug)]
+pub struct MeshSize {
+    /// Number of vertices.
+    pub vertices: usize,
+    /// Number of faces.
+    pub faces: usize,
+    /// Pieces of the vertices, and of the faces.
+    pub pieces: [usize; 2],
+    /// Whether vertices have normals.
+    pub has_normals: bool,
+    /// Whether vertices have colours.
+    pub has_colors: bool,
+}
+
 /// A mesh that gives its vertices and faces piece by piece, in the order of the file.
 pub trait MeshSource: Sync {
-    /// Number of vertices.
-    fn vertex_count(&self) -> usize;
-    /// Number of faces.
-    fn face_count(&self) -> usize;
-    /// Whether vertices have normals.
-    fn has_normals(&self) -> bool;
-    /// Whether vertices have colours.
-    fn has_colors(&self) -> bool;
-    /// Number of pieces of the vertices.
-    fn vertex_pieces(&self) -> usize;
-    /// Number of pieces of the faces.
-    fn face_pieces(&self) -> usize;
+    /// How much there is of it.
+    fn size(&self) -> MeshSize;
     /// Replaces the content of `out` by a piece of the vertices; beyond the last, by nothing.
     fn vertices(&self, piece: usize, out: &mut Vertices);
     /// Replaces the content of `out` by a piece of the faces, three vertices each; beyond the last, by nothing.
@@ -71,28 +76,14 @@ impl<'a> HeightSource<'a> {
 }
 
 impl MeshSource for HeightSource<'_> {
-    fn vertex_count(&self) -> usize {
-        self.mesh.vertex_count()
-    }
-
-    fn face_count(&self) -> usize {
-        self.mesh.face_count()
-    }
-
-    fn has_normals(&self) -> bool {
-        self.normals.is_some()
-    }
-
-    fn has_colors(&self) -> bool {
-        self.grey.is_some()
-    }
-
-    fn vertex_pieces(&self) -> usize {
-        self.mesh.rows().div_ceil(self.piece_rows())
-    }
-
-    fn face_pieces(&self) -> usize {
-        self.vertex_pieces()
+    fn size(&self) -> MeshSize {
+        MeshSize {
+            vertices: self.mesh.vertex_count(),
+            faces: self.mesh.face_count(),
+            pieces: [self.mesh.rows().div_ceil(self.piece_rows()); 2],
+            has_normals: self.normals.is_some(),
+            has_colors: self.grey.is_some(),
+        }
     }
 
     fn vertices(&self, piece: usize, out: &mut Vertices) {

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::mesh_source::{MeshSource, Vertices};
+use super::mesh_source::{MeshSize, MeshSource, Vertices};
 use crate::{Error, Result};
 
 /// Vertices or faces of a piece, and faces checked at a time: they stay in the second-level cache.
@@ -50,28 +50,11 @@ impl MeshView<'_> {
 }
 
 impl MeshSource for MeshView<'_> {
-    fn vertex_count(&self) -> usize {
-        self.vertices.len()
-    }
-
-    fn face_count(&self) -> usize {
-        self.faces.len()
-    }
-
-    fn has_normals(&self) -> bool {
-        self.normals.is_some()
-    }
-
-    fn has_colors(&self) -> bool {
-        self.colors.is_some()
-    }
-
-    fn vertex_pieces(&self) -> usize {
-        self.vertices.len().div_ceil(BLOCK)
-    }
-
-    fn face_pieces(&self) -> usize {
-        self.faces.len().div_ceil(BLOCK)
+    fn size(&self) -> MeshSize {
+        let (vertices, faces) = (self.vertices.len(), self.faces.len());
+        let pieces = [vertices, faces].map(|items| items.div_ceil(BLOCK));
+        let (has_normals, has_colors) = (self.normals.is_some(), self.colors.is_some());
+        MeshSize { vertices, faces, pieces, has_normals, has_colors }
     }
 
     fn vertices(&self, piece: usize, out: &mut Vertices) {

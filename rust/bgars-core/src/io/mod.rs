@@ -11,5 +11,5 @@ pub mod ply;
 pub mod rgb16;
 
 pub use mesh_file::{MeshFormat, write_mesh_file};
-pub use mesh_source::{HeightSource, MeshSource, Vertices};
+pub use mesh_source::{HeightSource, MeshSize, MeshSource, Vertices};
 pub use mesh_view::MeshView;

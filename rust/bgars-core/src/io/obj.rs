@@ -5,10 +5,6 @@ use std::io::Write;
 use super::blocks::write_pieces;
 use super::{MeshSource, Vertices};
 
-/// Digits of a normal behind the point.
-const NORMAL_DIGITS: usize = 6;
-const NORMAL_UNITS: u32 = 1_000_000;
-
 /// Writes `mesh` as OBJ: `v x y z [r g b]` (colours 0..1, the common extension), `vn`, `f`; `comments` come first.
 ///
 /// # Method
@@ -20,6 +16,7 @@ pub fn write_obj(mesh: &impl MeshSource, comments: &[String], out: &mut (impl Wr
     for comment in comments {
         writeln!(out, "# {}", comment.replace(['\r', '\n'], " "))?;
     }
+    let size = mesh.size();
     let levels: Vec<String> = (0..=255u8).map(|level| format!(" {:.4}", f32::from(level) / 255.0)).collect();
     let encode_vertices = |piece: usize, vertices: &mut Vertices, text: &mut Vec<u8>| {
         mesh.vertices(piece, vertices);
@@ -35,29 +32,26 @@ pub fn write_obj(mesh: &impl MeshSource, comments: &[String], out: &mut (impl Wr
             text.push(b'\n');
         }
     };
-    write_pieces(mesh.vertex_pieces(), encode_vertices, out)?;
-    if mesh.has_normals() {
+    write_pieces(size.pieces[0], encode_vertices, out)?;
+    if size.has_normals {
         let encode_normals = |piece: usize, vertices: &mut Vertices, text: &mut Vec<u8>| {
             mesh.vertices(piece, vertices);
             text.clear();
-            for normal in &vertices.normals {
-                text.extend_from_slice(b"vn");
-                for &value in normal {
-                    push_fixed(text, value);
-                }
-                text.push(b'\n');
+            for [x, y, z] in &vertices.normals {
+                // To memory, which never fails.
+                let _ = writeln!(text, "vn {x:.6} {y:.6} {z:.6}");
             }
         };
-        write_pieces(mesh.vertex_pieces(), encode_normals, out)?;
+        write_pieces(size.pieces[0], encode_normals, out)?;
     }
     let encode_faces = |piece: usize, faces: &mut Vec<[u32; 3]>, text: &mut Vec<u8>| {
         mesh.faces(piece, faces);
         text.clear();
         for face in faces {
-            push_face(text, face.map(|index| u64::from(index) + 1), mesh.has_normals());
+            push_face(text, face.map(|index| u64::from(index) + 1), size.has_normals);
         }
     };
-    write_pieces(mesh.face_pieces(), encode_faces, out)
+    write_pieces(size.pieces[1], encode_faces, out)
 }
 
 /// A space and the shortest decimal that reads back as `value`.
@@ -66,29 +60,6 @@ fn push_shortest(text: &mut Vec<u8>, value: f32) {
     let digits = digits.format(value);
     text.push(b' ');
     text.extend_from_slice(digits.strip_suffix(".0").unwrap_or(digits).as_bytes());
-}
-
-/// A space and `value` rounded to [`NORMAL_DIGITS`] digits behind the point.
-fn push_fixed(text: &mut Vec<u8>, value: f32) {
-    let units = (f64::from(value.abs()) * f64::from(NORMAL_UNITS) + 0.5).floor();
-    if !(units < f64::from(10 * NORMAL_UNITS)) {
-        // No component of a unit normal, but what it is must be seen.
-        text.extend_from_slice(format!(" {value:.NORMAL_DIGITS$}").as_bytes());
-        return;
-    }
-    let mut rest = units as u32;
-    let mut digits = *b" -0.000000";
-    for digit in digits[4..].iter_mut().rev() {
-        *digit = b'0' + (rest % 10) as u8;
-        rest /= 10;
-    }
-    digits[2] = b'0' + rest as u8;
-    if value.is_sign_negative() {
-        text.extend_from_slice(&digits);
-    } else {
-        digits[1] = b' ';
-        text.extend_from_slice(&digits[1..]);
-    }
 }
 
 /// `f a b c`, or `f a//a b//b c//c` where vertices have normals; counted from 1.

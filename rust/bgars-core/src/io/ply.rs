@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use super::blocks::write_pieces;
-use super::{MeshSource, Vertices};
+use super::{MeshSize, MeshSource, Vertices};
 
 /// Bytes of three floats.
 const TRIPLE_BYTES: usize = 12;
@@ -20,36 +20,23 @@ const FACE_BYTES: usize = 13;
 /// # Cost
 /// Little more than `out` takes for the bytes: pieces are encoded on all threads while others are written.
 pub fn write_ply(mesh: &impl MeshSource, comments: &[String], out: &mut (impl Write + Send)) -> std::io::Result<()> {
-    out.write_all(header(mesh, comments).as_bytes())?;
+    out.write_all(header(mesh.size(), comments).as_bytes())?;
     let encode_vertices = |piece: usize, vertices: &mut Vertices, block: &mut Vec<u8>| {
         mesh.vertices(piece, vertices);
         encode_vertices(vertices, block);
     };
-    write_pieces(mesh.vertex_pieces(), encode_vertices, out)?;
+    write_pieces(mesh.size().pieces[0], encode_vertices, out)?;
     let encode_faces = |piece: usize, faces: &mut Vec<[u32; 3]>, block: &mut Vec<u8>| {
         mesh.faces(piece, faces);
         encode_faces(faces, block);
     };
-    write_pieces(mesh.face_pieces(), encode_faces, out)
-}
-
-/// How many bytes [`write_ply`] will write.
-#[must_use]
-pub fn ply_bytes(mesh: &impl MeshSource, comments: &[String]) -> u64 {
-    let bytes = header(mesh, comments).len()
-        + mesh.vertex_count() * record_bytes(mesh.has_normals(), mesh.has_colors())
-        + mesh.face_count() * FACE_BYTES;
-    bytes as u64
-}
-
-/// Bytes of a vertex.
-fn record_bytes(has_normals: bool, has_colors: bool) -> usize {
-    TRIPLE_BYTES + TRIPLE_BYTES * usize::from(has_normals) + COLOR_BYTES * usize::from(has_colors)
+    write_pieces(mesh.size().pieces[1], encode_faces, out)
 }
 
 /// Records of the vertices, one array after the other: each is a loop without a branch.
 fn encode_vertices(vertices: &Vertices, block: &mut Vec<u8>) {
-    let record_bytes = record_bytes(!vertices.normals.is_empty(), !vertices.colors.is_empty());
+    let (has_normals, has_colors) = (!vertices.normals.is_empty(), !vertices.colors.is_empty());
+    let record_bytes = TRIPLE_BYTES + TRIPLE_BYTES * usize::from(has_normals) + COLOR_BYTES * usize::from(has_colors);
     block.resize(vertices.positions.len() * record_bytes, 0);
     let triples = [(0, &vertices.positions), (TRIPLE_BYTES, &vertices.normals)];
     for (at, triples) in triples {
@@ -77,26 +64,20 @@ fn float_bytes(values: [f32; 3]) -> [u8; TRIPLE_BYTES] {
     bytemuck::cast(values.map(|value| value.to_bits().to_le()))
 }
 
-fn header(mesh: &impl MeshSource, comments: &[String]) -> String {
+fn header(mesh: MeshSize, comments: &[String]) -> String {
     let mut header = String::from("ply\nformat binary_little_endian 1.0\n");
     for comment in comments {
         // A line break would end the comment and start a header line of its own.
         header += &format!("comment {}\n", comment.replace(['\r', '\n'], " "));
     }
-    header += &format!("element vertex {}\n", mesh.vertex_count());
-    for name in ["x", "y", "z"] {
-        header += &format!("property float {name}\n");
+    header += &format!("element vertex {}\n", mesh.vertices);
+    for (written, kind, names) in [
+        (true, "float", ["x", "y", "z"]),
+        (mesh.has_normals, "float", ["nx", "ny", "nz"]),
+        (mesh.has_colors, "uchar", ["red", "green", "blue"]),
+    ] {
+        header.extend(names.iter().filter(|_| written).map(|name| format!("property {kind} {name}\n")));
     }
-    if mesh.has_normals() {
-        for name in ["nx", "ny", "nz"] {
-            header += &format!("property float {name}\n");
-        }
-    }
-    if mesh.has_colors() {
-        for name in ["red", "green", "blue"] {
-            header += &format!("property uchar {name}\n");
-        }
-    }
-    header += &format!("element face {}\nproperty list uchar uint vertex_indices\nend_header\n", mesh.face_count());
+    header += &format!("element face {}\nproperty list uchar uint vertex_indices\nend_header\n", mesh.faces);
     header
 }

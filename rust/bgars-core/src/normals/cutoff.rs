@@ -166,20 +166,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    fn cutoffs_are_those_of_a_sorted_list() {
-        let few = [(3, 0), (4, 20), (5, 50), (8, 0), (8, 50), (8, 255), (13, 20), (16, 40), (17, 20), (25, 15)];
-        let many = [(9, 30), (24, 10), (24, 130), (24, 255), (96, 0), (96, 3)];
-        for (lights, gap) in few.into_iter().chain(many) {
-            for mut state in 0..50u32 {
-                check(lights, gap as f32, |_, _| {
-                    state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                    let level = (state >> 24) as u8;
-                    // Half of the values in a dark cluster, so that gaps occur.
-                    f32::from(if state & 1 == 0 { level / 5 } else { level })
-                });
-            }
-        }
-    }
 }

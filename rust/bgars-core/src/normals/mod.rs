@@ -27,6 +27,7 @@ pub(crate) use confidence::{confidence_of, misfit_freedom};
 pub use estimate::{estimate, estimate_into};
 pub(crate) use lanes::add_product;
 pub use robust::robust_filter;
+pub(crate) use solve::solve;
 pub use specular::specular_filter;
 
 /// Which lights of a pixel enter its least squares.

@@ -13,7 +13,6 @@ const LIFT: f32 = (1u128 << 64) as f32;
 
 /// The lights of some pixels by their rank: the clipped last, else the darker first, of equal values the lower number.
 pub(super) struct Ranks {
-    /// The rank of each light.
     pub of_lights: Vec<Row<u32>>,
     /// The lights in that order.
     pub lights: Vec<Ranked>,

@@ -210,18 +210,3 @@ pub(super) fn cost_factor(kept: usize, lights: usize) -> f64 {
 pub(super) fn prior_squares(noise: f64) -> f64 {
     PRIOR_FITS * noise * noise
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn windows_hold_three_lights_and_a_third_the_largest_first() {
-        assert_eq!(windows(4), [(0, 4), (0, 3), (1, 4)]);
-        for lights in [8, 96] {
-            let windows = windows(lights);
-            assert!(windows.len() <= 21 && windows[0] == (0, lights));
-            assert!(windows.iter().all(|&(first, end)| end - first >= 3.max(lights / 3) && end <= lights));
-        }
-    }
-}

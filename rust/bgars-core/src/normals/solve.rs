@@ -10,13 +10,13 @@ pub(super) fn inverse(gram: &Matrix3<f64>) -> Option<Matrix3<f64>> {
 }
 
 /// `rho n` and the inverse of the Gram matrix it came from.
-pub(super) struct Solution {
+pub(crate) struct Solution {
     pub scaled_normal: Vector3<f64>,
     pub inverse: Matrix3<f64>,
 }
 
 /// `(L^T L)^-1 L^T I` over the lights marked in `kept`; `None` when these do not fix a normal.
-pub(super) fn solve(values: &[f32], directions: &[Vector3<f64>], kept: &[bool]) -> Option<Solution> {
+pub(crate) fn solve(values: &[f32], directions: &[Vector3<f64>], kept: &[bool]) -> Option<Solution> {
     let (mut gram, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for ((&value, direction), _) in values.iter().zip(directions).zip(kept).filter(|(_, kept)| **kept) {
         gram += direction * direction.transpose();

@@ -65,7 +65,6 @@ pub(super) fn doubled([xx, xy, xz, yy, yz, zz]: Symmetric) -> Symmetric {
     [xx, 2.0 * xy, 2.0 * xz, yy, 2.0 * yz, zz]
 }
 
-/// The upper triangle of a matrix.
 pub(super) fn upper(matrix: &Matrix3<f64>) -> Symmetric {
     [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|place| matrix[place] as f32)
 }

@@ -39,15 +39,12 @@ const MAX_LEVERAGE: f32 = 0.9;
 /// Everything known about one ball before its pixels are looked at.
 #[derive(Debug)]
 pub struct Ball {
-    /// Its silhouette.
     pub circle: Circle,
-    /// Its material.
     pub material: Material,
     /// What the other balls show beyond their materials.
     pub correction: Option<CellTable>,
     /// Where it is no sphere, what to add to the normals of its circle.
     pub odd: Option<CellTable>,
-    /// Its flat top.
     pub flat: Option<FlatTop>,
     /// Root mean square angle between its normals and its circle's that the estimate allows for, in radian; infinite for
     /// no expectation.
@@ -76,8 +73,9 @@ impl Ball {
 
 /// Which minimum of a pixel is wanted.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Search {
+pub enum Search {
     Deepest,
+    /// To what is expected: for pixels whose deepest minimum no neighbour shares.
     Nearest,
 }
 
@@ -92,38 +90,18 @@ enum Expected {
 
 /// One ball's pixels, ready to be estimated.
 pub struct BallWork<'a> {
-    reader: &'a Reader<'a>,
-    ball: &'a Ball,
-    table: &'a Signatures,
-    spread: &'a Spread,
-    clip: &'a [f32],
+    pub reader: &'a Reader<'a>,
+    pub ball: &'a Ball,
+    /// From [`Ball::signatures`].
+    pub table: &'a Signatures,
+    pub spread: &'a Spread,
+    pub clip: &'a [f32],
 }
 
-impl<'a> BallWork<'a> {
-    /// What is needed to look at the ball's pixels; `table` from [`Ball::signatures`].
-    pub fn new(
-        reader: &'a Reader<'a>,
-        ball: &'a Ball,
-        table: &'a Signatures,
-        spread: &'a Spread,
-        clip: &'a [f32],
-    ) -> Self {
-        Self { reader, ball, table, spread, clip }
-    }
-
+impl BallWork<'_> {
     /// The normal of a pixel, and why it may be trusted.
-    pub fn estimate(&self, pixel: usize, scratch: &mut Scratch) -> BallPixel {
-        let best = self.minimum(pixel, Search::Deepest, scratch);
-        self.described(pixel, &best, scratch)
-    }
-
-    /// The same, by the minimum nearest to what is expected: for pixels whose deepest minimum no neighbour shares.
-    pub fn estimate_near(&self, pixel: usize, scratch: &mut Scratch) -> BallPixel {
-        let best = self.minimum(pixel, Search::Nearest, scratch);
-        self.described(pixel, &best, scratch)
-    }
-
-    fn described(&self, pixel: usize, best: &Minimum, scratch: &Scratch) -> BallPixel {
+    pub fn estimate(&self, pixel: usize, search: Search, scratch: &mut Scratch) -> BallPixel {
+        let best = &self.minimum(pixel, search, scratch);
         let normal = from_disc(best.point.map(f64::from));
         let deviation = self.ball.deviation_rad / DISC_RADIAN;
         let off = scratch.anchor.map_or(0.0, |anchor| angle(&from_disc(anchor.map(f64::from)), &normal));

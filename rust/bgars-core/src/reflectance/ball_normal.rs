@@ -5,7 +5,6 @@
 pub struct BallPixel {
     /// Index into the image.
     pub pixel: usize,
-    /// Unit normal.
     pub normal: [f32; 3],
     /// Its place on the disc.
     pub point: [f32; 2],

@@ -65,44 +65,21 @@ fn smooth(table: &mut [f32], channels: usize) {
     }
 }
 
-/// The tables of all balls.
-#[derive(Clone, Debug)]
-pub struct Population {
-    channels: usize,
-    balls: usize,
-    /// `balls` values for each cell and channel; NaN where a ball shows nothing.
-    values: Vec<f32>,
-}
-
-impl Population {
-    /// From the means of each ball.
-    pub fn new(channels: usize, balls: &[Vec<f32>]) -> Self {
-        let mut values = vec![f32::NAN; SIDE * SIDE * channels * balls.len()];
-        for (ball, table) in balls.iter().enumerate() {
-            for (cell, &value) in table.iter().enumerate() {
-                values[cell * balls.len() + ball] = value;
-            }
-        }
-        Self { channels, balls: balls.len(), values }
-    }
-
-    /// For each ball median and spread of all others; zero where too few have seen a cell.
-    pub fn left_out(&self) -> Vec<CellTable> {
-        if self.balls == 0 {
-            return Vec::new();
-        }
-        let cells = SIDE * SIDE * self.channels;
-        let mut others = vec![(0.0, 0.0); cells * self.balls];
-        let each_cell = others.par_chunks_mut(self.balls).zip(self.values.par_chunks(self.balls));
-        each_cell.for_each_init(Sorted::default, |sorted, (others, values)| sorted.write(values, others));
-        (0..self.balls)
-            .into_par_iter()
-            .map(|ball| {
-                let (middle, sigma) = others[ball..].iter().step_by(self.balls).copied().unzip();
-                CellTable { channels: self.channels, middle, sigma }
-            })
-            .collect()
-    }
+/// For each ball median and spread of what all others show, by the means of each; zero where too few have seen a cell.
+pub fn left_out(channels: usize, balls: &[Vec<f32>]) -> Vec<CellTable> {
+    let count = balls.len();
+    let mut others = vec![(0.0, 0.0); SIDE * SIDE * channels * count];
+    others.par_chunks_mut(count.max(1)).enumerate().for_each_init(Sorted::default, |sorted, (cell, others)| {
+        let values: Vec<f32> = balls.iter().map(|ball| ball[cell]).collect();
+        sorted.write(&values, others);
+    });
+    (0..count)
+        .into_par_iter()
+        .map(|ball| {
+            let (middle, sigma) = others[ball..].iter().step_by(count).copied().unzip();
+            CellTable { channels, middle, sigma }
+        })
+        .collect()
 }
 
 /// What the balls show in one cell, sorted once for all.
@@ -196,7 +173,7 @@ mod tests {
 
     #[test]
     fn what_is_left_out_is_not_counted() {
-        assert!(Population::new(1, &[]).left_out().is_empty());
+        assert!(left_out(1, &[]).is_empty());
         for balls in 1..20usize {
             // Repeated values, some far off, and some balls that have seen nothing.
             let of_ball = |ball: usize| match ball * ball % 7 {
@@ -205,7 +182,7 @@ mod tests {
                 other => other as f32 - 0.25 * (ball % 3) as f32,
             };
             let tables: Vec<Vec<f32>> = (0..balls).map(|ball| vec![of_ball(ball); SIDE * SIDE]).collect();
-            for (ball, table) in Population::new(1, &tables).left_out().into_iter().enumerate() {
+            for (ball, table) in left_out(1, &tables).into_iter().enumerate() {
                 let others = (0..balls).filter(|&other| other != ball).map(of_ball);
                 let mut others: Vec<f32> = others.filter(|value| value.is_finite()).collect();
                 let (mut middle, mut sigma) = (0.0, 0.0);

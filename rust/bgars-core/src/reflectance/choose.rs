@@ -16,7 +16,6 @@ const RACE_STEPS: usize = 25;
 const FINAL_STEPS: usize = 60;
 
 /// The best material of balls of known shape, no more complicated than the observations demand.
-#[must_use]
 pub fn best_material(samples: &Samples) -> MaterialFit {
     let some = samples.thinned((samples.len() / RACE_PIXELS).max(1));
     let simple = Free { grazing: false, tails: true, gains: true };

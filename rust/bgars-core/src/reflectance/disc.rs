@@ -3,7 +3,6 @@
 use nalgebra::Vector3;
 
 /// `(a, b) = n_xy / sqrt(1 + n_z)`.
-#[must_use]
 #[inline]
 pub fn to_disc(normal: &Vector3<f64>) -> [f64; 2] {
     let scale = (1.0 + normal.z).sqrt().recip();
@@ -11,7 +10,6 @@ pub fn to_disc(normal: &Vector3<f64>) -> [f64; 2] {
 }
 
 /// The unit normal of a point of the disc; points outside are moved to its edge.
-#[must_use]
 #[inline]
 pub fn from_disc([a, b]: [f64; 2]) -> Vector3<f64> {
     let radius2 = a * a + b * b;
@@ -25,7 +23,6 @@ pub fn from_disc([a, b]: [f64; 2]) -> Vector3<f64> {
 
 /// How `(a, b)` moves with the direction: for a displacement `(da, db)` the angle squared in radian^2 is
 /// `g0 da^2 + 2 g1 da db + g2 db^2`.
-#[must_use]
 #[inline]
 pub fn metric([a, b]: [f64; 2]) -> [f64; 3] {
     // n_xy = s (a, b), s^2 = 2 - r^2, n_z = 1 - r^2: ds = -(a da + b db) / s.

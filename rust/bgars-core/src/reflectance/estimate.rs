@@ -91,24 +91,6 @@ pub struct Findings {
     pub flat_tops: Vec<Option<FlatTop>>,
 }
 
-impl Findings {
-    /// A material that does not explain the balls.
-    fn refused(material: Material, fit: Option<MaterialFit>, shape: CommonShape, loss: f64, balls: usize) -> Self {
-        Self {
-            material,
-            fit,
-            shape,
-            loss,
-            left_out: Vec::new(),
-            accepted: false,
-            own_material: vec![false; balls],
-            residuals_learnt: false,
-            deviation_deg: vec![f32::NAN; balls],
-            flat_tops: vec![None; balls],
-        }
-    }
-}
-
 /// Estimates the normals of balls, and of free pixels of the same material, into arrays that hold another estimate already:
 /// other pixels stay as they are, and so do free pixels that the material does not explain.
 ///
@@ -201,23 +183,36 @@ fn estimate_readings(
     let Fitted { some, fit, shape, circles } = fitted(&request, &inside, &core, &sampled);
     let material = request.material.or(fit.as_ref().map(|fit| &fit.material)).cloned().ok_or(Error::NoMaterial)?;
     let loss = fit_from(&some, &material, Free::NOTHING, 0).cost;
+    let refused = Findings {
+        material,
+        fit,
+        shape,
+        loss,
+        left_out: Vec::new(),
+        accepted: false,
+        own_material: vec![false; balls],
+        residuals_learnt: false,
+        deviation_deg: vec![f32::NAN; balls],
+        flat_tops: vec![None; balls],
+    };
     if loss > MAX_LOSS {
-        return Ok(Findings::refused(material, fit, shape, loss, balls));
+        return Ok(refused);
     }
+    let (material, is_fitted) = (&refused.material, refused.fit.is_some());
     report(0.2)?;
     let (least, most) = RESIDUAL_PIXELS_OF_BALL;
     let many = sampled(&circles, &inside, (RESIDUAL_PIXELS / balls.max(1)).clamp(least, most), RESIDUAL_MIN_N_Z);
-    let materials = if fit.is_some() { ball_materials(&many, &material, balls) } else { vec![material.clone(); balls] };
+    let materials = if is_fitted { ball_materials(&many, material, balls) } else { vec![material.clone(); balls] };
     let corrections = learnt_corrections(&many, &materials);
     let residuals_learnt = corrections.is_some();
     report(0.3)?;
 
-    let own_material: Vec<bool> = materials.iter().map(|own| *own != material).collect();
+    let own_material: Vec<bool> = materials.iter().map(|own| own != material).collect();
     let mut corrections = corrections.into_iter().flatten();
     let mut known: Vec<Region> = Vec::with_capacity(balls + 1);
     let clip: Vec<f32> = clip.iter().map(|&level| bend(level) as f32).collect();
     let left_out =
-        if loss > DOUBTED_LOSS { left_out(reader, lights, &clip, &material, &circles, &core) } else { Vec::new() };
+        if loss > DOUBTED_LOSS { left_out(reader, lights, &clip, material, &circles, &core) } else { Vec::new() };
     for ((&circle, own), pixels) in circles.iter().zip(materials).zip(inside) {
         known.push(Region { ball: Ball::new(circle, own, corrections.next()), pixels, free: false });
     }
@@ -239,16 +234,13 @@ fn estimate_readings(
     regions.estimate(&spread, &mut out, &mut |done| report(0.5 + 0.5 * done))?;
     let known = &regions.all[..balls];
     Ok(Findings {
-        shape,
-        loss,
         left_out,
         accepted: true,
-        material,
-        fit,
         own_material,
         residuals_learnt,
         deviation_deg: known.iter().map(|region| region.ball.deviation_rad.to_degrees()).collect(),
         flat_tops: known.iter().map(|region| region.ball.flat).collect(),
+        ..refused
     })
 }
 

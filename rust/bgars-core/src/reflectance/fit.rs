@@ -74,7 +74,7 @@ const FIRST_LOBE: usize = 3;
 /// Parameters of a lobe.
 const PER_LOBE: usize = 3;
 
-/// `J^T W J`, `J^T W r` and the loss.
+/// The lower triangle of `J^T W J`, `J^T W r` and the loss.
 struct Normal {
     matrix: DMatrix<f64>,
     vector: DVector<f64>,
@@ -144,7 +144,6 @@ impl Sums {
 /// # Method
 /// Levenberg-Marquardt on `sum log(1 + (r / 3)^2)`, `r` the difference of observed and predicted level, both bent by
 /// `asinh(0.03 I) / 0.03` and both clipped, weights renewed at every step.
-#[must_use]
 pub fn fit_from(samples: &Samples, start: &Material, free: Free, max_steps: usize) -> MaterialFit {
     let mut material = start.clone();
     let mut normal = normal_equations(samples, &material);
@@ -218,7 +217,7 @@ fn add_observation(samples: &Samples, material: &Material, index: usize, light: 
     let mut sum_of_parts = diffuse;
     for (lobe, row) in material.lobes.iter().zip(sums.row[FIRST_LOBE..common].chunks_exact_mut(PER_LOBE)) {
         // By the logarithm of the strength the derivative is the value.
-        let slopes = facet.specular_slopes(lobe, material.masking).map(|slope| lobe.strength * slope);
+        let slopes = facet.specular(lobe, material.masking).map(|slope| lobe.strength * slope);
         row.copy_from_slice(&slopes.map(|slope| scale * slope));
         sum_of_parts += slopes[0];
     }
@@ -257,11 +256,8 @@ fn is_free(material: &Material, free: Free, index: usize) -> bool {
 fn reduced(normal: &Normal, material: &Material, free: Free) -> (Vec<usize>, DMatrix<f64>, DVector<f64>) {
     let gains = FIRST_LOBE + PER_LOBE * material.lobes.len();
     let kept: Vec<usize> = (0..normal.vector.len()).filter(|&index| is_free(material, free, index)).collect();
-    let mut matrix = DMatrix::from_fn(kept.len(), kept.len(), |i, j| {
-        let (i, j) = (kept[i].max(kept[j]), kept[i].min(kept[j]));
-        normal.matrix[(i, j)]
-    });
-    let mut vector = DVector::from_fn(kept.len(), |i, _| normal.vector[kept[i]]);
+    let mut matrix = normal.matrix.select_rows(&kept).select_columns(&kept);
+    let mut vector = normal.vector.select_rows(&kept);
     for (i, &index) in kept.iter().enumerate().filter(|(_, index)| **index >= gains) {
         let weight = PRIOR_WEIGHT / (GAIN_SPREAD * GAIN_SPREAD);
         // Gains move by their logarithm.

@@ -52,7 +52,7 @@ pub fn left_out(
         let ball = Ball::new(circles[index], material.clone(), None);
         let own: Option<Signatures> = near.then(|| ball.signatures(lights));
         let Some(table) = own.as_ref().or(common.as_ref()) else { return Vec::new() };
-        let work = BallWork::new(reader, &ball, table, &spread, clip);
+        let work = BallWork { reader, ball: &ball, table, spread: &spread, clip };
         let mut scratch = Scratch::new(reader.lights());
         let mut found = Vec::new();
         for &pixel in spaced(&pixels[index], of_each) {

@@ -31,81 +31,36 @@ pub struct Lobe {
     pub tail: f64,
 }
 
-/// `ln(D cos^4 a)` of a lobe at a half vector, and what it is computed from.
-struct AtAngle {
-    /// Squared cosine.
-    cos2: f64,
-    /// `tan^2 a / m^2`
-    t: f64,
-    /// `ln(1 + u t)`
-    log: f64,
-    exponent: f64,
-}
-
 impl Lobe {
     /// Distribution of microfacets, 1 at its peak, `t = tan^2 a / m^2`:
     /// `D = (1 + u t)^-(1 + 1/u) / cos^4 a`: Beckmann (Cook and Torrance 1982, eq. 4) for u = 0, GGX (Walter et al. 2007, eq. 33)
-    /// for u = 1.
+    /// for u = 1; its derivatives by the logarithm of the roughness and by the tail; and that of its logarithm by the cosine.
     #[must_use]
-    #[inline]
-    pub fn distribution(&self, cos_half: f64) -> f64 {
-        self.exponent(cos_half).map_or(0.0, |at| at.exponent.exp() / at.cos2.powi(2))
-    }
-
-    /// [`Self::distribution`] and the derivative of its logarithm by the cosine.
-    #[must_use]
-    #[inline]
-    pub fn distribution_by_cosine(&self, cos_half: f64) -> [f64; 2] {
-        let Some(at) = self.exponent(cos_half) else { return [0.0; 2] };
-        let by_t = -(1.0 + self.tail) / (1.0 + self.tail * at.t);
-        let t_by_cosine = -2.0 / (self.roughness.powi(2) * at.cos2 * cos_half);
-        [at.exponent.exp() / at.cos2.powi(2), by_t * t_by_cosine - 4.0 / cos_half]
-    }
-
-    /// [`Self::distribution`], its derivative by the logarithm of the roughness, and that by the tail.
-    #[must_use]
-    #[inline]
-    pub fn distribution_slopes(&self, cos_half: f64) -> [f64; 3] {
-        let Some(at) = self.exponent(cos_half) else { return [0.0; 3] };
-        let AtAngle { cos2, t, log, exponent } = at;
-        let u = self.tail;
-        let bulge = 1.0 + u * t;
-        // The exponent's derivative by u; its limit where u t is small.
-        let by_tail = if u * t < SERIES { t * (0.5 * t - 1.0) } else { log / (u * u) - (1.0 + 1.0 / u) * t / bulge };
-        let value = exponent.exp() / (cos2 * cos2);
-        [value, value * 2.0 * t * (1.0 + u) / bulge, value * by_tail]
-    }
-
-    /// What the distribution is made of; `None` where nothing is left of it.
-    #[inline]
-    fn exponent(&self, cos_half: f64) -> Option<AtAngle> {
+    #[inline(always)]
+    pub fn distribution(&self, cos_half: f64) -> [f64; 4] {
         if cos_half <= 1e-3 {
-            return None;
+            return [0.0; 4];
         }
-        let cos2 = cos_half * cos_half;
+        let (cos2, u) = (cos_half * cos_half, self.tail);
         let t = (1.0 - cos2).max(0.0) / (cos2 * self.roughness * self.roughness);
-        let u = self.tail;
-        let log = (u * t).ln_1p();
+        let (bulge, log) = (1.0 + u * t, (u * t).ln_1p());
         let exponent = if u * t < SERIES { -t * (1.0 + u) } else { -(1.0 + 1.0 / u) * log };
-        (exponent >= NOTHING_LEFT).then_some(AtAngle { cos2, t, log, exponent })
+        if exponent < NOTHING_LEFT {
+            return [0.0; 4];
+        }
+        // The exponent's derivatives by t, and by u; the limit of that where u t is small.
+        let by_t = -(1.0 + u) / bulge;
+        let by_tail = if u * t < SERIES { t * (0.5 * t - 1.0) } else { log / (u * u) - (1.0 + 1.0 / u) * t / bulge };
+        let t_by_cosine = -2.0 / (self.roughness.powi(2) * cos2 * cos_half);
+        let value = exponent.exp() / (cos2 * cos2);
+        [value, value * -2.0 * t * by_t, value * by_tail, by_t * t_by_cosine - 4.0 / cos_half]
     }
 
-    /// Shadowing of one direction at cosine `cos` to the normal: between Beckmann's (rational form) and GGX's, by the tail.
+    /// Shadowing of one direction at cosine `cos` to the normal, between Beckmann's (rational form) and GGX's, by the tail; its
+    /// derivative by the logarithm of the roughness, and that by the tail.
     #[must_use]
-    #[inline]
-    pub fn smith(&self, cos: f64) -> f64 {
-        let tan = (1.0 - cos * cos).max(0.0).sqrt() / cos;
-        let slope = self.roughness * tan;
-        let ggx = 2.0 / (1.0 + (1.0 + slope * slope).sqrt());
-        let c = 1.0 / slope.max(1e-9);
-        let beckmann = if c < 1.6 { (3.535 * c + 2.181 * c * c) / (1.0 + 2.276 * c + 2.577 * c * c) } else { 1.0 };
-        beckmann + self.tail * (ggx - beckmann)
-    }
-
-    /// [`Self::smith`], its derivative by the logarithm of the roughness, and that by the tail.
-    #[must_use]
-    #[inline]
-    pub fn smith_slopes(&self, cos: f64) -> [f64; 3] {
+    #[inline(always)]
+    pub fn smith(&self, cos: f64) -> [f64; 3] {
         let tan = (1.0 - cos * cos).max(0.0).sqrt() / cos;
         let slope = self.roughness * tan;
         let root = (1.0 + slope * slope).sqrt();
@@ -152,45 +107,28 @@ impl Facet {
         }
     }
 
-    /// `G / N.V` of a lobe.
-    #[inline]
-    fn attenuation(&self, lobe: &Lobe, masking: Masking) -> f64 {
-        let g = match masking {
-            Masking::CookTorrance => {
-                let factor = 2.0 * self.n_dot_h / self.v_dot_h;
-                (factor * self.n_dot_v.min(self.n_dot_l)).min(1.0)
-            }
-            Masking::Smith => lobe.smith(self.n_dot_v) * lobe.smith(self.n_dot_l),
-        };
-        g / self.n_dot_v
-    }
-
-    /// Specular light of a lobe of strength 1; 0 in attached shadow.
+    /// Specular light of a lobe of strength 1, 0 in attached shadow; its derivative by the logarithm of the roughness, and that by
+    /// the tail. Inlined, so that nothing is computed that nobody takes.
     #[must_use]
-    #[inline]
-    pub fn specular(&self, lobe: &Lobe, masking: Masking) -> f64 {
-        if self.n_dot_l <= 0.0 { 0.0 } else { lobe.distribution(self.n_dot_h) * self.attenuation(lobe, masking) }
-    }
-
-    /// [`Self::specular`], its derivative by the logarithm of the roughness, and that by the tail.
-    #[must_use]
-    #[inline]
-    pub fn specular_slopes(&self, lobe: &Lobe, masking: Masking) -> [f64; 3] {
+    #[inline(always)]
+    pub fn specular(&self, lobe: &Lobe, masking: Masking) -> [f64; 3] {
         if self.n_dot_l <= 0.0 {
             return [0.0; 3];
         }
-        let slopes = lobe.distribution_slopes(self.n_dot_h);
-        if slopes[0] == 0.0 {
-            return slopes;
+        let [value, by_roughness, by_tail, _] = lobe.distribution(self.n_dot_h);
+        if value == 0.0 {
+            return [0.0; 3];
         }
+        let slopes = [value, by_roughness, by_tail].map(|slope| slope / self.n_dot_v);
         match masking {
-            Masking::CookTorrance => slopes.map(|slope| slope * self.attenuation(lobe, masking)),
+            Masking::CookTorrance => {
+                let factor = 2.0 * self.n_dot_h / self.v_dot_h;
+                slopes.map(|slope| slope * (factor * self.n_dot_v.min(self.n_dot_l)).min(1.0))
+            }
             Masking::Smith => [self.n_dot_v, self.n_dot_l]
                 .into_iter()
-                .map(|cos| lobe.smith_slopes(cos))
-                .fold(slopes.map(|slope| slope / self.n_dot_v), |[f, f_m, f_u], [g, g_m, g_u]| {
-                    [f * g, f_m * g + f * g_m, f_u * g + f * g_u]
-                }),
+                .map(|cos| lobe.smith(cos))
+                .fold(slopes, |[f, f_m, f_u], [g, g_m, g_u]| [f * g, f_m * g + f * g_m, f_u * g + f * g_u]),
         }
     }
 
@@ -249,7 +187,7 @@ impl Material {
             sum *= 1.0 + self.grazing * (facet.grazing() - 1.0);
         }
         for lobe in &self.lobes {
-            sum += lobe.strength * facet.specular(lobe, self.masking);
+            sum += lobe.strength * facet.specular(lobe, self.masking)[0];
         }
         sum
     }
@@ -268,8 +206,8 @@ mod tests {
                 for (x, y) in [(0.0, 0.1), (0.3, -0.2), (0.6, 0.5), (-0.4, 0.85)] {
                     let normal = Vector3::new(x, y, (1.0f64 - x * x - y * y).sqrt());
                     let facet = Facet::new(&normal, &Vector3::new(0.6, 0.0, 0.8));
-                    let [value, by_roughness, by_tail] = facet.specular_slopes(&lobe, masking);
-                    let at = |roughness: f64, tail: f64| facet.specular(&Lobe { roughness, tail, ..lobe }, masking);
+                    let [value, by_roughness, by_tail] = facet.specular(&lobe, masking);
+                    let at = |roughness: f64, tail: f64| facet.specular(&Lobe { roughness, tail, ..lobe }, masking)[0];
                     approx::assert_relative_eq!(value, at(roughness, tail), max_relative = 1e-12);
                     let wider =
                         (at(roughness * (1.0 + step), tail) - at(roughness * (1.0 - step), tail)) / (2.0 * step);

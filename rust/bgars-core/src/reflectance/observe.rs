@@ -18,7 +18,6 @@ pub struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// A reader for a capture.
     pub fn new(capture: &'a dyn Readings) -> Self {
         let full_scale = f64::from(capture.full_scale());
         let scales = capture.intensities().iter().map(|&i| (255.0 / (full_scale * i)) as f32).collect();
@@ -35,7 +34,6 @@ impl<'a> Reader<'a> {
         self.capture.centre(pixel)
     }
 
-    /// Number of lights.
     pub fn lights(&self) -> usize {
         self.scales.len()
     }

@@ -3,7 +3,8 @@
 use rayon::prelude::*;
 
 use super::ball_normal::BallPixel;
-use super::cells::{CellSums, CellTable, Population, SIDE};
+use super::cells::{CellSums, CellTable, SIDE, left_out};
+use crate::components::Runs;
 
 /// A place is odd where the ball differs from the others by this angle in radian (1.5 degrees) ...
 const MIN_ANGLE_RAD: f32 = 0.026;
@@ -28,7 +29,7 @@ const LOSS: usize = 2;
 /// anywhere.
 pub fn odd_places(found: &[Vec<BallPixel>]) -> Vec<Option<CellTable>> {
     let own: Vec<Vec<f32>> = found.par_iter().map(|pixels| ball_deviation(pixels)).collect();
-    let others = Population::new(CHANNELS, &own).left_out();
+    let others = left_out(CHANNELS, &own);
     own.par_iter()
         .zip(others)
         .map(|(own, mut table)| {
@@ -56,39 +57,9 @@ pub fn odd_places(found: &[Vec<BallPixel>]) -> Vec<Option<CellTable>> {
 
 /// The cells of groups of neighbours that are large enough.
 fn large_groups(marked: &[bool]) -> Vec<bool> {
-    let mut large = vec![false; marked.len()];
-    let mut seen = vec![false; marked.len()];
-    for start in 0..marked.len() {
-        if !marked[start] || seen[start] {
-            continue;
-        }
-        seen[start] = true;
-        let mut group = vec![start];
-        let mut next = 0;
-        while next < group.len() {
-            let cell = group[next];
-            next += 1;
-            let (row, col) = (cell / SIDE, cell % SIDE);
-            let neighbours = [
-                (row > 0).then(|| cell - SIDE),
-                (row + 1 < SIDE).then(|| cell + SIDE),
-                (col > 0).then(|| cell - 1),
-                (col + 1 < SIDE).then(|| cell + 1),
-            ];
-            for neighbour in neighbours.into_iter().flatten() {
-                if marked[neighbour] && !seen[neighbour] {
-                    seen[neighbour] = true;
-                    group.push(neighbour);
-                }
-            }
-        }
-        if group.len() >= MIN_CELLS {
-            for cell in group {
-                large[cell] = true;
-            }
-        }
-    }
-    large
+    let groups = Runs::new(marked, None, SIDE);
+    let is_large = |&group: &i32| group >= 0 && groups.components[group as usize].pixels >= MIN_CELLS;
+    groups.labels().iter().map(is_large).collect()
 }
 
 /// Smoothed means of one ball.

@@ -50,7 +50,6 @@ pub struct Prior {
     pub weight: f32,
 }
 
-/// A minimum.
 #[derive(Clone, Copy, Debug)]
 pub struct Minimum {
     /// On the disc.
@@ -67,7 +66,6 @@ pub struct Minimum {
 
 impl Minimum {
     /// The expected normal of a pixel that is not looked at.
-    #[must_use]
     pub fn unseen(point: [f32; 2], weight: f32) -> Self {
         Self { point, cost: 0.0, data_cost: 0.0, information: [0.0; 3], prior_information: weight * weight }
     }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::ball::{Ball, BallWork, Scratch};
+use super::ball::{Ball, BallWork, Scratch, Search};
 use super::ball_normal::BallPixel;
 use super::flat_top::flat_top;
 use super::observe::Reader;
@@ -73,7 +73,6 @@ pub struct Regions<'a> {
     /// The balls in their order, then the free pixels.
     pub all: Vec<Region>,
     tables: Vec<Signatures>,
-    /// Table of each region.
     table_of: Vec<usize>,
 }
 
@@ -110,12 +109,8 @@ impl<'a> Regions<'a> {
     }
 
     fn work<'s>(&'s self, region: usize, spread: &'s Spread) -> BallWork<'s> {
-        let table = &self.tables[self.table_of[region]];
-        BallWork::new(self.reader, &self.all[region].ball, table, spread, self.clip)
-    }
-
-    fn scratch(&self) -> Scratch {
-        Scratch::new(self.reader.lights())
+        let (ball, table) = (&self.all[region].ball, &self.tables[self.table_of[region]]);
+        BallWork { reader: self.reader, ball, table, spread, clip: self.clip }
     }
 
     /// The spread of observations by their level, at normals found with the spread so far.
@@ -125,7 +120,7 @@ impl<'a> Regions<'a> {
             .into_par_iter()
             .map(|index| {
                 let work = self.work(index, spread);
-                let mut scratch = self.scratch();
+                let mut scratch = Scratch::new(self.reader.lights());
                 let mut residuals = Vec::new();
                 for &pixel in spaced(&self.all[index].pixels, count) {
                     work.residuals(pixel, &mut scratch, &mut residuals);
@@ -147,8 +142,10 @@ impl<'a> Regions<'a> {
             .into_par_iter()
             .map(|index| {
                 let work = self.work(index, spread);
-                let mut scratch = self.scratch();
-                spaced(&self.all[index].pixels, SHAPE_PIXELS).map(|&p| work.estimate(p, &mut scratch)).collect()
+                let mut scratch = Scratch::new(self.reader.lights());
+                spaced(&self.all[index].pixels, SHAPE_PIXELS)
+                    .map(|&p| work.estimate(p, Search::Deepest, &mut scratch))
+                    .collect()
             })
             .collect();
         let telling: Vec<Vec<BallPixel>> =
@@ -184,12 +181,16 @@ impl<'a> Regions<'a> {
                     let work = self.work(index, spread);
                     let region = &self.all[index];
                     let pixels = region.pixels.par_iter();
-                    let mut found: Vec<BallPixel> =
-                        pixels.map_init(|| self.scratch(), |scratch, &pixel| work.estimate(pixel, scratch)).collect();
+                    let mut found: Vec<BallPixel> = pixels
+                        .map_init(
+                            || Scratch::new(self.reader.lights()),
+                            |scratch, &pixel| work.estimate(pixel, Search::Deepest, scratch),
+                        )
+                        .collect();
                     if !region.free {
-                        let mut scratch = self.scratch();
+                        let mut scratch = Scratch::new(self.reader.lights());
                         for lone in lone_pixels(&found, self.reader.size().1) {
-                            found[lone] = work.estimate_near(found[lone].pixel, &mut scratch);
+                            found[lone] = work.estimate(found[lone].pixel, Search::Nearest, &mut scratch);
                         }
                     }
                     found
@@ -220,19 +221,9 @@ fn lone_pixels(found: &[BallPixel], width: usize) -> Vec<usize> {
         .filter(|&index| far(&found[index]))
         .filter(|&index| {
             let pixel = found[index].pixel;
-            let neighbours = [
-                pixel.wrapping_sub(width + 1),
-                pixel.wrapping_sub(width),
-                pixel.wrapping_sub(width - 1),
-                pixel.wrapping_sub(1),
-                pixel + 1,
-                pixel + width - 1,
-                pixel + width,
-                pixel + width + 1,
-            ];
-            let friends =
-                neighbours.into_iter().filter_map(at).filter(|other| far(other) && agree(&found[index], other)).count();
-            friends < FRIENDS
+            let rows = [pixel.wrapping_sub(width), pixel, pixel + width];
+            let around = rows.into_iter().flat_map(|row| [row.wrapping_sub(1), row, row + 1]).filter(|&at| at != pixel);
+            around.filter_map(at).filter(|other| far(other) && agree(&found[index], other)).count() < FRIENDS
         })
         .collect()
 }

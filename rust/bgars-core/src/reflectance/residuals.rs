@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::cells::{CellSums, CellTable, Population};
+use super::cells::{CellSums, CellTable, left_out};
 use super::disc::to_disc;
 use super::fit::LOSS_SCALE;
 use super::material::Material;
@@ -17,12 +17,11 @@ const JUDGED_PIXELS: usize = 4000;
 
 /// For each ball, what to add to the bent level of each light, by what the others show beyond their materials; `None`
 /// where that does not help balls that had no part in it.
-#[must_use]
 pub fn learnt_corrections(samples: &Samples, materials: &[Material]) -> Option<Vec<CellTable>> {
     let balls = materials.len();
     let tables: Vec<Vec<f32>> =
         (0..balls).into_par_iter().map(|ball| ball_residuals(samples, ball, &materials[ball])).collect();
-    let corrections = Population::new(samples.lights, &tables).left_out();
+    let corrections = left_out(samples.lights, &tables);
     let (mut without, mut with) = (0.0, 0.0);
     let mut shifts = vec![0.0; samples.lights];
     for pixel in (0..samples.len()).step_by((samples.len() / JUDGED_PIXELS).max(1)) {

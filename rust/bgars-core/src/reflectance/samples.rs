@@ -30,15 +30,12 @@ pub struct Samples {
     pub facets: Vec<Facet>,
     /// Relative irradiance of each light at each pixel, L a pixel.
     pub irradiance: Vec<f64>,
-    /// Normal of each pixel.
     pub normals: Vec<Vector3<f64>>,
-    /// Ball of each pixel.
     pub balls: Vec<usize>,
 }
 
 impl Samples {
     /// No pixels yet, for lights that clip at these linear grey levels of 255.
-    #[must_use]
     pub fn new(clip_levels: &[f64]) -> Self {
         Self {
             lights: clip_levels.len(),
@@ -61,13 +58,11 @@ impl Samples {
     }
 
     /// The pixels of one ball, every `step`-th of them.
-    #[must_use]
     pub fn of_ball(&self, ball: usize, step: usize) -> Self {
         self.chosen((0..self.len()).filter(|&pixel| self.balls[pixel] == ball).step_by(step))
     }
 
     /// Every `step`-th pixel.
-    #[must_use]
     pub fn thinned(&self, step: usize) -> Self {
         self.chosen((0..self.len()).step_by(step))
     }
@@ -85,14 +80,11 @@ impl Samples {
         chosen
     }
 
-    /// Number of pixels.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.normals.len()
     }
 
     /// Predicted linear grey level of an observation.
-    #[must_use]
     #[inline]
     pub fn brightness(&self, index: usize, light: usize, material: &Material) -> f64 {
         material.brightness(&self.facets[index]) * material.gains[light] * self.irradiance[index] + material.ambient

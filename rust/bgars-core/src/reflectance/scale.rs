@@ -4,7 +4,6 @@
 pub const BEND: f64 = 0.03;
 
 /// `asinh(BEND I) / BEND` of a linear grey level of 255.
-#[must_use]
 #[inline]
 pub fn bend(level: f64) -> f64 {
     // `f64::asinh` takes three times as long for digits that nobody needs.
@@ -13,7 +12,6 @@ pub fn bend(level: f64) -> f64 {
 }
 
 /// [`bend`] of a reading, to 1e-5 grey levels.
-#[must_use]
 #[inline]
 pub fn bend_reading(level: f32) -> f32 {
     let x = BEND as f32 * level;
@@ -21,14 +19,12 @@ pub fn bend_reading(level: f32) -> f32 {
 }
 
 /// Inverse of [`bend`].
-#[must_use]
 #[inline]
 pub fn unbend(bent: f64) -> f64 {
     (BEND * bent).sinh() / BEND
 }
 
 /// Derivative of [`bend`].
-#[must_use]
 #[inline]
 pub fn bend_slope(level: f64) -> f64 {
     (1.0 + (BEND * level).powi(2)).sqrt().recip()

@@ -11,7 +11,6 @@ const ENOUGH: usize = 40;
 /// One light at one pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Residual {
-    /// Bent level.
     pub level: f32,
     /// Observed minus predicted.
     pub size: f32,
@@ -26,13 +25,11 @@ pub struct Spread {
 
 impl Spread {
     /// The same for every level.
-    #[must_use]
     pub fn constant(sigma: f32) -> Self {
         Self { top: 1.0, sigma: [sigma; BINS] }
     }
 
     /// From residuals: 1.4826 times the median of their sizes in each bin of levels, at least `floor`.
-    #[must_use]
     pub fn from_residuals(residuals: &[Residual], floor: f32) -> Self {
         let top = residuals.iter().fold(1.0f32, |top, residual| top.max(residual.level));
         let mut bins: Vec<Vec<f32>> = vec![Vec::new(); BINS];
@@ -50,13 +47,11 @@ impl Spread {
     }
 
     /// All standard deviations times `factor`.
-    #[must_use]
     pub fn scaled(&self, factor: f32) -> Self {
         Self { top: self.top, sigma: self.sigma.map(|sigma| sigma * factor) }
     }
 
     /// Standard deviation at a bent level, linear between the bins' middles.
-    #[must_use]
     #[inline]
     pub fn at(&self, level: f32) -> f32 {
         let position = (level / self.top * BINS as f32 - 0.5).clamp(0.0, (BINS - 1) as f32);

@@ -56,9 +56,7 @@ struct Coarse {
 pub struct Signature {
     /// Bent grey levels.
     pub value: Group,
-    /// Change by a.
     pub along_a: Group,
-    /// Change by b.
     pub along_b: Group,
 }
 
@@ -80,19 +78,12 @@ impl Signatures {
     /// Tabulates `signature(normal, levels)`, which writes the bent level under each light.
     pub fn tabulate(lights: usize, signature: impl Fn(&Vector3<f64>, &mut [f32]) + Sync) -> Self {
         let groups = lights.div_ceil(GROUP);
-        let mut nodes = vec![[0.0; GROUP]; FULL_SIDE * FULL_SIDE * groups];
-        nodes.par_chunks_mut(FULL_SIDE * groups).enumerate().for_each(|(row, nodes)| {
-            for (col, node) in nodes.chunks_exact_mut(groups).enumerate() {
-                signature(&from_disc(node_place(node_point(row, col))), &mut node.as_flattened_mut()[..lights]);
-            }
-        });
-        let mut table = Self { groups, nodes, coarse: Coarse::default() };
-        table.coarse = table.coarse_nodes(lights);
-        table
+        let nodes = vec![[0.0; GROUP]; FULL_SIDE * FULL_SIDE * groups];
+        let empty = Self { groups, nodes, coarse: Coarse::default() };
+        empty.corrected(lights, |place, levels| signature(&from_disc(place), levels))
     }
 
     /// The same, corrected: `correct(place, levels)`, bent levels of all lights.
-    #[must_use]
     pub fn corrected(&self, lights: usize, correct: impl Fn([f64; 2], &mut [f32]) + Sync) -> Self {
         let groups = self.groups;
         let mut nodes = self.nodes.clone();
@@ -126,20 +117,16 @@ impl Signatures {
         Coarse { points, values }
     }
 
-    /// Groups of lights.
-    #[must_use]
     pub fn groups(&self) -> usize {
         self.groups
     }
 
     /// The coarse nodes and, for each light, their bent levels.
-    #[must_use]
     pub fn coarse(&self) -> (&[[f32; 2]], &[f32]) {
         (&self.coarse.points, &self.coarse.values)
     }
 
     /// The signature at a place of the disc for one group of lights, by cubic convolution (Keys 1981, eq. 3 with a = -1/2).
-    #[must_use]
     #[inline(always)]
     #[allow(clippy::manual_clamp)]
     pub fn at<const FMA: bool>(&self, [a, b]: [f32; 2], group: usize) -> Signature {

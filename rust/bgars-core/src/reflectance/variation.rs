@@ -37,7 +37,6 @@ fn median_of(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// One material a ball: its own where the balls differ and its fit is believable, else that of all.
-#[must_use]
 pub fn ball_materials(samples: &Samples, common: &Material, balls: usize) -> Vec<Material> {
     let alike = || vec![common.clone(); balls];
     if balls < 3 {

@@ -1,6 +1,6 @@
 //! What callers set, and what they get.
 
-use super::super::components::Component;
+use crate::components::Component;
 
 /// How exactly the systems between two re-weightings are solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,7 +6,6 @@ use rayon::prelude::*;
 
 use super::super::checkerboard::{Grid, join_row, split_row};
 use super::super::checks::{Facing, check_lengths, check_memory, check_pixels};
-use super::super::components::Runs;
 use super::super::conjugate_gradient::{Limits, Outcome, conjugate_gradient};
 use super::super::norm::{norm, sum};
 use super::super::settings::{Field, Progress};
@@ -16,6 +15,7 @@ use super::jacobi::{Diagonal, Laplacian};
 use super::pixels::{Pixels, Shares, assemble};
 use super::reweigh::{even, reweigh};
 use super::settings::{BilateralParams, BilateralSurface, Setting};
+use crate::components::Runs;
 use crate::{Error, Result};
 
 /// Largest relative residual of an inner solve as published, and most iterations.

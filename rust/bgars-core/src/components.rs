@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use memchr::memchr;
 use rayon::prelude::*;
 
 /// One connected component of the mask (4-neighbourhood).
@@ -32,10 +31,9 @@ impl Run {
 
 /// A mask as runs in reading order (each within one region), and the components that they form.
 #[derive(Debug)]
-pub(super) struct Runs {
+pub(crate) struct Runs {
     width: usize,
     all: Vec<Run>,
-    /// The component of each run.
     component_of: Vec<u32>,
     /// First run of each row, and the end.
     row_starts: Vec<usize>,
@@ -48,11 +46,11 @@ impl Runs {
     pub fn new(mask: &[bool], regions: Option<&[i32]>, width: usize) -> Self {
         let height = mask.len() / width;
         let region = |row: usize, run: Run| regions.map_or(0, |regions| regions[row * width + run.start as usize]);
-        let row_runs = |(row, mask)| {
-            let regions = regions.map(|regions| &regions[row * width..(row + 1) * width]);
-            RowRuns { mask: bytemuck::must_cast_slice::<bool, u8>(mask), regions, col: 0 }.collect()
-        };
-        let rows: Vec<Vec<Run>> = mask.par_chunks(width).enumerate().map(row_runs).collect();
+        let rows: Vec<Vec<Run>> = mask
+            .par_chunks(width)
+            .enumerate()
+            .map(|(row, mask)| row_runs(mask, regions.map(|regions| &regions[row * width..(row + 1) * width])))
+            .collect();
         let all = rows.concat();
         let mut row_starts = vec![0; height + 1];
         for (row, runs) in rows.iter().enumerate() {
@@ -146,27 +144,16 @@ impl Runs {
 }
 
 /// The runs of one row of a mask.
-struct RowRuns<'a> {
-    /// 0 or 1 a pixel.
-    mask: &'a [u8],
-    regions: Option<&'a [i32]>,
-    col: usize,
-}
-
-impl Iterator for RowRuns<'_> {
-    type Item = Run;
-
-    fn next(&mut self) -> Option<Run> {
-        let start = self.col + memchr(1, &self.mask[self.col..])?;
-        let rest = &self.mask[start..];
-        let mut end = start + memchr(0, rest).unwrap_or(rest.len());
-        if let Some(regions) = self.regions {
-            let rest = &regions[start..end];
-            end = start + rest.iter().position(|&region| region != rest[0]).unwrap_or(rest.len());
+fn row_runs(mask: &[bool], regions: Option<&[i32]>) -> Vec<Run> {
+    let number = |col: usize| regions.map_or(0, |regions| regions[col]);
+    let mut runs: Vec<Run> = Vec::new();
+    for col in (0..mask.len()).filter(|&col| mask[col]) {
+        match runs.last_mut() {
+            Some(run) if run.end as usize == col && number(col) == number(col - 1) => run.end += 1,
+            _ => runs.push(Run { start: col as u32, end: col as u32 + 1 }),
         }
-        self.col = end;
-        Some(Run { start: start as u32, end: end as u32 })
     }
+    runs
 }
 
 /// The first run of the component of `run`.
@@ -186,41 +173,6 @@ fn unite(parents: &mut [u32], a: usize, b: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn diagonal_neighbours_are_apart() {
-        let mask = [true, false, false, true, false, true];
-        let runs = Runs::new(&mask, None, 2);
-        assert_eq!(runs.labels(), [0, -1, -1, 1, -1, 1]);
-        let sizes: Vec<usize> = runs.components.iter().map(|component| component.pixels).collect();
-        assert_eq!(sizes, [1, 2]);
-        assert_eq!((runs.components[1].first_row, runs.components[1].first_col), (1, 1));
-    }
-
-    #[test]
-    fn rows_do_not_wrap_around() {
-        assert_eq!(Runs::new(&[false, true, true, false], None, 2).components.len(), 2);
-    }
-
-    #[test]
-    fn arms_that_meet_further_down_are_one_component() {
-        // A comb: three teeth on one beam, and a pixel of its own.
-        let rows = ["#.#.#", "#.#.#", "#####", ".....", "..#.."];
-        let mask: Vec<bool> = rows.concat().chars().map(|mark| mark == '#').collect();
-        let runs = Runs::new(&mask, None, 5);
-        let sizes: Vec<usize> = runs.components.iter().map(|component| component.pixels).collect();
-        assert_eq!(sizes, [11, 1]);
-    }
-
-    #[test]
-    fn regions_split_rows_and_stacks() {
-        // Two regions side by side, a third below both.
-        let regions = [1, 1, 2, 2, 1, 3, 3, 2];
-        let runs = Runs::new(&[true; 8], Some(&regions), 4);
-        assert_eq!(runs.labels(), [0, 0, 1, 1, 0, 2, 2, 1]);
-        let sizes: Vec<usize> = runs.components.iter().map(|component| component.pixels).collect();
-        assert_eq!(sizes, [3, 3, 2]);
-    }
 
     /// Word for word: from each pixel without a number to all that it is joined to.
     fn flooded(mask: &[bool], regions: &[i32], width: usize) -> Vec<i32> {
@@ -266,13 +218,5 @@ mod tests {
                 assert_eq!(component.pixels, expected.iter().filter(|&&label| label == number as i32).count());
             }
         }
-    }
-
-    #[test]
-    fn means_are_taken_a_component() {
-        let mask = [true, true, false, true, false, false];
-        let means = Runs::new(&mask, None, 3).means(|row, cols| cols.map(|col| (10 * row + col) as f64).sum());
-        // Row 0: columns 0 and 1; row 1: column 0, below column 0.
-        assert_eq!(means, [(0.0 + 1.0 + 10.0) / 3.0]);
     }
 }
