@@ -9,7 +9,19 @@ from pathlib import Path
 import pytest
 
 SOURCE = Path(__file__).parents[2] / "rust" / "bgars-core" / "src"
-ORDER = ["error", "pixel", "median", "components", "lights", "stack", "radiometry", "readings", "normals", "reflectance", "blind"]
+ORDER = [
+    "error",
+    "pixel",
+    "median",
+    "components",
+    "lights",
+    "stack",
+    "radiometry",
+    "readings",
+    "normals",
+    "reflectance",
+    "blind",
+]
 """Each may name those before it; what is not here stands by itself on the first eight."""
 INPUTS = 8
 NAMES = {
