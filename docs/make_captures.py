@@ -58,7 +58,7 @@ def _figures(rows: list[dict[str, Any]]) -> list[str]:
         "",
         f"Of {len(faulty)} captures with one fault each {found} are found ({found / len(faulty):.0%}) and {named} are",
         f"given the right cause first ({named / len(faulty):.0%}); {alarms} of {len(good)} good captures get a warning",
-        "or an error. Simulated arrays and reliefs (seeds from 60000), and rendered parts (`BGARS_RENDERED`: seeds",
+        "or an error. Simulated arrays and reliefs (seeds from 70000), and rendered parts (`BGARS_RENDERED`: seeds",
         f"{_seeds(rows)}), each also turned: none of them was seen when the",
         "thresholds were chosen (`make check-faults`). Two faults are only",
         "put where anything shows them: ambient light and a half turn of the table where there are cast shadows.",

@@ -41,7 +41,7 @@ RELIEFS = 36
 def captures(which: str) -> Iterator[tuple[str, bgars.Capture]]:
     """Yield names and captures: a hundred, other ones for choosing thresholds than for judging."""
     judged = which == JUDGED_ON
-    start = 60_000 if judged else 1000
+    start = 70_000 if judged else 1000
     for seed in range(start, start + SIMULATED):
         yield f"array {seed}", array(seed)
     for seed in range(start, start + RELIEFS):
