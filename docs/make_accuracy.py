@@ -93,7 +93,7 @@ def table(chosen: list[Case]) -> list[str]:
         for result in results:
             errors = result.normals
             cell = f"**{errors.mean_deg:.2f}** / {errors.median_deg:.2f} / {errors.p95_deg:.1f} ({errors.invalid})"
-            if result.method == "reflectance" and result.measured is not None and result.coverage is not None:
+            if result is results[-1] and result.measured is not None and result.coverage is not None:
                 share, within = 100 * result.measured.pixels / errors.pixels, 100 * result.coverage
                 cell += f"; measured {share:.0f} %: {result.measured.mean_deg:.2f}, within u {within:.0f} %"
             cells.append(cell)
