@@ -71,3 +71,13 @@ pub enum Error {
     #[error("{}: is {actual}, but the first image of the stack ({}) is {expected}; all must be alike", path.display(), first.display())]
     StackMismatch { path: PathBuf, first: PathBuf, expected: String, actual: String },
 }
+
+/// Refuses an array of another length than expected.
+pub(crate) fn check_length(argument: &'static str, expected: usize, actual: usize) -> Result<()> {
+    if expected == actual { Ok(()) } else { Err(Error::LengthMismatch { argument, expected, actual }) }
+}
+
+/// Refuses a number for which its rule does not hold.
+pub(crate) fn check_rule(argument: &'static str, rule: &'static str, value: f64, holds: bool) -> Result<()> {
+    if holds { Ok(()) } else { Err(Error::OutOfRange { argument, rule, value }) }
+}

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::error::{check_length, check_rule};
 use crate::{Error, Result};
 
 /// Smallest accepted [`conditioning`]: below it the lights count as coplanar.
@@ -50,20 +51,14 @@ impl Lights {
     /// # Errors
     /// Fewer than 3 lights, a light not above the board plane, or lights coplanar with the image centre.
     pub fn near(positions_px: &[[f64; 3]], reference_px: &[f64]) -> Result<Self> {
-        if reference_px.len() != positions_px.len() {
-            return Err(Error::LengthMismatch {
-                argument: "light_reference_distance",
-                expected: positions_px.len(),
-                actual: reference_px.len(),
-            });
-        }
+        check_length("light_reference_distance", positions_px.len(), reference_px.len())?;
         for (index, position) in positions_px.iter().enumerate() {
             if !(position.iter().all(|v| v.is_finite()) && position[2] > 0.0) {
                 return Err(Error::LightBelowBoard { index, z: position[2] });
             }
         }
-        if let Some(&value) = reference_px.iter().find(|&&value| !(value.is_finite() && value > 0.0)) {
-            return Err(Error::OutOfRange { argument: "light_reference_distance", rule: "finite and above 0", value });
+        for &value in reference_px {
+            check_rule("light_reference_distance", "finite and above 0", value, value.is_finite() && value > 0.0)?;
         }
         let lights = Self::Near {
             positions_px: positions_px.iter().map(|&p| Vector3::from(p)).collect(),

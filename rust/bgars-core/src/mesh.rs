@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use crate::error::{check_length, check_rule};
 use crate::{Error, Result};
 
 /// Vertices and faces of a height map.
@@ -25,8 +26,7 @@ pub struct HeightMesh<'a> {
     pitch: f64,
     /// Vertices before each row, and all of them.
     vertex_starts: Vec<usize>,
-    /// Faces before each row; those between a row and the one above belong to it.
-    face_starts: Vec<usize>,
+    face_count: usize,
 }
 
 impl<'a> HeightMesh<'a> {
@@ -37,26 +37,21 @@ impl<'a> HeightMesh<'a> {
     /// # Errors
     /// Mismatched lengths, an empty mask, more than 2^32 - 1 pixels.
     pub fn new(height_px: &'a [f32], mask: &'a [bool], width: usize, pitch: f64) -> Result<Self> {
-        if height_px.len() != mask.len() {
-            return Err(Error::LengthMismatch { argument: "height_px", expected: mask.len(), actual: height_px.len() });
-        }
+        check_length("height_px", mask.len(), height_px.len())?;
         if width == 0 || !mask.contains(&true) {
             return Err(Error::EmptyMask);
         }
-        if u32::try_from(mask.len()).is_err() {
-            let value = mask.len() as f64;
-            return Err(Error::OutOfRange { argument: "height_px", rule: "at most 2^32 - 1 pixels", value });
-        }
-        let mut mesh = Self { height_px, mask, width, pitch, vertex_starts: Vec::new(), face_starts: Vec::new() };
+        let holds = u32::try_from(mask.len()).is_ok();
+        check_rule("height_px", "at most 2^32 - 1 pixels", mask.len() as f64, holds)?;
+        let mut mesh = Self { height_px, mask, width, pitch, vertex_starts: vec![0], face_count: 0 };
         let rows = 0..mask.len() / width;
         let vertices: Vec<usize> =
             rows.clone().into_par_iter().map(|row| mesh.row_mask(row).iter().filter(|&&valid| valid).count()).collect();
-        let faces: Vec<usize> = rows
-            .into_par_iter()
-            .map(|row| mesh.squares(row).map(|square| faces_of_square(square).len()).sum())
-            .collect();
-        mesh.vertex_starts = starts(&vertices);
-        mesh.face_starts = starts(&faces);
+        for (row, count) in vertices.into_iter().enumerate() {
+            mesh.vertex_starts.push(mesh.vertex_starts[row] + count);
+        }
+        let faces = |row| mesh.squares(row).map(|square| faces_of_square(square).len()).sum::<usize>();
+        mesh.face_count = rows.into_par_iter().map(faces).sum();
         Ok(mesh)
     }
 
@@ -81,7 +76,7 @@ impl<'a> HeightMesh<'a> {
     /// Number of faces.
     #[must_use]
     pub fn face_count(&self) -> usize {
-        self.face_starts[self.rows()]
+        self.face_count
     }
 
     /// Calls `vertex` with pixel (row * width + column) and `[x, y, z]` of each vertex of a row, from left to right.
@@ -103,10 +98,9 @@ impl<'a> HeightMesh<'a> {
         }
         // Vertices of the square's left column, if they are there, and how many there were before the right one.
         let [mut upper, mut lower] = [self.vertex_starts[row - 1] as u32, self.vertex_starts[row] as u32];
-        let [upper_mask, lower_mask] = [self.row_mask(row - 1), self.row_mask(row)];
-        for (upper_pair, lower_pair) in upper_mask.windows(2).zip(lower_mask.windows(2)) {
-            let corners = [upper, lower, lower + u32::from(lower_pair[0]), upper + u32::from(upper_pair[0])];
-            for from in faces_of_square([upper_pair[0], lower_pair[0], lower_pair[1], upper_pair[1]]) {
+        for square in self.squares(row) {
+            let corners = [upper, lower, lower + u32::from(square[1]), upper + u32::from(square[0])];
+            for from in faces_of_square(square) {
                 face(from.map(|corner| corners[corner]));
             }
             [upper, lower] = [corners[3], corners[2]];
@@ -129,14 +123,6 @@ impl<'a> HeightMesh<'a> {
 ///
 /// # Errors
 /// Those of [`HeightMesh::new`].
-///
-/// # Examples
-/// ```
-/// let mesh = bgars_core::mesh::triangulate(&[0.0, 0.0, 0.0, 1.0], &[true; 4], 2, 10.0)?;
-/// assert_eq!(mesh.vertices[3], [5.0, -5.0, 10.0]);
-/// assert_eq!(mesh.faces.len(), 2);
-/// # Ok::<(), bgars_core::Error>(())
-/// ```
 pub fn triangulate(height_px: &[f32], mask: &[bool], width: usize, pitch: f64) -> Result<TriangleMesh> {
     let source = HeightMesh::new(height_px, mask, width, pitch)?;
     let rows = || (0..source.rows()).into_par_iter();
@@ -164,15 +150,4 @@ fn faces_of_square(valid: [bool; 4]) -> &'static [[usize; 3]] {
         [true, true, true, false] => &[[0, 1, 2]],
         _ => &[],
     }
-}
-
-/// Sum of the lengths before each, and of all.
-fn starts(lengths: &[usize]) -> Vec<usize> {
-    let mut sum = 0;
-    std::iter::once(0)
-        .chain(lengths.iter().map(|length| {
-            sum += length;
-            sum
-        }))
-        .collect()
 }

@@ -1,5 +1,6 @@
 //! From grey levels to values proportional to light: response, dark frame, black level, light intensity.
 
+use crate::error::{check_length, check_rule};
 use crate::{Error, ImageStack, Pixel, Result};
 
 /// How a grey level becomes a radiance, applied pixel by pixel inside the kernels, so that no float copy of a stack is made.
@@ -42,23 +43,12 @@ impl<P: Pixel> Radiometry<'_, P> {
     /// Names the field and the value that break a rule.
     pub fn check(&self, stack: &ImageStack<'_, P>) -> Result<()> {
         if let Some(response) = self.response {
-            let expected = P::CODES.unwrap_or(0);
-            if response.len() != expected {
-                return Err(Error::LengthMismatch { argument: "response", expected, actual: response.len() });
-            }
+            check_length("response", P::CODES.unwrap_or(0), response.len())?;
         }
-        if let Some(dark) = self.dark
-            && dark.len() != stack.pixels()
-        {
-            return Err(Error::LengthMismatch { argument: "dark", expected: stack.pixels(), actual: dark.len() });
+        if let Some(dark) = self.dark {
+            check_length("dark", stack.pixels(), dark.len())?;
         }
-        if self.intensities.len() != stack.lights() {
-            return Err(Error::LengthMismatch {
-                argument: "light_intensities",
-                expected: stack.lights(),
-                actual: self.intensities.len(),
-            });
-        }
+        check_length("light_intensities", stack.lights(), self.intensities.len())?;
         for (index, &value) in self.intensities.iter().enumerate() {
             if !(value.is_finite() && value > 0.0) {
                 return Err(Error::BadIntensity { index, value });
@@ -71,9 +61,7 @@ impl<P: Pixel> Radiometry<'_, P> {
             ("black_level", black, "at least 0 and below full scale", (0.0..full_scale).contains(&black)),
             ("saturation", clipped, "above the black level", clipped > black),
         ] {
-            if !holds {
-                return Err(Error::OutOfRange { argument, rule, value: f64::from(value) });
-            }
+            check_rule(argument, rule, f64::from(value), holds)?;
         }
         Ok(())
     }

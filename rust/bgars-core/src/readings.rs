@@ -2,6 +2,7 @@
 
 use multiversion::multiversion;
 
+use crate::error::check_length;
 use crate::{Error, ImageStack, Lights, Pixel, Radiometry, Result};
 
 /// A stack, and how its grey levels become values in proportion to light.
@@ -18,11 +19,8 @@ impl<P: Pixel> Capture<'_, P> {
             return Err(Error::LightCountMismatch { images: self.stack.lights(), lights: lights.len() });
         }
         self.radiometry.check(self.stack)?;
-        let expected = self.stack.pixels();
         for &(argument, mask) in masks {
-            if let Some(actual) = mask.map(<[bool]>::len).filter(|&actual| actual != expected) {
-                return Err(Error::LengthMismatch { argument, expected, actual });
-            }
+            check_length(argument, self.stack.pixels(), mask.map_or(self.stack.pixels(), <[bool]>::len))?;
         }
         Ok(())
     }

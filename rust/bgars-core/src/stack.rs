@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use crate::{Error, Pixel, Result};
+use crate::error::check_length;
+use crate::{Pixel, Result};
 
 /// `lights` planes of `height * width` pixels, row-major, plane after plane.
 #[derive(Clone, Copy, Debug)]
@@ -17,19 +18,9 @@ impl<'a, P: Pixel> ImageStack<'a, P> {
     /// Borrows `data` of shape `(lights, height, width)`.
     ///
     /// # Errors
-    /// [`Error::LengthMismatch`] when the length does not fit the shape.
-    ///
-    /// # Examples
-    /// ```
-    /// let stack = bgars_core::ImageStack::new(&[0u8; 24], 3, 2, 4)?;
-    /// assert_eq!(stack.plane(2).len(), 8);
-    /// # Ok::<(), bgars_core::Error>(())
-    /// ```
+    /// [`crate::Error::LengthMismatch`] when the length does not fit the shape.
     pub fn new(data: &'a [P], lights: usize, height: usize, width: usize) -> Result<Self> {
-        let expected = lights * height * width;
-        if data.len() != expected {
-            return Err(Error::LengthMismatch { argument: "images", expected, actual: data.len() });
-        }
+        check_length("images", lights * height * width, data.len())?;
         Ok(Self { data, lights, height, width })
     }
 
@@ -71,13 +62,6 @@ impl<'a, P: Pixel> ImageStack<'a, P> {
 
 impl<P: Pixel> ImageStack<'_, P> {
     /// The largest value that is finite, 0 where none is above; of many values each thread looks through a part.
-    ///
-    /// # Examples
-    /// ```
-    /// let stack = bgars_core::ImageStack::new(&[0.5, f32::NAN, f32::INFINITY, -3.0], 1, 2, 2)?;
-    /// assert_eq!(stack.largest_finite(), 0.5);
-    /// # Ok::<(), bgars_core::Error>(())
-    /// ```
     #[must_use]
     pub fn largest_finite(&self) -> f32 {
         if !self.is_large() {

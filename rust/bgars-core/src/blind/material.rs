@@ -205,10 +205,3 @@ fn add_pixel(
     sum.matrix -= coupling * inverse * coupling.transpose();
     sum.right -= coupling * (inverse * own.right);
 }
-
-/// Turning part of a pixel's covariance: the inverse of its information without the albedo.
-pub(super) fn turning_variance(information: &Matrix3<f64>) -> Option<f64> {
-    let inverse = information.try_inverse()?;
-    let variance = inverse[(0, 0)] + inverse[(1, 1)];
-    (variance.is_finite() && variance >= 0.0).then_some(variance)
-}

@@ -4,7 +4,6 @@ use nalgebra::Vector3;
 
 use super::facet::{self, Facet, Pull, equations, tangents};
 use super::lobe::Material;
-use super::material::turning_variance;
 use super::observation::{Kind, Observation, SCALE};
 use crate::normals::{confidence_of, misfit_freedom};
 
@@ -130,7 +129,11 @@ pub(super) fn trust(observation: &Observation, material: &Material, facet: &Face
     let unexplained = (squares / weights - of_noise).max(0.0);
     let misfit = (lights * unexplained + PRIOR_RESIDUAL * PRIOR_RESIDUAL) / misfit_freedom(lights.max(LEAST_LIGHTS));
     let variance = noise + misfit;
-    let Some(turning) = turning_variance(&information) else { return Trust { confidence: 0.0, measured: false } };
+    // The turning part of the covariance.
+    let turning = information.try_inverse().map_or(f64::NAN, |inverse| inverse[(0, 0)] + inverse[(1, 1)]);
+    if !(turning.is_finite() && turning >= 0.0) {
+        return Trust { confidence: 0.0, measured: false };
+    }
     let error_deg = (variance * turning).sqrt().to_degrees();
     // Never quite 0: that is what a pixel without a normal has.
     let confidence = confidence_of(error_deg).max(f32::MIN_POSITIVE);

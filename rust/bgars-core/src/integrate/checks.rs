@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::settings::{Field, Params};
+use crate::error::{check_length, check_rule};
 use crate::{Error, Result};
 
 /// Shortest and longest normal that is taken for one of length 1: interpolation and 8 bits shorten them, garbage is far off.
@@ -24,35 +25,21 @@ pub(super) fn check(field: Field<'_>, params: &Params) -> Result<()> {
     for (argument, value) in
         [("relative_tolerance", params.relative_tolerance), ("absolute_tolerance", params.absolute_tolerance)]
     {
-        if !(value.is_finite() && value > 0.0) {
-            return Err(Error::OutOfRange { argument, rule: "finite and above 0", value });
-        }
+        check_rule(argument, "finite and above 0", value, value.is_finite() && value > 0.0)?;
     }
-    if params.max_iters == 0 {
-        return Err(Error::OutOfRange { argument: "max_iters", rule: "at least 1", value: 0.0 });
-    }
-    Ok(())
+    check_rule("max_iters", "at least 1", 0.0, params.max_iters > 0)
 }
 
 /// Refuses arrays that do not fit each other, and a mask without a pixel.
 pub(super) fn check_lengths(field: Field<'_>) -> Result<()> {
     let Field { normals, mask, weights, regions, width } = field;
     check_length("normals", mask.len() * 3, normals.len())?;
-    if let Some(weights) = weights {
-        check_length("weights", mask.len(), weights.len())?;
-    }
-    if let Some(regions) = regions {
-        check_length("regions", mask.len(), regions.len())?;
-    }
+    check_length("weights", mask.len(), weights.map_or(mask.len(), <[_]>::len))?;
+    check_length("regions", mask.len(), regions.map_or(mask.len(), <[_]>::len))?;
     if width == 0 || !mask.contains(&true) {
         return Err(Error::EmptyMask);
     }
-    check_length("mask", mask.len().div_ceil(width) * width, mask.len())?;
-    Ok(())
-}
-
-pub(super) fn check_length(argument: &'static str, expected: usize, actual: usize) -> Result<()> {
-    if expected == actual { Ok(()) } else { Err(Error::LengthMismatch { argument, expected, actual }) }
+    check_length("mask", mask.len().div_ceil(width) * width, mask.len())
 }
 
 /// Where normals may point.
@@ -71,11 +58,8 @@ pub(super) fn check_pixels(field: Field<'_>, facing: Facing) -> Result<()> {
         return Err(first);
     }
     let weighs = |(&weight, &used): (&f32, &bool)| used && weight > 0.0;
-    if field.weights.is_some_and(|weights| !weights.iter().zip(field.mask).any(weighs)) {
-        let rule = "above 0 in at least one pixel of the mask";
-        return Err(Error::OutOfRange { argument: "weights", rule, value: 0.0 });
-    }
-    Ok(())
+    let holds = field.weights.is_none_or(|weights| weights.iter().zip(field.mask).any(weighs));
+    check_rule("weights", "above 0 in at least one pixel of the mask", 0.0, holds)
 }
 
 /// Refuses a normal or a weight inside the mask that means nothing.

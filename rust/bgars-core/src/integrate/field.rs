@@ -134,14 +134,6 @@ impl System {
     ///
     /// # Errors
     /// Those of [`super::integrate`] that concern the input.
-    ///
-    /// # Examples
-    /// ```
-    /// use bgars_core::integrate::{Difference, System};
-    /// let system = System::new(&[0.0, 0.0, 1.0].repeat(12), &[true; 12], 4, None, Difference::Trapezoid)?;
-    /// assert_eq!(system.right_side().len(), 6); // every other pixel
-    /// # Ok::<(), bgars_core::Error>(())
-    /// ```
     pub fn new(
         normals: &[f32],
         mask: &[bool],

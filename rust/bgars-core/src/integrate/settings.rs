@@ -62,17 +62,15 @@ pub struct Fit {
 }
 
 /// A height map in pixels, defined up to one constant a component (chosen so that each has zero mean).
+#[allow(missing_docs)] // as of a [`Fit`]
 #[derive(Clone, Debug)]
 pub struct Surface {
     /// Height in pixels, row-major; NaN outside the mask.
     pub height_px: Vec<f32>,
     /// Index of each pixel's component, -1 outside the mask.
     pub labels: Vec<i32>,
-    /// The connected components (4-neighbourhood), in the order of their first pixels.
     pub components: Vec<Component>,
-    /// Iterations of the conjugate gradient.
     pub iterations: usize,
-    /// True residual norm at the end, relative to the right side.
     pub residual: f64,
 }
 

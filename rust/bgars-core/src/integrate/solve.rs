@@ -4,12 +4,13 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::checkerboard::{Crop, by_column, join_row};
-use super::checks::{check, check_length, check_memory};
+use super::checks::{check, check_memory};
 use super::conjugate_gradient::{Limits, conjugate_gradient};
 use super::field::assemble;
 use super::norm::sum;
 use super::settings::{Field, Fit, OnProgress, Params, Progress, Surface};
 use crate::components::Runs;
+use crate::error::check_length;
 use crate::{Error, Result};
 
 /// Integrates `normals` over `mask` to a height map in pixels.

@@ -4,17 +4,16 @@ use std::path::Path;
 
 use image::{DynamicImage, ImageDecoder};
 
-use super::decode::{bits_of, check_size, open, translate};
+use super::decode::{bits_of, open, read_header, translate};
 use crate::{Error, Result};
 
 /// A decoded colour image.
+#[allow(missing_docs)] // the names say it
 #[derive(Clone, Debug, PartialEq)]
 pub struct ColorImage {
     /// Codes of the file, or its floats; `channels` values a pixel, row-major.
     pub data: Vec<f32>,
-    /// Rows.
     pub height: usize,
-    /// Columns.
     pub width: usize,
     /// 3, or 4 with alpha.
     pub channels: usize,
@@ -27,7 +26,7 @@ pub struct ColorImage {
 /// # Errors
 /// Names the file; grey images are refused.
 pub fn read_color(path: &Path, max_megapixels: f64) -> Result<ColorImage> {
-    check_size(path, max_megapixels)?;
+    read_header(path, max_megapixels)?;
     let decoder = open(path, max_megapixels)?;
     let color = decoder.color_type();
     if !color.has_color() {

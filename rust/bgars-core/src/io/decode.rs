@@ -7,23 +7,22 @@ use std::path::{Path, PathBuf};
 use image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use rayon::prelude::*;
 
+use crate::error::check_length;
 use crate::{Error, Result};
 
 /// The most that a decoder asks for, RGBA of `f32`, in bytes a megapixel; what a header claims is checked before.
 const MAX_PIXEL_BYTES: f64 = 16e6;
 
 /// How a colour pixel becomes one value; always on linear values, never with a hidden gamma.
+#[allow(missing_docs)] // the names say it
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
     /// Rec. 709 luminance: 0.2126 R + 0.7152 G + 0.0722 B.
     Luminance,
     /// (R + G + B) / 3.
     Mean,
-    /// Red alone.
     Red,
-    /// Green alone.
     Green,
-    /// Blue alone.
     Blue,
 }
 
@@ -61,20 +60,17 @@ impl Color<'_> {
 
 /// What a header says.
 #[derive(Clone, Copy, PartialEq, Eq)]
-struct Header {
+pub(super) struct Header {
     width: u32,
     height: u32,
-    color: ColorType,
+    bits: u16,
+    has_color: bool,
 }
 
 impl Header {
     fn describe(self) -> String {
-        let kind = if self.color.has_color() { "colour" } else { "grey" };
-        format!("{} x {} pixels, {} bit {kind}", self.width, self.height, bits_of(self.color))
-    }
-
-    fn bits(self) -> u16 {
-        bits_of(self.color)
+        let kind = if self.has_color { "colour" } else { "grey" };
+        format!("{} x {} pixels, {} bit {kind}", self.width, self.height, self.bits)
     }
 }
 
@@ -84,13 +80,11 @@ pub(super) fn bits_of(color: ColorType) -> u16 {
 }
 
 /// Where the pixels of a stack go, image after image.
+#[allow(missing_docs)] // as of a [`StackType`]
 #[derive(Debug)]
 pub enum StackMut<'a> {
-    /// 8-bit grey levels.
     U8(&'a mut [u8]),
-    /// 16-bit grey levels.
     U16(&'a mut [u16]),
-    /// Linear values.
     F32(&'a mut [f32]),
 }
 
@@ -106,16 +100,14 @@ pub enum StackType {
 }
 
 /// What the headers of some files promise; nothing is decoded yet.
+#[allow(missing_docs)] // the names say it
 #[derive(Clone, Debug)]
 pub struct StackPlan<'a> {
     paths: &'a [PathBuf],
     color: &'a Color<'a>,
     max_megapixels: f64,
-    /// Rows of an image.
     pub height: usize,
-    /// Columns of an image.
     pub width: usize,
-    /// Type of the values.
     pub kind: StackType,
     /// True when response and gains will be in the values (colour files).
     pub linear: bool,
@@ -136,11 +128,7 @@ impl<'a> StackPlan<'a> {
         let headers = paths.par_iter().map(|path| read_header(path, max_megapixels)).collect::<Result<Vec<_>>>()?;
         let first = headers[0];
         for (path, &header) in paths.iter().zip(&headers) {
-            let alike = header.width == first.width
-                && header.height == first.height
-                && header.bits() == first.bits()
-                && header.color.has_color() == first.color.has_color();
-            if !alike {
+            if header != first {
                 return Err(Error::StackMismatch {
                     path: path.clone(),
                     first: first_path.clone(),
@@ -149,14 +137,14 @@ impl<'a> StackPlan<'a> {
                 });
             }
         }
-        let linear = first.color.has_color() && color.needs_float();
-        let kind = match (first.bits(), linear) {
+        let linear = first.has_color && color.needs_float();
+        let kind = match (first.bits, linear) {
             (8, false) => StackType::U8,
             (16, false) => StackType::U16,
             _ => StackType::F32,
         };
         let (height, width) = (first.height as usize, first.width as usize);
-        Ok(Self { paths, color, max_megapixels, height, width, kind, linear, bits: first.bits() })
+        Ok(Self { paths, color, max_megapixels, height, width, kind, linear, bits: first.bits })
     }
 
     /// Values of the whole stack.
@@ -184,9 +172,7 @@ impl<'a> StackPlan<'a> {
 
     /// Runs `read` on every image's part of `out`, in parallel.
     fn fill<T: Send>(&self, out: &mut [T], read: impl Fn(usize, &mut [T]) -> Result<()> + Sync) -> Result<()> {
-        if out.len() != self.values() {
-            return Err(Error::LengthMismatch { argument: "out", expected: self.values(), actual: out.len() });
-        }
+        check_length("out", self.values(), out.len())?;
         out.par_chunks_mut((self.height * self.width).max(1)).enumerate().try_for_each(|(index, out)| read(index, out))
     }
 }
@@ -216,11 +202,7 @@ fn jpeg_is_whole(bytes: &[u8]) -> bool {
 }
 
 /// Refuses a file whose header claims too many pixels.
-pub(super) fn check_size(path: &Path, max_megapixels: f64) -> Result<()> {
-    read_header(path, max_megapixels).map(|_| ())
-}
-
-fn read_header(path: &Path, max_megapixels: f64) -> Result<Header> {
+pub(super) fn read_header(path: &Path, max_megapixels: f64) -> Result<Header> {
     let decoder = open(path, max_megapixels)?;
     let (width, height) = decoder.dimensions();
     let megapixels = f64::from(width) * f64::from(height) / 1e6;
@@ -231,7 +213,8 @@ fn read_header(path: &Path, max_megapixels: f64) -> Result<Header> {
     if width == 0 || height == 0 {
         return Err(Error::Decode { path: path.to_path_buf(), reason: format!("{width} x {height} pixels") });
     }
-    Ok(Header { width, height, color: decoder.color_type() })
+    let color = decoder.color_type();
+    Ok(Header { width, height, bits: bits_of(color), has_color: color.has_color() })
 }
 
 pub(super) fn translate(path: &Path, error: ImageError) -> Error {
@@ -287,20 +270,13 @@ impl Reader<'_> {
         let linear = |code: u16| color.response.map_or(f32::from(code), |table| table[usize::from(code)]);
         match &image {
             DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
-                for (out, pixel) in out.iter_mut().zip(image.to_rgb32f().pixels()) {
-                    *out = weigh(pixel.0, weights);
-                }
+                combine(out, image.to_rgb32f().pixels().map(|pixel| pixel.0), weights);
             }
             _ if bits_of(image.color()) == 8 => {
-                for (out, pixel) in out.iter_mut().zip(image.to_rgb8().pixels()) {
-                    *out = weigh(pixel.0.map(|code| linear(u16::from(code))), weights);
-                }
+                let linear = |code: u8| linear(u16::from(code));
+                combine(out, image.to_rgb8().pixels().map(|pixel| pixel.0.map(linear)), weights);
             }
-            _ => {
-                for (out, pixel) in out.iter_mut().zip(image.to_rgb16().pixels()) {
-                    *out = weigh(pixel.0.map(linear), weights);
-                }
-            }
+            _ => combine(out, image.to_rgb16().pixels().map(|pixel| pixel.0.map(linear)), weights),
         }
         Ok(())
     }
@@ -308,6 +284,11 @@ impl Reader<'_> {
     fn decode(&self, decoder: impl ImageDecoder) -> Result<DynamicImage> {
         DynamicImage::from_decoder(decoder).map_err(|error| translate(self.path, error))
     }
+}
+
+/// The weighted sums of the channels of some pixels.
+fn combine(out: &mut [f32], pixels: impl Iterator<Item = [f32; 3]>, weights: [f32; 3]) {
+    out.iter_mut().zip(pixels).for_each(|(out, pixel)| *out = weigh(pixel, weights));
 }
 
 /// The weighted sum of three channels.

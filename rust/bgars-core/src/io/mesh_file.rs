@@ -10,11 +10,10 @@ use super::ply::write_ply;
 use crate::{Error, Result};
 
 /// Formats of a mesh file.
+#[allow(missing_docs)] // [`super::ply`] and [`super::obj`] say it
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MeshFormat {
-    /// Binary PLY.
     Ply,
-    /// Wavefront OBJ.
     Obj,
 }
 
@@ -22,17 +21,6 @@ pub enum MeshFormat {
 ///
 /// # Errors
 /// [`Error::Io`], naming the file.
-///
-/// # Examples
-/// ```
-/// use bgars_core::{io::{HeightSource, MeshFormat, write_mesh_file}, mesh::HeightMesh};
-/// let mesh = HeightMesh::new(&[0.0, 0.0, 0.0, 1.0], &[true; 4], 2, 10.0)?;
-/// let path = std::env::temp_dir().join("bgars-doctest.ply");
-/// write_mesh_file(&HeightSource::new(mesh, None, None)?, MeshFormat::Ply, &[], &path)?;
-/// assert!(std::fs::read(&path)?.ends_with(&[3, 0, 0, 0, 0, 3, 0, 0, 0, 1, 0, 0, 0])); // triangle 0 3 1
-/// # std::fs::remove_file(path)?;
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 pub fn write_mesh_file(mesh: &impl MeshSource, format: MeshFormat, comments: &[String], path: &Path) -> Result<()> {
     let write = || {
         let mut file = File::create(path)?;

@@ -1,7 +1,8 @@
 //! Meshes in pieces, for the writers: what holds a mesh need not hold it a second time in the form of a file.
 
+use crate::Result;
+use crate::error::check_length;
 use crate::mesh::HeightMesh;
-use crate::{Error, Result};
 
 /// Pixels of a height map in a piece, about.
 const PIECE_PIXELS: usize = 1 << 14;
@@ -18,17 +19,14 @@ pub struct Vertices {
 }
 
 /// How much there is of a mesh.
+#[allow(missing_docs)] // the names say it
 #[derive(Clone, Copy, Debug)]
 pub struct MeshSize {
-    /// Number of vertices.
     pub vertices: usize,
-    /// Number of faces.
     pub faces: usize,
     /// Pieces of the vertices, and of the faces.
     pub pieces: [usize; 2],
-    /// Whether vertices have normals.
     pub has_normals: bool,
-    /// Whether vertices have colours.
     pub has_colors: bool,
 }
 
@@ -54,14 +52,11 @@ impl<'a> HeightSource<'a> {
     /// A surface, with the unit normal and the grey level of each pixel where they are known.
     ///
     /// # Errors
-    /// [`Error::LengthMismatch`] unless there is one for each pixel.
+    /// [`crate::Error::LengthMismatch`] unless there is one for each pixel.
     pub fn new(mesh: HeightMesh<'a>, normals: Option<&'a [[f32; 3]]>, grey: Option<&'a [u8]>) -> Result<Self> {
         let expected = mesh.rows() * mesh.width();
-        for (argument, actual) in [("normals", normals.map(<[_]>::len)), ("grey", grey.map(<[_]>::len))] {
-            if let Some(actual) = actual.filter(|&actual| actual != expected) {
-                return Err(Error::LengthMismatch { argument, expected, actual });
-            }
-        }
+        check_length("normals", expected, normals.map_or(expected, <[_]>::len))?;
+        check_length("grey", expected, grey.map_or(expected, <[_]>::len))?;
         Ok(Self { mesh, normals, grey })
     }
 

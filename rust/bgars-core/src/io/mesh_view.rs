@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::mesh_source::{MeshSize, MeshSource, Vertices};
+use crate::error::check_length;
 use crate::{Error, Result};
 
 /// Vertices or faces of a piece, and faces checked at a time: they stay in the second-level cache.
@@ -28,11 +29,8 @@ impl MeshView<'_> {
     /// [`Error::LengthMismatch`] or [`Error::OutOfRange`].
     pub fn check(&self) -> Result<()> {
         let expected = self.vertices.len();
-        let fits = |argument, actual| {
-            if actual == expected { Ok(()) } else { Err(Error::LengthMismatch { argument, expected, actual }) }
-        };
-        self.normals.map_or(Ok(()), |normals| fits("normals", normals.len()))?;
-        self.colors.map_or(Ok(()), |colors| fits("colors", colors.len()))?;
+        check_length("normals", expected, self.normals.map_or(expected, <[_]>::len))?;
+        check_length("colors", expected, self.colors.map_or(expected, <[_]>::len))?;
         // A file has 32 bits for an index; of a negative one the bits are those of a number far above.
         let count = expected.min(1 << 32) as u64;
         let is_bad = |index: &i64| *index as u64 >= count;

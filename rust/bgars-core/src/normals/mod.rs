@@ -20,7 +20,8 @@ mod windows;
 
 use std::ops::Range;
 
-use crate::{Error, Result};
+use crate::Result;
+use crate::error::check_length;
 
 pub(crate) use checks::check_finite;
 pub(crate) use confidence::{confidence_of, misfit_freedom};
@@ -64,19 +65,15 @@ pub struct NormalMap {
 }
 
 /// The arrays of a [`NormalMap`], wherever they are, to be written.
+#[allow(missing_docs)] // as there
 #[derive(Debug)]
 pub struct NormalMapMut<'a> {
-    /// 3 values a pixel.
     pub normals: &'a mut [f32],
-    /// 1 value a pixel.
     pub albedo: &'a mut [f32],
-    /// 1 value a pixel.
     pub mask: &'a mut [bool],
-    /// 1 value a pixel.
     pub confidence: &'a mut [f32],
     /// 1 value a pixel; or empty, for methods that fill nothing in (all but the blind one): it would be `mask` again.
     pub measured: &'a mut [bool],
-    /// 1 value a pixel.
     pub lights_kept: &'a mut [u16],
     /// `lights` values a pixel, or empty: not wanted.
     pub kept_sets: &'a mut [bool],
@@ -191,9 +188,7 @@ impl<'a> NormalMapMut<'a> {
             ("lights_kept", pixels, self.lights_kept.len()),
             ("kept_sets", kept_sets, self.kept_sets.len()),
         ] {
-            if expected != actual {
-                return Err(Error::LengthMismatch { argument, expected, actual });
-            }
+            check_length(argument, expected, actual)?;
         }
         Ok(())
     }

@@ -11,17 +11,16 @@ const CENTRE_HEIGHT: f64 = 0.7;
 const MIN_N_Z: f64 = 0.1;
 
 /// The silhouette of a ball. x right, y up, origin at the image centre, pixels.
+#[allow(missing_docs)] // the names say it
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Circle {
     /// Centre to the right of the image centre.
     pub x_px: f64,
     /// Centre above the image centre.
     pub y_px: f64,
-    /// Radius.
     pub radius_px: f64,
     /// Standard uncertainty of the radius; 0 for a circle that is right.
     pub u_radius_px: f64,
-    /// What stands on it.
     pub shape: Shape,
 }
 

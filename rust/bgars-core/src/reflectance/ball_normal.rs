@@ -3,7 +3,6 @@
 /// A normal of a ball.
 #[derive(Clone, Copy, Debug)]
 pub struct BallPixel {
-    /// Index into the image.
     pub pixel: usize,
     pub normal: [f32; 3],
     /// Its place on the disc.

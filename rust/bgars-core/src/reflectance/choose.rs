@@ -18,7 +18,7 @@ const FINAL_STEPS: usize = 60;
 /// The best material of balls of known shape, no more complicated than the observations demand.
 pub fn best_material(samples: &Samples) -> MaterialFit {
     let some = samples.thinned((samples.len() / RACE_PIXELS).max(1));
-    let simple = Free { grazing: false, tails: true, gains: true };
+    let simple = Free { grazing: false, tails_and_gains: true };
     let grazing = Free { grazing: true, ..simple };
     let one = fit_from(samples, &winner(&some, &starts(samples), simple).material, simple, FINAL_STEPS);
     let of_one = fit_from(&some, &one.material, simple, 0).cost;

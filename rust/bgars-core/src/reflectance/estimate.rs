@@ -18,6 +18,7 @@ use super::scale::bend;
 use super::shape::{CommonShape, EVIDENCE, PRIOR, common_shape};
 use super::spread::Spread;
 use super::variation::ball_materials;
+use crate::error::{check_length, check_rule};
 use crate::normals::{NormalMapMut, check_finite};
 use crate::readings::Capture;
 use crate::{Error, ImageStack, Lights, Pixel, Radiometry, Result};
@@ -95,7 +96,7 @@ pub struct Findings {
 /// other pixels stay as they are, and so do free pixels that the material does not explain.
 ///
 /// # Inputs
-/// `stack`, `lights`, `radiometry` as for [`crate::normals::estimate_into`]; at least six lights. Circles in pixels, x
+/// `stack`, `lights`, `radiometry` as for [`crate::normals::estimate_into`]; at least [`MIN_LIGHTS`]. Circles in pixels, x
 /// right and y up from the image centre.
 ///
 /// # Method
@@ -113,33 +114,21 @@ pub struct Findings {
 /// # Examples
 /// ```
 /// use bgars_core::normals::NormalMap;
-/// use bgars_core::reflectance::{Circle, Lobe, Masking, Material, Request, estimate_into};
+/// use bgars_core::reflectance::{Lobe, Masking, Material, Request, estimate_into};
 /// use bgars_core::{ImageStack, Lights, Radiometry};
-/// // A ring of six lights over one ball of 10 pixels radius, photographed by the material's own equation.
-/// let ring: Vec<[f64; 3]> = (0..6)
-///     .map(|light| f64::from(light) * std::f64::consts::FRAC_PI_3)
-///     .map(|azimuth| [0.6 * azimuth.cos(), 0.6 * azimuth.sin(), 0.8])
-///     .collect();
-/// let lights = Lights::directional(&ring)?;
-/// let lobe = Lobe { strength: 300.0, roughness: 0.3, tail: 0.0 };
-/// let (diffuse, gains) = (120.0, vec![1.0; 6]);
-/// let solder = Material { diffuse, grazing: 0.0, ambient: 0.0, lobes: vec![lobe], masking: Masking::Smith, gains };
-/// let circle = Circle::exact(0.0, 0.0, 10.0);
-/// let mut images = vec![0f32; 6 * 24 * 24];
-/// for pixel in 0..24 * 24 {
-///     let Some(normal) = circle.normal((pixel % 24) as f64 - 11.5, 11.5 - (pixel / 24) as f64) else { continue };
-///     for light in 0..6 {
-///         let direction = lights.at(light, 0.0, 0.0).0;
-///         images[light * 24 * 24 + pixel] = solder.radiance(light, &normal, &direction, 1.0).min(255.0) as f32;
-///     }
-/// }
-/// let stack = ImageStack::new(&images, 6, 24, 24)?;
-/// let mut map = NormalMap::zeros(24 * 24, 0);
-/// let request = Request { mask: None, circles: &[circle], free: None, wanted: None, material: None };
+/// // A pixel of a material that was fitted before, as bright under four lights around it: it faces the camera.
+/// let lights = Lights::directional(&[[0.6, 0.0, 0.8], [0.0, 0.6, 0.8], [-0.6, 0.0, 0.8], [0.0, -0.6, 0.8]])?;
+/// let lobes = vec![Lobe { strength: 300.0, roughness: 0.3, tail: 0.0 }];
+/// let (diffuse, masking, gains) = (120.0, Masking::Smith, vec![1.0; 4]);
+/// let solder = Material { diffuse, grazing: 0.0, ambient: 0.0, lobes, masking, gains };
+/// let level = solder.radiance(0, &nalgebra::Vector3::z(), &lights.at(0, 0.0, 0.0).0, 1.0) as f32;
+/// let images = [level; 4];
+/// let stack = ImageStack::new(&images, 4, 1, 1)?;
+/// let mut map = NormalMap::zeros(1, 0);
+/// let request = Request { mask: None, circles: &[], free: Some(&[true]), wanted: None, material: Some(&solder) };
 /// let proceed = &mut |_| std::ops::ControlFlow::Continue(());
-/// let found = estimate_into(&stack, &lights, &Radiometry::linear(6, 255.0), request, proceed, map.as_mut())?;
-/// assert!(found.accepted && (found.material.diffuse - 120.0).abs() < 1.0);
-/// assert!(map.measured[12 * 24 + 12] && map.normals[3 * (12 * 24 + 12) + 2] > 0.99); // the top faces the camera
+/// let found = estimate_into(&stack, &lights, &Radiometry::linear(4, 255.0), request, proceed, map.as_mut())?;
+/// assert!(found.accepted && map.normals[2] > 0.999);
 /// # Ok::<(), bgars_core::Error>(())
 /// ```
 ///
@@ -290,36 +279,14 @@ fn fitted(request: &Request<'_>, inside: &[Vec<usize>], core: &[Vec<usize>], sam
 
 fn check<P: Pixel>(capture: &Capture<'_, P>, lights: &Lights, request: &Request<'_>) -> Result<()> {
     capture.check(lights, &[("mask", request.mask), ("free", request.free), ("wanted", request.wanted)])?;
-    if lights.len() < MIN_LIGHTS {
-        return Err(Error::OutOfRange {
-            argument: "lights",
-            rule: "at least 4 for the reflectance estimator",
-            value: lights.len() as f64,
-        });
-    }
-    if let Some(material) = request.material
-        && material.gains.len() != lights.len()
-    {
-        return Err(Error::LengthMismatch {
-            argument: "material.gains",
-            expected: lights.len(),
-            actual: material.gains.len(),
-        });
-    }
-    for circle in request.circles {
-        for (rule, value, holds) in [
-            ("finite x", circle.x_px, circle.x_px.is_finite()),
-            ("finite y", circle.y_px, circle.y_px.is_finite()),
-            (
-                "radius at least 3 pixels",
-                circle.radius_px,
-                circle.radius_px >= MIN_RADIUS_PX && circle.radius_px < f64::MAX,
-            ),
-        ] {
-            if !holds {
-                return Err(Error::OutOfRange { argument: "circles", rule, value });
-            }
-        }
+    let (count, rule) = (lights.len(), "at least 4 for the reflectance estimator");
+    check_rule("lights", rule, count as f64, count >= MIN_LIGHTS)?;
+    check_length("material.gains", count, request.material.map_or(count, |material| material.gains.len()))?;
+    for &Circle { x_px, y_px, radius_px, .. } in request.circles {
+        check_rule("circles", "finite x", x_px, x_px.is_finite())?;
+        check_rule("circles", "finite y", y_px, y_px.is_finite())?;
+        let holds = (MIN_RADIUS_PX..f64::MAX).contains(&radius_px);
+        check_rule("circles", "radius at least 3 pixels", radius_px, holds)?;
     }
     check_finite(capture.stack, request.mask)
 }

@@ -25,33 +25,27 @@ const PRIOR_WEIGHT: f64 = 1.0;
 /// Products of losses' arguments are turned into a logarithm before they overflow.
 const LARGE: f64 = 1e200;
 
-impl Free {
-    /// Only what is always free.
-    pub const NOTHING: Self = Self { grazing: false, tails: false, gains: false };
-}
-
 /// A fitted material.
+#[allow(missing_docs)] // the names say it
 #[derive(Clone, Debug)]
 pub struct MaterialFit {
-    /// The material.
     pub material: Material,
     /// Mean loss an observation, `log(1 + (r / 3)^2)` with `r` in bent grey levels.
     pub cost: f64,
     /// Standard errors in the order of [`parameter_names`].
     pub standard_errors: Vec<f64>,
-    /// Steps made.
-    pub steps: usize,
 }
 
 /// Which parameters are free, beside diffuse light, ambient level, strengths and roughness.
 #[derive(Clone, Copy, Debug)]
 pub struct Free {
-    /// The loss of diffuse light at grazing angles.
     pub grazing: bool,
-    /// The tails of the lobes.
-    pub tails: bool,
-    /// The gains of the lights.
-    pub gains: bool,
+    pub tails_and_gains: bool,
+}
+
+impl Free {
+    /// Only what is always free.
+    pub const NOTHING: Self = Self { grazing: false, tails_and_gains: false };
 }
 
 /// Names of the parameters of a material with so many lobes, in the order of [`MaterialFit::standard_errors`].
@@ -148,9 +142,7 @@ pub fn fit_from(samples: &Samples, start: &Material, free: Free, max_steps: usiz
     let mut material = start.clone();
     let mut normal = normal_equations(samples, &material);
     let mut damping = 1e-3;
-    let mut steps = 0;
-    while steps < max_steps {
-        steps += 1;
+    for _ in 0..max_steps {
         let Some(step) = damped_step(&normal, &material, free, damping) else { break };
         let candidate = moved(&material, &step);
         let next = normal_equations(samples, &candidate);
@@ -174,7 +166,6 @@ pub fn fit_from(samples: &Samples, start: &Material, free: Free, max_steps: usiz
         cost: normal.loss / observations,
         standard_errors: standard_errors(&normal, &material, free, observations),
         material,
-        steps,
     }
 }
 
@@ -247,8 +238,7 @@ fn is_free(material: &Material, free: Free, index: usize) -> bool {
     match index {
         DIFFUSE | AMBIENT => true,
         GRAZING => free.grazing,
-        _ if index >= gains => free.gains,
-        _ => (index - FIRST_LOBE) % PER_LOBE < 2 || free.tails,
+        _ => index < gains && (index - FIRST_LOBE) % PER_LOBE < 2 || free.tails_and_gains,
     }
 }
 

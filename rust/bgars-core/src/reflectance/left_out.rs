@@ -56,30 +56,23 @@ pub fn left_out(
         let mut scratch = Scratch::new(reader.lights());
         let mut found = Vec::new();
         for &pixel in spaced(&pixels[index], of_each) {
-            of_pixel(reader, &work, clip, pixel, &mut scratch, &mut found);
+            of_pixel(&work, pixel, &mut scratch, &mut found);
         }
         found
     };
     taken.par_iter().map(of_ball).collect::<Vec<_>>().concat()
 }
 
-fn of_pixel(
-    reader: &Reader<'_>,
-    work: &BallWork<'_>,
-    clip: &[f32],
-    pixel: usize,
-    scratch: &mut Scratch,
-    found: &mut Vec<LeftOut>,
-) {
-    let mut bent = vec![0.0; reader.lights()];
-    reader.read(pixel, &mut bent);
+fn of_pixel(work: &BallWork<'_>, pixel: usize, scratch: &mut Scratch, found: &mut Vec<LeftOut>) {
+    let mut bent = vec![0.0; work.reader.lights()];
+    work.reader.read(pixel, &mut bent);
     let linear = |bent: f32| unbend(f64::from(bent)) as f32;
     let mean = bent.iter().map(|&level| linear(level)).sum::<f32>() / bent.len() as f32;
     for light in (0..bent.len()).step_by(bent.len().div_ceil(LIGHTS)) {
         let predicted = work.predicted(pixel, light, scratch);
         let value = linear(bent[light]);
         let mut difference = linear(predicted) - value;
-        if bent[light] >= clip[light] {
+        if bent[light] >= work.clip[light] {
             difference = difference.min(0.0);
         }
         found.push(LeftOut { difference, value, mean });

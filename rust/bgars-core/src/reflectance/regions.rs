@@ -58,9 +58,7 @@ const BATCH: usize = 16;
 /// Pixels that are estimated together, with one model.
 #[derive(Debug)]
 pub struct Region {
-    /// Their model.
     pub ball: Ball,
-    /// Indices into the image.
     pub pixels: Vec<usize>,
     /// True for pixels that may be something else, too.
     pub free: bool,

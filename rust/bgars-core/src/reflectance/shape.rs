@@ -33,7 +33,7 @@ pub const EVIDENCE: f64 = 0.15;
 /// What stands on the circles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CommonShape {
-    /// Shape.
+    #[allow(missing_docs)] // the type says it
     pub shape: Shape,
     /// Standard uncertainty of its ratio.
     pub u_ratio: f64,
@@ -61,7 +61,7 @@ struct Best {
 /// same normals: the ratio is that of both, and so is its uncertainty.
 pub fn common_shape(samples: &dyn Fn(Shape) -> Samples, material: &Material, u_radius: f64) -> CommonShape {
     let prior = PRIOR.hypot(u_radius);
-    let free = Free { grazing: material.grazing != 0.0, tails: true, gains: true };
+    let free = Free { grazing: material.grazing != 0.0, tails_and_gains: true };
     let Some(cap) = least(samples, material, free, Shape::Cap) else {
         return CommonShape { shape: Shape::SPHERE, u_ratio: prior };
     };

@@ -184,25 +184,4 @@ mod tests {
             let _ = table.at::<false>(place, 0);
         }
     }
-
-    #[test]
-    fn a_smooth_signature_and_its_slope_come_back() {
-        let table = Signatures::tabulate(3, |normal, levels| {
-            for (light, level) in levels.iter_mut().enumerate() {
-                *level = (normal.x * (light as f64 + 1.0) + normal.y * normal.z).sin() as f32;
-            }
-        });
-        let exact = |a: f64, b: f64, light: usize| {
-            let n = from_disc([a, b]);
-            (n.x * (light as f64 + 1.0) + n.y * n.z).sin()
-        };
-        for (a, b) in [(0.123, -0.456), (0.0, 0.0), (-0.7, 0.3)] {
-            let signature = table.at::<false>([a as f32, b as f32], 0);
-            for light in 0..3 {
-                approx::assert_abs_diff_eq!(f64::from(signature.value[light]), exact(a, b, light), epsilon = 2e-5);
-                let slope = (exact(a + 1e-6, b, light) - exact(a - 1e-6, b, light)) / 2e-6;
-                approx::assert_abs_diff_eq!(f64::from(signature.along_a[light]), slope, epsilon = 5e-3);
-            }
-        }
-    }
 }

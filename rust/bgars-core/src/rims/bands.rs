@@ -5,13 +5,11 @@ use std::f64::consts::TAU;
 use rayon::prelude::*;
 
 /// A circle in array coordinates: pixel centres are integers.
+#[allow(missing_docs)] // the names say it
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Circle {
-    /// Row of the centre, in pixels.
     pub row_px: f64,
-    /// Column of the centre, in pixels.
     pub col_px: f64,
-    /// Radius in pixels.
     pub radius_px: f64,
 }
 
@@ -73,7 +71,6 @@ fn anchor(circle: Circle) -> (i64, i64) {
     (circle.row_px.round_ties_even() as i64, circle.col_px.round_ties_even() as i64)
 }
 
-/// Pixels of one band.
 fn band(circle: Circle, [inward, outward]: [f64; 2], every: usize, sectors: usize) -> Band {
     let (anchor_row, anchor_col) = anchor(circle);
     let reach = (circle.radius_px + outward).ceil() as i64 + 1;

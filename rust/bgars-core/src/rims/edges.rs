@@ -6,15 +6,13 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 /// Images of several lights, one after the other.
+#[allow(missing_docs)] // the names say it
 #[derive(Clone, Copy, Debug)]
 pub struct Planes<'a> {
     /// `lights * height * width` values.
     pub values: &'a [f32],
-    /// Number of images.
     pub lights: usize,
-    /// Rows of an image.
     pub height: usize,
-    /// Columns of an image.
     pub width: usize,
 }
 

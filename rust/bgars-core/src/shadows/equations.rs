@@ -159,10 +159,6 @@ mod tests {
         LightState { lamp: Lamp { vector, near }, ways: [[0.0; 3]; 2], shift: [0.0; 2] }
     }
 
-    fn distance(x: f64, y: f64, ball: Ball, light: LightState, board: Board) -> f64 {
-        edge_rows([&[x], &[y]], &[ball], &[light], &board, [0.0; WAVES])[0][TERMS]
-    }
-
     /// Derivatives by ball, light, shift and board are those of the distance.
     #[test]
     fn derivatives_are_differences() {
@@ -188,7 +184,7 @@ mod tests {
                         7 | 8 => light.shift[term - 7] += step,
                         _ => board.0[term - 9] += step,
                     }
-                    distance(point.x, point.y, ball, light, board)
+                    edge_rows([&[point.x], &[point.y]], &[ball], &[light], &board, [0.0; WAVES])[0][TERMS]
                 };
                 let difference = (at(step) - at(-step)) / (2.0 * step);
                 approx::assert_relative_eq!(*by, difference, epsilon = 1e-4, max_relative = 1e-4);

@@ -10,20 +10,18 @@ const OUTLINE_POINTS: usize = 24;
 const WINDOW_MARGIN_PX: f64 = 2.0;
 
 /// How much wider than predicted silhouettes and shadows are drawn, in pixels.
+#[allow(missing_docs)] // the names say it
 #[derive(Clone, Copy, Debug)]
 pub struct Margins {
-    /// Of silhouettes.
     pub silhouette_px: f64,
-    /// Of shadows.
     pub shadow_px: f64,
 }
 
 /// Predicted silhouettes and shadows, one cell for `step` by `step` pixels.
+#[allow(missing_docs)] // the names say it
 #[derive(Clone, Debug)]
 pub struct ShadowMap {
-    /// Rows of the map.
     pub rows: usize,
-    /// Columns of the map.
     pub cols: usize,
     /// `rows * cols`: whether a ball hides the board.
     pub hidden: Vec<bool>,

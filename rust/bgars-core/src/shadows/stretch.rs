@@ -157,7 +157,6 @@ fn solve<const C: usize>(pixels: &[Pixel]) -> ([f64; COLUMNS], [f64; COLUMNS]) {
     (solution, deviation)
 }
 
-/// Means over a stretch.
 fn summarise(part: &Part<'_>, lines: &[Line], stretch: &mut Stretch) {
     let (mut weight, mut texture, mut information, mut mean) = (0.0, 0.0, 0.0, [0.0; 3]);
     for pixel in &*part.pixels {

@@ -1,6 +1,7 @@
 //! Perspective: what a pinhole camera makes of a normal.
 
-use crate::{Error, Result};
+use crate::Result;
+use crate::error::check_rule;
 
 /// A pinhole camera, in pixels; the centre of the first pixel is at (0, 0), columns to the right and rows downward.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,9 +26,7 @@ impl Pinhole {
             ("camera.c_y_px", self.c_y_px, false),
         ] {
             let rule = if positive { "finite and above 0" } else { "finite" };
-            if !(value.is_finite() && (!positive || value > 0.0)) {
-                return Err(Error::OutOfRange { argument, rule, value });
-            }
+            check_rule(argument, rule, value, value.is_finite() && (!positive || value > 0.0))?;
         }
         Ok(())
     }

@@ -16,6 +16,7 @@ use super::pixels::{Pixels, Shares, assemble};
 use super::reweigh::{even, reweigh};
 use super::settings::{BilateralParams, BilateralSurface, Setting};
 use crate::components::Runs;
+use crate::error::check_rule;
 use crate::{Error, Result};
 
 /// Largest relative residual of an inner solve as published, and most iterations.
@@ -121,16 +122,10 @@ fn check(field: Field<'_>, camera: Option<Pinhole>, params: &BilateralParams) ->
             check_facing(field, camera)?;
         }
     }
-    for (argument, value, positive) in [("k", params.k, false), ("tol", params.tolerance, true)] {
-        if !(value.is_finite() && (value > 0.0 || !positive && value == 0.0)) {
-            let rule = if positive { "finite and above 0" } else { "finite and at least 0" };
-            return Err(Error::OutOfRange { argument, rule, value });
-        }
-    }
-    if params.max_iters == 0 {
-        return Err(Error::OutOfRange { argument: "max_iters", rule: "at least 1", value: 0.0 });
-    }
-    Ok(())
+    let (k, tolerance) = (params.k, params.tolerance);
+    check_rule("k", "finite and at least 0", k, k.is_finite() && k >= 0.0)?;
+    check_rule("tol", "finite and above 0", tolerance, tolerance.is_finite() && tolerance > 0.0)?;
+    check_rule("max_iters", "at least 1", 0.0, params.max_iters > 0)
 }
 
 /// Refuses a camera under which most of the surface looks away: a sign is wrong somewhere.
