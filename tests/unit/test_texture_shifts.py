@@ -36,6 +36,9 @@ def board(contrast: float, *, noise_levels: float = 1.0) -> bgars.Capture:
     return bgars.Capture(np.array(images, np.uint8), bgars.LightRig.ring(LIGHTS), np.ones((SIDE, SIDE), np.bool_))
 
 
+RING = bgars.LightRig.ring(LIGHTS).directions
+
+
 def shadows(*, hidden_share: float = 0.0) -> ShadowMap:
     """Nothing but board, except for a strip."""
     hidden = np.zeros((SIDE, SIDE), np.bool_)
@@ -47,16 +50,30 @@ def shadows(*, hidden_share: float = 0.0) -> ShadowMap:
 
 @pytest.mark.parametrize("noise_levels", [1.0, 4.0])
 def test_shifts_are_seen_by_texture_within_their_uncertainty(noise_levels: float) -> None:
-    found = texture_shifts(Radiance(board(0.1, noise_levels=noise_levels)), shadows())
+    found = texture_shifts(Radiance(board(0.1, noise_levels=noise_levels)), shadows(), RING)
     off = np.abs(found.move_px - MOVES) / found.u_px[:, None]
     assert off.max() < 3.0
     assert found.u_px[:4].max() < 0.02
     assert found.u_px.max() < 0.1
 
 
+def test_ridges_that_are_brighter_are_no_shift() -> None:
+    """Every image of such a board lies as if it had moved away from its lamp."""
+    random = np.random.default_rng(5)
+    height = ndimage.gaussian_filter(random.normal(size=(SIDE, SIDE)), 3.0)
+    height *= 0.1 / height.std()
+    slope_up, slope_right = np.gradient(height)
+    images = []
+    for x, y, z in RING:
+        shading = z - x * slope_right + y * slope_up
+        images.append(np.clip(np.rint(120.0 * (1.0 + 1.5 * height) * shading), 0, 254))
+    capture = bgars.Capture(np.array(images, np.uint8), bgars.LightRig.ring(LIGHTS), np.ones((SIDE, SIDE), np.bool_))
+    assert np.isinf(texture_shifts(Radiance(capture), shadows(), RING).u_px).all()
+
+
 @pytest.mark.parametrize(("contrast", "hidden_share"), [(0.0, 0.0), (0.1, 0.95)])
 def test_without_texture_or_board_nothing_is_claimed(contrast: float, hidden_share: float) -> None:
-    found = texture_shifts(Radiance(board(contrast)), shadows(hidden_share=hidden_share))
+    found = texture_shifts(Radiance(board(contrast)), shadows(hidden_share=hidden_share), RING)
     size = np.hypot(*found.move_px.T)
     assert (size < 4.0 * found.u_px).all()
     assert found.u_px.min() > 0.1

@@ -97,9 +97,9 @@ def agreed_shifts(coarse: ImageShifts, fine: ImageShifts) -> ImageShifts:
 
 
 def with_texture(by_outlines: ImageShifts, by_texture: ImageShifts) -> ImageShifts:
-    """Shifts by the board's texture where it is seen, but for those that are too large for it."""
-    large = np.hypot(*by_outlines.move_px.T) >= SHIFT_ERROR_PX
-    if large.any() or not np.isfinite(by_texture.u_px).all():
+    """Shifts by the board's texture where it is seen, but for those that are too large for it, as outlines tell."""
+    size = np.hypot(*by_outlines.move_px.T), np.hypot(*by_texture.move_px.T)
+    if np.max(size) >= SHIFT_ERROR_PX or not np.isfinite(by_texture.u_px).all():
         return by_outlines
     return by_texture
 

@@ -179,7 +179,7 @@ class ShadowPasses:
         few = np.argsort(np.hypot(seen[:, 0], seen[:, 1]))[:SHIFT_BALLS]
         self.outlines = outline_centres(radiance, shadows, seen[few], azimuths, sharp_px, coarse=True)
         by_outlines = agreed_shifts(image_shifts(self.outlines), image_shifts(fine))
-        self.shifts = with_texture(by_outlines, texture_shifts(radiance, shadows))
+        self.shifts = with_texture(by_outlines, texture_shifts(radiance, shadows, self.state.vectors))
         moves_px = seen_moves(self.shifts)
         self.priors = with_shifts(self.priors, self.shifts)
         self.priors = _with_outlines(problem, self.priors, moved_back(fine, seen, moves_px), seen, moves_px)

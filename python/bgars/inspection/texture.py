@@ -5,8 +5,9 @@ On a tile of board that all lights reach, image l is the texture T in the light 
     I = T (a + b x + c y) - s . grad T,
 
 to first order in s, which smoothing carries to two thirds of a pixel: least squares in five unknowns, tile by tile, and
-the tiles' robust mean. Relief tilts towards one lamp and away from the next; what that adds to T differs from tile to
-tile, and counts in how much the tiles scatter.
+the tiles' robust mean. Relief of height h adds T l . grad h, l the direction to the light, horizontal over vertical.
+Where texture and relief are not alike that scatters from tile to tile. Where they are, as on bright ridges, all images
+seem to move by c l, each away from its lamp or towards it, as no part moves: then nothing is claimed.
 """
 
 from __future__ import annotations
@@ -39,13 +40,16 @@ SMOOTHINGS = 3
 MODEL_PX, MODEL_SHARE = 0.01, 0.1
 """What relief leaves of boards that stand still, 0.003 to 0.02 px as rendered; what the first order, 4 %, and noise, up
 to a part in ten, leave of shifts."""
+MOST_RELIEF = 0.4
+"""Share of the squared moves that relief explains, c l, from which on it is believed: of one image among eight that
+moved it is an eighth, of half of a ring at most a fifth, of ridges along one direction a half, of others all."""
 ROUNDS = 5
 CAUCHY = 2.5
 """Scale of the Cauchy loss of tiles, in standard deviations."""
 RIDGE = 1e-9
 
 
-def texture_shifts(radiance: Radiance, shadows: ShadowMap) -> ImageShifts:
+def texture_shifts(radiance: Radiance, shadows: ShadowMap, vectors: Array) -> ImageShifts:
     """Shifts of images against where most of them show the board; u is infinite where there is too little texture.
 
     Parameters
@@ -53,6 +57,8 @@ def texture_shifts(radiance: Radiance, shadows: ShadowMap) -> ImageShifts:
     radiance : Radiance
     shadows : ShadowMap
         Which board no ball hides or shadows, with margins.
+    vectors : (L, 3) float64
+        Towards the lights.
     """
     lights = radiance.lights
     unknown = ImageShifts(np.zeros((lights, 2)), np.full(lights, np.inf))
@@ -64,6 +70,10 @@ def texture_shifts(radiance: Radiance, shadows: ShadowMap) -> ImageShifts:
         return unknown
     move_px, u_px = _together(moves, information)
     move_px -= np.median(move_px, axis=0)
+    slant = vectors[:, :2] / vectors[:, 2:]
+    by_relief = (move_px * slant).sum() ** 2 / max(float(np.square(slant).sum()), 1e-12)
+    if by_relief > MOST_RELIEF * np.square(move_px).sum():
+        return unknown
     return ImageShifts(move_px, np.sqrt(u_px**2 + MODEL_PX**2 + np.square(MODEL_SHARE * move_px).sum(axis=1)))
 
 
