@@ -31,11 +31,12 @@ STEEP = 4.0
 
 
 class MattFit(NamedTuple):
-    """Normals times albedo (3, N), what is left over (L, N) relative to the mean, whether solved (N,)."""
+    """Normals times albedo (3, N), relative residuals (L, N), whether solved (N,), and normal matrices (N, 3, 3)."""
 
     normal: Array
     left: Array
     solved: Mask
+    matrix: Array
 
 
 def matt_lights(view: View) -> Mask:
@@ -65,7 +66,7 @@ def fit_normals(values: Array, keep: Mask, lights: Array) -> MattFit:
     normal = np.linalg.solve(normal_matrix, right[..., None])[..., 0].T
     mean = (weight * values).sum(axis=0) / np.maximum(number, 1.0)
     left = weight * solved * (values - np.einsum("lk,kn->ln", lights, normal)) / np.maximum(mean, 1e-9)
-    return MattFit(np.asarray(normal, np.float64), left, solved)
+    return MattFit(np.asarray(normal, np.float64), left, solved, normal_matrix)
 
 
 def promised(view: View) -> Array:
@@ -78,12 +79,8 @@ def promised(view: View) -> Array:
     keep = matt_lights(view).reshape(count, -1)
     values = view.values.reshape(count, -1).astype(np.float64)
     fit = fit_normals(values, keep, lights)
-    weight = keep.astype(np.float64)
-    products = (lights[:, :, None] * lights[:, None, :]).reshape(count, 9)
-    matrix = (weight.T @ products).reshape(-1, 3, 3)
-    matrix[~fit.solved] = np.eye(3)
-    leverage = weight * np.einsum("li,nij,lj->ln", lights, np.linalg.inv(matrix), lights, optimize=True)
-    told = lights @ fit.normal
+    leverage = keep * np.einsum("li,nij,lj->ln", lights, np.linalg.inv(fit.matrix), lights, optimize=True)
+    told = np.einsum("lk,kn->ln", lights, fit.normal)
     known = fit.solved & (leverage < MOST_LEVERAGE)
     without = told - leverage / np.maximum(1.0 - leverage, 1.0 - MOST_LEVERAGE) * (values - told)
     promise: Array = np.where(known, without, np.nan).reshape(view.values.shape)

@@ -25,7 +25,6 @@ __all__ = [
     "check_shifts",
     "displaced_images",
     "image_shifts",
-    "seen_moves",
     "with_texture",
 ]
 
@@ -102,13 +101,6 @@ def with_texture(by_outlines: ImageShifts, by_texture: ImageShifts) -> ImageShif
     if np.max(size) >= SHIFT_ERROR_PX or not np.isfinite(by_texture.u_px).all():
         return by_outlines
     return by_texture
-
-
-def seen_moves(shifts: ImageShifts) -> Array:
-    """(L, 2) shifts beyond doubt, 0 for the others."""
-    seen = np.hypot(*shifts.move_px.T) > SHIFT_SIGMAS * shifts.u_px
-    moves: Array = np.where(seen[:, None], shifts.move_px, 0.0)
-    return moves
 
 
 def check_shifts(shifts: ImageShifts, files: Sequence[Path] = ()) -> tuple[str, ...]:

@@ -24,7 +24,7 @@ from bgars.inspection.common_terms import (
     ROUNDNESS,
     Mixture,
 )
-from bgars.inspection.image_shifts import seen_moves
+from bgars.inspection.image_shifts import SHIFT_SIGMAS
 from bgars.inspection.population import q_spread
 
 if TYPE_CHECKING:
@@ -235,6 +235,7 @@ def _scatter_of_lights(priors: Priors, solution: Solution) -> Array:
 
 def with_shifts(priors: Priors, shifts: ImageShifts) -> Priors:
     """Shifts of images that are seen beyond doubt, instead of none."""
-    move = seen_moves(shifts)
-    u = np.where(move.any(axis=1), np.maximum(shifts.u_px, SHIFT_PX), SHIFT_PX)
+    seen = np.hypot(*shifts.move_px.T) > SHIFT_SIGMAS * shifts.u_px
+    move = np.where(seen[:, None], shifts.move_px, 0.0)
+    u = np.where(seen, np.maximum(shifts.u_px, SHIFT_PX), SHIFT_PX)
     return priors._replace(shifts_px=move, u_shifts_px=np.repeat(u[:, None], 2, axis=1))

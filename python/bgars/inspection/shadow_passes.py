@@ -11,7 +11,7 @@ from bgars.inspection.board import Board
 from bgars.inspection.bundle import Priors, Solution, solve_bundle
 from bgars.inspection.bundle_model import State
 from bgars.inspection.common_terms import PERSPECTIVE
-from bgars.inspection.image_shifts import ImageShifts, agreed_shifts, image_shifts, seen_moves, with_texture
+from bgars.inspection.image_shifts import ImageShifts, agreed_shifts, image_shifts, with_texture
 from bgars.inspection.outline import Outlines, moved_back, outline_centres
 from bgars.inspection.plateaus import edge_bias_px
 from bgars.inspection.priors import COARSE_SPREAD_PX, refined_priors, with_edges, with_shifts
@@ -180,9 +180,10 @@ class ShadowPasses:
         self.outlines = outline_centres(radiance, shadows, seen[few], azimuths, sharp_px, coarse=True)
         by_outlines = agreed_shifts(image_shifts(self.outlines), image_shifts(fine))
         self.shifts = with_texture(by_outlines, texture_shifts(radiance, shadows, self.state.vectors))
-        moves_px = seen_moves(self.shifts)
         self.priors = with_shifts(self.priors, self.shifts)
-        self.priors = _with_outlines(problem, self.priors, moved_back(fine, seen, moves_px), seen, moves_px)
+        if self.priors.shifts_px.any():
+            fine = moved_back(fine, seen, self.priors.shifts_px)
+        self.priors = _with_outlines(problem, self.priors, fine, seen)
 
     def _know_edges(self, settings: EdgeSettings, radius: float) -> None:
         """How well edges can be known, in the priors."""
@@ -272,9 +273,9 @@ def _typical_spread_px(spread: EdgeSpread, radius: float) -> float:
     return float(np.hypot(spread.sharp_px, TYPICAL_WAY * spread.lamp_rad * radius))
 
 
-def _with_outlines(problem: Problem, priors: Priors, outlines: Outlines, table: Array, moves_px: Array) -> Priors:
+def _with_outlines(problem: Problem, priors: Priors, outlines: Outlines, table: Array) -> Priors:
     """Centres of the priors: the finder's, which sees all images as they lie, and the outlines', weighted."""
-    u_finder = np.hypot(problem.u_centre, np.sqrt(np.square(moves_px).mean()))
+    u_finder = np.hypot(problem.u_centre, np.sqrt(np.square(priors.shifts_px).mean()))
     centres, u_outline = outlines.centres, outlines.u_centre
     known = np.isfinite(u_outline) & ~problem.bridged
     # What outlines scatter beyond their own word shows against the shadows' centres, but for a common shift.

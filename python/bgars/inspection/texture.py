@@ -62,10 +62,11 @@ def texture_shifts(radiance: Radiance, shadows: ShadowMap, vectors: Array) -> Im
     """
     lights = radiance.lights
     unknown = ImageShifts(np.zeros((lights, 2)), np.full(lights, np.inf))
-    corners = _free_tiles(radiance, shadows)
+    free = ~shadows.hidden & ~shadows.count.any(axis=0)
+    corners = _free_tiles(radiance, free, shadows.step)
     if len(corners) < FEWEST_TILES:
         return unknown
-    moves, information = _by_tile(radiance, shadows, corners)
+    moves, information = _by_tile(radiance, shadows, free, corners)
     if len(moves) < FEWEST_TILES:
         return unknown
     move_px, u_px = _together(moves, information)
@@ -77,11 +78,10 @@ def texture_shifts(radiance: Radiance, shadows: ShadowMap, vectors: Array) -> Im
     return ImageShifts(move_px, np.sqrt(u_px**2 + MODEL_PX**2 + np.square(MODEL_SHARE * move_px).sum(axis=1)))
 
 
-def _free_tiles(radiance: Radiance, shadows: ShadowMap) -> NDArray[np.intp]:
-    """(K, 2) first row and column of the tiles with most free board."""
-    free = ~shadows.hidden & ~shadows.count.any(axis=0)
-    cells = max(TILE_PX // shadows.step, 1)
-    first = -(-BORDER_PX // shadows.step)
+def _free_tiles(radiance: Radiance, free: NDArray[np.bool_], step: int) -> NDArray[np.intp]:
+    """(K, 2) first row and column of the tiles with most free board; `free` by cells of so many pixels."""
+    cells = max(TILE_PX // step, 1)
+    first = -(-BORDER_PX // step)
     rows, cols = ((size - 2 * first) // cells for size in free.shape)
     if rows < 1 or cols < 1:
         return np.zeros((0, 2), np.intp)
@@ -89,20 +89,20 @@ def _free_tiles(radiance: Radiance, shadows: ShadowMap) -> NDArray[np.intp]:
     share = part.reshape(rows, cells, cols, cells).mean(axis=(1, 3))
     best = np.argsort(-share, axis=None, kind="stable")[:MOST_TILES]
     best = best[share.reshape(-1)[best] * TILE_PX**2 >= LEAST_PIXELS]
-    corners = (np.column_stack(np.unravel_index(best, share.shape)) * cells + first) * shadows.step
+    corners = (np.column_stack(np.unravel_index(best, share.shape)) * cells + first) * step
     inside = (corners + TILE_PX + BORDER_PX <= [radiance.height, radiance.width]).all(axis=1)
     return corners[inside].astype(np.intp)
 
 
-def _by_tile(radiance: Radiance, shadows: ShadowMap, corners: NDArray[np.intp]) -> tuple[Array, Array]:
+def _by_tile(
+    radiance: Radiance, shadows: ShadowMap, free: NDArray[np.bool_], corners: NDArray[np.intp]
+) -> tuple[Array, Array]:
     """(K, L, 2) shifts, x right and y up, and (K, L, 2, 2) their inverse covariances, of tiles that show texture."""
     side = np.arange(-BORDER_PX, TILE_PX + BORDER_PX)
     row, col = corners[:, :1, None] + side[:, None], corners[:, 1:, None] + side[None, :]
     pixels = row * radiance.width + col
     values = radiance.at(pixels).astype(np.float64)
-    at = shadows.pixels(row, col)
-    covered = shadows.hidden.reshape(-1)[at] | shadows.count.any(axis=0).reshape(-1)[at]
-    good = np.isfinite(values).all(axis=0) & ~covered
+    good = np.isfinite(values).all(axis=0) & free.reshape(-1)[shadows.pixels(row, col)]
     values = np.where(np.isfinite(values), values, 0.0)
     for _ in range(SMOOTHINGS):
         values, good = _smooth(values), _all_around(good)
