@@ -7,11 +7,13 @@ from dataclasses import fields, replace
 import bgars
 import numpy as np
 import pytest
+from bgars import _bgars
 from bgars.inspection.board import Board
+from bgars.inspection.bundle_model import tangents
 from bgars.inspection.radiance import Radiance
 from bgars.inspection.shadow_edges import EdgeSettings, measure_edges
 from bgars.inspection.shadow_map import Casters, ShadowMap
-from bgars.inspection.shadow_model import Balls, Lights
+from bgars.inspection.shadow_model import Balls, Lights, edge_at
 from numpy.typing import NDArray
 from slow_shadows import shadowed, slow_edges
 
@@ -139,3 +141,57 @@ def test_threads_do_not_change_a_bit() -> None:
     )
     for field in fields(one):
         np.testing.assert_array_equal(getattr(one, field.name), getattr(two, field.name))
+
+
+def slow_distances(curve: Array, points: Array, middle: Array) -> Array:
+    """(P,) distances of points (P, 2) to a closed curve (M, 2) of segments around its middle; outside is positive."""
+    ahead = np.roll(curve, -1, axis=0) - curve
+    off = points[:, None] - curve
+    share = np.clip((off * ahead).sum(axis=-1) / np.maximum(np.square(ahead).sum(axis=-1), 1e-300), 0.0, 1.0)
+    left = off - share[..., None] * ahead
+    nearest = np.square(left).sum(axis=-1).argmin(axis=1)
+    at = points - left[np.arange(len(points)), nearest]
+    outside = np.square(points - middle).sum(axis=1) > np.square(at - middle).sum(axis=1)
+    return np.where(outside, 1.0, -1.0) * np.linalg.norm(points - at, axis=1)
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_rows_hold_the_distance_to_the_nearest_point_of_the_edge(name: str) -> None:
+    rig = RIGS[name]
+    _, table, vectors = part(rig)
+    dense = np.linspace(-np.pi, np.pi, 20_000, endpoint=False)
+    angles, sizes = np.radians([-70.0, -20.0, 0.0, 35.0, 80.0]), np.array([0.3, -0.3, 0.2, -0.1, 0.25])
+    balls, lights = Balls.from_table(table).spread(2), Lights.from_table(vectors, rig.is_near).spread(1, 1)
+    whole, some = edge_at(dense, balls, lights, SLIGHTLY), edge_at(angles, balls, lights, SLIGHTLY)
+    curves = np.stack(np.broadcast_arrays(whole.x, whole.y), axis=-1)
+    middles = curves.mean(axis=2)
+    outward = np.stack([some.x, some.y], axis=-1) - middles[:, :, None]
+    points = middles[:, :, None] + outward * (1.0 + sizes / np.linalg.norm(outward, axis=-1))[..., None]
+    shifts = np.random.default_rng(2).normal(0.0, 0.5, (len(vectors), 2))
+    waves_px = [0.1, -0.05, 0.02, 0.03]
+    rows = _bgars.edge_rows(
+        np.ascontiguousarray(points[..., 0] + shifts[:, None, 0]),
+        np.ascontiguousarray(points[..., 1] + shifts[:, None, 1]),
+        Casters.of(table, vectors, rig.is_near, SLIGHTLY),
+        turns=tangents(vectors).reshape(-1, 6),
+        shifts_px=shifts,
+        waves_px=waves_px,
+    )
+    angle = rows[..., -1]
+    assert (np.sign(angle[..., [0, 1, 3, 4]]) == np.sign(angles[[0, 1, 3, 4]])).all()
+    np.testing.assert_allclose(angle[..., 2], 0.0, atol=0.1)
+    waves = np.cos(np.arange(4) * angle[..., None])
+    np.testing.assert_allclose(rows[..., -6:-2], -waves, atol=1e-12)
+    expected = [
+        [slow_distances(curve, near, middle) for curve, near, middle in zip(*of_ball, strict=True)]
+        for of_ball in zip(curves, points, middles, strict=True)
+    ]
+    np.testing.assert_allclose(rows[..., -2] + waves @ waves_px, expected, atol=2e-3)
+
+
+def test_products_are_those_of_numpy() -> None:
+    random = np.random.default_rng(3)
+    rows, weights = random.normal(size=(3, 4, 7, 20)), random.random((3, 4, 7))
+    terms = rows[..., :-1]
+    expected = np.einsum("nlp,nlpi,nlpj->nlij", weights, terms, terms)
+    np.testing.assert_allclose(_bgars.edge_products(rows, weights), expected, rtol=1e-12, atol=1e-12)
