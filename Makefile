@@ -56,10 +56,10 @@ bilateral: data $(VENV)/.installed ## Rewrite the bilateral tables of docs/accur
 station: data $(VENV)/.installed ## Measure the calibration of stations and rewrite the tables of docs/station.md (5 minutes; needs BGARS_DATA)
 	$(BIN)/python docs/make_station.py
 
-station-balls: $(VENV)/.installed ## Render balls for it with Mitsuba (20 s a seed; needs an LLVM, see benches/reality)
+station-balls: $(VENV)/.installed ## Render balls for it with Mitsuba (5 s a seed; needs an LLVM, see benches/reality)
 	$(BIN)/python -m pip install --quiet --requirement benches/reality/requirements.txt
-	$(BIN)/python benches/station/render_balls.py benches/station/balls board 301 302 303 304 401 402 403
-	$(BIN)/python benches/station/render_balls.py benches/station/balls grey 301 302 303 304 401 402 403
+	$(BIN)/python benches/station/render_balls.py benches/station/balls board 301 302 303 304 401 402 403 501 502 503 504 505 506 601 602 603 604 605 606 607 608 609 610
+	$(BIN)/python benches/station/render_balls.py benches/station/balls grey 301 302 303 304 401 402 403 501 502 503 504 505 506
 	$(BIN)/python benches/station/render_balls.py benches/station/balls matt 301 302 303 304 401 402 403
 
 simulator: data $(VENV)/.installed ## Rewrite the tables of docs/simulator.md (needs BGARS_DATA)

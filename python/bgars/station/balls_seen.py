@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bgars.errors import CalibrationError, InputError
 from bgars.records.remark import Remark
+from bgars.station.horizon import radius_around
 from bgars.station.matt_lights import shading_misfit
 from bgars.station.outline import as_outline, find_outline, refine_outline
 from bgars.station.rim import fit_rim
@@ -84,6 +85,9 @@ def outlines_of(
             else refine_outline(pictures, start, steps)
         )
         found = _sharpened(levels, found, matt)
+        around_px = None if matt or found is None else radius_around(levels, found)
+        if found is not None and around_px is not None:
+            found = _sharpened(levels, replace(found, radius_px=around_px), matt)
         if start is not None:
             found = _joined(found, start)
         if found is None:
