@@ -337,7 +337,4 @@ def _why(problem: Problem, index: int, lights: int, contrast: float) -> list[str
         return [f"too little contrast of shadow and board: {max(shown, 0.0):.1f} grey levels of 255, 2 are needed"]
     if lights >= MIN_LIGHTS:
         return ["too little of its shadows is in view to fit a ball to them"]
-    return [
-        f"fewer than 2 usable lights ({lights}): shadows hidden, outside the image or without an edge "
-        "(a bump whose flanks are flatter than the light's elevation casts none)"
-    ]
+    return [f"fewer than 2 usable lights ({lights}): shadows hidden, outside the image, or none cast by so flat a bump"]
