@@ -42,7 +42,7 @@ inspection: data $(VENV)/.installed ## Rewrite the inspection tables of docs/acc
 	$(BIN)/python docs/make_inspection_accuracy.py
 
 SEEDS ?= 1001-1100
-reality-scenes: $(VENV)/.installed ## Render SEEDS into benches/reality/scenes (10 to 60 s a seed; needs an LLVM, see benches/reality)
+reality-scenes: $(VENV)/.installed ## Render SEEDS into benches/reality/scenes (10 to 60 s per seed; needs an LLVM, see benches/reality)
 	$(BIN)/python -m pip install --quiet --requirement benches/reality/requirements.txt
 	$(BIN)/python benches/reality/make_scenes.py $(SEEDS)
 
@@ -56,7 +56,7 @@ bilateral: data $(VENV)/.installed ## Rewrite the bilateral tables of docs/accur
 station: data $(VENV)/.installed ## Measure the calibration of stations and rewrite the tables of docs/station.md (5 minutes; needs BGARS_DATA)
 	$(BIN)/python docs/make_station.py
 
-station-balls: $(VENV)/.installed ## Render balls for it with Mitsuba (5 s a seed; needs an LLVM, see benches/reality)
+station-balls: $(VENV)/.installed ## Render balls for it with Mitsuba (5 s per seed; needs an LLVM, see benches/reality)
 	$(BIN)/python -m pip install --quiet --requirement benches/reality/requirements.txt
 	$(BIN)/python benches/station/render_balls.py benches/station/balls board 301 302 303 304 401 402 403 501 502 503 504 505 506 601 602 603 604 605 606 607 608 609 610
 	$(BIN)/python benches/station/render_balls.py benches/station/balls grey 301 302 303 304 401 402 403 501 502 503 504 505 506

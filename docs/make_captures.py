@@ -52,16 +52,19 @@ def _figures(rows: list[dict[str, Any]]) -> list[str]:
     found, named = sum(bool(row["kinds"]) for row in faulty), sum(row["right"] for row in faulty)
     alarms = sum(bool(row["kinds"]) for row in good)
     return [
-        "`bgars check FOLDER` looks for these faults before any number; `reconstruct`, `normals` and `inspect` do the",
-        "same, print what they find, and stop (exit code 2) where every normal would be wrong, unless told `--force`.",
+        "`bgars check FOLDER` looks for these faults before anything is measured; `reconstruct`, `normals` and "
+        "`inspect` do the",
+        "same, print the findings, and stop (exit code 2) where every normal would be wrong, unless `--force` is "
+        "given.",
         "Exit code of `bgars check`: 0 without an error, 1 with one, 2 where the capture cannot be read.",
         "",
-        f"Of {len(faulty)} captures with one fault each {found} are found ({found / len(faulty):.0%}) and {named} are",
-        f"given the right cause first ({named / len(faulty):.0%}); {alarms} of {len(good)} good captures get a warning",
-        "or an error. Simulated arrays and reliefs (seeds from 70000), and rendered parts (`BGARS_RENDERED`: seeds",
-        f"{_seeds(rows)}), each also turned: none of them was seen when the",
-        "thresholds were chosen (`make check-faults`). Two faults are only",
-        "put where anything shows them: ambient light and a half turn of the table where there are cast shadows.",
+        f"Of {len(faulty)} captures with one fault each, {found} are found ({100 * found / len(faulty):.0f} %), and "
+        f"for {named} ({100 * named / len(faulty):.0f} %) the right cause",
+        f"is named first; {alarms} of {len(good)} good captures get a warning or an error.",
+        "The captures are simulated arrays and reliefs (seeds from 70000) and rendered parts (`BGARS_RENDERED`: seeds",
+        f"{_seeds(rows)}), each also turned; none was used when the",
+        "thresholds were chosen (`make check-faults`). Two faults need",
+        "cast shadows to show, and are only put there: ambient light and a half turn of the table.",
         *_own(own),
     ]
 
@@ -75,12 +78,13 @@ def _seeds(rows: list[dict[str, Any]]) -> str:
 
 
 def _own(rows: list[dict[str, Any]]) -> list[str]:
-    """Rendered parts whose camera was wrong as drawn, of any size, also such as hardly matters."""
+    """Rendered parts whose camera was wrong as drawn, by any amount, also a negligible one."""
     if not rows:
         return []
     found, right = sum(bool(row["kinds"]) for row in rows), sum(row["right"] for row in rows)
     return [
-        f"Of {len(rows)} parts rendered with a faulty camera, of any size down to nothing, {found} are found and",
+        f"Of {len(rows)} part{'' if len(rows) == 1 else 's'} rendered with a faulty camera (faults of any size, also "
+        f"negligible ones), {found} are found and",
         f"{right} given the right cause.",
     ]
 

@@ -54,7 +54,7 @@ SETTINGS = {
     "45 degrees, rig 1 degree off": {"rig_off_deg": 1.0},
     "30 degrees": {"elevation_deg": 30.0},
     "60 degrees, rig 0.5 degrees off": {"elevation_deg": 60.0, "rig_off_deg": 0.5},
-    "20 um a pixel": {"pitch_um": 20.0},
+    "20 um per pixel": {"pitch_um": 20.0},
     "lens blur 1 px": {"blur_px": 1.0},
     "bowed board": {"bow_um": 20.0},
     "four lights": {"lights": 4},

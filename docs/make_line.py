@@ -134,7 +134,7 @@ def batch_table(folder: Path, parts: int, large_cpu_s: float) -> list[str]:
         "Efficiency (CPU) is what one process needs for all parts over what two need: what running side by side costs "
         "by itself. The start is that of the command and of each process, once, whatever the number of parts: what the "
         "same command takes when the store knows all of them. Beyond two it is calculated, not measured: the one "
-        f"process that writes the store needs {1e3 * append_s:.0f} ms a part, which is the limit of any number of "
+        f"process that writes the store needs {1e3 * append_s:.0f} ms per part, which is the limit of any number of "
         "workers; images that are sent pass a network of 1 Gbit/s (32 MB for a part of 4 megapixels and eight "
         "lights).\n",
         f"| workers | parts a minute, these | what binds | parts a minute, 4 megapixels, "

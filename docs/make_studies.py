@@ -104,7 +104,7 @@ def words(lines: list[str]) -> str:
     told = []
     for pitch_um in PITCHES_UM:
         own = [value for key, value in grr.items() if key[0] == pitch_um]
-        told.append(f"{min(own):.2f} to {max(own):.2f} µm at {pitch_um:g} µm a pixel")
+        told.append(f"{min(own):.2f} to {max(own):.2f} µm at {pitch_um:g} µm per pixel")
     calm, loud = ([ev[pitch_um, bits, noise] for pitch_um in PITCHES_UM for bits in BITS] for noise in NOISES[::2])
     deeper = [
         grr[pitch_um, BITS[1], noise] / grr[pitch_um, BITS[0], noise] for pitch_um in PITCHES_UM for noise in NOISES
@@ -132,7 +132,7 @@ def draw(all_figures: dict[Setting, dict[str, GaugeFigures]]) -> None:
                 ev = np.array([each.spread("EV").sigma for each in top])
                 reach = np.abs(np.array([(each.ev_low, each.ev_high) for each in top]).T - ev)
                 x = np.array(NOISES) * (0.98 if bits == BITS[0] else 1.02)
-                label = f"{pitch_um:g} µm a pixel, {bits} bit"
+                label = f"{pitch_um:g} µm per pixel, {bits} bit"
                 axes.errorbar(x, ev, reach, fmt=mark + dash, color=colour, capsize=3, markersize=5, label=label)
         axes.set_xscale("log", base=2)
         axes.set_yscale("log")

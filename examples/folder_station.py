@@ -1,4 +1,4 @@
-"""A station without a camera: the images of folders, one folder a part, as if they were taken now.
+"""A station without a camera: the images of folders, one folder per part, as if they were taken now.
 
     bgars capture folder_station:Station -o INBOX/SN0042 --lights 8 --rig rig/capture.toml
 

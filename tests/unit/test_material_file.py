@@ -109,7 +109,7 @@ def test_a_material_of_other_lights_names_its_gains(tmp_path: Path) -> None:
     path.write_text(text, encoding="utf-8")
     with pytest.raises(bgars.InputError) as caught:
         bgars.read_material(path)
-    words = "standard_errors: 'gain_5' is no parameter of this material (gains: one a light, got 5; known: "
+    words = "standard_errors: 'gain_5' is no parameter of this material (gains: one per light, got 5; known: "
     assert str(caught.value).startswith(f"{path}: {words}")
 
 

@@ -239,7 +239,7 @@ def _covered(coarse: CoarseCircles, mask: BoolArray) -> NDArray[np.float64]:
 def _accepted(
     levels: Levels, coarse: CoarseCircles, slopes: tuple[FloatArray, FloatArray], share: float, strength: float
 ) -> CoarseCircles:
-    """Circles with a rim all around, whose inside slopes outward, one a place."""
+    """Circles with a rim all around, whose inside slopes outward, one per place."""
     coarse = _take(
         coarse,
         (coarse.share >= share) & (coarse.strength >= strength) & (coarse.radius_px >= SMALLEST_RADIUS_PX),

@@ -31,7 +31,7 @@ NEAR, SAME = 0.2, 0.5
 
 
 def shining_circles(levels: Levels, reduced: FloatArray, row: Array, col: Array, scale_px: Array) -> HighlightCircles:
-    """Circles whose highlights stand where a sphere mirrors each light, one a place, in full pixels.
+    """Circles whose highlights stand where a sphere mirrors each light, one per place, in full pixels.
 
     A sphere mirrors light k at c + R h_k, with h_k the half vector of light and view (Torrance and Sparrow 1967). The
     contrast of a figure is that of its weakest spots but a quarter, each against the median of all lights at its place:

@@ -76,7 +76,7 @@ def find_balls(
         Where balls should be, at any turn of the part. Without it, the lattice is that of the balls: every free place
         of the smallest rectangle around them is missing.
     threads : int, optional
-        Most threads to work on; by default one a core.
+        Largest number of threads; by default one per core.
     progress : callable, optional
         Called with the fraction done.
 

@@ -29,7 +29,7 @@ class Levels:
     capture : Capture
         Images and what is known of the camera.
     threads : int or None
-        Most threads to work on.
+        Largest number of threads.
     """
 
     def __init__(self, capture: Capture, threads: int | None) -> None:

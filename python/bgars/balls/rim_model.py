@@ -33,7 +33,7 @@ class RimModel:
     reach_px : float
         Largest depth, inside and outside.
     threads : int, optional
-        Most threads to work on; by default one a core.
+        Largest number of threads; by default one per core.
     """
 
     def __init__(self, blur_px: float, reach_px: float, threads: int | None = None) -> None:

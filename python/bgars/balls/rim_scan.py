@@ -68,7 +68,7 @@ def scan_rims(
     rims : int
         Radii to follow up for each centre.
     threads : int, optional
-        Most threads to work on; by default one a core.
+        Largest number of threads; by default one per core.
     """
     if not len(row):
         return CoarseCircles(*(np.zeros(0) for _ in range(5)))

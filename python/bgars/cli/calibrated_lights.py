@@ -36,7 +36,7 @@ def said_values(findings: tuple[Remark, ...]) -> dict[str, Any]:
 
 
 def tell_lights(found: LightCalibration) -> None:
-    """Print a line a light."""
+    """Print a line per light."""
     rig = found.rig
     kind = "near lights, positions in mm" if rig.is_near else "distant lights"
     count = len(found.balls)

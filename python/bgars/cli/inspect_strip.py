@@ -40,7 +40,7 @@ def inspect_strip(
     told: tuple[str, ...],
     report: Callable[[str, float], object],
 ) -> list[PlaceRow]:
-    """Inspect every part of a strip into ``output/PLACE``, and write the overview; return a row a part.
+    """Inspect every part of a strip into ``output/PLACE``, and write the overview; return a row per part.
 
     A part that cannot be inspected is a row of verdict "error" and does not stop the others. `told`: what the check of
     the capture found.

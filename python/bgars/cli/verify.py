@@ -90,7 +90,7 @@ def verify(
             slope = (
                 ""
                 if math.isnan(one.slope)
-                else f", {1000 * one.slope:+.1f} um a millimetre (u {1000 * one.u_slope:.1f})"
+                else f", {1000 * one.slope:+.1f} um per millimetre (u {1000 * one.u_slope:.1f})"
             )
             again = "" if math.isnan(one.repeatability_um) else f", repeats to {one.repeatability_um:.2f} um"
             say(

@@ -118,15 +118,15 @@ def read_intensities(path: Path) -> NDArray[np.float64]:
     in_rows = _in_rows(path)
     if in_rows is not None:
         return in_rows
-    return read_numbers(path, (1, 3), "one intensity a light, or red green blue")
+    return read_numbers(path, (1, 3), "one intensity per light, or red green blue")
 
 
 def read_filenames(path: Path) -> list[str]:
-    """Read image file names, one a line, plain or in quotes; a line that begins with ``# `` is a comment."""
+    """Read image file names, one per line, plain or in quotes; a line that begins with ``# `` is a comment."""
     lines = [line.strip() for line in read_text(path).splitlines()]
     names = [line.strip("\"'") for line in lines if line and not line.startswith("# ")]
     if not names:
-        msg = f"{path}: is empty; expected one image file name a line"
+        msg = f"{path}: is empty; expected one image file name per line"
         raise FileFormatError(msg)
     if len(names) > MAX_LIGHTS:
         msg = f"{path}: names {len(names)} images, more than a capture may have (at most {MAX_LIGHTS})"

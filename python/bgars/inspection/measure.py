@@ -55,7 +55,7 @@ def measure_balls(
     roundness : (float, float), optional
         Usual q of these balls and its standard uncertainty, common to all; by default spheres, with doubts.
     threads : int, optional
-        Most threads to work on; by default what ``RAYON_NUM_THREADS`` says, else one a core. The result does not depend
+        Largest number of threads; by default ``RAYON_NUM_THREADS``, else one per core. The result does not depend
         on it.
     progress : callable, optional
         Called with the fraction done.

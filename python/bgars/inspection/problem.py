@@ -160,7 +160,7 @@ def _irradiance(rig: LightRig, table: Array, pitch_um: float) -> Array:
 
 
 def thread_count(threads: int | None) -> int:
-    """Threads to work on: as asked for, else RAYON_NUM_THREADS, else one a core.
+    """Threads to work on: as asked for, else RAYON_NUM_THREADS, else one per core.
 
     Raises
     ------

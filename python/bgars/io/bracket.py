@@ -50,7 +50,7 @@ class _Noise(NamedTuple):
 
 
 def bracket_names(recipe: CaptureRecipe, lights: int) -> list[list[str]]:
-    """Return the names of the images: one list an exposure, one name a light.
+    """Return the names of the images: one list per exposure, one name per light.
 
     Raises
     ------

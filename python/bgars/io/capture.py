@@ -82,10 +82,10 @@ def read_capture(
     max_megapixels : float
         Images whose header claims more are refused before anything is allocated.
     threads : int, optional
-        Most threads to decode on; by default what ``RAYON_NUM_THREADS`` says, else one a core.
+        Largest number of threads; by default ``RAYON_NUM_THREADS``, else one per core.
     station : Station or path, optional
         What is known of the station (:func:`bgars.read_station`): lights, response, flat field and scale are then
-        taken from it, one light an image in its order. By default what ``station`` in ``capture.toml`` names.
+        taken from it, one light per image in its order. By default what ``station`` in ``capture.toml`` names.
 
     Returns
     -------

@@ -46,7 +46,7 @@ def read_headers(paths: Sequence[Path], *, stack: bool) -> Headers:
     for path, tag in zip(paths, tags, strict=True):
         if tag.pages > 1 and not stack:
             msg = (
-                f"{path}: holds {tag.pages} images; one a light is expected (a stack of all lights is read where it is "
+                f"{path}: holds {tag.pages} images; one per light is expected (a stack of all lights is read if it is "
                 "the only image file)"
             )
             raise FileFormatError(msg)

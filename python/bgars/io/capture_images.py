@@ -33,7 +33,7 @@ class ChosenImages(NamedTuple):
     Attributes
     ----------
     names : list of str
-        Files relative to the capture folder, one a light; one alone is a stack.
+        Files relative to the capture folder, one per light; one alone is a stack.
     written : list of str
         The same as the file that names them does.
     mask : str or None

@@ -54,5 +54,5 @@ def _lights_first(array: NDArray[Any], count: int, path: Path, max_megapixels: f
     if len(shape) == 3 and shape[2] == count:  # noqa: PLR2004 - rows, columns, lights
         check_size(path, shape[0], shape[1], max_megapixels)
         return np.ascontiguousarray(np.moveaxis(array, 2, 0))
-    msg = f"{path}: must hold {count} images, one a light, as (lights, rows, columns), but its shape is {shape}"
+    msg = f"{path}: must hold {count} images, one per light, as (lights, rows, columns), but its shape is {shape}"
     raise FileFormatError(msg)

@@ -44,7 +44,7 @@ class DecodedStack(NamedTuple):
     Attributes
     ----------
     images : (L, H, W) uint8, uint16 or float32
-        One image a file.
+        One image per file.
     linear : bool
         True when response and gains are in the values already (colour files).
     full_scale : float or None
@@ -70,7 +70,7 @@ def decode_stack(
     Parameters
     ----------
     paths : sequence of Path
-        Images of any of :data:`~bgars.io.image_formats.IMAGE_FORMATS`, one a file.
+        Images of any of :data:`~bgars.io.image_formats.IMAGE_FORMATS`, one per file.
     channel : str
         How red, green and blue become one value: luminance (Rec. 709 on the stored values, no hidden gamma), mean, red,
         green, blue.
@@ -81,7 +81,7 @@ def decode_stack(
     max_megapixels : float
         A header that claims more is refused before anything is allocated.
     threads : int, optional
-        Most threads to decode on.
+        Largest number of threads.
 
     Raises
     ------
@@ -153,7 +153,7 @@ def _stack_of(
     response: FloatArray | None,
     gains: FloatArray | None,
 ) -> DecodedStack:
-    """One value a pixel of images that must be alike."""
+    """One value per pixel of images that must be alike."""
     stack: PixelArray | None = None
     first_shape: tuple[int | str, ...] = ()
     linear = False
@@ -203,7 +203,7 @@ def _supported(pixels: PixelArray, path: Path) -> PixelArray:
 def _combine(
     image: PixelArray, channel: ChannelName, response: FloatArray | None, gains: FloatArray | None
 ) -> PixelArray:
-    """One value a pixel from red, green and blue; the same arithmetic as the core's decoder."""
+    """One value per pixel from red, green and blue; the same arithmetic as the core's decoder."""
     weights = np.array(WEIGHTS[channel], dtype=np.float32)
     if gains is not None:
         weights = weights * gains

@@ -68,7 +68,7 @@ class MaterialFile(Strict):
         known |= {f"gain_{light}" for light in range(len(self.gains))}
         for name in self.standard_errors:
             if name not in known:
-                has = f"gains: one a light, got {len(self.gains)}; known: {', '.join(sorted(known))}"
+                has = f"gains: one per light, got {len(self.gains)}; known: {', '.join(sorted(known))}"
                 msg = f"standard_errors: '{name}' is no parameter of this material ({has})"
                 raise ValueError(msg)
         return self

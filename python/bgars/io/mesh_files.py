@@ -53,7 +53,7 @@ def write_mesh(
         With a height map: gives each vertex its estimated normal and its albedo as grey. Without it a file carries
         neither; viewers compute normals from the faces.
     threads : int, optional
-        Most threads to work on; by default what ``RAYON_NUM_THREADS`` says, else one a core.
+        Largest number of threads; by default ``RAYON_NUM_THREADS``, else one per core.
 
     Raises
     ------

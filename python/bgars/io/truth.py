@@ -104,6 +104,6 @@ def _normals(path: Path, mask_path: Path) -> FloatArray:
     shape = decode_stack([mask_path]).images.shape[1:] if mask_path.is_file() else None
     if shape is None or len(rows) != shape[0] * shape[1]:
         size = "no mask.png tells their size" if shape is None else f"mask.png is {shape[1]} x {shape[0]} pixels"
-        msg = f"{path}: holds {len(rows)} normals, one a pixel in reading order is expected, but {size}"
+        msg = f"{path}: holds {len(rows)} normals, one per pixel in reading order is expected, but {size}"
         raise FileFormatError(msg)
     return rows.reshape(*shape, AXES)

@@ -129,7 +129,7 @@ def inspect_many(
     naming : Naming, optional
         Where serial numbers come from; the folder's name by default.
     processes, threads : int, optional
-        Processes, and threads of each; together one a core by default.
+        Processes, and threads of each; together one per core by default.
     scheduler : str, optional
         Address of a Dask scheduler, ``tcp://HOST:PORT``: work there. Its workers see the folders under the same names,
         unless `send_images`.

@@ -149,11 +149,11 @@ def take_capture(
     if rig is not None:
         recipe = read_recipe(Path(rig))
         if recipe.exposures_ms is not None or isinstance(recipe.images, str):
-            msg = f"{rig}: exposures_ms: a camera is asked for one image a light; take the bracket's files yourself"
+            msg = f"{rig}: exposures_ms: a camera is asked for one image per light; take the bracket's files yourself"
             raise InputError(msg)
         described = recipe.images
         if described is not None and len(described) != lights:
-            msg = f"{rig}: images: must name {lights} files, one a light, got {len(described)}"
+            msg = f"{rig}: images: must name {lights} files, one per light, got {len(described)}"
             raise InputError(msg)
         names = described or names
     try:

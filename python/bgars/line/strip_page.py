@@ -1,4 +1,4 @@
-"""The overview of one strip: a page and a table with a row a part."""
+"""The overview of one strip: a page and a table with a row per part."""
 
 from __future__ import annotations
 

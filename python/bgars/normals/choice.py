@@ -21,7 +21,7 @@ ABSORBED = 0.45
 """A fit with a lobe, blind to circles, must predict at this share of the anchored cost to be believed.
 
 Not 1: light that no model holds (the board and the neighbours, mirrored) is a smooth function of the light's direction,
-some six independent values a pixel. A fit with three free unknowns a pixel absorbs half of it, into wrong normals, and
+some six independent values per pixel. A fit of three unknowns per pixel absorbs half of it, into wrong normals, and
 then predicts it. Less than that by a tenth, for balls of unlike material come close to it.
 """
 MATTE = 0.75

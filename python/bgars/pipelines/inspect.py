@@ -78,7 +78,7 @@ def inspect(
         Look first whether the images show what the capture says (:func:`bgars.check`): wrong geometry is refused, and
         what else is found is a :class:`~bgars.CaptureWarning`, kept in ``result.warnings``.
     threads : int, optional
-        Most threads to work on; the result does not depend on it.
+        Largest number of threads; the result does not depend on it.
     progress : callable, optional
         Called with (stage, fraction done of that stage).
 

@@ -93,7 +93,7 @@ def estimate_normals(
         Result of an earlier call on images of the same size, to be overwritten and returned. After an error in the
         pixels, or an interruption, its content means nothing.
     threads : int, optional
-        Most threads to work on; by default what the environment variable ``RAYON_NUM_THREADS`` says, else one a core.
+        Largest number of threads; by default the environment variable ``RAYON_NUM_THREADS``, else one per core.
         The result does not depend on it.
     progress : callable, optional
         Called with the fraction done, at most ten times a second; not at all where the work is done before that.

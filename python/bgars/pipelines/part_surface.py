@@ -42,7 +42,7 @@ def part_surface(
     board_step_px : int
         Distance of its pixels.
     threads : int, optional
-        Most threads to work on.
+        Largest number of threads.
 
     Notes
     -----

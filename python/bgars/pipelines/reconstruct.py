@@ -129,7 +129,7 @@ def reconstruct(
         Look first whether the images show what the capture says (:func:`bgars.check`): wrong geometry is refused, and
         what else is found is a :class:`~bgars.CaptureWarning`.
     threads : int, optional
-        Most threads to work on; see :func:`bgars.estimate_normals`.
+        Largest number of threads; see :func:`bgars.estimate_normals`.
     progress : callable, optional
         Called with (stage, fraction done of that stage); the solver's fraction is logarithmic in its residual.
 

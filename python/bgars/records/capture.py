@@ -33,7 +33,7 @@ class Capture(ShownCapture):
     Attributes
     ----------
     images : (L, H, W) uint8, uint16 or float32
-        One image a light, grey levels as the camera gave them.
+        One image per light, grey levels as the camera gave them.
     rig : LightRig
         The L lights, in the order of the images.
     mask : (H, W) bool

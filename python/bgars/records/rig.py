@@ -28,7 +28,7 @@ MOST_SHOWN = 10**20
 
 @dataclass(frozen=True, eq=False)
 class LightRig:
-    """The lights of a capture, one an image.
+    """The lights of a capture, one per image.
 
     Make one with :meth:`ring`, :meth:`from_directions`, :meth:`from_angles`, :meth:`from_positions` or :meth:`from_lp`.
 
@@ -256,7 +256,7 @@ class LightRig:
         return replace(self, intensities=_intensities(intensities, len(self)), files=files)
 
     def with_u_deg(self, u_deg: ArrayLike | None) -> LightRig:
-        """Return the same lights with one uncertainty of direction for all, or one a light, in degrees.
+        """Return the same lights with one uncertainty of direction for all, or one per light, in degrees.
 
         Examples
         --------
@@ -284,7 +284,7 @@ def directions_from_angles(angles_deg: ArrayLike) -> NDArray[np.float64]:
 
 
 def _rows(values: ArrayLike, name: str) -> NDArray[np.float64]:
-    """A row a light."""
+    """A row per light."""
     vectors = plain(name, values, np.float64)
     if vectors.ndim != 2 or vectors.shape[1] != 3:  # noqa: PLR2004 - x, y, z
         msg = f"{name}: must have shape (L, 3), got {vectors.shape}"
@@ -296,7 +296,7 @@ def _rows(values: ArrayLike, name: str) -> NDArray[np.float64]:
 
 
 def _vectors(values: ArrayLike, name: str) -> NDArray[np.float64]:
-    """A row a light, of finite numbers."""
+    """A row per light, of finite numbers."""
     vectors = _rows(values, name)
     if not np.isfinite(vectors).all():
         index = int(np.flatnonzero(~np.isfinite(vectors).all(axis=1))[0])
@@ -310,7 +310,7 @@ def _intensities(values: ArrayLike | None, count: int) -> NDArray[np.float64]:
         return np.array([1.0] * count)
     intensities = plain("light_intensities", values, np.float64)
     if intensities.shape != (count,):
-        msg = f"light_intensities: must have shape ({count},), one a light, got {intensities.shape}"
+        msg = f"light_intensities: must have shape ({count},), one per light, got {intensities.shape}"
         raise InputError(msg)
     return _positive("light_intensities", intensities)
 
@@ -323,7 +323,7 @@ def _uncertainties(u_deg: ArrayLike | None, count: int) -> NDArray[np.float64] |
     if values.ndim == 0:
         values = np.repeat(values, count)
     if values.shape != (count,):
-        msg = f"u_deg: must be one number, or have shape ({count},), one a light, got {values.shape}"
+        msg = f"u_deg: must be one number, or have shape ({count},), one per light, got {values.shape}"
         raise InputError(msg)
     return _positive("u_deg", values)
 

@@ -24,6 +24,6 @@ class SeatingResult:
 
     balls: Annotated[tuple[str, ...], Key("balls that touch it")]
     coplanarity_um: Annotated[float, Key("largest distance of a top below it, in um")]
-    slope_x: Annotated[float, Key("rise to the right, um a um")]
-    slope_y: Annotated[float, Key("rise upward in the image, um a um")]
+    slope_x: Annotated[float, Key("rise to the right, um per um")]
+    slope_y: Annotated[float, Key("rise upward in the image, um per um")]
     offset_um: Annotated[float, Key("height at the image's centre, in um")]

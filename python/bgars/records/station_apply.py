@@ -42,7 +42,7 @@ def with_station(capture: Capture, station: Station) -> Capture:
         expected = len(station.lights.rig)
         if len(capture.images) != expected:
             msg = (
-                f"{capture.name}: {len(capture.images)} images, but {station.name} has {expected} lights, one an image"
+                f"{capture.name}: {len(capture.images)} images, but {station.name} has {expected} lights, one per image"
             )
             raise InputError(msg)
         _refuse_other_order(capture, station)

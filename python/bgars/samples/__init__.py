@@ -10,7 +10,7 @@ __all__ = ["sample_capture", "sample_part_recipe"]
 def sample_capture() -> Path:
     """Return the folder of the sample capture.
 
-    One solder ball of 600 um diameter on its board, strong highlights, 8 lights at 45 degrees, 3.4 um a pixel;
+    One solder ball of 600 um diameter on its board, strong highlights, 8 lights at 45 degrees, 3.4 um per pixel;
     rendered by a physically based renderer, with its truth in ``gt.npz``.
 
     Examples

@@ -69,7 +69,7 @@ def simulate(
     seed : int
         Of noise and of the variation from ball to ball. The same seed gives the same bits, for any `threads`.
     threads : int, optional
-        Threads to render on; one a core by default.
+        Threads to render on; one per core by default.
     progress : callable, optional
         Called with the fraction done.
     tile_rows : int, optional

@@ -73,7 +73,7 @@ def response_from_bracket(
     times = np.asarray(exposures, dtype=np.float64)
     if times.ndim != 1 or len(times) != len(images) or len(times) < 2 or not (np.isfinite(times) & (times > 0)).all():  # noqa: PLR2004
         msg = (
-            f"exposures: must be finite and above 0, one an image, two or more, got {times.tolist()} for "
+            f"exposures: must be finite and above 0, one per image, two or more, got {times.tolist()} for "
             f"{len(images)} images"
         )
         raise InputError(msg)

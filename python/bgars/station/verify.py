@@ -190,7 +190,7 @@ def _judge(found: Verification, error: np.ndarray, u_known: np.ndarray) -> tuple
         said.append(Remark("doubt", words, f"bias-{what}", found.bias_um, COVERAGE * found.u_bias_um, "um"))
     if math.isfinite(found.slope) and abs(found.slope) > COVERAGE * found.u_slope:
         words = (
-            f"{what}: the error grows by {1000 * found.slope:+.1f} um a millimetre (u {1000 * found.u_slope:.1f} um)"
+            f"{what}: the error grows by {1000 * found.slope:+.1f} um per millimetre (u {1000 * found.u_slope:.1f} um)"
         )
         said.append(Remark("doubt", words, f"slope-{what}", found.slope, COVERAGE * found.u_slope))
     return tuple(said)

@@ -144,10 +144,10 @@ def process_trend(
 ) -> ProcessTrend:
     """Chart a process and state its capability.
 
-    A chart follows one value a part, the mean over its balls, in subgroups of consecutive parts: balls of a part share
-    its causes, so that limits made from their spread within a part would cry at every part. Capability counts every
-    ball, because every ball has to be within its limits; its interval counts how many independent readings they are
-    worth, n / (1 + (b - 1) rho) with b balls a part and their intraclass correlation rho.
+    A chart follows one value per part, the mean over its balls, in subgroups of consecutive parts: balls of a part
+    share its causes, so that limits from the spread within a part would flag every part. Capability counts every
+    ball, because every ball must be within its limits; its interval counts how many independent readings they are
+    worth, n / (1 + (b - 1) rho) with b balls per part and their intraclass correlation rho.
 
     Parameters
     ----------

@@ -140,7 +140,7 @@ def integrate_normals(
     pixel_pitch_um : float, optional
         Size of a pixel; a field brings its own.
     threads : int, optional
-        Most threads to work on; by default what the environment variable ``RAYON_NUM_THREADS`` says, else one a core.
+        Largest number of threads; by default the environment variable ``RAYON_NUM_THREADS``, else one per core.
         The result does not depend on it.
     progress : callable, optional
         Called with (iteration, relative residual), for bilateral with (re-weightings, relative change of the energy),

@@ -22,7 +22,7 @@ __all__ = ["check_faces", "mesh_from_height", "mesh_size"]
 def mesh_from_height(
     height: HeightMap, field: NormalField | None = None, *, threads: int | None = None
 ) -> trimesh.Trimesh:
-    """Triangulate a height map: a vertex a pixel, faces between neighbours; masked pixels are left out.
+    """Triangulate a height map: a vertex per pixel, faces between neighbours; masked pixels are left out.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def mesh_from_height(
         Gives each vertex its estimated normal and its albedo as grey; without it, normals follow from the faces
         (weighted by their angles at the vertex, as trimesh does).
     threads : int, optional
-        Most threads to work on; by default what ``RAYON_NUM_THREADS`` says, else one a core.
+        Largest number of threads; by default ``RAYON_NUM_THREADS``, else one per core.
 
     Returns
     -------

@@ -46,7 +46,7 @@ class SimplifiedMesh(NamedTuple):
     max_error_um : float
         Largest vertical distance of the mesh from the heights, over all pixels of the mesh; reached, not asked for.
     full_faces : int
-        Triangles of the mesh that has a vertex a pixel.
+        Triangles of the mesh that has a vertex per pixel.
     """
 
     mesh: trimesh.Trimesh
@@ -63,7 +63,7 @@ def simplified_mesh(
 ) -> SimplifiedMesh:
     """Triangulate a height map with as few triangles as a bound on the error of the heights allows.
 
-    The outline, of holes too, stays as it is: a vertex a pixel. Needs ``pip install 'bgars[simplify]'``.
+    The outline, of holes too, stays as it is: a vertex per pixel. Needs ``pip install 'bgars[simplify]'``.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def simplified_mesh(
     max_error_um : float
         Largest vertical distance from the heights at any pixel.
     threads : int, optional
-        Most threads to work on; by default what ``RAYON_NUM_THREADS`` says, else one a core.
+        Largest number of threads; by default ``RAYON_NUM_THREADS``, else one per core.
     progress : callable, optional
         Called with the fraction done.
 

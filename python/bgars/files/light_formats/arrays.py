@@ -98,7 +98,7 @@ def read_mat_table(path: Path) -> LightTable:
         held = ", ".join(f"{shown(key)} {'x'.join(map(str, shape))}" for key, shape in list(shapes.items())[:10])
         msg = (
             f"{path}: holds no single variable of shape (lights, 3) for the light directions (found {held or 'none'}); "
-            "call it L, or write the vectors to light_directions.txt, one x y z a line"
+            "call it L, or write the vectors to light_directions.txt, one x y z per line"
         )
         raise FileFormatError(msg)
     strength = _pick([other for other in wanted if other != name], INTENSITY_NAMES)

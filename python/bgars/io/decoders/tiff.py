@@ -64,7 +64,7 @@ def read_tiff_pages(path: Path, count: int, max_megapixels: float) -> NDArray[An
             if pixels.ndim == 3 and getattr(page, "planarconfig", 1) == PLANAR_SEPARATE:  # noqa: PLR2004 - colour
                 pixels = np.moveaxis(pixels, 0, -1)
             if pixels.shape[:2] != (page.imagelength, page.imagewidth):
-                msg = f"{path}: must hold one grey or RGB image a page, but its shape is {pixels.shape}"
+                msg = f"{path}: must hold one grey or RGB image per page, but its shape is {pixels.shape}"
                 raise FileFormatError(msg)
             if pixels.dtype == np.bool_:
                 pixels = pixels.astype(np.uint8) * np.uint8(255)

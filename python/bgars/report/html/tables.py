@@ -81,7 +81,7 @@ def spreads(result: dict[str, Any]) -> list[dict[str, str]]:
 
 
 def ball_rows(result: dict[str, Any]) -> list[dict[str, Any]]:
-    """One row a ball, cells as they are shown and as they are sorted by."""
+    """One row per ball, cells as they are shown and as they are sorted by."""
     rows = []
     for index, ball in enumerate(result["balls"]):
         cells = [
@@ -140,7 +140,7 @@ def _why(name: str, result: dict[str, Any]) -> str:
 
 
 def light_rows(source: PageSource) -> list[dict[str, str]]:
-    """One row a light: where the rig has it, where its shadows put it, how far that is."""
+    """One row per light: where the rig has it, where its shadows put it, how far that is."""
     rows = []
     is_fitted = is_known(source.result["shadow_residual_rms"])
     changes = source.result["light_change_deg"] if is_fitted else []
