@@ -32,6 +32,7 @@ from .normals.methods import register_method as register_method
 from .pipelines.calibrate_lights import calibrate_lights as calibrate_lights
 from .pipelines.calibrate_material import calibrate_material as calibrate_material
 from .pipelines.check import check as check
+from .pipelines.colour import colour_albedo as colour_albedo
 from .pipelines.evaluate import Evaluation as Evaluation
 from .pipelines.evaluate import angular_error_deg as angular_error_deg
 from .pipelines.evaluate import evaluate as evaluate

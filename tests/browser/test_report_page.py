@@ -170,7 +170,7 @@ def test_a_ball_is_chosen_in_picture_table_and_charts(failed_page: Path, open_pa
     page.wait_for_function(f"() => document.querySelector('#chosen h3').textContent === {json.dumps(known[2])}")
     page.keyboard.press("Escape")
     assert page.locator(".chosen").count() == 0
-    assert page.inner_text("#chosen h3") == "Choose a ball"
+    assert page.inner_text("#chosen h3") == "Select a ball"
     assert opened.errors == []
 
 

@@ -286,7 +286,7 @@ def test_paths_of_windows_in_a_recipe(tmp_path: Path) -> None:
 def test_a_recipe_whose_name_hides_its_ending(tmp_path: Path) -> None:
     write_images(tmp_path)
     (tmp_path / "capture.toml.txt").write_text("[lights]\nring = { count = 8 }\n", encoding="utf-8")
-    refused(tmp_path, "capture.toml.txt is not read", "must be called capture.toml")
+    refused(tmp_path, "capture.toml.txt is not read", "must be capture.toml")
 
 
 def test_the_same_image_for_two_lights(tmp_path: Path) -> None:

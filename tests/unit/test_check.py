@@ -208,7 +208,7 @@ def test_a_blurred_image_is_named(balls: bgars.Capture) -> None:
 def test_python_checks_before_any_number(balls: bgars.Capture) -> None:
     mirrored = with_lights(balls, balls.rig.directions * [1, -1, 1])
     for function in (bgars.reconstruct, bgars.inspect):
-        with pytest.raises(bgars.InputError, match=r"lights on the other side in y.*check=False goes on"):
+        with pytest.raises(bgars.InputError, match=r"lights on the other side in y.*check=False continues"):
             function(mirrored)
     assert bgars.reconstruct(mirrored, method="robust-filter", check=False).field.mask.any()
 

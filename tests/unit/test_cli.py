@@ -180,12 +180,12 @@ def test_the_help_of_every_estimator_explains_each_method() -> None:
         (told,) = [option.help for option in commands[name].params if option.name == "method"]
         for method in ALL_METHODS:
             assert f"{method}: " in told, (name, method)
-        assert "without balls and a material, under fewer than 4 lights" in told
+        assert "Without balls and a material, with fewer than 4 lights" in told
         assert ": blind. robust-filter: " in told
     (told,) = [option.help for option in commands["evaluate"].params if option.name == "method"]
     for method in METHODS:
         assert method in told
-    assert "blind is what reflectance uses without balls" in told
+    assert "reflectance uses blind without balls" in told
 
 
 def loaded(command: Any) -> Any:  # noqa: ANN401 - a command of whichever click typer brings

@@ -174,7 +174,7 @@ def test_a_layout_that_does_not_fit_is_refused() -> None:
     capture, _ = bgars.simulate(grid(), RING, SHINY, CAMERA)
     with pytest.raises(bgars.InputError, match=r"layout: "):
         bgars.find_balls(capture, layout=bgars.BallLayout(rows=4, cols=5, pitch_um=1500.0))
-    words = r"layout: pitch_um: must be within 10% of the image's at .* 12, which is (999|1000)(\.\d)?, got 880"
+    words = r"layout: pitch_um: must be within 10 % of the image's at .* 12, which is (999|1000)(\.\d)?, got 880"
     with pytest.raises(bgars.InputError, match=words):
         bgars.find_balls(capture, layout=bgars.BallLayout(rows=4, cols=5, pitch_um=880.0))
     with pytest.raises(bgars.InputError, match=r"layout\.depopulated: .*'I1'"):

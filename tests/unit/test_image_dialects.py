@@ -24,7 +24,7 @@ from case_captures import (
 )
 from PIL import Image
 
-LOSSY = "hardly ever proportional"
+LOSSY = "hardly ever linear"
 
 
 @pytest.mark.parametrize(

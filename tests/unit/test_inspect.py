@@ -173,7 +173,7 @@ def test_an_output_that_is_a_file_is_refused_before_the_work(quick: Path, tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("level", "words"), [(0, ["light_02.png", "black", "0.0%"]), (255, ["light_02.png", "saturated", "50%", "100%"])]
+    ("level", "words"), [(0, ["light_02.png", "black", "0.0 %"]), (255, ["light_02.png", "saturated", "50 %", "100 %"])]
 )
 def test_a_dead_or_saturated_light_is_refused_by_name(
     quick: Path, tmp_path: Path, level: int, words: list[str]

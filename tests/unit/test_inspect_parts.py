@@ -70,7 +70,7 @@ def test_each_defect_is_the_only_thing_that_fails() -> None:
 def test_a_recipe_of_another_pitch_is_refused_by_file_and_key(tmp_path: Path) -> None:
     capture, _ = photographed(1, {})
     path = tmp_path / "part.toml"
-    for pitch_um, words in ((880, "pitch_um: must be within 10%"), (700, "pitch_um: must be within 10%")):
+    for pitch_um, words in ((880, "pitch_um: must be within 10 %"), (700, "pitch_um: must be within 10 %")):
         path.write_text(f'name = "p"\nrows = 3\ncols = 4\npitch_um = {pitch_um}\n', encoding="utf-8")
         with pytest.raises(bgars.InputError) as caught:
             bgars.inspect(capture, path)

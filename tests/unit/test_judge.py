@@ -96,7 +96,7 @@ def test_readings_are_the_truth_within_their_uncertainty() -> None:
         (bgars.Defect.offset(70.0, 40.0), "true position"),
         (bgars.Defect.size(0.8), "diameter"),
         (bgars.Defect.size(1.15), "diameter"),
-        (bgars.Defect.flattened(0.85, 1.08), "vertical over horizontal radius"),
+        (bgars.Defect.flattened(0.85, 1.08), "aspect ratio"),
         (bgars.Defect.clipped(40.0), "flat top"),
     ],
     ids=lambda value: getattr(value, "kind", ""),

@@ -86,7 +86,7 @@ def test_a_picture_is_no_normal_map() -> None:
     picture = np.random.default_rng(1).integers(230, 256, (10, 10, 3), np.uint8)
     picture[:2] = [128, 128, 255]  # a fifth of it faces the camera
     iio.imwrite("picture.png", picture)
-    words = "at least 50% of its pixels must be unit vectors (length 1 within 0.1), but 80.0% are not"
+    words = "at least 50 % of its pixels must be unit vectors (length 1 within 0.1), but 80.0 % are not"
     assert mesh("picture.png") == f"picture.png: is not a normal map: {words}"
     picture[:8] = [128, 128, 255]
     iio.imwrite("picture.png", picture)

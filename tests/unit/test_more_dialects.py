@@ -70,7 +70,7 @@ def test_angles_that_could_be_either_are_not_guessed(header: str, folder: Path) 
     [
         ("part.relight", json.dumps({"images": []}), "export its lights as .lp"),
         ("part.ptm", "PTM_1.2", "is a finished RTI"),
-        ("Results.csv", ",X,Y,Z\n1,0,0,1\n", "Should Results.csv hold the lights"),
+        ("Results.csv", ",X,Y,Z\n1,0,0,1\n", "If Results.csv holds the lights"),
     ],
 )
 def test_files_of_other_programs_are_answered_with_what_to_do(name: str, content: str, said: str, folder: Path) -> None:

@@ -216,7 +216,7 @@ def test_a_cone_on_its_plane_is_no_cut_out(slope: float, tmp_path: Path) -> None
 def test_a_declared_green_is_kept_and_a_field_that_says_else_is_told(tmp_path: Path) -> None:
     path = png(codes(TURNED))(tmp_path)
     found = read_stored_normals(path, directx=False)
-    assert "says y down" in found.notes[0]
+    assert "shows y down" in found.notes[0]
     assert error_deg(found.vectors * [1, -1, 1], MASK | True) < 0.5
     with pytest.warns(UserWarning, match="DirectX"):
         bgars.read_normal_map(path)
@@ -243,7 +243,7 @@ def test_mesh_says_what_it_assumed_and_takes_the_word_of_the_caller(tmp_path: Pa
     path = png(codes(TURNED))(tmp_path)
     assert "DirectX" in str(mesh(path, tmp_path)["notes"])
     assert mesh(path, tmp_path, "--directx")["notes"] == []
-    assert "says y down" in str(mesh(path, tmp_path, "--opengl")["notes"])
+    assert "shows y down" in str(mesh(path, tmp_path, "--opengl")["notes"])
 
 
 @pytest.mark.data

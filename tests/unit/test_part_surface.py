@@ -118,7 +118,7 @@ def test_the_page_draws_the_height_map() -> None:
 def test_without_a_surface_the_page_says_so() -> None:
     result = inspected()[0]
     text = page_text(PageSource(result.to_dict()))
-    assert "No integrated surface lies beside this result" in text
+    assert "No integrated surface is stored with this result" in text
     assert "integrated normals" not in text
     assert "a sample every 15 µm" in page_text(PageSource(result.to_dict(), surface=surface()))
 

@@ -85,7 +85,7 @@ def test_no_cell_of_csv_is_a_formula(store: bgars.Store) -> None:
         ("select * from nothing", "Table with name nothing does not exist"),
         ("select * from read_csv('/etc/passwd')", "Permission Error"),
         ("copy parts to '/tmp/bgars-test.csv'", "Permission Error"),
-        ("-- no question", "must be a question that has an answer"),
+        ("-- no question", "must be a query that returns rows"),
     ],
 )
 def test_a_question_that_is_none_gets_one_line(store: bgars.Store, sql: str, words: str) -> None:

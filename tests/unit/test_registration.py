@@ -56,7 +56,7 @@ def test_missing_and_foreign_balls_do_not_turn_a_part() -> None:
 def test_a_wrong_pitch_is_named_at_any_turn(scale: float, turn_deg: float) -> None:
     layout = bgars.BallLayout(rows=4, cols=5, pitch_um=800.0)
     balls = part(layout, turn_deg, scale)
-    with pytest.raises(bgars.InputError, match=r"layout: pitch_um: must be within 10% .*, got 800") as refusal:
+    with pytest.raises(bgars.InputError, match=r"layout: pitch_um: must be within 10 % .*, got 800") as refusal:
         register(balls.real, balls.imag, layout, PIXEL_UM)
     named_um = float(str(refusal.value).split("which is ")[1].split(",")[0])
     assert named_um == pytest.approx(scale * 800.0, rel=0.01)

@@ -193,7 +193,7 @@ def test_report_again_from_the_folder(tmp_path: Path) -> None:
         assert (tmp_path / "again.html").read_bytes() == first
     (tmp_path / "photograph.jpg").unlink()
     bgars.write_report(tmp_path, tmp_path / "again.html")
-    assert "No photograph lies beside" in (tmp_path / "again.html").read_text(encoding="utf-8")
+    assert "No photograph is stored with" in (tmp_path / "again.html").read_text(encoding="utf-8")
     assert {path.name for path in tmp_path.iterdir()} == {"result.json", "report.html", "report.json", "again.html"}
 
 

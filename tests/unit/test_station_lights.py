@@ -152,7 +152,7 @@ def test_a_ball_that_is_cut_off_is_refused(mirror: NDArray[np.uint8]) -> None:
 
 def test_a_burnt_out_ball_is_refused(matt: NDArray[np.uint8]) -> None:
     burnt = np.clip(matt.astype(np.int32) * 4, 0, 255).astype(np.uint8)
-    with pytest.raises(bgars.CalibrationError, match=r"burnt out: .* % of the ball is clipped; expose shorter"):
+    with pytest.raises(bgars.CalibrationError, match=r"overexposed: .* % of the ball is clipped; expose shorter"):
         bgars.calibrate_lights(capture_of(burnt), sphere="matt", outline=BALL)
     as_mirror = bgars.calibrate_lights(capture_of(burnt), outline=BALL)
     assert {"wide-highlight"} <= {doubt.code for doubt in as_mirror.doubts}

@@ -159,7 +159,7 @@ GRR: dict[str, tuple[Callable[[Path], object], str, str]] = {
     "mixed recipe": (mixed_recipe, "part2/place1/2", "must have the same recipe as"),
     "other limits": (other_limits, "part2/place1/2", "another layout or other limits"),
     "other pixel pitch": (other_pitch, "part2/place1/2", "must have the same pixel_pitch_um as"),
-    "a copy": (copied, "part1/place2/3", "was made from the same files as"),
+    "a copy": (copied, "part1/place2/3", "comes from the same files as"),
     "corrupt": (cut, "part2/place1/2/result.json", "is not valid JSON"),
     "one repeat": (one_repeat, "part2/place1", "must hold at least 2 repeats, got 1"),
     "unbalanced": (hole, "part2/place1", "the design is not balanced: must hold 3 repeats like the first, got 2"),

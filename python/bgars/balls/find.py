@@ -103,7 +103,7 @@ def find_balls(
     """
     threads = thread_count(threads)
     if layout is not None and capture.pixel_pitch_um is None:
-        msg = "layout: needs capture.pixel_pitch_um, which is None, to lay micrometres over pixels"
+        msg = "layout: needs capture.pixel_pitch_um, which is None, to convert micrometres to pixels"
         raise InputError(msg)
     need_whole(capture)
     levels = Levels(capture, threads)

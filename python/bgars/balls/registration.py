@@ -118,7 +118,7 @@ def register(
 
 def _wrong_scale(layout: BallLayout, ratio: float, pixel_pitch_um: float) -> str:
     """What to say where distances in the image are so many times those of the layout."""
-    at = f"within {WRONG_SCALE:.0%} of the image's at its pixel_pitch_um of {pixel_pitch_um:g}"
+    at = f"within {100 * WRONG_SCALE:.0f} % of the image's at its pixel_pitch_um of {pixel_pitch_um:g}"
     if layout.pitch_um is None:
         return f"layout: positions: distances must be {at}, which are {ratio:.3g} times as long"
     return f"layout: pitch_um: must be {at}, which is {ratio * layout.pitch_um:.4g}, got {layout.pitch_um:g}"

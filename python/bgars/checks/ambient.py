@@ -130,9 +130,9 @@ def check_ambient(capture: Capture, lights: Array) -> list[Finding]:
         Finding(
             "ambient",
             "warning",
-            f"the deepest shadows still have {share:.0%} of the light of the lit surface: ambient light, stray light, "
-            "or a black level",
-            "darken the room, take an image with all lamps off and give it as 'dark' in capture.toml (or black_level)",
+            f"the deepest shadows still have {100 * share:.0f} % of the light of the lit surface: ambient light, stray "
+            "light, or a black level",
+            "darken the room, or give an image with all lamps off as 'dark' in capture.toml (or black_level)",
             value=share,
             limit=AMBIENT,
             unit="of the light",

@@ -47,7 +47,7 @@ def dead_lamps(view: View, inside: NDArray[np.bool_]) -> list[Finding]:
                 Finding(
                     "lamp-dead",
                     "error",
-                    f"{view.names[index]} is black: it has {value / usual:.1%} of the light of the others",
+                    f"{view.names[index]} is black: it has {100 * (value / usual):.1f} % of the light of the others",
                     "the lamp did not light or the trigger came too early: check lamp, cable and trigger, and take the "
                     "image again (or leave the image and its light out)",
                     image=index,
@@ -70,7 +70,7 @@ def check_dark(view: View, inside: NDArray[np.bool_]) -> list[Finding]:
         Finding(
             "dark",
             "warning",
-            f"the images are dark: their brightest parts reach {brightest:.1%} of full scale",
+            f"the images are dark: their brightest parts reach {100 * brightest:.1f} % of full scale",
             f"expose about {0.7 / max(brightest, 1e-3):.0f} times longer, so that matt parts come to 40 to 80 % of "
             f"full scale{fewer}",
             value=brightest,
@@ -92,8 +92,8 @@ def check_clipped(view: View, inside: NDArray[np.bool_]) -> list[Finding]:
             Finding(
                 "clipped",
                 "warning" if share > MUCH_OVEREXPOSED else "note",
-                f"{share:.0%} of the image is clipped under three lights of four or more",
-                "expose shorter, or give 'saturation' if the camera clips elsewhere: clipped pixels have no normal",
+                f"{100 * share:.0f} % of the image is clipped under three lights of four or more",
+                "reduce the exposure, or state 'saturation' if it clips elsewhere: clipped pixels have no normal",
                 value=share,
                 limit=OVEREXPOSED,
                 unit="of the pixels",
@@ -108,7 +108,8 @@ def check_clipped(view: View, inside: NDArray[np.bool_]) -> list[Finding]:
                 Finding(
                     "clipped",
                     "warning",
-                    f"{view.names[index]} is overexposed: {value:.0%} of it is clipped, {usual:.0%} of the others",
+                    f"{view.names[index]} is overexposed: {100 * value:.0f} % of it is clipped, but only "
+                    f"{100 * usual:.0f} % of the others",
                     "lower this lamp, or shorten the exposure",
                     image=index,
                     value=float(value),

@@ -84,7 +84,7 @@ def check_focus(capture: Capture, kept: NDArray[np.intp], names: Sequence[str]) 
         Finding(
             "focus",
             "warning",
-            f"{names[index]} is blurred against the others ({more}{blur_px2**0.5:.1f} px more)",
+            f"{names[index]} is blurred compared with the others ({more}{blur_px2**0.5:.1f} px more)",
             "look for vibration, a moved focus ring, or autofocus between the images, and take it again",
             image=index,
             value=blur_px2**0.5,

@@ -78,8 +78,8 @@ def check_half_lit(view: View) -> list[Finding]:
             Finding(
                 "half-lit",
                 "error" if share > 0.3 else "warning",  # noqa: PLR2004 - most of the light
-                f"{view.names[index]} is lit in part: at {step.place:.0%} of its {word}s its light changes by "
-                f"{share:.0%}, which the other images do not show",
+                f"{view.names[index]} is partly lit: at {100 * step.place:.0f} % of its {word}s its light changes by "
+                f"{100 * share:.0f} %, which the other images do not show",
                 WORDS,
                 image=index,
                 value=share,
@@ -263,7 +263,7 @@ def _late(view: View) -> list[Finding]:
         Finding(
             "half-lit",
             "error",
-            f"{share:.0%} of the rows of {view.names[image]} show the light of {view.names[neighbour]}",
+            f"{100 * share:.0f} % of the rows of {view.names[image]} show the light of {view.names[neighbour]}",
             WORDS,
             image=image,
             value=share,

@@ -50,7 +50,7 @@ def check_noise(noise: NDArray[np.float64], level: float, names: Sequence[str]) 
             Finding(
                 "noise",
                 "warning" if share > VERY_NOISY else "note",
-                f"the images are noisy: {share:.0%} of the signal",
+                f"the images are noisy: {100 * share:.0f} % of the signal",
                 "expose longer at lower gain, or average several images under each light",
                 value=share,
                 limit=NOISY,

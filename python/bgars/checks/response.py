@@ -111,7 +111,7 @@ def check_response(capture: Capture, view: View, lit: Mask, lights: Array) -> li
             Finding(
                 "response",
                 "note",
-                "JPEG files are hardly ever linear in light, and are taken as linear",
+                "JPEG files are hardly ever linear in light, but are taken as linear",
                 "use the camera's raw or linear TIFF or PNG files, or state the response in capture.toml",
             )
         ]

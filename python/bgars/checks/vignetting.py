@@ -67,7 +67,7 @@ def check_vignetting(view: View, lit: Mask) -> list[Finding]:
         Finding(
             "vignetting",
             "warning" if loss > MUCH else "note",
-            f"every image loses {loss:.0%} of its light towards the corners",
+            f"every image loses {100 * loss:.0f} % of its light towards the corners",
             "take a flat field (a white card under all lamps) and divide by it, stop the lens down, or keep the part "
             "in the middle",
             value=loss,

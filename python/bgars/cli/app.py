@@ -17,6 +17,7 @@ from bgars.cli.lazy import LazyGroup
 from bgars.cli.options import (
     METHOD_ARGUMENTS,
     ChannelChoice,
+    ColourOption,
     DirectxOption,
     FlattenOption,
     FolderArgument,
@@ -51,7 +52,7 @@ def top(
     version: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False,
     threads: Annotated[
         int | None,
-        typer.Option(min=1, max=1024, help="Largest number of threads; by default one per core.", show_default=False),
+        typer.Option(min=1, max=1024, help="Largest number of threads; one per core by default.", show_default=False),
     ] = None,
 ) -> None:
     """Options of the command itself."""
@@ -68,20 +69,21 @@ def top(
 @app.command()
 def demo(
     what: Annotated[
-        Literal["ball", "line"], typer.Argument(help="ball: one solder ball. line: a station that drops 50 parts.")
+        Literal["ball", "line"],
+        typer.Argument(help="ball: one solder ball. line: a simulated station that delivers 50 parts."),
     ] = "ball",
     output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT", help="Folder for the results.")] = Path(
         "bgars-demo"
     ),
     parts: Annotated[
-        int | None, typer.Option(min=4, help="Parts of the line; 50 by default.", show_default=False)
+        int | None, typer.Option(min=4, help="Number of parts of the line; 50 by default.", show_default=False)
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Reconstruct the sample solder ball that comes with bgars, or simulate a station on a line.
 
-    'bgars demo line' simulates 50 parts, three of them with a defect, drops them into an inbox, inspects them as they
-    come (minutes), and writes the page of their lot.
+    'bgars demo line' simulates 50 parts, three of them with a defect, puts them into an inbox, inspects them as they
+    arrive (minutes), and writes the page of their lot.
     """
     if what == "line":
         from bgars.cli.demo_line import demo_line  # noqa: PLC0415 - loaded when it runs
@@ -106,7 +108,7 @@ def demo(
         f"Mean error of its normals: {scores[DEFAULT_METHOD]['mean_deg']:.2f} deg with {DEFAULT_METHOD}, "
         f"{scores['lambertian']['mean_deg']:.2f} deg with plain least squares: highlights are not diffuse light."
     )
-    say("The height of the ball above its board is not in the normals: between both the surface jumps unseen.")
+    say("The height of the ball above its board is not in the normals: the surface between them is hidden.")
     say()
     say("Open these:")
     _list_files(output, files)
@@ -127,19 +129,22 @@ def reconstruct(
     mesh_format: Annotated[Literal["ply", "obj", "stl", "glb"], typer.Option(help="Format of the mesh file.")] = "ply",
     height_format: Annotated[
         Literal["gsf", "sdf", "x3p"] | None,
-        typer.Option(help="Heights also for metrology programs, in metres; needs the extra areal.", show_default=False),
+        typer.Option(
+            help="Also write the heights for metrology programs, in metres; needs the extra areal.", show_default=False
+        ),
     ] = None,
     flatten: FlattenOption = None,
+    colour: ColourOption = False,
     directx: DirectxOption = False,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Turn a folder of photographs into normals, a height map, a mesh and an overview picture.
 
-    Writes overview.png, normals.png (16 bit), height.tif and height.npy (float32, um when the pixel pitch is known),
-    mesh.ply and summary.json; files that an earlier run left in OUT are replaced. The height of one part above another
-    that it does not touch, such as a ball above its board, is not measured. The capture is checked first ('bgars
-    check'): where its lights and images do not fit, nothing is written (exit code 2) unless --force says so.
+    Writes overview.png, normals.png (16 bit), height.tif and height.npy (float32, um if the pixel pitch is known),
+    mesh.ply and summary.json; files of an earlier run in OUT are replaced. Hidden steps, such as the height of a ball
+    above its board, are not measured. The capture is checked first ('bgars check'): if lights and
+    images do not fit, nothing is written (exit code 2) unless --force is given.
     """
     from bgars.cli.first_check import check_first  # noqa: PLC0415 - loaded when it runs
 
@@ -157,7 +162,10 @@ def reconstruct(
         check_height_file(output / f"height.{height_format}", has_pitch=capture.pixel_pitch_um is not None)
     findings = check_first(capture, force=force)
     formats = {"mesh_format": mesh_format, "height_format": height_format}
-    summary, files = _reconstruct_to(capture, output, run, **formats, directx=directx, checked=findings.to_dict())
+    albedos = partial(bgars.colour_albedo, folder, channel=channel, station=station) if colour else None
+    summary, files = _reconstruct_to(
+        capture, output, run, **formats, directx=directx, checked=findings.to_dict(), colour=albedos
+    )
     if as_json:
         print_json(summary)
         return
@@ -172,7 +180,7 @@ def reconstruct(
     )
     say(method_line)
     if height["bow"] is not None:
-        say(f"doubt: {height['bow']}")
+        say(f"warning: {height['bow']}")
     _list_files(output, files)
 
 
@@ -185,6 +193,7 @@ def normals(
     material: MaterialOption = None,
     channel: ChannelChoice = None,
     station: StationOption = None,
+    colour: ColourOption = False,
     directx: DirectxOption = False,
     force: ForceOption = False,
     as_json: JsonOption = False,
@@ -193,14 +202,14 @@ def normals(
 
     With '-o FILE', such as normals.exr: only the normals, in the format of the ending.
 
-    The capture is checked first ('bgars check'): where its lights and images do not fit, nothing is written (exit code
-    2) unless --force says so. Black background is not measured.
+    The capture is checked first ('bgars check'): if lights and images do not fit, nothing is written (exit code 2)
+    unless --force is given. Black background is left out.
     """
     from bgars.cli.first_check import check_first  # noqa: PLC0415 - loaded when it runs
     from bgars.cli.outputs import need_normals_place, write_normals  # noqa: PLC0415
     from bgars.normals.noise_floor import without_background  # noqa: PLC0415
 
-    need_normals_place(output, folder, directx=directx)
+    need_normals_place(output, folder, directx=directx, colour=colour)
     capture = bgars.read_capture(folder, channel=channel, station=station)
     findings = check_first(capture, force=force)
     surface = _material_from(material, capture)
@@ -213,7 +222,8 @@ def normals(
             progress=lambda fraction: report("normals", fraction),
         )
     field = without_background(field, capture)
-    summary, files = write_normals(field, output, directx=directx)
+    albedos = bgars.colour_albedo(folder, field, channel=channel, station=station) if colour else None
+    summary, files = write_normals(field, output, directx=directx, albedo_rgb=albedos)
     if as_json:
         print_json({"capture": capture.name, **summary, **findings.to_dict()})
         return
@@ -250,14 +260,15 @@ def evaluate(
             "--method",
             "-m",
             **METHOD_ARGUMENTS,
-            help=f"Estimator; by default each of {', '.join(METHODS)}. blind is what reflectance uses without balls.",
+            help=f"Estimator; by default each of {', '.join(METHODS)}. reflectance uses blind without balls.",
             show_default=False,
         ),
     ] = None,
     images: Annotated[
         Path | None,
         typer.Option(
-            help="Text file of image names, one per line: use only these (such as ring8.txt).", show_default=False
+            help="Text file with one image name per line: use only these images (such as ring8.txt).",
+            show_default=False,
         ),
     ] = None,
     material: MaterialOption = None,
@@ -266,10 +277,9 @@ def evaluate(
 ) -> None:
     """Compare estimated normals with known ones (gt.npz of a scene; Normal_gt.npy, .mat or normal.txt of a photograph).
 
-    Scenes are judged over ball pixels with true n_z > 0.3, photographs over their mask. A pixel without a solution
-    counts as (0, 0, 1). Measured pixels are those whose own light fixes the normal; on balls, the errors of about 68 %
-    of them should be within the standard error that the method states, on photographs far fewer are
-    (docs/accuracy.md).
+    Scenes are evaluated over ball pixels with true n_z > 0.3, photographs over their mask. A pixel without a solution
+    counts as (0, 0, 1). Measured pixels are those whose own values determine the normal; on balls, the errors of about
+    68 % of them should be within the stated standard error (docs/accuracy.md).
     """
     from bgars.files.light_files import read_filenames  # noqa: PLC0415 - loaded when it runs
 

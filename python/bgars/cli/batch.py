@@ -48,7 +48,7 @@ def batch(
     folders: Annotated[
         list[str],
         typer.Argument(
-            metavar="FOLDER...",
+            metavar="FOLDER",
             help="Captures, folders of captures, or patterns such as 'lots/L7/*', which bgars expands itself.",
             show_default=False,
         ),
@@ -59,20 +59,24 @@ def batch(
     processes: Annotated[
         int | None,
         typer.Option(
-            min=1, help="Parts side by side; with --threads, one thread per core by default.", show_default=False
+            min=1,
+            help="Number of processes, each with one part; by default together with --threads one thread per core.",
+            show_default=False,
         ),
     ] = None,
-    threads: Annotated[int | None, typer.Option(min=1, help="Threads of each process.", show_default=False)] = None,
+    threads: Annotated[
+        int | None, typer.Option(min=1, help="Number of threads of each process.", show_default=False)
+    ] = None,
     scheduler: Annotated[
         str | None,
         typer.Option(
             metavar="tcp://HOST:PORT",
-            help="Work on this Dask cluster, which sees the same folders.",
+            help="Use this Dask cluster, whose workers see the same folders.",
             show_default=False,
         ),
     ] = None,
     send_images: Annotated[
-        bool, typer.Option("--send-images", help="Send the images to the cluster, which does not see the folders.")
+        bool, typer.Option("--send-images", help="Send the images to a cluster that does not see the folders.")
     ] = False,
     serial_from: SerialFrom = "{serial}",
     lot: LotOption = "",
@@ -83,11 +87,11 @@ def batch(
 ) -> None:
     """Inspect many captures into one store: all cores, failures kept with their reason, killed runs resumed.
 
-    A part whose images, recipe and version are in the store already is not inspected again. No pages are written: see
-    'bgars report STORE' for the overview, 'bgars report STORE SERIAL' for a part, 'bgars query STORE' for questions.
+    A part is not inspected again if the store has its images, recipe and version. No pages are written: see 'bgars
+    report STORE' for the overview, 'bgars report STORE SERIAL' for a part, 'bgars query STORE' for queries.
 
     Exit code 0: every part passes. 1: a part does not, or could not be inspected. 2: wrong use, or a store that cannot
-    be written. 130: interrupted; run it again to go on.
+    be written. 130: interrupted; run it again to continue.
     """
     naming = Naming(serial_from, PartIdentity(lot=lot, station=station_name, operator=operator, round=round_))
     store = open_store(output, create=True)
@@ -116,12 +120,12 @@ def batch(
 
 def _tell(done: Batch, output: Path) -> None:
     verdicts = ", ".join(f"{count} {verdict}" for verdict, count in done.verdicts.items())
-    rate = f", {60 * done.inspected / done.seconds:.1f} parts a minute" if done.inspected and done.seconds > 0 else ""
+    rate = f", {60 * done.inspected / done.seconds:.1f} parts per minute" if done.inspected and done.seconds > 0 else ""
     say(f"{done.inspected} parts inspected: {verdicts} ({done.seconds:.1f} s{rate})")
     if done.known:
-        say(f"{done.known} were in the store and were not done again")
+        say(f"{done.known} were in the store already and were skipped")
     if done.failures:
-        say(f"{len(done.failures)} could not be inspected; they are tried again when this is run again:")
+        say(f"{len(done.failures)} could not be inspected; the next run tries again:")
         for folder, reason in done.failures[:MOST_FAILURES]:
             say(f"  {folder}: {reason}")
         if len(done.failures) > MOST_FAILURES:
@@ -155,4 +159,4 @@ def _words(now: Progress) -> str:
     left = now.remaining_s
     time_left = f"{left:.0f} s" if left < 100 else f"{left / 60:.0f} min"  # noqa: PLR2004
     failed = f", {now.failed} not inspected" if now.failed else ""
-    return f"{now.per_minute:.1f} a minute, {time_left} left{failed}"
+    return f"{now.per_minute:.1f} per minute, {time_left} left{failed}"

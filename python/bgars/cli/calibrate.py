@@ -32,7 +32,7 @@ def register(app: typer.Typer) -> None:
     """Add the group of commands."""
     group = typer.Typer(
         name="calibrate",
-        help="Measure what all captures of a station share, and keep it in a file.",
+        help="Calibrate what all captures of a station share, and keep it in a file.",
         no_args_is_help=True,
     )
     group.callback()(lambda: None)
@@ -61,13 +61,11 @@ def material(
         Path | None,
         typer.Option(
             metavar="IMAGE",
-            help="The outline of one reference sphere (white); by default balls are looked for.",
+            help="Mask of one reference sphere (white); by default balls are searched for.",
             show_default=False,
         ),
     ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
-    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> None:
     """Fit how a surface shines, on the balls of a capture, for 'bgars normals --material FILE' and the other commands.
 
@@ -126,8 +124,8 @@ def _remarks(fit: ReflectanceFit) -> Iterator[str]:
     """What is not in the file."""
     own = sum(fit.own_material)
     if own:
-        yield f"{own} of the balls differ clearly in material: one file for all is a compromise."
+        yield f"{own} of the balls differ clearly in material: one file for all of them is a compromise."
     if fit.residuals_learnt:
-        yield "The balls share a residual that no material explains (light from ball to ball); the file leaves it out."
+        yield "The balls share a residual that no material explains (interreflection); the file does not contain it."
     if any(flat is not None for flat in fit.flat_radius):
         yield "Some balls have a flat top."

@@ -36,13 +36,13 @@ def response(
     exposures: Annotated[
         str | None,
         typer.Option(
-            metavar="T,T,...", help="Exposure times of the images, any unit, in their order.", show_default=False
+            metavar="T,T,...", help="Exposure times of the images, in their order and in any unit.", show_default=False
         ),
     ] = None,
     sums: Annotated[
         bool, typer.Option("--sums", help="The three images are light a, light b, and both together.")
     ] = False,
-    srgb: Annotated[bool, typer.Option("--srgb", help="Take the sRGB curve.")] = False,
+    srgb: Annotated[bool, typer.Option("--srgb", help="Use the sRGB curve.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Find how much light each grey level means; says when the camera is not linear."""
@@ -87,7 +87,7 @@ def scale(
         float | None,
         typer.Option(metavar="MM", help="Its standard uncertainty; 0.01 % by default.", show_default=False),
     ] = None,
-    target: Annotated[Literal["dots", "chessboard"], typer.Option(help="What is on the target.")] = "dots",
+    target: Annotated[Literal["dots", "chessboard"], typer.Option(help="Kind of target.")] = "dots",
     as_json: JsonOption = False,
 ) -> None:
     """Measure the pixel pitch on a grid that lies where parts lie; says how much the lens distorts."""

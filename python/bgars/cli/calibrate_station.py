@@ -12,7 +12,7 @@ import bgars
 from bgars.cli.calibrated_lights import lights_values, said_values, tell_lights
 from bgars.cli.camera_option import CameraOption, seen_by
 from bgars.cli.console import print_json, say, stage_progress, utc_now
-from bgars.errors import InputError
+from bgars.errors import FileFormatError, InputError
 from bgars.io.capture import read_unlit
 from bgars.io.own_files import need_new_or_own
 from bgars.io.station_file import is_station_file, read_station, write_station
@@ -40,15 +40,15 @@ OutputOption = Annotated[
         "--output",
         "-o",
         metavar="station.toml",
-        help="Station file; made, or its part of this calibration replaced. station.html is written beside it.",
+        help="Station file; created, or its section of this calibration replaced. station.html is written beside it.",
         show_default=False,
     ),
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
 FoldersArgument = Annotated[
     list[Path],
     typer.Argument(
-        metavar="FOLDER...", help="Capture folders, one per place of the ball; lights need not be described."
+        metavar="FOLDER", help="Capture folders, one per place of the ball; without a description of the lights."
     ),
 ]
 FolderArgument = Annotated[Path, typer.Argument(metavar="FOLDER", help="Capture folder.", show_default=False)]
@@ -66,7 +66,7 @@ InViewOption = Annotated[
 RecipeOption = Annotated[
     Path | None,
     typer.Option(
-        metavar="part.toml", help="With --sphere balls: the part's layout, and how round its balls usually are.",
+        metavar="part.toml", help="With --sphere balls: layout of the part, and usual roundness of its balls.",
         show_default=False,
     ),
 ]  # fmt: skip
@@ -83,13 +83,15 @@ NearOption = Annotated[
     bool | None,
     typer.Option(
         "--near/--distant",
-        help="Positions in mm (two places of the ball or more), or directions; by default what the balls show.",
+        help="Positions in mm (two places of the ball or more), or directions; by default the data decide.",
         show_default=False,
     ),
 ]
 DiameterOption = Annotated[
     float | None,
-    typer.Option(metavar="MM", help="Diameter of the ball: the scale where capture.toml has none.", show_default=False),
+    typer.Option(
+        metavar="MM", help="Diameter of the ball, in mm: gives the scale if capture.toml has none.", show_default=False
+    ),
 ]
 
 
@@ -144,8 +146,8 @@ def flat(folder: FolderArgument, output: OutputOption, as_json: JsonOption = Fal
         print_json({"degree": found.degree, "residual": found.residual, **said_values(findings), "file": str(output)})
         return
     say(
-        f"Even maps of {len(found.coefficients)} lights, polynomials of degree {found.degree}; "
-        f"{100 * found.residual:.2f} % is left."
+        f"Flat field of {len(found.coefficients)} lights, polynomials of degree {found.degree}; "
+        f"residual {100 * found.residual:.2f} %."
     )
     tell_findings(findings, output)
 
@@ -215,7 +217,7 @@ def drift(
     station: Annotated[Path, typer.Option(metavar="station.toml", help="The station.", show_default=False)],
     reference: Annotated[
         Literal["mirror", "matt", "flat"] | None,
-        typer.Option(help="What is in view; by default the kind of ball of the calibration.", show_default=False),
+        typer.Option(help="Reference in view; by default the kind of ball of the calibration.", show_default=False),
     ] = None,
     outline: OutlineOption = None,
     camera: CameraOption = None,
@@ -236,9 +238,9 @@ def drift(
     else:
         for finding in found:
             if finding.severity != "note":
-                say(f"{finding.severity}: {finding.message}")
+                say(f"{shown_severity(finding)}: {finding.message}")
         say(
-            f"{known.name}: {len(moved)} beyond the limit of {len(found)} comparisons"
+            f"{known.name}: {len(moved)} of {len(found)} comparisons exceed the limit"
             if moved
             else f"{known.name}: nothing moved"
         )
@@ -292,10 +294,13 @@ def _existing(path: Path) -> Station:
     if path.suffix.lower() != ".toml":
         msg = f"{path}: a station file must end in .toml"
         raise InputError(msg)
+    if not path.parent.is_dir():
+        msg = f"{path}: cannot be written (no such folder)"
+        raise FileFormatError(msg)
     if not path.exists():
         return bgars.Station(path.stem)
     if not is_station_file(path):
-        msg = f"{path}: is there already and no station file; name another one"
+        msg = f"{path}: exists and is not a station file; name another one"
         raise InputError(msg)
     return read_station(path)
 
@@ -318,8 +323,13 @@ def keep_part(output: Path, parts: dict[str, Any], findings: tuple[Remark, ...],
     write_station_page(new, output.with_suffix(".html"))
 
 
+def shown_severity(finding: Remark) -> str:
+    """The word before a message: what a station file keeps as a doubt is a warning to whoever runs the command."""
+    return "warning" if finding.severity == "doubt" else finding.severity
+
+
 def tell_findings(findings: tuple[Remark, ...], output: Path) -> None:
     """Say what was noticed, and where the result is."""
     for finding in findings:
-        say(f"{finding.severity}: {finding.message}")
+        say(f"{shown_severity(finding)}: {finding.message}")
     say(f"Written: {output}, and its page {output.with_suffix('.html')}")

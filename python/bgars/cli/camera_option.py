@@ -19,7 +19,7 @@ CameraOption = Annotated[
     str | None,
     typer.Option(
         metavar="telecentric|MM",
-        help="The lens: telecentric, or its distance from the board in mm, where capture.toml does not say. Without, "
+        help="Lens, if capture.toml does not state it: telecentric, or its distance from the board in mm. Without, "
         "either is allowed for in the uncertainty.",
         show_default=False,
     ),

@@ -28,7 +28,7 @@ def capture(
         str,
         typer.Argument(
             metavar="CAMERA",
-            help="MODULE:CALLABLE that returns an object with grab(light) -> pixels, or folder:PATH, which shows the "
+            help="MODULE:CALLABLE that returns an object with grab(light) -> pixels; or folder:PATH, which shows the "
             "images of a folder.",
             show_default=False,
         ),
@@ -36,17 +36,21 @@ def capture(
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="FOLDER", help="New capture folder.", show_default=False)
     ],
-    lights: Annotated[int, typer.Option(min=1, help="Lights, one image each.")] = 8,
+    lights: Annotated[int, typer.Option(min=1, help="Number of lights, one image each.")] = 8,
     rig: Annotated[
         Path | None,
-        typer.Option(metavar="capture.toml", help="Description of the rig, copied into it.", show_default=False),
+        typer.Option(
+            metavar="capture.toml",
+            help="capture.toml that describes the rig, copied into the folder.",
+            show_default=False,
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Take an image under each light with a camera, write a capture folder, read it again and say what is in it.
+    """Take an image under each light with a camera, write a capture folder, read it again and describe it.
 
-    The folder appears when all is in it, so that it may lie in the inbox of bgars watch. The capture is then checked as
-    'bgars check' does.
+    The folder appears when it is complete, so that it may be in the inbox of bgars watch. The capture is then checked
+    as by 'bgars check'.
     """
     need_file(rig)
     with stage_progress() as report:
@@ -64,6 +68,6 @@ def capture(
     for line in [] if facts is None else describe_in_words(facts):
         say(line)
     if facts is None:
-        say("without --rig nothing says where the lights are: put a capture.toml into it")
+        say("no --rig was given: put a capture.toml into the folder (bgars init)")
     for finding in () if findings is None else findings.told:
         warn(finding)

@@ -51,19 +51,17 @@ def check(
         Path | None,
         typer.Option(
             metavar="station.toml",
-            help="Compare with the calibration of this station: FOLDER shows its reference again, as every morning.",
+            help="Compare with the calibration of this station: FOLDER shows its reference again.",
             show_default=False,
         ),
     ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
-    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> None:
-    """Say whether images and lights belong together, and what else is wrong with a capture, before it is measured.
+    """Check whether images and lights belong together, and find other faults of a capture, before it is measured.
 
     Order and handedness of the lights, lights below the surface, the same image twice, dead and uneven lamps, exposure,
     partly lit frames, ambient light, vignetting, motion, focus, noise, response, bit depth. What a capture cannot show
-    (a flat part has no shading) is not judged. With --station: what moved since its calibration (docs/station.md).
+    (a flat part has no shading) is not judged. With --station: changes since its calibration (docs/station.md).
 
     Exit code 0: no error was found (there may be warnings). 1: an error was found: numbers from this capture would be
     wrong. 2: wrong use, or a capture that cannot be read.

@@ -57,19 +57,19 @@ def describe_in_words(facts: dict[str, Any]) -> Iterator[str]:
     yield f"capture     {facts['capture']}"
     yield f"images      {len(facts['lights'])} of {width} x {height} pixels, {facts['dtype']}"
     yield f"scale       {scale}"
-    yield f"mask        {facts['mask_fraction']:.1%} of the image"
+    yield f"mask        {100 * facts['mask_fraction']:.1f} % of the image is used"
     dark = "dark frame" if facts["dark_frame"] else f"black level {facts['black_level']:g}"
-    clip = "none" if facts["saturation"] is None else f"{facts['saturation']:g}"
-    yield f"radiometry  {facts['response']} response, {dark}, clipped at {clip}"
+    clip = "no clipping level" if facts["saturation"] is None else f"clipped at {facts['saturation']:g}"
+    yield f"radiometry  {facts['response']} response, {dark}, {clip}"
     yield f"rig         {len(facts['lights'])} {facts['rig']}"
     yield ""
     yield (
         f"{'image':<24} {'azimuth':>9} {'elevation':>10} {'intensity':>10} {'median':>9} {'maximum':>9} {'clipped':>9}"
     )
-    yield f"{'':<24} {'deg':>9} {'deg':>10} {'':>10} {'grey':>9} {'grey':>9} {'':>9}"
+    yield f"{'':<24} {'deg':>9} {'deg':>10} {'':>10} {'grey':>9} {'grey':>9} {'%':>9}"
     for light in facts["lights"]:
         yield (
             f"{light['image']:<24} {light['azimuth_deg']:>9.1f} {light['elevation_deg']:>10.1f} "
             f"{light['intensity']:>10.3f}"
-            f" {light['median_grey']:>9.4g} {light['maximum_grey']:>9.4g} {light['clipped_fraction']:>9.2%}"
+            f" {light['median_grey']:>9.6g} {light['maximum_grey']:>9.6g} {100 * light['clipped_fraction']:>9.2f}"
         )

@@ -20,9 +20,9 @@ def choice_in_words(normals: dict[str, Any]) -> str:
     if share >= ALL_MEASURED:
         trust = "Trust: the images determine every normal."
     elif share >= HALF:
-        trust = f"Trust: the images determine {share:.1%} of the normals; the others are filled in, and marked."
+        trust = f"Trust: the images determine {100 * share:.1f} % of the normals; the others are filled in, and marked."
     else:
-        trust = f"Do not trust the surface as a whole: the images determine only {share:.1%} of its normals."
+        trust = f"Do not trust the surface as a whole: the images determine only {100 * share:.1f} % of its normals."
     return f"{trust}\nMethod: {normals['method_reason']}."
 
 

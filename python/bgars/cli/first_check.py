@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 __all__ = ["check_first", "warn"]
 
-WAY_OUT = "'bgars check' shows it; --force goes on all the same"
+WAY_OUT = "'bgars check' shows it; --force continues nevertheless"
 
 
 def check_first(capture: Capture, *, force: bool) -> Findings:

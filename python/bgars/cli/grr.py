@@ -28,11 +28,11 @@ __all__ = ["register"]
 FILES = {
     "grr.html": "the page to look at first",
     "grr.json": "every figure",
-    "readings.csv": "every reading, one line each",
+    "readings.csv": "all readings, one per line",
 }
 NAMES = FolderNames(frozenset(FILES), frozenset({"grr.json"}))
 RESULTS = "results"
-RESULTS_MEANING = "the result of every run: bgars report shows one, bgars grr repeats the study from them"
+RESULTS_MEANING = "the results of all runs, for bgars report and to repeat the study"
 
 
 def register(app: typer.Typer) -> None:
@@ -53,7 +53,7 @@ def grr(
     output: Annotated[
         Path,
         typer.Option(
-            "--output", "-o", metavar="OUT", help="Folder for the study; made if missing.", show_default=False
+            "--output", "-o", metavar="OUT", help="Folder for the study; created if missing.", show_default=False
         ),
     ],
     recipe: Annotated[
@@ -62,7 +62,7 @@ def grr(
             "--recipe",
             "-r",
             metavar="PART.toml",
-            help="Recipe for captures; results bring their own.",
+            help="Recipe for captures; results contain theirs.",
             show_default=False,
         ),
     ] = None,
@@ -75,13 +75,11 @@ def grr(
         ),
     ] = None,
     method: MethodOption = DEFAULT_METHOD,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
-    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> None:
-    """Say how repeatable the gauge is: gauge R&R by analysis of variance, from repeated measurements of several parts.
+    """Compute how repeatable the gauge is: gauge R&R by analysis of variance, from repeated measurements of parts.
 
-    Runs that are captures are inspected, and their results kept in OUT/results, in folders of the same names.
+    Captures are inspected, and their results kept in OUT/results, in folders of the same names.
 
     Exit code 0: GRR is at most 10 % of every tolerance. 1: it is more, or unknown; the output says why. 2:
     wrong use, a design that is not balanced, runs that do not belong together, or a capture that cannot be measured.

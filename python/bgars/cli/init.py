@@ -27,19 +27,25 @@ def init(
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder with the images.", show_default=False)],
     station: Annotated[
         Path | None,
-        typer.Option(metavar="station.toml", help="Calibrated station: lights, scale and more.", show_default=False),
+        typer.Option(
+            metavar="station.toml", help="Calibrated station, with lights, scale and more.", show_default=False
+        ),
     ] = None,
     ring: Annotated[
         str | None,
-        typer.Option(metavar="COUNT,ELEVATION[,AZIMUTH0]", help="Even ring of lights, degrees.", show_default=False),
+        typer.Option(
+            metavar="COUNT,ELEVATION[,AZIMUTH0]",
+            help="Lights of a ring in equal steps: count, elevation and first azimuth in degrees, such as 8,45.",
+            show_default=False,
+        ),
     ] = None,
     pitch_um: Annotated[
-        float | None, typer.Option(metavar="UM", help="Size of a pixel on the board.", show_default=False)
+        float | None, typer.Option(metavar="UM", help="Size of a pixel on the board, in um.", show_default=False)
     ] = None,
     dark: Annotated[
         str | None, typer.Option(metavar="IMAGE", help="Image with all lights off.", show_default=False)
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a capture.toml that is there.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing capture.toml.")] = False,
 ) -> None:
     """Write capture.toml: from these options, or by asking on a terminal what they leave open.
 
@@ -47,7 +53,7 @@ def init(
     """
     place = need_folder(folder) / RECIPE_NAME
     if place.exists() and not force:
-        msg = f"{place}: is there already; --force replaces it"
+        msg = f"{place}: exists; --force replaces it"
         raise InputError(msg)
     if station is None and ring is None and sys.stdin.isatty():
         answer = typer.prompt("Station file (empty: none)", default="", show_default=False)
@@ -60,7 +66,7 @@ def init(
             )
             pitch_um = _number(answer) if answer else None
     if (station is None) == (ring is None):
-        msg = "--station and --ring: give one of them, it says where the lights are"
+        msg = "--station or --ring: give one of them, to say where the lights are"
         raise InputError(msg)
     lines = [] if pitch_um is None else [f"pixel_pitch_um = {pitch_um:g}"]
     lines += [] if dark is None else [f"dark = {json.dumps(dark)}"]

@@ -62,7 +62,7 @@ def inspect(
     output: Annotated[
         Path,
         typer.Option(
-            "--output", "-o", metavar="OUT", help="Folder for the results; made if missing.", show_default=False
+            "--output", "-o", metavar="OUT", help="Folder for the results; created if missing.", show_default=False
         ),
     ],
     recipe: Annotated[
@@ -90,15 +90,13 @@ def inspect(
     parquet: Annotated[
         # The help is markup: a bracket that is no style is escaped.
         bool,
-        typer.Option("--parquet", help=r"Write balls.parquet, too (needs pip install 'bgars\[parquet]')."),
+        typer.Option("--parquet", help=r"Also write balls.parquet (needs pip install 'bgars\[parquet]')."),
     ] = False,
     cfx: Annotated[
-        bool, typer.Option("--cfx", help="Write cfx.json, too: the IPC-CFX message UnitsInspected.")
+        bool, typer.Option("--cfx", help="Also write cfx.json: the IPC-CFX message UnitsInspected.")
     ] = False,
     pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Draw the four pictures (PNG).")] = True,
-    page: Annotated[
-        bool, typer.Option("--report/--no-report", help="Write report.html and what belongs to it.")
-    ] = True,
+    page: Annotated[bool, typer.Option("--report/--no-report", help="Write report.html and its side files.")] = True,
     force: ForceOption = False,
     log_line: Annotated[
         bool, typer.Option("--log", help="Print one line of key=value pairs for a log instead of text.")

@@ -17,26 +17,26 @@ __all__ = ["LAZY_COMMANDS", "LazyGroup"]
 LAZY_COMMANDS = {
     "check": (
         "bgars.cli.check",
-        "Say whether images and lights belong together, and what else is wrong with a capture.",
+        "Check whether images and lights belong together, and find other faults of a capture.",
     ),
     "mesh": ("bgars.cli.mesh", "Turn a normal map or a height map into a mesh."),
     "inspect": ("bgars.cli.inspect", "Find, measure and judge the solder balls of a part."),
     "capture": ("bgars.cli.capture", "Take an image under each light with a camera, write a capture folder."),
     "batch": ("bgars.cli.batch", "Inspect many captures into one store: all cores, failures kept with their reason."),
-    "watch": ("bgars.cli.watch", "Inspect parts as they come: each once, none lost."),
+    "watch": ("bgars.cli.watch", "Inspect parts as they arrive: each once, none lost."),
     "report": ("bgars.cli.report", "Write the page of an inspection again, from its result.json."),
-    "query": ("bgars.cli.query", "Ask a store of results, in SQL."),
-    "store": ("bgars.cli.query", "Look after a store of results."),
+    "query": ("bgars.cli.query", "Query a store of results, in SQL."),
+    "store": ("bgars.cli.query", "Maintain a store of results."),
     "send": (
         "bgars.cli.send",
         "Send the results of a store to a broker, by MQTT or AMQP 1.0: at least once, in order.",
     ),
-    "grr": ("bgars.cli.grr", "Say how repeatable the gauge is: gauge R&R by analysis of variance."),
+    "grr": ("bgars.cli.grr", "Compute how repeatable the gauge is: gauge R&R by analysis of variance."),
     "spc": (
         "bgars.cli.spc",
         "Chart many results over time: X-bar / S or I-MR charts, Cp, Cpk, Pp, Ppk with confidence intervals.",
     ),
-    "calibrate": ("bgars.cli.calibrate", "Measure what all captures of a station share, and keep it in a file."),
+    "calibrate": ("bgars.cli.calibrate", "Calibrate what all captures of a station share, and keep it in a file."),
     "init": (
         "bgars.cli.init",
         "Write capture.toml: from these options, or by asking on a terminal.",
@@ -46,7 +46,7 @@ LAZY_COMMANDS = {
         "Write a part recipe from golden parts: layout, empty places, nominal sizes.",
     ),
     "verify": ("bgars.cli.verify", "Compare a station with a part of known sizes: bias, linearity, repeatability."),
-    "simulate": ("bgars.cli.simulate", "Photograph a simulated part with known truth."),
+    "simulate": ("bgars.cli.simulate", "Render a simulated part with known truth."),
 }
 """Of each command, in the order of the help: the module whose ``register`` adds it, and its line in the list."""
 
@@ -100,6 +100,15 @@ def _reflow(command: Any) -> None:  # noqa: ANN401
     for option in getattr(command, "params", ()):
         if getattr(option, "is_flag", False):
             option.metavar = ""  # else <bool>, as if they took one
+    own_help = command.get_help_option
+
+    def help_option(context: Any) -> Any:  # noqa: ANN401
+        option = own_help(context)
+        if option is not None:
+            option.metavar = ""
+        return option
+
+    command.get_help_option = help_option
     command.help = "\n\n".join(" ".join(text.split()) for text in (command.help or "").split("\n\n"))
     if any(option.name == "method" for option in getattr(command, "params", ())):
         _with_added_methods(command)

@@ -56,7 +56,7 @@ def mesh(
     pixel_pitch_um: Annotated[
         float | None,
         typer.Option(
-            help="Pixel pitch. A .tif of bgars brings its own; any other height map needs one, its heights are um.",
+            help="Pixel pitch in um; a .tif of bgars contains it, other height maps (in um) need it.",
             show_default=False,
         ),
     ] = None,
@@ -64,14 +64,14 @@ def mesh(
         bool | None,
         typer.Option(
             "--directx/--opengl",
-            help="The normal map has green = y down (up). By default the curl of its field says.",
+            help="Green of the normal map is y down (up). By default the curl of its field decides.",
             show_default=False,
         ),
     ] = None,
     mask: Annotated[
         Path | None,
         typer.Option(
-            help="Image, white = use, for a normal map; by default alpha and a background of one colour are left out.",
+            help="Image, white = use, for a normal map; by default opaque pixels, without a background of one colour.",
             show_default=False,
         ),
     ] = None,
@@ -79,7 +79,7 @@ def mesh(
         float | None,
         typer.Option(
             metavar="UM",
-            help="Write as few triangles as keep every pixel within this height error; needs the extra simplify.",
+            help="Largest height error, in um, of a mesh with as few triangles as possible; needs the extra simplify.",
             show_default=False,
         ),
     ] = None,
@@ -88,23 +88,19 @@ def mesh(
         typer.Option(
             "--method",
             "-m",
-            help="Integrator of a normal map; bilateral keeps jumps. By default least-squares.",
+            help="Integrator of a normal map; bilateral keeps jumps; least-squares by default.",
             show_default=False,
         ),
     ] = None,
     k: Annotated[
         float | None,
-        typer.Option("--k", help="bilateral: sharpness of jumps, at least 0; by default 2.", show_default=False),
+        typer.Option("--k", help="bilateral: sharpness of jumps, at least 0; 2 by default.", show_default=False),
     ] = None,
     solver: Annotated[
         Solver | None,
-        typer.Option(
-            "--solver", help="bilateral: how its systems are solved; by default converged.", show_default=False
-        ),
+        typer.Option("--solver", help="bilateral: solver of its systems; converged by default.", show_default=False),
     ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
-    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> None:
     """Turn a normal map or a height map into a mesh, a point cloud, or heights for another program."""
     check_surface_file(output, simplify)
@@ -138,7 +134,7 @@ def mesh(
         say(f"note: {note}")
     say(f"{output}: {surface_in_words(written)}")
     if height.bilateral is not None and not height.bilateral.converged:
-        say(f"The energy still moved after {summary['reweightings']} re-weightings.")
+        say(f"The energy had not converged after {summary['reweightings']} re-weightings.")
 
 
 def _integration(source: Path, is_normal_map: bool, given: dict[str, Any]) -> dict[str, Any]:

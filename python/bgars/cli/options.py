@@ -13,6 +13,7 @@ __all__ = [
     "METHOD_ARGUMENTS",
     "METHOD_METAVAR",
     "ChannelChoice",
+    "ColourOption",
     "DirectxOption",
     "FlattenOption",
     "FolderArgument",
@@ -61,25 +62,28 @@ ForceOption = Annotated[
     bool,
     typer.Option(
         "--force",
-        help="Continue although the images do not fit the lights (order, mirrored, below the surface, an image twice).",
+        help="Continue although images and lights do not fit (order, mirrored, light below the surface, duplicates).",
     ),
 ]
 LotOption = Annotated[str, typer.Option(metavar="LOT", help="Lot that the parts belong to.", show_default=False)]
 StationNameOption = Annotated[
     str, typer.Option(metavar="NAME", help="Name of the station that took the images.", show_default=False)
 ]
-OperatorOption = Annotated[str, typer.Option(metavar="NAME", help="Who operates the station.", show_default=False)]
+OperatorOption = Annotated[str, typer.Option(metavar="NAME", help="Operator of the station.", show_default=False)]
 RoundOption = Annotated[
     int | None,
     typer.Option(
         "--round",
         min=1,
-        help="Which inspection of its serial number: 1 before rework, 2 after it; a store counts by itself.",
+        help="Number of the inspection of this serial number: 1 before rework, 2 after it; a store counts itself.",
         show_default=False,
     ),
 ]
 StoreOption = Annotated[
-    Path, typer.Option("--output", "-o", metavar="STORE", help="Store; made if missing.", show_default=False)
+    Path,
+    typer.Option(
+        "--output", "-o", metavar="STORE", help="Folder of the store; created if missing.", show_default=False
+    ),
 ]
 RecipeOption = Annotated[
     Path | None,
@@ -89,16 +93,16 @@ SerialFrom = Annotated[
     str,
     typer.Option(
         metavar="PATTERN",
-        help="Where serial numbers come from: a pattern of the folder's name with {serial}, {lot}, {substrate}, "
+        help="Source of serial numbers: a pattern for the folder's name with {serial}, {lot}, {substrate}, "
         "{position}, {station}, {operator}, {round}, such as '{lot}/{serial}_{position}'; or 'code', the "
-        r"DataMatrix in the images. A \[part] table in capture.toml goes first.",
+        r"DataMatrix or QR code in the images. A \[part] table in capture.toml takes precedence.",
     ),
 ]
 StationOption = Annotated[
     Path | None,
     typer.Option(
         metavar="station.toml",
-        help="The calibrated station (docs/station.md): its lights, response, flat field and scale are used.",
+        help="Calibrated station (docs/station.md), whose lights, response, flat field and scale are used.",
         show_default=False,
     ),
 ]
@@ -115,7 +119,9 @@ FolderArgument = Annotated[
 ]
 OutOption = Annotated[
     Path,
-    typer.Option("--output", "-o", metavar="OUT", help="Folder for the results; made if missing.", show_default=False),
+    typer.Option(
+        "--output", "-o", metavar="OUT", help="Folder for the results; created if missing.", show_default=False
+    ),
 ]
 NormalsOutOption = Annotated[
     Path,
@@ -123,14 +129,14 @@ NormalsOutOption = Annotated[
         "--output",
         "-o",
         metavar="OUT",
-        help="Folder for the results, made if missing; or one file of normals: .png, .tif, .exr, .npy, .npz.",
+        help="Folder for the results, created if missing; or one file of normals: .png, .tif, .exr, .npy, .npz.",
         show_default=False,
     ),
 ]
 ThresholdOption = Annotated[
     float | None,
     typer.Option(
-        help="Gap of specular-filter, in grey levels of 255, scaled with the bit depth; 50 by default.",
+        help="Gap of specular-filter, in grey levels of 255 (scaled with the bit depth); 50 by default.",
         show_default=False,
     ),
 ]
@@ -144,14 +150,21 @@ MaterialOption = Annotated[
 ]
 ChannelChoice = Annotated[
     ChannelOption | None,
-    typer.Option(help="How colour becomes one value (linear); by default what capture.toml says.", show_default=False),
-]
-DirectxOption = Annotated[bool, typer.Option("--directx", help="Write normals.png with green = y down.")]
-FlattenOption = Annotated[
-    Literal["plane", "quadratic"] | None,
     typer.Option(
-        help="Subtract a plane, or a quadratic surface, from the heights: wrong or near lights bend flat parts so.",
+        help="How colour is reduced to one value (linear); by default as in capture.toml, else luminance.",
         show_default=False,
     ),
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")]
+ColourOption = Annotated[
+    bool,
+    typer.Option("--colour", help="Also write albedo_rgb.tif: albedo of red, green and blue, by the same normals."),
+]
+DirectxOption = Annotated[bool, typer.Option("--directx", help="Write normals.png with green = y down (DirectX).")]
+FlattenOption = Annotated[
+    Literal["plane", "quadratic"] | None,
+    typer.Option(
+        help="Subtract a plane, or a quadratic surface, from the heights: inaccurate or near lights bow a flat part.",
+        show_default=False,
+    ),
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]

@@ -28,22 +28,25 @@ if TYPE_CHECKING:
 
     from bgars.pipelines.reconstruct import Reconstruction
     from bgars.records.normal_field import NormalField
+    from bgars.records.pixels import FloatArray
 
 __all__ = ["need_normals_place", "write_normals", "write_reconstruction"]
 
 MARK = "summary.json"
 RECONSTRUCTION = FolderNames(
-    frozenset({"overview.png", "normals.png", "height.tif", "height.npy", MARK})
+    frozenset({"overview.png", "normals.png", "height.tif", "height.npy", "albedo_rgb.tif", MARK})
     | {f"mesh{suffix}" for suffix in MESH_SUFFIXES}
     | {f"height{suffix}" for suffix in AREAL_PACKAGES},
     frozenset({MARK}),
     judged=False,
 )
 
+COLOUR = {"albedo_rgb.tif": "diffuse reflectance in red, green and blue, float32"}
+
 WRITERS = ("write_mesh", "write_normal_map", "write_height")
 
 NORMALS = FolderNames(
-    frozenset({"normals.png", "albedo.tif", "confidence.tif", "measured.png", "lights_kept.png"}),
+    frozenset({"normals.png", "albedo.tif", "albedo_rgb.tif", "confidence.tif", "measured.png", "lights_kept.png"}),
     frozenset(),
     judged=False,
 )
@@ -60,12 +63,13 @@ def write_reconstruction(
     directx: bool,
     height_format: str | None = None,
     checked: dict[str, Any] | None = None,
+    colour: Callable[[NormalField], FloatArray] | None = None,
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Run a reconstruction and write its results; return its summary and what each file is.
 
     The output folder is tried first, so that no work is lost to an unwritable one. What an earlier reconstruction left
     there goes when the new files come. `height_format`: gsf, sdf or x3p, besides. `checked`: what the check of the
-    capture found.
+    capture found. `colour`: makes albedo_rgb.tif of the normals.
     """
     with atomic_folder(output, RECONSTRUCTION) as folder:
         result = run()
@@ -77,6 +81,7 @@ def write_reconstruction(
             "height.tif": f"heights, float32, in {unit}",
             "height.npy": "the same for numpy",
             **({f"height.{height_format}": "the same for surface metrology, in m"} if height_format else {}),
+            **(COLOUR if colour else {}),
             MARK: "the numbers of this run",
         }
         if missing("matplotlib"):
@@ -90,6 +95,8 @@ def write_reconstruction(
             if "overview.png" in files:
                 bgars.write_overview(result, folder / "overview.png")
             written.result()
+        if colour is not None:
+            write_described(folder / "albedo_rgb.tif", colour(result.field), "albedo of red, green, blue")
         summary = {
             "format": "bgars-reconstruction",
             "bgars": bgars.__version__,
@@ -123,7 +130,7 @@ def _normals_meaning(directx: bool) -> str:
     return "normals, 16 bit, DirectX (green = y down)" if directx else "normals, 16 bit, OpenGL (green = y up)"
 
 
-def need_normals_place(output: Path, capture: Path, *, directx: bool) -> None:
+def need_normals_place(output: Path, capture: Path, *, directx: bool, colour: bool = False) -> None:
     """Raise where the normals of a capture could not be written as a folder or a file, before the work."""
     need_folder(capture)
     if not _is_named_file(output):
@@ -134,6 +141,9 @@ def need_normals_place(output: Path, capture: Path, *, directx: bool) -> None:
     except InputError as error:
         msg = f"{error}; for results in a folder of this name, make it first"
         raise InputError(msg) from None
+    if colour:
+        msg = f"--colour: goes with a folder for the results; leave it out for {output}"
+        raise InputError(msg)
     if directx and output.suffix.lower() != ".png":
         msg = f"--directx: only a .png says which way its green points; leave it out for {output}"
         raise InputError(msg)
@@ -143,7 +153,9 @@ def need_normals_place(output: Path, capture: Path, *, directx: bool) -> None:
     need_output(output.parent, capture)
 
 
-def write_normals(field: NormalField, output: Path, *, directx: bool) -> tuple[dict[str, Any], dict[str, str]]:
+def write_normals(
+    field: NormalField, output: Path, *, directx: bool, albedo_rgb: FloatArray | None = None
+) -> tuple[dict[str, Any], dict[str, str]]:
     """Write a normal field as pictures, or as the one file that is named; return its summary and what each file is."""
     if _is_named_file(output):
         is_picture = output.suffix.lower() == ".png"
@@ -156,6 +168,7 @@ def write_normals(field: NormalField, output: Path, *, directx: bool) -> tuple[d
     files = {
         "normals.png": _normals_meaning(directx),
         "albedo.tif": "diffuse reflectance times light, float32, 1 = full scale",
+        **(COLOUR if albedo_rgb is not None else {}),
         "confidence.tif": "trust in each normal, float32, 0 to 1",
         "measured.png": "white: the pixel's own light fixes its normal",
         "lights_kept.png": "number of lights in each fit",
@@ -163,6 +176,8 @@ def write_normals(field: NormalField, output: Path, *, directx: bool) -> tuple[d
     with atomic_folder(output, NORMALS) as folder:
         bgars.write_normal_map(field, folder / "normals.png", directx=directx)
         write_described(folder / "albedo.tif", field.albedo, "albedo")
+        if albedo_rgb is not None:
+            write_described(folder / "albedo_rgb.tif", albedo_rgb, "albedo of red, green, blue")
         write_described(folder / "confidence.tif", field.confidence, "confidence")
         iio.imwrite(folder / "measured.png", np.where(field.is_measured, 255, 0).astype(np.uint8))
         iio.imwrite(folder / "lights_kept.png", np.minimum(field.lights_kept, 255).astype(np.uint8))

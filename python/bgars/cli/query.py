@@ -30,7 +30,7 @@ StoreArgument = Annotated[
 def register(app: typer.Typer) -> None:
     """Add the commands."""
     app.command("query")(query)
-    stores = typer.Typer(help="Look after a store of results.", no_args_is_help=True)
+    stores = typer.Typer(help="Maintain a store of results.", no_args_is_help=True)
     stores.command("compact")(compact)
     stores.command("export")(export)
     stores.command("add")(add)
@@ -41,19 +41,21 @@ def query(
     store: StoreArgument,
     sql: Annotated[
         str,
-        typer.Argument(metavar="SQL", help="A question in SQL; without one, what can be asked.", show_default=False),
+        typer.Argument(
+            metavar="SQL", help="A query in SQL; without one, the tables and columns are listed.", show_default=False
+        ),
     ] = "",
     as_csv: Annotated[bool, typer.Option("--csv", help="Print CSV.")] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object: columns, and rows as objects.")
     ] = False,
 ) -> None:
-    """Ask a store of results, in SQL: which lot, which ball, since when, how often.
+    """Query a store of results, in SQL: which lot, which ball, since when, how often.
 
-    Tables: parts, balls, checks, budgets, failures, results; docs/queries.md has the questions of a quality engineer.
-    The question sees the store and no other file, and changes nothing.
+    Tables: parts, balls, checks, budgets, failures, results; docs/queries.md has examples. A query reads only the store
+    and changes nothing.
 
-    Exit code 0: answered. 2: no store, or a question that DuckDB refuses.
+    Exit code 0: answered. 2: no store, or a query that DuckDB refuses.
     """
     if as_csv and as_json:
         msg = "--csv and --json: give one of them"
@@ -114,7 +116,7 @@ def add(
     store: StoreArgument,
     results: Annotated[
         list[Path],
-        typer.Argument(metavar="RESULT...", help="result.json files, or folders that hold one.", show_default=False),
+        typer.Argument(metavar="RESULT", help="result.json files, or folders that hold one.", show_default=False),
     ],
     as_json: JsonOption = False,
 ) -> None:
@@ -149,7 +151,9 @@ def _say_table(names: list[str], rows: list[list[Any]]) -> None:
             for cell, width, right in zip(row, widths, number, strict=True)
         ]
         say("  ".join(padded).rstrip())
-    say(f"({len(rows)} rows)" if len(rows) != 1 else "(1 row)")
+    is_cut = any(len(cell) == MOST_WIDE and cell.endswith("...") for row in cells for cell in row)
+    hint = "; texts are shortened, --csv prints them whole" if is_cut else ""
+    say(f"({len(rows)} row{'' if len(rows) == 1 else 's'}{hint})")
 
 
 def _csv_cell(value: Any) -> Any:  # noqa: ANN401 - whatever was asked for

@@ -52,16 +52,16 @@ def report(
             "--output",
             "-o",
             metavar="PAGE.html",
-            help="The page; report.html beside the result by default, in the folder pages of a store.",
+            help="The page; by default report.html beside the result, or a file in the folder pages of a store.",
             show_default=False,
         ),
     ] = None,
     lot: Annotated[
-        str | None, typer.Option(metavar="LOT", help="Overview of this lot of the store.", show_default=False)
+        str | None, typer.Option(metavar="LOT", help="Write the overview of this lot of the store.", show_default=False)
     ] = None,
     round_: Annotated[
         int | None,
-        typer.Option("--round", min=1, help="Which inspection of the serial number; the last by default."),
+        typer.Option("--round", min=1, help="Number of the inspection of the serial number; the last by default."),
     ] = None,
     pages: Annotated[
         bool, typer.Option("--pages", help="With the overview, write the pages of its last parts, too.")
@@ -74,8 +74,8 @@ def report(
     it can be mailed, archived, and opened without a network. The photograph is taken from photograph.jpg and
     report.json beside the result, where bgars inspect left them.
 
-    Of a store that bgars batch or bgars watch wrote: the page of part SERIAL, or without one the overview of a lot:
-    yield, defects, where they are, drift, the last parts. Pages of a store share one plotly.min.js beside them.
+    With a store of bgars batch or bgars watch: the page of part SERIAL, or without SERIAL the overview of all
+    parts or a lot: yield, defects and their places, drift, the last parts. Its pages share one plotly.min.js.
 
     Exit code 0: the page was written, whatever the verdict. 2: there is no result, or it is not one.
     """
@@ -83,7 +83,7 @@ def report(
         _report_store(open_store(result), serial, output, lot, round_, pages=pages, as_json=as_json)
         return
     if serial is not None or lot is not None or round_ is not None or pages:
-        msg = f"{result}: is not a store: SERIAL, --lot, --round and --pages go with one"
+        msg = f"{result}: is not a store: SERIAL, --lot, --round and --pages need one"
         raise InputError(msg)
     page = output or (result if result.is_dir() else result.parent) / PAGE
     need_new_or_own(page, result)

@@ -44,16 +44,19 @@ def send(
             show_default=False,
         ),
     ] = "",
-    cfx: Annotated[bool, typer.Option("--cfx", help="Send IPC-CFX UnitsInspected, not the short message.")] = False,
+    cfx: Annotated[
+        bool, typer.Option("--cfx", help="Send IPC-CFX UnitsInspected instead of the short message.")
+    ] = False,
     follow: Annotated[
-        bool, typer.Option("--follow", help="Keep sending as parts come, across restarts of the broker, until stopped.")
+        bool,
+        typer.Option("--follow", help="Keep sending as parts arrive, across restarts of the broker, until stopped."),
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Send the results of a store to a broker, by MQTT or AMQP 1.0: at least once, in order.
 
-    The store is the outbox. What the broker has is remembered beside it (STORE/sent), each part when it was
-    acknowledged; what it could not take is sent when it answers again, with growing pauses of a minute at most.
+    The store is the outbox. Parts that the broker has acknowledged are recorded in STORE/sent; the others are sent when
+    it answers again, after growing pauses of a minute at most.
 
     Passwords are read from the environment, or from the file that BGARS_MQTT_PASSWORD_FILE or BGARS_AMQP_PASSWORD_FILE
     names. TLS trusts the system's authorities; BGARS_AMQP_CA_FILE names another file of them.

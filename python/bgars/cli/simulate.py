@@ -18,8 +18,8 @@ MEANINGS = {
     "capture.toml": "how to read the images: bgars info, reconstruct, evaluate",
     "gt.npz": "true normals, heights, labels and lit masks, for bgars evaluate",
     "balls.csv": "the true ball table",
-    "truth.json": "the same, with both coplanarities",
-    "scene.json": "the recipe that makes the same bits again",
+    "truth.json": "the same as JSON, with both coplanarities",
+    "scene.json": "the recipe that makes the same images again",
     "albedo_map.npy": "albedo of the board",
     "response.csv": "response of the camera",
 }
@@ -31,10 +31,10 @@ def register(app: typer.Typer) -> None:
     app.command(
         "simulate",
         help=(
-            "Photograph a simulated part with known truth: a capture folder that every other command reads.\n\n"
+            "Render a simulated part with known truth: a capture folder that every other command reads.\n\n"
             "One reflection, no light from ball to ball; attached and cast shadows are exact. "
-            "A recipe file (.toml; docs/simulator.md) says what, from where, and with which camera; "
-            "these come with bgars:\n\n"
+            "A recipe file (.toml; docs/simulator.md) describes part, lights and camera; "
+            "these recipes come with bgars:\n\n"
             f"{recipes}"
         ),
     )(simulate)
@@ -53,17 +53,15 @@ def simulate(
             "--output",
             "-o",
             metavar="OUT",
-            help="Folder of the capture; made if missing. It must not hold a capture already.",
+            help="Folder of the capture; created if missing. It must not hold a capture already.",
             show_default=False,
         ),
     ],
     seed: Annotated[
         int | None,
-        typer.Option(help="Another seed of noise and ball-to-ball material than the recipe's.", show_default=False),
+        typer.Option(help="Seed of noise and ball-to-ball material, instead of the recipe's.", show_default=False),
     ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
-    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> None:
     """Run a recipe and write its capture."""
     setup = bgars.read_scene(recipe)

@@ -39,7 +39,7 @@ def spc(
     results: Annotated[
         list[Path],
         typer.Argument(
-            metavar="RESULT...",
+            metavar="RESULT",
             help="Results of bgars inspect: result.json files, their folders, folders of such folders, patterns of "
             "these; or a store.",
             show_default=False,
@@ -48,42 +48,40 @@ def spc(
     output: Annotated[
         Path,
         typer.Option(
-            "--output", "-o", metavar="OUT", help="Folder for the charts; made if missing.", show_default=False
+            "--output", "-o", metavar="OUT", help="Folder for the charts; created if missing.", show_default=False
         ),
     ],
     subgroup: Annotated[
         int | None,
         typer.Option(
-            help="Consecutive parts of a subgroup; 1: each part is a point, with moving ranges (I-MR). By default "
+            help="Parts of a subgroup, in order; 1: each part is a point, with moving ranges (I-MR). By default "
             f"{DEFAULT_SUBGROUP}, and 1 below {FEW_PARTS} parts.",
             show_default=False,
         ),
     ] = None,
     target: Annotated[float, typer.Option(help="Required Ppk.")] = TARGET,
     western_electric: Annotated[
-        bool, typer.Option("--western-electric", help="Look for the zone patterns, too; more false alarms.")
+        bool, typer.Option("--western-electric", help="Also apply the Western Electric zone rules; more false alarms.")
     ] = False,
     nelson: Annotated[
         str,
-        typer.Option(
-            metavar="RULES", help="Look for these of Nelson's rules, such as 2,3,5; or all.", show_default=False
-        ),
+        typer.Option(metavar="RULES", help="Nelson's rules to apply, such as 2,3,5; or all.", show_default=False),
     ] = "",
     where: Annotated[
         str,
-        typer.Option(metavar="SQL", help="Which parts of a store, such as \"lot = 'L7'\".", show_default=False),
+        typer.Option(
+            metavar="SQL", help="Condition on the parts of a store, such as \"lot = 'L7'\".", show_default=False
+        ),
     ] = "",
     query: Annotated[
         str,
         typer.Option(
             metavar="SQL",
-            help="Chart the numbers of this question to a store instead (I-MR); its other columns are labels.",
+            help="Chart the numbers of this query of a store instead (I-MR); its other columns are labels.",
             show_default=False,
         ),
     ] = "",
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
-    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> None:
     """Chart many results over time: X-bar / S or I-MR charts, Cp, Cpk, Pp, Ppk with confidence intervals.
 

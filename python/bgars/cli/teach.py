@@ -26,17 +26,15 @@ def register(app: typer.Typer) -> None:
 def teach(
     golden: Annotated[
         list[Path],
-        typer.Argument(metavar="GOLDEN...", help="Capture folders of parts that are good.", show_default=False),
+        typer.Argument(metavar="GOLDEN", help="Capture folders of parts that are good.", show_default=False),
     ],
     output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="part.toml", help="The recipe; made.", show_default=False)
+        Path, typer.Option("--output", "-o", metavar="part.toml", help="Part recipe to write.", show_default=False)
     ],
     name: Annotated[str, typer.Option(help="Name of the part; the file's name by default.", show_default=False)] = "",
     station: StationOption = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a recipe that is there.")] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
-    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing recipe.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> None:
     """Write a part recipe from golden parts: layout, empty places, nominal sizes, and limits by a rule the file states.
 
@@ -44,7 +42,7 @@ def teach(
     differ.
     """
     if output.exists() and not force:
-        msg = f"{output}: is there already; --force replaces it"
+        msg = f"{output}: exists; --force replaces it"
         raise InputError(msg)
     results = []
     with stage_progress() as report:
@@ -62,5 +60,6 @@ def teach(
         f"{taught.name}: {taught.rows} x {taught.cols} places, {len(taught.depopulated)} of them empty, pitch "
         f"{taught.pitch_um:.1f} um,"
     )
-    say(f"balls of {taught.diameter_um:.1f} um, {taught.height_um:.1f} um high, from {taught.parts} part(s).")
-    say(f"Written: {output}. Read its limits before you use it.")
+    parts = f"{taught.parts} part{'' if taught.parts == 1 else 's'}"
+    say(f"balls of {taught.diameter_um:.1f} um, {taught.height_um:.1f} um high, from {parts}.")
+    say(f"Written: {output}. Check its limits before you use it.")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import bgars
-from bgars.cli.calibrate_station import said_values
+from bgars.cli.calibrate_station import said_values, shown_severity
 from bgars.cli.console import print_json, say, stage_progress, utc_now
 from bgars.errors import InputError
 from bgars.io.station_file import read_station, write_station
@@ -34,28 +34,30 @@ def register(app: typer.Typer) -> None:
 
 def verify(
     folders: Annotated[
-        list[Path], typer.Argument(metavar="FOLDER...", help="Captures of the known part.", show_default=False)
+        list[Path], typer.Argument(metavar="FOLDER", help="Captures of the known part.", show_default=False)
     ],
     known: Annotated[
         Path,
         typer.Option(
-            metavar="known.csv", help="Calibrated sizes: name, height_um, diameter_um, u_um.", show_default=False
+            metavar="known.csv",
+            help="CSV table of calibrated sizes: name, height_um, diameter_um, u_um.",
+            show_default=False,
         ),
     ],
     station: Annotated[
-        Path, typer.Option(metavar="station.toml", help="The station; the result is kept in it.", show_default=False)
+        Path, typer.Option(metavar="station.toml", help="Station file; the result is added to it.", show_default=False)
     ],
     recipe: Annotated[
         Path | None,
-        typer.Option("--recipe", "-r", metavar="PART.toml", help="Layout: names of the balls.", show_default=False),
+        typer.Option(
+            "--recipe", "-r", metavar="PART.toml", help="Part recipe, which names the balls.", show_default=False
+        ),
     ] = None,
     mpe_um: Annotated[
         float | None,
         typer.Option(metavar="UM", help="Maximum permissible error of a single reading.", show_default=False),
     ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object for machines instead of text.")
-    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> None:
     """Compare a station with a part of known sizes: bias, linearity, repeatability (protocol: docs/station.md).
 
@@ -98,6 +100,6 @@ def verify(
                 f"{one.largest_um:.2f} um, {one.balls} balls in {one.captures} captures"
             )
         for remark in said:
-            say(f"{remark.severity}: {remark.message}")
+            say(f"{shown_severity(remark)}: {remark.message}")
     if broken:
         raise typer.Exit(EXIT_BROKEN)

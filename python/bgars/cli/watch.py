@@ -56,50 +56,56 @@ def watch(
         ),
     ] = None,
     count: Annotated[
-        int | None, typer.Option(min=1, help="Images of a complete part, masks counted.", show_default=False)
+        int | None, typer.Option(min=1, help="Number of images of a complete part, masks included.", show_default=False)
     ] = None,
     trigger: Annotated[
         str,
         typer.Option(
-            metavar="NAME", help="File that is written last: with it nothing has to settle.", show_default=False
+            metavar="NAME",
+            help="Name of a file that is written last; with it --settle is not used.",
+            show_default=False,
         ),
     ] = "",
     files: Annotated[
         str,
         typer.Option(
             metavar="PATTERN",
-            help="Images lie in INBOX itself, and are told apart by their names: '{serial}_{image}.png'.",
+            help="Pattern of images in INBOX itself, such as '{serial}_{image}.png'; needs --count.",
             show_default=False,
         ),
     ] = "",
     settle: Annotated[
-        float, typer.Option(min=0.0, help="Seconds without a change after which a part is complete.")
+        float, typer.Option(min=0.0, help="Time without a change after which a part is complete, in s.")
     ] = 0.5,
-    poll: Annotated[float, typer.Option(min=0.01, help="Seconds between two looks.")] = 0.1,
+    poll: Annotated[float, typer.Option(min=0.01, help="Polling interval, in s.")] = 0.1,
     patience: Annotated[
-        float, typer.Option(min=0.0, help="Seconds after which an incomplete or unreadable part counts as failed.")
+        float, typer.Option(min=0.0, help="Time after which an incomplete or unreadable part counts as failed, in s.")
     ] = 60.0,
     done: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Where parts go; INBOX/_done by default.", show_default=False)
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Folder for inspected parts; INBOX/_done by default.", show_default=False),
     ] = None,
     failed: Annotated[
         Path | None,
         typer.Option(
-            metavar="FOLDER", help="Where parts go that cannot be inspected; INBOX/_failed.", show_default=False
+            metavar="FOLDER",
+            help="Folder for parts that cannot be inspected; INBOX/_failed by default.",
+            show_default=False,
         ),
     ] = None,
     on_result: Annotated[
         str,
-        typer.Option(metavar="COMMAND", help="Program that gets each result as JSON on its input.", show_default=False),
+        typer.Option(metavar="COMMAND", help="Program that receives each result as JSON on stdin.", show_default=False),
     ] = "",
     post: Annotated[
-        str, typer.Option(metavar="URL", help="HTTP server that gets each result as JSON.", show_default=False)
+        str, typer.Option(metavar="URL", help="HTTP server that receives each result as JSON.", show_default=False)
     ] = "",
     result_file: Annotated[
-        str, typer.Option(metavar="FILE", help="File that holds the line of the last result.", show_default=False)
+        str, typer.Option(metavar="FILE", help="File that holds the log line of the last result.", show_default=False)
     ] = "",
     tcp: Annotated[
-        str, typer.Option(metavar="HOST:PORT", help="PLC that gets the line of each result.", show_default=False)
+        str,
+        typer.Option(metavar="HOST:PORT", help="PLC that receives the log line of each result.", show_default=False),
     ] = "",
     method: MethodOption = DEFAULT_METHOD,
     serial_from: SerialFrom = "{serial}",
@@ -110,16 +116,16 @@ def watch(
         int | None, typer.Option("--stop-after", min=1, help="Stop after this many parts.", show_default=False)
     ] = None,
 ) -> None:
-    """Inspect parts as they come: each once, none lost, across restarts, full disks and changes of the clock.
+    """Inspect parts as they arrive: each once, none lost, across restarts, full disks and changes of the clock.
 
-    A part is a folder in INBOX. It is complete with --count images and when nothing changed for --settle seconds, or as
-    soon as the --trigger file is there. It is inspected where it lies; its result is written to disk and reported,
-    and only then the part moves to the done or failed ones: if that is interrupted, it is inspected again, and is in
-    the store once. One line of key=value pairs is printed for each part; --result-file and --tcp give it to a PLC.
+    A part is a folder in INBOX. It is complete with --count images and no change for --settle seconds, or as soon as
+    the --trigger file exists. It is inspected in place; its result is written to disk and reported, and only then is
+    the part moved to the done or failed folder. After an interruption it is inspected again, and is in the store once.
+    One line of key=value pairs is printed per part; --result-file and --tcp pass it to a PLC.
 
     SIGTERM and Ctrl-C end it after the current part.
 
-    Exit code 0: it was ended. 2: wrong use, or another bgars watch works on INBOX.
+    Exit code 0: ended by a signal or --stop-after. 2: wrong use, or another bgars watch works on INBOX.
     """
     for path in (recipe, rig):
         if path is not None:

@@ -55,7 +55,8 @@ def check_capture(capture: Capture) -> None:
             raise InputError(msg)
         clipped = float(np.mean(sample >= capture.saturation))
         if clipped > MAX_CLIPPED:
-            msg = f"{name}: saturated: at most {MAX_CLIPPED:.0%} of the pixels may be clipped, got {clipped:.0%}"
+            most, got = 100 * MAX_CLIPPED, 100 * clipped
+            msg = f"{name}: saturated: at most {most:.0f} % of the pixels may be clipped, got {got:.0f} %"
             raise InputError(msg)
         signal = float(np.percentile(sample, BRIGHT_PERCENT)) - dark
         if not signal > MIN_CONTRAST * capture.full_scale:

@@ -80,14 +80,14 @@ def unjudged_lights(
     looked_at, fitting = (none, none) if weight is None else fitting_stretches(edges, weight)
     wrong = ~in_view & (looked_at >= FEWEST_STRETCHES) & (fitting < MISFIT_SHARE * looked_at)
     texts = [
-        f"{light_name(light, files, what='image')}: most of its shadows lies outside of it, and what is left is not "
+        f"{light_name(light, files, what='image')}: most of its shadows lie outside of it, and the rest is not "
         f"where light {light} of the rig casts it ({fitting[light]} of {looked_at[light]} stretches of edge fit)"
         for light in map(int, np.flatnonzero(wrong))
     ]
     others = [int(light) for light in np.flatnonzero(~in_view & ~wrong)]
     if others:
         names = "all lights" if len(others) == len(in_view) else _names(others, files)
-        why = "no shadow could be fitted" if weight is None else "most of the shadows lies outside the image"
+        why = "no shadow could be fitted" if weight is None else "most of the shadows lie outside the image"
         texts.append(f"{names}: {why}: where they stand cannot be judged by their shadows")
     return tuple(texts)
 

@@ -28,12 +28,12 @@ WORDS = {
     "true_position_um": "true position",
     "diameter_um": "diameter",
     "height_um": "height",
-    "aspect_ratio": "vertical over horizontal radius",
+    "aspect_ratio": "aspect ratio",
     "flat_top_depth_um": "flat top",
 }
 MISSING = "no ball at its place"
 UNCLEAR = "something is at its place, but it was not measured"
-UNJUDGED = "no ball found, in a set-up that shows too few of them to judge by"
+UNJUDGED = "no ball found, and too few others in view to judge by"
 EXTRA = "a ball where none should be"
 NOT_MEASURED = "found, but not measured"
 

@@ -23,7 +23,7 @@ OUTSIDE = "is outside its limits"
 """What :mod:`bgars.inspection.decision` says of a reading that fails."""
 HOW_TO_LIMIT = f"{NO_LIMITS}: for a verdict, give a recipe with a [limits] table"
 LOOK_AT = (
-    "this cannot be judged; look at the order of lights and images (mirrored, counted clockwise), the exposure, "
+    "this cannot be judged; check the order of lights and images (mirrored, counted clockwise), the exposure, "
     "pixel_pitch_um and pitch_um, and the mask"
 )
 FALLS = "the part does not stand: its centre of gravity is outside its balls"
@@ -126,7 +126,9 @@ def part_reasons(
         if ball.present and ball.verdict == "undecided" and own:
             why.append(f"{ball.name} ({own[0]})")
     if why:
-        reasons.append(f"{_count(len(why), 'ball')} undecided: {_listed(why, ';', MAX_TOLD)}")
+        # Without limits every ball is undecided: these are in doubt besides.
+        state = "undecided" if has_limits else "in doubt"
+        reasons.append(f"{_count(len(why), 'ball')} {state}: {_listed(why, ';', MAX_TOLD)}")
     reasons += [check.reason for check in checks if check.verdict == "undecided"]
     if not has_limits:
         reasons.append(HOW_TO_LIMIT)

@@ -241,7 +241,7 @@ def _measured(
             top -= flat
             reasons.append(f"flat top: {flat * pitch:.0f} um are missing")
         elif not u_flat <= UNSEEN_TOP * radius:
-            reasons.append("its top was not seen well enough (clipped, or too dark): a flat one would look the same")
+            reasons.append("its top was not seen well enough (clipped, or too dark): a flat top would look the same")
     known = np.isfinite(solution.residual_px[place])
     outliers = float((solution.weight[place][known] < 0.1).mean()) if known.any() else 1.0  # noqa: PLR2004
     if outliers > MANY_OUTLIERS:

@@ -40,7 +40,7 @@ def what_is_odd(settled: Settled, pitch_um: float) -> tuple[str, ...]:
             f"either all balls are {'flatter' if common[ROUNDNESS] < 0 else 'taller'} than spheres, or all lamps stand "
             f"{'higher' if common[ELEVATION] > 0 else 'lower'} than the rig says (probability {100 * round_:.0f} and "
             f"{100 * raised:.0f} %): heights are uncertain by about {percent:.1f} %. A calibrated rig ([lights] u_deg) "
-            "or the balls' shape (aspect_ratio, u_aspect_ratio of the recipe) would tell"
+            "or the balls' shape (aspect_ratio, u_aspect_ratio of the recipe) would decide"
         )
     if odd.get(PERSPECTIVE, 0.0) > PROBABLE:
         distance_mm = 1e-3 * pitch_um / max(float(common[PERSPECTIVE]), 1e-12)
@@ -51,8 +51,8 @@ def what_is_odd(settled: Settled, pitch_um: float) -> tuple[str, ...]:
     if odd.get(EDGE, 0.0) > PROBABLE:
         texts.append(
             f"all edges of shadows lie {abs(float(common[EDGE])):.2f} pixels "
-            f"{'outside' if common[EDGE] > 0 else 'inside'} of where outlines put them: is the response linear, is the "
-            "board over-exposed?"
+            f"{'outside' if common[EDGE] > 0 else 'inside'} of their place by the outlines: check that the "
+            "response is linear and the board not overexposed"
         )
     return tuple(texts)
 
@@ -82,6 +82,6 @@ def silhouettes_or_shadows(silhouette_px: Array, shadow_px: Array) -> tuple[str,
         return ()
     word = "smaller" if off < 0.0 else "larger"
     return (
-        f"the balls look {100.0 * abs(off):.0f} % {word} than their shadows say: one of both is wrong, and heights "
-        "with it (too little contrast, or highlights taken for outlines)",
+        f"the balls look {100.0 * abs(off):.0f} % {word} than their shadows indicate: one of the two is wrong, and "
+        "so are the heights (too little contrast, or highlights taken for outlines)",
     )

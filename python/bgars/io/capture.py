@@ -245,7 +245,7 @@ def _load(
     headers = read_headers(paths[:1] if stack else paths, stack=stack)
     if headers.lossy and "response" not in recipe.model_fields_set:
         notes.append(
-            f"{headers.lossy} is hardly ever proportional to light, but taken so; where a camera or phone made it, "
+            f"{headers.lossy} is hardly ever linear in light, but is taken as linear; if a camera or phone made it, "
             f'write response = "srgb" in {RECIPE_NAME}, or "linear" to confirm'
         )
     decoding = Decoding(paths, stack, channel, max_megapixels, threads)

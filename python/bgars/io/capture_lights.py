@@ -134,8 +134,8 @@ def _unit(table: LightTable, path: Path, notes: list[str]) -> tuple[NDArray[np.f
         return units, table.intensities
     if lengths.max() > STRONGEST:
         msg = (
-            f"{path}: its vectors are {lengths.min():.4g} to {lengths.max():.4g} long, so that they are no directions; "
-            f'where they are positions of LEDs, write in {RECIPE_NAME}, under [lights]: positions_mm = "{path.name}"'
+            f"{path}: its vectors are {lengths.min():.4g} to {lengths.max():.4g} long, so they are not directions; "
+            f'if they are positions of LEDs, write in {RECIPE_NAME}, under [lights]: positions_mm = "{path.name}"'
         )
         raise FileFormatError(msg)
     if table.intensities is not None:

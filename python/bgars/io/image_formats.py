@@ -115,7 +115,7 @@ def format_of(path: Path) -> ImageFormat:
     if head[4:8] == b"ftyp":
         name = "HEIF, AVIF or a film"
     if head.startswith(LFS_POINTER):
-        msg = f"{path}: cannot be decoded as an image (it only names one that Git LFS keeps: git lfs pull fetches it)"
+        msg = f"{path}: cannot be decoded as an image (it is a Git LFS pointer: git lfs pull fetches the image)"
         raise FileFormatError(msg)
     told = "unknown file format" if name is None else f"it is {name}, which is not read; convert it to PNG or TIFF"
     msg = f"{path}: cannot be decoded as an image ({told})"

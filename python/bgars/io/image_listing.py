@@ -74,14 +74,14 @@ class Listing:
     def in_words(self, *, without_images: bool = False) -> str:
         """What is there, for a message about what is not."""
         parts = [
-            f"{len(names)} {what} ({some_of(names)})"
+            f"{len(names)} {what.format(s='' if len(names) == 1 else 's')} ({some_of(names)})"
             for what, names in (
-                ("images", () if without_images else self.images),
-                ("masks", self.masks),
-                ("images of other use", self.special),
-                ("hidden files", self.hidden),
-                ("files that are no images", self.others),
-                ("folders", self.folders),
+                ("image{s}", () if without_images else self.images),
+                ("mask{s}", self.masks),
+                ("image{s} of other use", self.special),
+                ("hidden file{s}", self.hidden),
+                ("file{s} other than images", self.others),
+                ("folder{s}", self.folders),
             )
             if names
         ]

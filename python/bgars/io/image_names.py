@@ -55,7 +55,7 @@ def find_named_images(
     where = "" if source is None else f"{source.name} names it; "
     listing = f"{where}{max(count, 0)} of {len(names)} named images found in {folder}"
     if count <= 0 and source is not None and not any(Path(name).suffix.lower() in IMAGE_SUFFIXES for name in bases):
-        listing += "; if these are no files, take them out, and lights go to images in their order"
+        listing += "; if these are not files, remove them: lights are then assigned to images in their order"
     msg = f"{shown(folder / _base_name(first))}: no such image file ({listing})"
     raise FileFormatError(msg)
 

@@ -123,17 +123,17 @@ def _other_file(folder: Path, listing: Listing, notes: list[str]) -> str:
         raise InputError(msg)
     if positions:
         msg = (
-            f"{folder}: {positions[0]} seems to hold positions of lights; say so in {RECIPE_NAME}: pixel_pitch_um = "
+            f"{folder}: {positions[0]} seems to hold positions of lights; write in {RECIPE_NAME}: pixel_pitch_um = "
             f'..., and under [lights] positions_mm = "{positions[0]}" (mm, origin at the image centre on the board)'
         )
         raise InputError(msg)
     almost = [name for name in listing.others if name.lower().startswith(RECIPE_NAME) and name != RECIPE_NAME]
     foreign = [name for name in listing.others if name.lower() in ("capture.yaml", "capture.yml", "capture.json")]
     if foreign:
-        msg = f"{folder}: {foreign[0]} is not read: write what it says as TOML into {RECIPE_NAME}"
+        msg = f"{folder}: {foreign[0]} is not read: write its content as TOML into {RECIPE_NAME}"
         raise InputError(msg)
     if almost:
-        msg = f"{folder}: {almost[0]} is not read: it must be called {RECIPE_NAME}"
+        msg = f"{folder}: {almost[0]} is not read: its name must be {RECIPE_NAME}"
         raise InputError(msg)
     msg = (
         f"{folder}: no description of the lights: expected {RECIPE_NAME} with [lights], {DIRECTIONS}, "
@@ -178,5 +178,5 @@ def _hint(folder: Path, listing: Listing) -> str:
         return f". {unread[0]} is not read: lights come as {known} (docs/captures.md)"
     tables = [name for name in listing.others if Path(name).suffix.lower() in SUFFIXES]
     if len(tables) == 1:
-        return f". Should {tables[0]} hold the lights: write {RECIPE_NAME} with [lights] and directions = '{tables[0]}'"
-    return ""
+        return f". If {tables[0]} holds the lights, write {RECIPE_NAME} with [lights] and directions = '{tables[0]}'"
+    return f". 'bgars init {folder}' writes {RECIPE_NAME}" if listing.images else ""

@@ -76,9 +76,8 @@ def normals_of(path: Path, pixels: Pixels, use: BoolArray | None, directx: bool 
     usable &= _are_normals(vectors)
     vectors /= np.maximum(_lengths(vectors), 1e-6)[..., np.newaxis]
     if use is None and (surround & usable).any() and is_cut_out(vectors, surround, usable):
-        notes.append(
-            f"the flat surround ({surround.mean():.1%} of the pixels) is taken as background; --mask says else"
-        )
+        share = 100 * surround.mean()
+        notes.append(f"the flat surround ({share:.1f} % of the pixels) is taken as background; --mask overrides this")
         usable &= ~surround
     _set_green(vectors, usable, directx, notes)
     vectors[~usable] = np.nan
@@ -202,8 +201,8 @@ def _refuse(path: Path, vectors: FloatArray, inner: BoolArray) -> FloatArray:
     """Of a picture of something else: its colours are no unit vectors."""
     others = 1.0 - (_unit_share(vectors, inner) if vectors.shape[2] == RGB else 0.0)
     msg = (
-        f"{path}: is not a normal map: at least {1 - MOST_OTHERS:.0%} of its pixels must be unit vectors (length 1 "
-        f"within {UNIT_WITHIN:g}), but {others:.1%} are not"
+        f"{path}: is not a normal map: at least {100 * (1 - MOST_OTHERS):.0f} % of its pixels must be unit vectors "
+        f"(length 1 within {UNIT_WITHIN:g}), but {100 * others:.1f} % are not"
     )
     raise FileFormatError(msg)
 
@@ -221,11 +220,11 @@ def _toward_the_camera(path: Path, vectors: FloatArray, inner: BoolArray, notes:
         notes.append("red is above half nearly everywhere, blue is not: its channels are taken as B, G, R")
         return np.ascontiguousarray(vectors[..., ::-1])
     if above[2] <= FEW:
-        notes.append("blue is below half nearly everywhere: z is taken as pointing away from the camera, and turned")
+        notes.append("blue is below half nearly everywhere: z is taken as pointing away from the camera, and reversed")
         return vectors * np.array([1.0, 1.0, -1.0], np.float32)
     msg = (
-        f"{path}: {1 - above[2]:.0%} of its normals face away from the camera (blue below half): an object- or "
-        "world-space map cannot be used; save one in the camera's (tangent) space, or leave the back out with a mask"
+        f"{path}: {100 * (1 - above[2]):.0f} % of its normals face away from the camera (blue below half): an object- "
+        "or world-space map cannot be used; save one in camera (tangent) space, or exclude the back with a mask"
     )
     raise FileFormatError(msg)
 
@@ -236,7 +235,7 @@ def _set_green(vectors: FloatArray, usable: BoolArray, directx: bool | None, not
     if directx if directx is not None else agreement < 0:
         vectors[..., 1] *= -1.0
     if directx is None and agreement < 0:
-        notes.append("green is taken as y down (DirectX): so the curl of the field says; --opengl says else")
+        notes.append("green is taken as y down (DirectX), as the curl of the field shows; --opengl overrides this")
     elif directx is not None and agreement and (agreement < 0) != directx:
         seen = "down" if agreement < 0 else "up"
-        notes.append(f"green is taken as said, but the curl of the field says y {seen}")
+        notes.append(f"green is taken as stated, but the curl of the field shows y {seen}")

@@ -94,7 +94,7 @@ def need_new_or_own(output: str | os.PathLike[str], *inputs: str | os.PathLike[s
             msg = f"{path}: is read by this command, and results never replace inputs; name another file"
             raise InputError(msg)
     if not is_own(path):
-        msg = f"{path}: is there already, and bgars did not write it; move it away, or name another file"
+        msg = f"{path}: exists, and bgars did not write it; move it away, or name another file"
         raise InputError(msg)
 
 

@@ -46,7 +46,7 @@ class LimitsTable(StrictNumbers):
     diameter_um: Range | None = Field(None, description="lowest and highest horizontal diameter")
     height_um: Range | None = Field(None, description="lowest and highest top above the local board")
     aspect_ratio: Range | None = Field(None, description="lowest and highest vertical over horizontal radius")
-    flat_top_depth_um: Positive | None = Field(None, description="largest height that a flat top may lack")
+    flat_top_depth_um: Positive | None = Field(None, description="largest missing height of a flat top")
     pitch_um: Range | None = Field(None, description="lowest and highest pitch of the best-fitting grid")
     seating_coplanarity_um: Positive | None = Field(None, description="largest apex distance from the seating plane")
     regression_coplanarity_um: Positive | None = Field(
@@ -155,7 +155,7 @@ class PartTable(StrictNumbers):
             given = [*(name for name in lattice if name not in missing)]
             given += [] if self.depopulated is None else ["depopulated"]
             if given:
-                msg = f"contradicting layout: positions goes without {', '.join(given)}"
+                msg = f"contradictory layout: positions excludes {', '.join(given)}"
                 raise ValueError(msg)
         elif missing:
             msg = f"the layout needs rows, cols and pitch_um, or positions; missing: {', '.join(missing)}"

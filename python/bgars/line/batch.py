@@ -111,10 +111,10 @@ def inspect_many(
     send_images: bool = False,
     progress: Callable[[Progress], object] | None = None,
 ) -> Batch:
-    """Inspect many captures; failures are kept with their reason and stop nothing.
+    """Inspect many captures; failures are kept with their reason and do not stop the others.
 
     The results are the same in any order and for any number of processes and threads. What the store has, by the
-    contents of images, recipe and version, is not done again: a run that was killed goes on where it was.
+    contents of images, recipe and version, is not done again: a killed run continues where it stopped.
 
     Parameters
     ----------

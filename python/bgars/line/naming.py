@@ -29,9 +29,9 @@ DEFAULT_PATTERN = "{serial}"
 
 @dataclass(frozen=True)
 class Naming:
-    """How a part is told from the next.
+    """How a part is identified.
 
-    What ``[part]`` in its capture.toml says counts most, then the pattern, then what is the same for all.
+    ``[part]`` in its capture.toml takes precedence, then the pattern, then what is the same for all.
 
     Attributes
     ----------

@@ -148,7 +148,7 @@ class Watch:
             for problem in self.notifier.tell(result, place):
                 self.say(f"{result.serial}: {problem}")
             if new is None:
-                self.say(f"{part.folder.name}: the store had it; told and moved again")
+                self.say(f"{part.folder.name}: the store had it; reported and moved again")
             self.say(f"{result.summary_line()} seconds={outcome.seconds:.2f}")
         return self._move(part, place)
 

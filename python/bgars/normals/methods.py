@@ -61,23 +61,23 @@ class NormalsMethod:
 TABLE = {
     method.name: method
     for method in (
-        NormalsMethod("lambertian", "all lights."),
+        NormalsMethod("lambertian", "least squares over all lights."),
         NormalsMethod("specular-filter", "the published sorted-gap filter.", options=("threshold",)),
         NormalsMethod(
             "robust-filter",
-            "the window of sorted values that a matt facet explains best, shadows and highlights left out.",
+            "least squares over the window of sorted values that fits a matt facet best; leaves out shadows and "
+            "highlights.",
         ),
         NormalsMethod(
             "reflectance",
-            "on balls, highlights included, by the material that is fitted on them, elsewhere robust-filter; "
-            "without balls and a material, under fewer than 4 lights, or where no material explains the balls: blind.",
+            "uses highlights: on balls, by the material fitted on them; elsewhere robust-filter. Without balls and a "
+            "material, with fewer than 4 lights, or if no material fits the balls: blind.",
             options=("anchors", "material"),
         ),
         NormalsMethod(
             "blind",
-            "one material is fitted to the whole capture together with every normal, and taken where it predicts "
-            "lights left out about as well as least squares and robust-filter, else the better of these; slow; under "
-            "fewer than 5 lights robust-filter.",
+            "fits one material and all normals together (slow). If it predicts left-out lights worse than least "
+            "squares and robust-filter, the better of these is used; with fewer than 5 lights robust-filter.",
             is_compared=False,  # it is what reflectance does without balls
         ),
     )

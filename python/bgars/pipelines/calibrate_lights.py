@@ -63,7 +63,7 @@ def calibrate_lights(
     diameter_um : float, optional
         Diameter of the ball: gives the pixel pitch where the captures state none. Not with "balls".
     recipe : PartRecipe or path, optional
-        With "balls": layout of the part, and how round its balls usually are.
+        With "balls": layout of the part, and usual roundness of its balls.
     progress : callable, optional
         Called with the fraction done.
 
@@ -75,7 +75,7 @@ def calibrate_lights(
     Raises
     ------
     CalibrationError
-        No ball, a ball cut off or burnt out, a light whose highlight is on no ball; too few shadows.
+        No ball, a ball that is cut off or overexposed, a light whose highlight is on no ball; too few shadows.
     InputError
         Captures with different numbers of images, an outline of a wrong shape, an argument that does not go with
         `sphere`.
@@ -87,7 +87,7 @@ def calibrate_lights(
     (`u_common_deg`).
 
     Shadows of solder balls fix the azimuth of each light, and its elevation against the others. That of all lights
-    together cannot be told from balls that are flattened alike: where the recipe does not say how round they are,
+    together looks the same as balls that are all flattened alike: if the recipe does not state their roundness,
     `u_common_deg` holds both.
 
     References
@@ -193,8 +193,8 @@ def _findings(measured: BallMeasurement, capture: Capture, *, known: bool) -> li
     found += [Remark("note", f"{capture.name}: {text}", "balls-warning") for text in measured.warnings]
     if not known:
         message = (
-            "how round the balls usually are is not stated (aspect_ratio and u_aspect_ratio of a recipe): the "
-            "elevation of all lights together cannot be told from balls flattened alike"
+            "the usual roundness of the balls is not stated (aspect_ratio and u_aspect_ratio of a recipe): a common "
+            "error in elevation of all lights looks the same as balls that are all flattened alike"
         )
         found.append(Remark("note", message, "roundness-unknown"))
     return found

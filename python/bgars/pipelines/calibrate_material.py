@@ -36,7 +36,7 @@ def calibrate_material(
     capture : Capture
         At least 4 lights; the lights and the exposure of the captures that the material will be used on.
     anchors : FoundBalls, (N, 3) array_like, or (H, W) array_like of bool, optional
-        Balls, circles, or the mask of one ball, as of :func:`bgars.estimate_normals`. By default balls are looked for.
+        Balls, circles, or the mask of one ball, as of :func:`bgars.estimate_normals`. Searched for by default.
     threads, progress
         See :func:`bgars.estimate_normals`.
 

@@ -19,10 +19,10 @@ __all__ = ["check", "check_before", "refuse_wrong_geometry", "told_by"]
 
 
 def check(capture: Capture | str | PathLike[str]) -> Findings:
-    """Find out whether a capture shows what its description says.
+    """Check whether a capture shows what its description says.
 
-    Order and handedness of the lights, lights below the surface, images twice, dead or uneven lamps, exposure, frames
-    lit in part, ambient light, vignetting, motion, focus, noise, response and bit depth. It looks at a reduced copy.
+    Order and handedness of the lights, lights below the surface, images twice, dead or uneven lamps, exposure, partly
+    lit frames, ambient light, vignetting, motion, focus, noise, response and bit depth. It looks at a reduced copy.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def check_before(capture: Capture, *, stacklevel: int = 3) -> tuple[str, ...]:
         Where every normal would be wrong.
     """
     findings = check_capture(capture)
-    refuse_wrong_geometry(findings, capture.name, way_out="bgars.check shows it; check=False goes on all the same")
+    refuse_wrong_geometry(findings, capture.name, way_out="bgars.check shows it; check=False continues nevertheless")
     texts = told_by(findings)
     for text in texts:
         warnings.warn(f"{capture.name}: {text.removeprefix('capture: ')}", CaptureWarning, stacklevel=stacklevel)

@@ -64,14 +64,14 @@ def estimate_normals(
         Unit vectors from the surface to the light; only with plain arrays.
     method : {"reflectance", "robust-filter", "specular-filter", "lambertian", "blind"} or str
         ``reflectance``: on balls, the normal whose brightness under all lights, highlights included, fits the material
-        best; the material is fitted on the balls themselves; other pixels are left to ``robust-filter``. Captures
-        with fewer than 4 lights, or with neither balls nor a material, are left to ``blind``: one material is fitted
-        to the whole capture together with normals and albedo of every pixel, and taken where it predicts left-out
-        lights better than least squares does (some 20 us a pixel; at least 5 lights). `NormalField.method_reason` says
-        what was done. The other three solve ``I_k = rho l_k . n`` by least squares (Woodham 1980) over the lights they
-        keep at a pixel: ``lambertian`` all; ``specular-filter``, as published: sort the values, cut at the first gap
-        over `threshold` with at least 3 values kept; ``robust-filter`` the window of sorted values that a Lambertian
-        facet explains best (docs/method.md). Further names: :func:`bgars.register_method`.
+        best; the material is fitted on the balls themselves; other pixels are left to ``robust-filter``. Captures with
+        fewer than 4 lights, or with neither balls nor a material, are left to ``blind``: one material is fitted to the
+        whole capture together with normals and albedo of every pixel, and taken where it predicts left-out lights about
+        as well as the simpler methods (some 20 us per pixel; at least 5 lights). `NormalField.method_reason` says what
+        was done. The other three solve ``I_k = rho l_k . n`` by least squares (Woodham 1980) over the lights they keep
+        at a pixel: ``lambertian`` all; ``specular-filter``, as published: sort the values, cut at the first gap over
+        `threshold` with at least 3 values kept; ``robust-filter`` the window of sorted values that a Lambertian facet
+        explains best (docs/method.md). Further names: :func:`bgars.register_method`.
     mask : (H, W) array_like of bool, optional
         True = use; combined with the capture's own mask.
     light_intensities : (L,) array_like, optional
@@ -83,7 +83,7 @@ def estimate_normals(
         Gap of ``specular-filter`` in grey levels of 255, scaled with the bit depth; 50, as published, by default.
     anchors : FoundBalls, (N, 3) array_like, or (H, W) array_like of bool, optional
         Balls for ``reflectance``: from :func:`bgars.find_balls`, or circles (x right and y up from the image centre,
-        radius, in pixels), or the mask of one ball. By default they are looked for.
+        radius, in pixels), or the mask of one ball. By default they are searched for.
     material : SurfaceMaterial, optional
         Material for ``reflectance`` that was fitted before, with the same rig and exposure
         (:func:`bgars.read_material`). Without balls every pixel is then taken to be of it.

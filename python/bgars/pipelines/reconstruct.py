@@ -46,7 +46,7 @@ class Reconstruction:
     mesh : trimesh.Trimesh
         Made when it is first asked for; :func:`bgars.write_mesh` writes PLY and OBJ from `height` and `field` alone.
     bow : Bow or None
-        A bow of the whole part that may be the lights' doing (before it was taken off).
+        A bow of the whole part that the lights may have caused (before its removal).
     """
 
     capture: Capture
@@ -124,7 +124,7 @@ def reconstruct(
     difference, weights
         See :func:`bgars.integrate_normals`.
     flatten : {"plane", "quadratic"}, optional
-        Take one plane, or one quadratic surface, off all heights: what near or wrong lights bend a flat part to.
+        Subtract a plane, or a quadratic surface: the bow that near or wrong lights cause on a flat part.
     check : bool
         Look first whether the images show what the capture says (:func:`bgars.check`): wrong geometry is refused, and
         what else is found is a :class:`~bgars.CaptureWarning`.

@@ -17,7 +17,7 @@ MAX_REGION = 2**31 - 1
 
 @dataclass(frozen=True, eq=False)
 class Anchors:
-    """Heights that are known from elsewhere, for parts of a surface that float freely.
+    """Heights that are known from elsewhere, for parts of a surface whose absolute height normals do not give.
 
     Anchors move a whole component up or down; only in regions with a reach do they bend it.
 

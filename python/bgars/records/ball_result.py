@@ -74,7 +74,7 @@ class BallResult:
     u_top_um: Annotated[float, Key("standard uncertainty (k = 1) of top_um, in um")] = math.nan
     aspect_ratio: Annotated[float, Key("vertical over horizontal radius; 1 = sphere", was="q")] = math.nan
     u_aspect_ratio: Annotated[float, Key("standard uncertainty (k = 1) of aspect_ratio", was="u_q")] = math.nan
-    flat_top_depth_um: Annotated[float, Key("height that a flat top lacks, in um", was="flat_um")] = math.nan
+    flat_top_depth_um: Annotated[float, Key("missing height of a flat top, in um", was="flat_um")] = math.nan
     u_flat_top_depth_um: Annotated[
         float, Key("standard uncertainty (k = 1) of flat_top_depth_um, in um", was="u_flat_um")
     ] = math.nan

@@ -19,9 +19,9 @@ class Component:
     first_row, first_col : int
         Its first pixel in reading order.
     anchor_pixels : int
-        Known heights that hold it; 0: it floats freely.
+        Known heights that fix it; 0: its height is arbitrary.
     anchor_rms_px : float
-        How far it passes from them, root mean square; NaN without any.
+        Root mean square distance from them; NaN without any.
     """
 
     pixels: int

@@ -17,7 +17,7 @@ __all__ = ["DepthMap"]
 
 @dataclass(frozen=True, eq=False)
 class DepthMap:
-    """Depths under a pinhole camera, up to one factor a connected component.
+    """Depths under a pinhole camera, up to one factor per connected component.
 
     Attributes
     ----------

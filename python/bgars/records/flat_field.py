@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class FlatField:
-    """How even each light is on a flat board: smooth maps, a polynomial a light.
+    """How even each light is on a flat board: smooth maps, one polynomial per light.
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class FlatField:
     size_px : (int, int)
         Height and width of the images.
     residual : float
-        What is left of the board's levels, noise taken off, root mean square, a ratio.
+        Relative residual of the board's levels, noise removed, root mean square.
     """
 
     coefficients: Array

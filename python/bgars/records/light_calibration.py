@@ -62,15 +62,15 @@ class LightCalibration:
     u_intensities : (L,) float64 or None
         Relative; None where intensities were not measured.
     lamp_deg : float
-        Angle of a whole lamp as the balls show it; NaN where not measured.
+        Angular diameter of a lamp as the balls show it; NaN where not measured.
     sphere : {"mirror", "matt", "balls"}
         What was in view.
     balls : tuple of BallView
-        One a ball and capture.
+        One per ball and capture.
     residual_px : float
         Root mean square of the residuals; 0 where there is nothing to spare.
     findings : tuple of Remark
-        What was noticed.
+        Findings.
     """
 
     rig: LightRig

@@ -30,7 +30,7 @@ class MeasuredBall:
     aspect_ratio : float
         Vertical over horizontal radius: 1 for a sphere.
     flat_top_depth_um : float
-        Height that a flat top lacks against the full spheroid; 0 for none.
+        Missing height of a flat top against the full spheroid; 0 for none.
     lights_used : int
         Lights whose shadow was usable.
     reasons : tuple of str

@@ -56,7 +56,7 @@ class NormalField(ShownField):
     method_reason : str
         What was used, and why, in one line.
     reflectance : ReflectanceFit or None
-        What the reflectance estimator learnt, where it ran.
+        What the reflectance estimator fitted, where it ran.
     """
 
     normals: FloatArray

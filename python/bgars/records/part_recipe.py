@@ -40,7 +40,7 @@ class Limits:
     aspect_ratio : (float, float) or None
         Vertical over horizontal radius.
     flat_top_depth_um : float or None
-        Height that a flat top lacks.
+        Missing height of a flat top.
     pitch_um : (float, float) or None
         Of the best-fitting grid.
     seating_coplanarity_um, regression_coplanarity_um : float or None

@@ -75,7 +75,7 @@ class PartResult(ShownPart):
     seating_budget : dict of float
         What `u_seating_coplanarity_um` is made of: standard uncertainty by cause, um, largest first.
     warnings : tuple of str
-        What to look at although numbers are right.
+        What to check although the numbers are right.
     recipe : PartRecipe or None
     pixel_pitch_um : float
     files : tuple of InputFile

@@ -16,7 +16,7 @@ WELL = 0.5
 
 @dataclass(frozen=True)
 class ReflectanceFit:
-    """What the reflectance estimator learnt on its way.
+    """What the reflectance estimator fitted.
 
     Attributes
     ----------

@@ -33,12 +33,12 @@ class ResponseCurve:
 
     @property
     def nonlinearity(self) -> float:
-        """Largest distance from a straight line, of full scale."""
+        """Largest deviation from a straight line, 1 = full scale."""
         return float(np.abs(self.radiances - self.levels).max())
 
     @property
     def gamma(self) -> float:
-        """Exponent of the power law that comes nearest."""
+        """Exponent of the nearest power law."""
         use = (self.levels > 0.1) & (self.levels < 1.0) & (self.radiances > 0)  # noqa: PLR2004 - away from the black
         if not use.any():
             return 1.0

@@ -226,7 +226,7 @@ class LightRig:
     def from_lp(
         cls, path: str | PathLike[str], *, intensities: ArrayLike | None = None, u_deg: ArrayLike | None = None
     ) -> LightRig:
-        """Read an RTI light position file: a count, then ``file x y z`` a line (vectors are normalised).
+        """Read an RTI light position file: a count, then ``file x y z`` per line (vectors are normalised).
 
         Warns with :class:`~bgars.CaptureWarning` of what had to be assumed.
 

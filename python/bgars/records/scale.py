@@ -16,7 +16,7 @@ class Scale:
     pixel_pitch_um, pixel_pitch_u_um : float
         Size of a pixel on the board, at the image centre, and its standard uncertainty.
     tilt_deg : float
-        Angle of the grid against the image plane; NaN where it cannot be told (telecentric lens).
+        Angle of the grid against the image plane; NaN where it cannot be measured (telecentric lens).
     rotation_deg : float
         Of the grid in the image, counter-clockwise.
     distortion : float

@@ -32,7 +32,7 @@ class Verification:
     largest_um : float
         Largest error of a single reading.
     mpe_um : float or None
-        Maximum permissible error that it was judged by.
+        Maximum permissible error applied.
     """
 
     quantity: str
@@ -62,7 +62,7 @@ class Station:
     calibrated_utc : str
         When, ISO 8601.
     findings : tuple of Remark
-        What the calibrations noticed.
+        Findings of the calibrations.
     verified : tuple of Verification
         Against a part of known sizes, and `verified_utc`, when.
     """

@@ -24,7 +24,7 @@ class SurfaceLobe:
     roughness : float
         Root mean square slope of the microfacets.
     tail : float
-        0 for Beckmann's distribution, 1 for GGX, between for between.
+        0 for Beckmann's distribution, 1 for GGX; values between interpolate.
     """
 
     strength_level: float
@@ -45,7 +45,7 @@ class SurfaceLobe:
 
 @dataclass(frozen=True)
 class SurfaceMaterial:
-    """What a surface does with light, under the lights of one rig.
+    """Reflectance of a surface, under the lights of one rig.
 
     Level of a pixel in grey levels of 255 at light intensity 1:
     ``gain (diffuse n.l [1 + grazing (A - 1)] + sum strength D G / n_z) + ambient`` (docs/method.md).
@@ -57,13 +57,13 @@ class SurfaceMaterial:
     grazing : float
         Weight of the loss of diffuse light at grazing angles; 0 for a Lambertian facet.
     ambient_level : float
-        Level without light from the lamps: inter-reflections, on the average.
+        Level without light from the lamps: mean interreflection.
     lobes : tuple of SurfaceLobe
         One or two.
     masking : {"smith", "cook-torrance"}
         Geometric attenuation of the lobes.
     gains : tuple of float
-        Brightness of each light against what the rig says.
+        Brightness of each light relative to the rig.
     standard_errors : dict
         Of ``diffuse``, ``grazing``, ``ambient``, ``strength_1``, ... as far as they were fitted.
     """

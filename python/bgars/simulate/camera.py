@@ -55,7 +55,7 @@ class Camera:
     saturation : float or None
         Grey level at which the sensor clips; full scale by default.
     supersample : int
-        Samples a pixel along each axis (a box filter); 1 = the pixel's centre.
+        Samples per pixel along each axis (a box filter); 1 = the pixel's centre.
     blur_px : float
         Standard deviation of a Gaussian blur by the lens.
 

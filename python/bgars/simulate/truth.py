@@ -112,7 +112,7 @@ class SimulatedTruth(Truth):
     lit : (L, H, W) bool
         True where the light reaches the pixel's centre: N.L > 0 and no cast shadow.
     balls : tuple of BallTruth
-        One record a ball.
+        One record per ball.
     seating, regression : PlaneTruth or None
         Reference planes over the world apexes of the present balls; None where they do not exist. The centre of
         gravity is the mean of the nominal places.

@@ -176,7 +176,7 @@ def _findings(capture: Capture, flat: FlatField, left: Array) -> list[Remark]:
         name = light_name(int(light), capture.files)
         message = (
             f"{capture.name}: {name}: {100 * left[light]:.1f} % of structure is left in the board: texture, "
-            "dust, shine or a shadow"
+            "dust, gloss or a shadow"
         )
         found.append(Remark("doubt", message, "flat-structure", float(left[light]), STRUCTURE, "", int(light)))
     corners = [flat_maps(flat, light) for light in range(len(flat.coefficients))]

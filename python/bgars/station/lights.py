@@ -55,7 +55,7 @@ def calibrate_lights(
     Raises
     ------
     CalibrationError
-        No ball, a ball cut off or burnt out, a light whose highlight is on no ball.
+        No ball, a ball that is cut off or overexposed, a light whose highlight is on no ball.
     InputError
         Captures with different numbers of images, or an outline of a wrong shape.
     """
@@ -179,7 +179,7 @@ def _intensities(
         Remark(
             "note",
             f"{captures[0].name}: intensities not measured (clipped highlights, dark board): taken as equal; "
-            "calibrate flat gives them",
+            "bgars calibrate flat measures them",
             "no-intensities",
         )
     )

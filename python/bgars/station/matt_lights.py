@@ -34,7 +34,7 @@ NOT_LAMBERT = 0.06
 EXPLAINED = 2.0
 """Residual, of the noise, up to which Lambert's law explains a ball wholly."""
 SATURATED_SHARE = 0.2
-"""Share of the lit pixels that are clipped from which on an image is burnt out."""
+"""Share of the lit pixels that are clipped from which on an image is overexposed."""
 LEAST_LEVEL = 12.0
 """Grey levels of 255 of the brightest point from which on there is shading."""
 BOARD_SHARE = 0.5
@@ -62,7 +62,7 @@ def shading_on(capture: Capture, levels: Levels, outline: Outline) -> SeenShadin
     Raises
     ------
     CalibrationError
-        An image that is too dark or burnt out on the ball.
+        An image that is too dark or overexposed on the ball.
     """
     findings: list[Remark] = []
     count = len(levels.images)
@@ -82,7 +82,7 @@ def shading_on(capture: Capture, levels: Levels, outline: Outline) -> SeenShadin
             raise CalibrationError(msg)
         if 1.0 - used.mean() > SATURATED_SHARE:
             msg = (
-                f"{capture.name}: {name}: burnt out: {100 * (1 - used.mean()):.0f} % of the ball is clipped; "
+                f"{capture.name}: {name}: overexposed: {100 * (1 - used.mean()):.0f} % of the ball is clipped; "
                 "expose shorter"
             )
             raise CalibrationError(msg)

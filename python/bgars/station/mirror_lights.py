@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 SECOND_SHARE = 0.35
 """Area of a second spot, of the first one's, from which on it is unclear which is the lamp."""
 WIDE_DEG, TOO_WIDE_DEG = 8.0, 25.0
-"""Angle of a lamp from which on its middle is doubted, and refused: a burnt-out image, or no mirror."""
+"""Angle of a lamp from which on its middle is doubted, and refused: an overexposed image, or no mirror."""
 POOR_FIT, FAR_SHARE = 3.0, 0.3
 """Misfit of a disc, and distance of its middle from that of the bright pixels, of its radius, that make it none."""
 MOVED_PX = 1.0
@@ -39,7 +39,7 @@ MOVED_PX = 1.0
 ROUGH_SHARE = 0.15
 """Uncertainty of the middle of a highlight of any shape, of its radius."""
 ALIKE = {
-    "wide-highlight": "wide highlights: broad lamps, a rough ball, or burnt out",
+    "wide-highlight": "wide highlights: broad lamps, a rough ball, or overexposed",
     "no-disc": "the highlight is no disc; the middle of its bright pixels is taken",
 }
 FEW = 3
@@ -61,7 +61,7 @@ def highlights_on(capture: Capture, levels: Levels, outline: Outline, camera_px:
     Raises
     ------
     CalibrationError
-        An image that is burnt out on the ball.
+        An image that is overexposed on the ball.
     """
     count = len(levels.images)
     still, usable = glare(levels.images, outline.circle_px)
@@ -81,14 +81,14 @@ def highlights_on(capture: Capture, levels: Levels, outline: Outline, camera_px:
         wide_deg = math.degrees(4.0 * math.sqrt(spot.area_px / math.pi) / outline.radius_px)
         if wide_deg > TOO_WIDE_DEG:
             msg = (
-                f"{capture.name}: {name}: burnt out: its highlight covers {wide_deg:.0f} deg of directions, at most "
+                f"{capture.name}: {name}: overexposed: its highlight covers {wide_deg:.0f} deg of directions, at most "
                 f"{TOO_WIDE_DEG:g} can be one lamp on a mirror; expose shorter, or use sphere 'matt'"
             )
             raise CalibrationError(msg)
         if wide_deg > WIDE_DEG:
             message = (
                 f"{capture.name}: {name}: its highlight is {wide_deg:.0f} deg wide: a broad lamp, a rough "
-                "ball, or burnt out"
+                "ball, or overexposed"
             )
             findings.append(Remark("doubt", message, "wide-highlight", wide_deg, WIDE_DEG, "deg", index))
         if spot.second_share > SECOND_SHARE:

@@ -41,7 +41,7 @@ UNKNOWN_PITCH_U = 1e-4
 def calibrate_scale(
     capture: Capture, pitch_um: float, *, target: Target = "dots", u_pitch_um: float | None = None
 ) -> tuple[Scale, tuple[Remark, ...]]:
-    """Measure a pixel on a grid of known pitch that lies where parts lie.
+    """Measure the pixel pitch on a grid of known pitch in the plane of the parts.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def calibrate_scale(
     pitch_um : float
         Distance of neighbouring dots, or of neighbouring crossings.
     target : {"dots", "chessboard"}
-        Dots on a plain ground, or a chessboard.
+        Dots on a plain background, or a chessboard.
     u_pitch_um : float, optional
         Standard uncertainty of the grid's pitch; 0.01 % of it by default.
 

@@ -92,8 +92,7 @@ def teach(results: Sequence[PartResult], name: str) -> Taught:
 def teach_text(taught: Taught) -> str:
     """Return the recipe as the text of a ``part.toml``."""
     lines = [
-        f"# Taught from {taught.parts} golden part(s): nominal = median; limits = nominal +- the larger of 4 "
-        "sqrt(s^2 + u^2)",
+        f"# Golden parts: {taught.parts}; nominal = median; limits = nominal +- the larger of 4 sqrt(s^2 + u^2)",
         "# and 5 %; position, coplanarity and warpage: the largest golden reading + 4 u. Put the drawing's "
         "limits here.",
         f"name = {json.dumps(taught.name)}",

@@ -17,9 +17,9 @@ LOST = ("No files found", "Cannot open file", "No such file")
 VIEWS = {
     "parts": "one row per part; round = 1, 2, ... counts the inspections of a serial number",
     "balls": "one row per ball, with serial, lot, part and time of its part",
-    "checks": "one row a judged quantity of a part",
+    "checks": "one row per judged quantity of a part",
     "budgets": "standard uncertainty by cause, of each reading",
-    "failures": "captures that could not be inspected, and why; gone once they are",
+    "failures": "captures that could not be inspected, and why; removed once inspected",
     "results": "part_key, serial, result_json: everything else of a result",
 }
 # A part is taken from the first of its files, and its balls from the file of the same name: while a compaction runs,
@@ -83,7 +83,7 @@ def query(folder: Path, sql: str) -> Any:  # noqa: ANN401 - pyarrow has no types
         except duckdb.Error as error:
             msg = f"query: {_one_line(error)}"
             raise InputError(msg) from error
-    msg = f"query: must be a question that has an answer, such as 'select count(*) from parts', got {sql!r}"
+    msg = f"query: must be a query that returns rows, such as 'select count(*) from parts', got {sql!r}"
     raise InputError(msg)
 
 

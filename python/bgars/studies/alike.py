@@ -41,7 +41,8 @@ def check_alike(results: Sequence[tuple[str, PartResult]]) -> tuple[str, ...]:
             ("method", first.method, result.method),
         ):
             if one != other:
-                told = "" if isinstance(one, dict) or isinstance(other, dict) else f": {one!r} against {other!r}"
+                is_shown = not isinstance(one, dict) and not isinstance(other, dict)
+                told = f": {other or 'none'}, not {one or 'none'}" if is_shown else ""
                 msg = f"{name}: must have the same {what} as {first_name}{told}"
                 raise InputError(msg)
     _check_copies(results)
@@ -52,7 +53,7 @@ def check_alike(results: Sequence[tuple[str, PartResult]]) -> tuple[str, ...]:
         warnings.append(f"verdicts of the single inspections: {told}")
     versions = sorted({result.version for _, result in results})
     if len(versions) > 1:
-        warnings.append(f"results of different versions of bgars are put together: {', '.join(versions)}")
+        warnings.append(f"results of different versions of bgars are combined: {', '.join(versions)}")
     return tuple(warnings)
 
 
@@ -62,7 +63,7 @@ def _check_copies(results: Sequence[tuple[str, PartResult]]) -> None:
     for name, result in results:
         digests = frozenset(digest for _, digest in result.files)
         if digests and digests in seen:
-            msg = f"{name}: was made from the same files as {seen[digests]}; every run must have images of its own"
+            msg = f"{name}: comes from the same files as {seen[digests]}; every run must have images of its own"
             raise InputError(msg)
         seen[digests] = name
 

@@ -142,7 +142,7 @@ def gauge_figures(readings: Readings, recipe: PartRecipe | None) -> GaugeFigures
     worst = int(own.argmax())
     verdict, reason = _verdict(characteristic.title, spreads[0].percent_tolerance)
     if verdict is not None and grr == 0:
-        verdict, reason = "undecided", f"{characteristic.title}: no spread at all, which no gauge has; look at the runs"
+        verdict, reason = "undecided", f"{characteristic.title}: no spread at all, check the runs"
     return GaugeFigures(
         characteristic.name,
         characteristic.unit,

@@ -155,7 +155,9 @@ def _verdict(
 def _warnings(study: Study, figures: tuple[GaugeFigures, ...], accuracies: tuple[Accuracy, ...]) -> tuple[str, ...]:
     warnings = list(study.warnings)
     if 1 < len(study.placements) < FEW_PLACEMENTS:
-        warnings.append(f"{len(study.placements)} placements: what placing adds (AV) is hardly known; take 3 or more")
+        warnings.append(
+            f"{len(study.placements)} placements: the contribution of placing (AV) is uncertain; use 3 or more"
+        )
     if len(study.placements) == 1:
         warnings.append("one placement: GRR is repeatability only, without what placing the part adds")
     few = [each for each in figures if each.measurands < FEW_MEASURANDS]

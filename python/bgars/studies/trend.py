@@ -86,7 +86,7 @@ class Trend:
 
 @dataclass(frozen=True, eq=False)
 class ProcessTrend:
-    """What many results say of their process.
+    """Trend and capability of a process, from many results.
 
     Attributes
     ----------

@@ -55,8 +55,8 @@ class Bow:
         shape = "dome" if self.height_px > 0 else "bowl"
         return (
             f"nearly all of the height is one {shape} of {abs(self.height_px):.0f} px over {self.width_px:.0f} px, as "
-            "lights near the part, or wrong by some degrees, make of a flat one: if the part is flat, use --flatten "
-            "quadratic; to know, calibrate the lights (positions instead of directions, or a flat reference)"
+            "near lights, or lights wrong by some degrees, cause on a flat part. If the part is flat, use --flatten "
+            "quadratic; to find out, calibrate the lights (positions, or a flat reference)"
         )
 
 

@@ -101,13 +101,13 @@ def integrate_normals(
     is the better choice: its edges take the mean of two normals, while a one-sided difference is of first order.
 
     **What neither can give**: heights across an occluding contour. Between a ball and its board the surface jumps where
-    no pixel sees it, so the stand-off height is not in the normals: least squares and bilateral both invent it.
+    no pixel sees it, so the stand-off height is not in the normals: with both methods it is arbitrary.
     `anchors` cut the surface there and put its parts where other evidence says.
 
     Parameters
     ----------
     normals : NormalField or (H, W, 3) array_like
-        Unit normals (a length of 0.5 to 2 is let through), x right, y up, z toward the camera. An aligned, C-contiguous
+        Unit normals (a length of 0.5 to 2 is accepted), x right, y up, z toward the camera. An aligned, C-contiguous
         float32 array is used where it lies; others are copied once.
     mask : (H, W) array_like of bool, optional
         True = use; combined with the field's own mask. For plain arrays: by default every finite normal with n_z > 0.

@@ -33,7 +33,7 @@ def anchors_from_part(result: PartResult, shape: tuple[int, int]) -> Anchors:
 
     The board (region 0) is bent to its measured shape, details from its normals, and every ball (regions 1, 2, ... in
     the order of the result) to the spheroid that its shadows gave, over a ring around its top. Heights are above the
-    board at the centre of the image. Balls that were not measured are cut out and float freely.
+    board at the centre of the image. Balls that were not measured are cut out; their height is arbitrary.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ class ShapeImages:
     gaussian_curvature : (H, W) float32
         Product of the principal curvatures, 1 / unit^2; positive on domes and dents, negative on saddles.
     flattened : (H, W) float32
-        Heights less their smoothed selves, in the unit: what is finer than the scale, such as scratches.
+        Heights minus their smoothed version, in the unit: what is finer than the scale, such as scratches.
     unit : str
         "um" or "px".
     """

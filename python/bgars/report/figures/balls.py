@@ -30,6 +30,7 @@ from bgars.report.figures.style import (
     shown_image,
     window_size_in,
 )
+from bgars.report.html.units import with_micro
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -109,7 +110,8 @@ def _mean_image(capture: Capture) -> NDArray[np.float32]:
 
 
 def _reasons(result: PartResult) -> list[str]:
-    lines = [line for reason in result.reasons for line in wrap(reason, MAX_LETTERS, subsequent_indent="      ")]
+    reasons = [with_micro(reason) for reason in result.reasons]
+    lines = [line for reason in reasons for line in wrap(reason, MAX_LETTERS, subsequent_indent="      ")]
     more = ["... more in result.json"] if len(lines) > MAX_LINES else []
     return lines[:MAX_LINES] + more
 

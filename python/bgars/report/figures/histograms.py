@@ -36,6 +36,7 @@ def histogram_figure(result: PartResult) -> Figure:
     figure.suptitle(part_title(result), fontsize=13)
     panels = [axes for row in figure.subplots(2, 2, squeeze=False) for axes in row]
     figure.subplots_adjust(left=0.045, right=0.985, bottom=0.07, top=0.91, hspace=0.27, wspace=0.11)
+    bridged = sum(ball.present and ball.kind == "bridged" for ball in result.balls)
     for axes, (limit, name, u_name, label) in zip(panels, PANELS, strict=True):
         values = np.array([getattr(ball, name) for ball in result.balls if ball.present and ball.kind == "ball"])
         u = np.array([getattr(ball, u_name) for ball in result.balls if ball.present]) if u_name else np.zeros(0)
@@ -45,7 +46,7 @@ def histogram_figure(result: PartResult) -> Figure:
         if limit == "seating_coplanarity_um":
             u_um = result.u_seating_coplanarity_um
         _panel(axes, known, limits, u_um, label)
-        axes.set_title(_title(known, len(values) - len(known)), fontsize=10)
+        axes.set_title(_title(known, len(values) - len(known), bridged), fontsize=10)
     return figure
 
 
@@ -95,10 +96,11 @@ def _panel(
         axes.set_xlim(left=min(0.0, float(values.min())))  # a distance, which is no less
 
 
-def _title(known: NDArray[np.float64], missing: int) -> str:
+def _title(known: NDArray[np.float64], missing: int, bridged: int) -> str:
     if not known.size:
         return "not measured"
     gap = f"; {missing} not measured" if missing else ""
+    gap += f"; {bridged} bridged left out" if bridged else ""
     if known.size == 1:
         return f"1 ball: {known[0]:.1f} µm{gap}"
     spread = f"mean {known.mean():.1f}, standard deviation {known.std():.1f}, {known.min():.1f} to {known.max():.1f} µm"

@@ -201,7 +201,8 @@ def _show_height(figure: Figure, axes: Axes, result: Reconstruction, row: int, o
     values = _thinned(height.height, height)
     known = values[np.isfinite(values)]
     low, high = (float(level) for level in np.percentile(known if known.size else height.height_px, [0.5, 99.5]))
-    title = "Height" if len(height.components) == 1 else "Height (each connected part has mean 0)"
+    whole = len(height.components) == 1
+    title = f"Height ({'mean 0' if whole else 'each connected part has mean 0'}; hidden steps are not included)"
     picture = _picture(axes, values, height, title, cmap="cividis", span=(low, high))
     figure.colorbar(picture, cax=_beside(axes), label=f"height ({_unit(height)})")
     y = (height.mask.shape[0] / 2 - row - 0.5) * (height.pixel_pitch_um or 1.0)

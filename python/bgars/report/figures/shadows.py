@@ -156,4 +156,4 @@ def _moved(result: PartResult, light: int) -> str:
 
 
 def _residual(value: float) -> str:
-    return f"residual {value:.1%} of the contrast" if math.isfinite(value) else "no shadow was fitted"
+    return f"residual {100 * value:.1f} % of the contrast" if math.isfinite(value) else "no shadow was fitted"

@@ -13,11 +13,11 @@ __all__ = ["material_facts", "material_rows"]
 MEANINGS = {
     "diffuse_level": ("diffuse light", "level of a matt facet that faces the light"),
     "grazing": ("grazing loss", "weight of the loss of diffuse light at grazing angles, 0 = Lambertian"),
-    "ambient_level": ("ambient light", "level without light from the lamps: inter-reflections, on the average"),
+    "ambient_level": ("ambient light", "level without lamps: mean interreflection"),
     "strength_level": ("strength of lobe {}", "level at its peak, where the camera looks along the normal"),
     "roughness": ("roughness of lobe {}", "root mean square slope of the microfacets"),
     "tail": ("tail of lobe {}", "0 = Beckmann, 1 = GGX"),
-    "gain": ("brightness of light {}", "against what the rig says, 1 = as it says; lights count from 0"),
+    "gain": ("brightness of light {}", "relative to the rig, 1 = as stated; lights count from 0"),
 }
 NUMBERED = re.compile(r"(strength|roughness|tail|gain)_(\d+)((?:_level)?)")
 SIGNIFICANT = 2
@@ -65,10 +65,10 @@ def material_facts(result: dict[str, Any]) -> list[tuple[str, str]]:
         ("material", "from the recipe's file, not fitted here" if material["from_file"] else "fitted to all balls"),
         ("loss", f"{loss:.3f}: one material explains the balls {words}" if is_known(loss) else "not known"),
         ("used for the normals", "yes" if material["accepted"] else "no: it explains the balls too badly"),
-        ("attenuation of the lobes", f"{material['masking']}: what fits better"),
+        ("attenuation of the lobes", f"{material['masking']}: the one that fits better"),
         ("balls with a material of their own", str(material["own_material_balls"])),
         (
-            "inter-reflections learnt from the other balls",
+            "interreflections estimated from the other balls",
             "yes" if material["residuals_learnt"] else "no: it did not lower the loss, or there are too few balls",
         ),
     ]

@@ -194,7 +194,9 @@ def page_text(source: PageSource, *, plotly_file: str = "") -> str:
         grid_angle=number(result["grid_angle_deg"], 3),
         seats=seats,
         no_plane="; ".join(row["why"] for row in unmeasured(result) if "coplanarity" in row["what"]),
-        residual="not measured" if residual is None else f"{residual:.1%} of the contrast of lit and shadowed board",
+        residual="not measured"
+        if residual is None
+        else f"{100 * residual:.1f} % of the contrast of lit to shadowed board",
         board=board_words(result),
         budget=budget_table(result),
         budget_columns=BUDGET_COLUMNS,

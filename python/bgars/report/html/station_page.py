@@ -65,7 +65,7 @@ def write_station_page(station: Station, path: str | PathLike[str]) -> None:
             if station.verified
             else _missing("bgars verify FOLDER... --known known.csv --station station.toml")
         ),
-        "<h2>What was noticed</h2><ul>",
+        "<h2>Findings</h2><ul>",
         *(
             f'<li class="{one.severity}">{html.escape(one.severity)}: {html.escape(one.message)}</li>'
             for one in station.findings
@@ -116,7 +116,7 @@ def _lights(lights: LightCalibration) -> Iterable[str]:
     )
     lens = 0.0 if lights.u_lens_deg is None else float(np.median(lights.u_lens_deg))
     if lens > max(math.sqrt(max(common**2 - lens**2, 0.0)), own):
-        limit = "what is not stated of the camera (telecentric, or its distance)"
+        limit = "the lens, which is not stated (telecentric, or its distance)"
     # One mirror ball gives each light one highlight: nothing is left over to disagree.
     alone = lights.sphere == "mirror" and len(lights.balls) == 1
     residual = "one ball shows no residual" if alone else f"residual {lights.residual_px:.3f} px"
@@ -159,8 +159,8 @@ def _flat(flat: FlatField) -> Iterable[str]:
     yield _table(["light", "level, of the mean"], rows)
     yield (
         f"<p>Polynomials of degree {flat.degree} over {flat.size_px[1]} x {flat.size_px[0]} pixels; "
-        f"{100 * flat.residual:.2f} % of the "
-        "level is left, noise taken off: what limits it is the board's own texture.</p>"
+        f"residual {100 * flat.residual:.2f} % of the "
+        "level, noise removed: the texture of the board limits it.</p>"
     )
 
 

@@ -171,13 +171,13 @@ def raised_together(source: PageSource) -> str:
     if not is_known(source.result["shadow_residual_rms"]):
         return "not fitted: no shadow was measured"
     if len(rows) != len(source.lamps) or not all(is_known(value) for row in rows for value in row) or not rows:
-        return "not known: report.json does not lie beside the result"
+        return "unknown: report.json is not beside the result"
     raised = [
         math.degrees(math.atan2(z, math.hypot(x, y))) - lamp.elevation_deg
         for (x, y, z), lamp in zip(rows, source.lamps, strict=True)
     ]
     mean = _signed(sum(raised) / len(raised))
-    return f"by {mean}° on average; what that makes heights uncertain by is part of their U"
+    return f"{mean}° on average; U of the heights covers its uncertainty"
 
 
 def _signed(value: float | None) -> str:

@@ -106,7 +106,7 @@ QUANTITIES = (
         unit="",
     ),
     Quantity(
-        "flat_top_depth_um", "u_flat_top_depth_um", "flat_top_depth_um", "flat top", "height that a flat top lacks"
+        "flat_top_depth_um", "u_flat_top_depth_um", "flat_top_depth_um", "flat top", "missing height of a flat top"
     ),
 )
 
