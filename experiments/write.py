@@ -131,7 +131,7 @@ def _need_own_or_new(outcome: Outcome, folder: Path, name: str) -> None:
     pictures = [folder / f"{picture.stem}.png" for picture in outcome.pictures]
     foreign = [] if is_earlier else [path for path in (table, *pictures) if path.exists() and not is_own(path)]
     if foreign:
-        msg = f"{foreign[0]}: is there already, and no experiment wrote it; move it away, or name another folder"
+        msg = f"{foreign[0]}: exists, and no experiment wrote it; move it away, or name another folder"
         raise InputError(msg)
 
 

@@ -7,7 +7,7 @@
 # %% [markdown]
 # # Compare methods
 #
-# A glossy object with known normals, all methods, and one of your own; then a photograph, where you have it.
+# A glossy object with known normals, all methods, and one of your own; then a photograph, if you have the data.
 
 # %%
 import os
@@ -20,7 +20,7 @@ import numpy as np
 # %% [markdown]
 # ## A glossy ball
 #
-# Half of its light scatters, the other half is mirrored: eight highlights wander over it.
+# Half of its reflected light is diffuse, half is specular: eight highlights, one per light.
 
 # %%
 scene = bgars.Scene.ball(600, height_um=450)
@@ -36,8 +36,8 @@ _ = capture.plot(0)
 # %% [markdown]
 # ## A method of your own
 #
-# Any function of a capture that returns normals can take part. This one solves for the three darkest lights, as naive
-# as it sounds: shadows count as data.
+# Any function of a capture that returns normals can be compared. This one solves for the three darkest lights, which is
+# naive: shadows count as data.
 
 
 # %%
@@ -71,9 +71,9 @@ _ = figure.colorbar(picture, ax=axes, label="angular error in degrees")
 # %% [markdown]
 # ## A photograph
 #
-# Of the DiLiGenT benchmark (Shi et al., 2016), where the environment variable `BGARS_DATA` names a folder that has
-# it. The object scatters light on itself and
-# no model fits wholly: errors are larger than in any simulation.
+# From the DiLiGenT benchmark (Shi et al., 2016), if the environment variable `BGARS_DATA` names a folder that contains
+# it. Light scatters from one part of the object to another, and no model fits exactly: errors are larger than in any
+# simulation.
 
 # %%
 folder = Path(os.environ.get("BGARS_DATA", "."), "real", "dil_cat")

@@ -9,9 +9,8 @@
 #
 # From eight photographs of a shiny ball to normals, heights and a mesh, and how far to trust them.
 #
-# A *capture* is a folder: one image per light, and where the lights are. This one comes with bgars; put the folder of
-# your own photographs
-# in its place.
+# A *capture* is a folder with one image per light and a description of the lights. This one comes with bgars; put the
+# folder of your own photographs in its place.
 
 # %%
 import bgars
@@ -20,7 +19,7 @@ capture = bgars.read_capture(bgars.sample_capture())
 capture
 
 # %% [markdown]
-# One light at a time: highlights move over the ball, and its shadow turns on the board.
+# One light at a time: the highlight moves over the ball, and its shadow turns on the board.
 
 # %%
 import matplotlib.pyplot as plt
@@ -30,8 +29,8 @@ for light, panel in zip((0, 2, 4, 6), axes, strict=True):
     capture.plot(light, axes=panel)
 
 # %% [markdown]
-# Do images and lights belong together? Ask before any number is given: lights in the wrong order or mirrored spoil
-# every normal.
+# Do images and lights belong together? Check this first: lights in the wrong order, or mirrored, make every normal
+# wrong.
 
 # %%
 print(bgars.check(capture))
@@ -39,8 +38,8 @@ print(bgars.check(capture))
 # %% [markdown]
 # ## Normals
 #
-# The default method finds the balls, fits what their material does with light, and then each normal to its pixel's
-# eight values.
+# The default method finds the balls, fits the reflectance of their material, and then each normal to the eight values
+# of its pixel.
 
 # %%
 field = bgars.estimate_normals(capture)
@@ -55,8 +54,8 @@ axes[1].set_title("standard error of the normal")
 _ = figure.colorbar(error, ax=axes[1], label="degrees")
 
 # %% [markdown]
-# A normal that the pixel's own light does not fix is drawn to the sphere of its ball: a *prior*, not a measurement.
-# `field.is_measured` tells them apart.
+# A normal that the values of its pixel do not determine is drawn to the sphere of its ball: a *prior*, not a
+# measurement. `field.is_measured` distinguishes them.
 
 # %%
 print(f"{field.is_measured[field.mask].mean():.1%} of the normals are measured")
@@ -65,8 +64,7 @@ print(f"{field.is_measured[field.mask].mean():.1%} of the normals are measured")
 # ## Height and mesh
 #
 # Heights follow from the normals, up to a constant for each connected part. Between ball and board the surface jumps
-# where no pixel looks: how high the
-# ball stands is *not* in the normals.
+# where no pixel sees it: the height of the ball above its board is *not* in the normals.
 
 # %%
 height = bgars.integrate_normals(field)
@@ -79,7 +77,7 @@ print(f"{len(mesh.vertices)} vertices, {len(mesh.faces)} faces in ball.ply")
 # %% [markdown]
 # ## How good is it?
 #
-# This sample brings its truth, so that errors can be counted.
+# This sample contains its true normals, so that errors can be computed.
 
 # %%
 errors = bgars.evaluate(capture).normals

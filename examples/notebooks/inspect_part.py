@@ -7,9 +7,9 @@
 # %% [markdown]
 # # Inspect a part
 #
-# Every ball of a BGA measured and judged against limits, with an uncertainty for every number.
+# Every ball of a BGA is measured and compared with limits, with an uncertainty for every reading.
 #
-# The part is simulated: 25 balls, some of them defective on purpose. With your own part:
+# The part is simulated: 25 balls, some of them with a defect. For your own part:
 # `capture = bgars.read_capture("FOLDER")`.
 
 # %%
@@ -19,7 +19,7 @@ setup = bgars.read_scene("defects-5x5")
 capture, truth = bgars.simulate(setup.scene, setup.rig, setup.material, setup.camera, seed=setup.seed)
 _ = capture.plot(0)
 # %% [markdown]
-# A recipe says what the part should be: layout, nominal sizes, limits. It is a TOML file; this one comes with bgars.
+# A recipe describes the part as it should be: layout, nominal sizes, limits. This TOML file comes with bgars.
 
 # %%
 recipe_path = bgars.sample_part_recipe()
@@ -44,7 +44,7 @@ for ball in result.balls:
 # %% [markdown]
 # ## Measured against the truth
 #
-# A difference should be within U for about 95 balls in 100.
+# The error should be within U for about 95 balls in 100.
 
 # %%
 true_top_um = {ball.name: ball.top_um for ball in truth.balls}
@@ -54,9 +54,9 @@ for ball in result.balls[:10]:
         print(f"{ball.name:4} {ball.top_um:11.1f} {2 * ball.u_top_um:6.1f} {true_top_um[ball.name]:7.1f}")
 
 # %% [markdown]
-# ## For others
+# ## Output files
 #
-# A page with pictures that opens in any browser, and a file for machines.
+# A page with pictures for any browser, and a file for other programs.
 
 # %%
 from pathlib import Path

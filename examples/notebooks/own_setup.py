@@ -7,7 +7,7 @@
 # %% [markdown]
 # # Simulate your own set-up
 #
-# Before you buy lamps and a lens: what would a set-up like yours measure, and how well?
+# Before you buy lamps and a lens: how accurately would a set-up like yours measure?
 
 # %%
 import bgars
@@ -17,7 +17,7 @@ import numpy as np
 # %% [markdown]
 # ## The part
 #
-# Nine balls of 600 um at a pitch of 1.5 mm, which vary as balls do.
+# Nine balls of 600 um at a pitch of 1.5 mm, with realistic variation.
 
 # %%
 scene = bgars.Scene.ball_array(
@@ -51,9 +51,9 @@ for elevation_deg, panel in zip((30, 45, 60), axes, strict=True):
 # %% [markdown]
 # Lower lamps cast longer shadows, which carry the height; too low, they reach the next ball.
 #
-# ## What decides how well it measures?
+# ## What determines the accuracy?
 #
-# For each set-up: the standard uncertainty that bgars states for the height of a ball, and how far it really is off.
+# For each set-up: the standard uncertainty that bgars states for the height of a ball, and the true error.
 
 # %%
 print("elevation   pixel   balls with a height   stated u   true error (rms), um")
@@ -67,6 +67,6 @@ for elevation_deg, pixel_pitch_um in ((30, 15), (45, 15), (60, 15), (45, 10)):
     print(f"{elevation_deg:5} deg {pixel_pitch_um:5} um {len(measured):14} of 9 {u_um:14.2f} {rms_um:14.2f}")
 
 # %% [markdown]
-# Stated uncertainties hold what a simulation leaves out, such as a rig that is not quite where you think: they are
-# larger than the errors here, and should be.
-# A [calibrated station](https://github.com/bgars/bgars/blob/main/docs/station.md) makes them smaller.
+# Stated uncertainties include what a simulation leaves out, such as wrong light directions; so they are larger than the
+# errors here, as they should be.
+# A [calibrated station](https://github.com/bgars/bgars/blob/main/docs/station.md) reduces them.

@@ -93,4 +93,4 @@ def test_lights_that_stay_are_not_raised_by_less_than_nothing() -> None:
     result, capture = named()
     source = PageSource(result.to_dict(), lamps=lamps_of(capture))
     lower = [replace(lamp, elevation_deg=lamp.elevation_deg + 0.001) for lamp in source.lamps]
-    assert raised_together(replace(source, lamps=tuple(lower))).startswith("by +0.00°")
+    assert raised_together(replace(source, lamps=tuple(lower))).startswith("+0.00°")

@@ -245,6 +245,6 @@ def test_an_experiment_replaces_its_own_files_and_no_others(tmp_path: Path) -> N
         for path in tmp_path.iterdir():
             path.unlink()
         (tmp_path / name).write_bytes(b"mine")
-        with pytest.raises(bgars.InputError, match="is there already"):
+        with pytest.raises(bgars.InputError, match="exists, and"):
             write_experiments("fig3", tmp_path, radius_px=12)
         assert content(tmp_path) == {name: b"mine"}

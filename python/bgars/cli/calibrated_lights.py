@@ -42,7 +42,7 @@ def tell_lights(found: LightCalibration) -> None:
     count = len(found.balls)
     balls = f"{found.sphere} ball{'s' if count != 1 else ''}" if found.sphere != "balls" else "solder balls"
     say(f"{len(rig)} {kind}, on {count} {balls}:")
-    say("  light  azimuth  elevation   u (deg)   own  common  strength" + ("   x, y, z (mm)" if rig.is_near else ""))
+    say("  light  azimuth  elevation   u (deg)   own  common  intensity" + ("   x, y, z (mm)" if rig.is_near else ""))
     for index in range(len(rig)):
         place = (
             ""
@@ -51,5 +51,5 @@ def tell_lights(found: LightCalibration) -> None:
         )
         say(
             f"  {index:>5}  {rig.azimuths_deg[index]:7.2f}  {rig.elevations_deg[index]:9.2f}  {found.u_deg[index]:8.3f}"
-            f" {found.u_own_deg[index]:5.3f}   {found.u_common_deg[index]:5.3f}  {rig.intensities[index]:8.3f}{place}"
+            f" {found.u_own_deg[index]:5.3f}   {found.u_common_deg[index]:5.3f}  {rig.intensities[index]:9.3f}{place}"
         )

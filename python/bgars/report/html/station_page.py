@@ -26,12 +26,15 @@ __all__ = ["write_station_page"]
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
 h1, h2 { font-weight: 600; } h2 { margin-top: 2.2rem; border-bottom: 1px solid #ccc; }
+.wide { overflow-x: auto; } figure { margin: 1rem 0; }
 table { border-collapse: collapse; } td, th { padding: .15rem .7rem; text-align: right; }
 th { border-bottom: 1px solid #888; font-weight: 600; } td:first-child, th:first-child { text-align: left; }
 .doubt, .fail { color: #a33; font-weight: 600; } svg { max-width: 100%; margin: 1rem 2rem 0 0; }
 .missing { color: #777; }
 """
 SIDE = 300
+LEAST_RESIDUAL_PX = 0.0005
+"""Below it, a residual is 0 as it is shown."""
 
 
 def write_station_page(station: Station, path: str | PathLike[str]) -> None:
@@ -45,11 +48,11 @@ def write_station_page(station: Station, path: str | PathLike[str]) -> None:
     pictures = Path(path).with_suffix(".balls.svg")
     parts = [
         f"<h1>{html.escape(station.name)}</h1>",
-        f"<p>Calibrated {html.escape(station.calibrated_utc or 'at a time that is not known')}.</p>",
+        f"<p>Calibrated {html.escape(station.calibrated_utc or 'at an unknown time')}.</p>",
         "<h2>Lights</h2>",
         *(_lights(station.lights) if station.lights else _missing("bgars calibrate lights FOLDER -o station.toml")),
         *(_balls(pictures) if station.lights and pictures.is_file() else ()),
-        "<h2>Evenness</h2>",
+        "<h2>Flat field (evenness of the lights)</h2>",
         *(_flat(station.flat) if station.flat else _missing("bgars calibrate flat FOLDER -o station.toml")),
         "<h2>Response of the camera</h2>",
         *(
@@ -87,7 +90,7 @@ def _missing(command: str) -> list[str]:
 
 def _lights(lights: LightCalibration) -> Iterable[str]:
     rig = lights.rig
-    head = ["light", "azimuth (deg)", "elevation (deg)", "u (deg)", "own", "common", "strength"]
+    head = ["light", "azimuth (deg)", "elevation (deg)", "u (deg)", "u own (deg)", "u common (deg)", "intensity"]
     if rig.positions_um is not None:
         head += ["x (mm)", "y (mm)", "z (mm)"]
     rows = []
@@ -118,8 +121,8 @@ def _lights(lights: LightCalibration) -> Iterable[str]:
     if lens > max(math.sqrt(max(common**2 - lens**2, 0.0)), own):
         limit = "the lens, which is not stated (telecentric, or its distance)"
     # One mirror ball gives each light one highlight: nothing is left over to disagree.
-    alone = lights.sphere == "mirror" and len(lights.balls) == 1
-    residual = "one ball shows no residual" if alone else f"residual {lights.residual_px:.3f} px"
+    alone = lights.residual_px < LEAST_RESIDUAL_PX
+    residual = "one ball leaves no residual" if alone else f"residual {lights.residual_px:.3f} px"
     yield f"<p>By a {html.escape(lights.sphere)} ball; {residual}. Limited by {limit}.</p>"
 
 
@@ -212,4 +215,4 @@ def _verified(station: Station) -> Iterable[str]:
 def _table(head: list[str], rows: list[list[str]]) -> str:
     top = "".join(f"<th>{html.escape(cell)}</th>" for cell in head)
     body = "".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
-    return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
+    return f'<div class="wide"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
