@@ -110,7 +110,7 @@ def test_the_page_draws_the_height_map() -> None:
     assert np.ptp(z[flat][near]) < 5.0, "flat"
     assert all(np.ptp(z[at][off[at] < 0.3]) > 8.0 for at in range(len(drawn)) if at != flat), "round"
     assert {"board, integrated normals", "from a prior, not measured"} <= set(traces)
-    assert traces["spheroids that shadows gave"]["visible"] == "legendonly"
+    assert traces["fitted spheroids"]["visible"] == "legendonly"
     faces = np.stack([unpacked(mesh[axis]) for axis in "ijk"])  # type: ignore[arg-type]
     assert faces.max() < z.size
 

@@ -317,5 +317,7 @@ def test_what_lies_beside_a_result_is_checked(tmp_path: Path) -> None:
 
 
 def test_without_a_result_the_message_says_who_writes_one(tmp_path: Path) -> None:
-    with pytest.raises(bgars.FileFormatError, match=r"holds no result\.json: not a folder that bgars inspect wrote"):
+    with pytest.raises(
+        bgars.FileFormatError, match=r"holds no result\.json: neither a folder that bgars inspect wrote"
+    ):
         bgars.write_report(tmp_path, tmp_path / "report.html")

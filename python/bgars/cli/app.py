@@ -170,7 +170,7 @@ def reconstruct(
         print_json(summary)
         return
     height = summary["height"]
-    low, high = height[f"height_range_{height['unit']}"]
+    low, high = (round(value, 1) + 0.0 for value in height[f"height_range_{height['unit']}"])  # no -0.0
     trust, _, method_line = choice_in_words(summary["normals"]).partition("\n")
     say(f"{summary['capture']}: {trust}")
     parts = height["components"]

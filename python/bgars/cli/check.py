@@ -108,7 +108,7 @@ def _write_page(output: Path, page: str) -> Path:
 
 def _tell(name: str, findings: Findings) -> None:
     if not findings.findings:
-        say(f"{name}: nothing found")
+        say(f"{name}: no faults found")
         return
     errors, warnings = len(findings.errors), len(findings.told) - len(findings.errors)
     say(f"{name}: {errors} error{'' if errors == 1 else 's'}, {warnings} warning{'' if warnings == 1 else 's'}")

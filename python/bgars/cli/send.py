@@ -64,7 +64,7 @@ def send(
     Exit code 0: everything was sent, or --follow was ended. 2: wrong use, or the broker does not answer.
     """
     if bool(mqtt) == bool(amqp):
-        msg = "--mqtt and --amqp: give one of them"
+        msg = "--mqtt or --amqp: give one of them"
         raise InputError(msg)
     sender = Sender(open_store(store), Mqtt(mqtt) if mqtt else Amqp(amqp), cfx, say=say)
     with ended_by_signals(sender):

@@ -147,6 +147,8 @@ def watch(
         )
         with ended_by_signals(watching):
             warm_up(watching.store, method)
+            if sys.stderr.isatty():
+                sys.stderr.write(f"watching {inbox}; Ctrl-C ends it\n")
             watching.run(most=most)
 
 

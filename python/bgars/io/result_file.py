@@ -51,7 +51,7 @@ def read_result(path: str | PathLike[str]) -> PartResult:
     if path.is_dir():
         path /= RESULT_NAME
         if not path.is_file():
-            msg = f"{path.parent}: holds no {RESULT_NAME}: not a folder that bgars inspect wrote"
+            msg = f"{path.parent}: holds no {RESULT_NAME}: neither a folder that bgars inspect wrote nor a store"
             raise FileFormatError(msg)
     return parse_result(read_bounded(path, MAX_BYTES, "result"), path)
 

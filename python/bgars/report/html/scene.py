@@ -68,7 +68,7 @@ def scene_chart(result: dict[str, Any], surface: PartSurface | None = None) -> d
     shown = {"visible": "legendonly"} if is_meshed else {}
     if coloured:
         look = {"intensity": packed(np.repeat(colors, cap_points(sides))), "coloraxis": "coloraxis", **shown}
-        title = "spheroids that shadows gave" if is_meshed else "balls, measured (equator up)"
+        title = "fitted spheroids" if is_meshed else "balls, measured (equator up)"
         traces.append(caps(coloured, sides, name=title, **look))
     if plain:
         title = "spheroids without a plane" if is_meshed else "balls without a plane"
@@ -269,4 +269,4 @@ def _rings(
     if not points["x"]:
         return None
     look = {"line": {"color": FAIL, "width": 4}, "hoverinfo": "skip", "connectgaps": False}
-    return {"type": "scatter3d", "mode": "lines", "name": "no ball, or no height: on the board", **points, **look}
+    return {"type": "scatter3d", "mode": "lines", "name": "no ball or no height (on the board)", **points, **look}
