@@ -27,17 +27,17 @@ MEASURES = (
     "* **Height RMSE:** the estimated normals are integrated over the whole silhouette of the hemisphere by the "
     "default integrator (pixels without a solution as (0, 0, 1) again); root mean square difference to the true height "
     "over all those pixels, the mean difference removed.",
-    "* **Measured:** share of the pixels of n_z > 0.3 whose own light fixes the normal (`measured_percent_nz03` of the "
-    "CSV files). Others `reflectance` draws to the sphere of the ball's circle.",
+    "* **Measured:** percentage of the pixels of n_z > 0.3 whose own values determine the normal "
+    "(`measured_percent_nz03` of the CSV files). `reflectance` draws the others to the sphere of the ball's circle.",
 )
 LIMITS = (
-    "* **One scene.** A sphere alone, ideal lights and camera, one reflection: these numbers compare methods under the "
-    "paper's conditions and say little about a real part.",
-    "* **A sphere flatters `reflectance`.** It takes balls for spheres until their light says otherwise, and here they "
-    "are: where little is measured, its small errors are those of the circle it found.",
-    "* **The exposure does not adapt.** Grey level 255 means I = 1 in every image, as in the paper's sweeps; at I_d = "
-    "{least:g} the diffuse light is worth {levels:.1f} grey levels, and 8 bits lose most of it.",
-    "* **The paper is known here by its equations,** not by its images or data: a figure agrees where it shows the "
+    "* **One scene.** A single sphere, ideal lights and camera, one reflection: these numbers compare methods under "
+    "the paper's conditions and say little about a real part.",
+    "* **A sphere favours `reflectance`.** It assumes spheres unless the images show another shape, and here they are "
+    "spheres: where little is measured, its small errors are those of the circle it found.",
+    "* **The exposure is fixed.** Grey level 255 means I = 1 in every image, as in the paper's sweeps; at I_d = "
+    "{least:g} the diffuse light is {levels:.1f} grey levels, and 8 bits lose most of it.",
+    "* **Only the equations of the paper were available,** not its images or data: a figure agrees if it shows the "
     "same effect.",
 )
 

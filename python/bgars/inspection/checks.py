@@ -175,7 +175,7 @@ def _name_lights(problem: Problem, answers: dict[int, Array]) -> list[Complaint]
     unit = problem.vectors / np.linalg.norm(problem.vectors, axis=1, keepdims=True)
     turns = [_turn_deg(unit[light], direction) for light, direction in answers.items()]
     if len(answers) == len(unit) and np.ptp(turns) < SAME_LIGHT_DEG and abs(np.mean(turns)) > SAME_LIGHT_DEG:
-        text = f"all lights stand {np.mean(turns):+.0f} degrees counter-clockwise of where the rig says"
+        text = f"all lights are turned by {np.mean(turns):+.0f} degrees (counter-clockwise) against the rig"
         return [Complaint(light, text, serious=True) for light in (0,)]
     like: dict[int, int] = {}
     for light, direction in answers.items():
@@ -192,8 +192,8 @@ def _name_lights(problem: Problem, answers: dict[int, Array]) -> list[Complaint]
             elevation = np.degrees(np.arcsin(direction[2]))
             off = np.degrees(np.arccos(np.clip(unit[light] @ direction, -1.0, 1.0)))
             text = (
-                f"{light_name(light, files)} stands about {off:.0f} degrees from where the rig says: its shadows point "
-                f"to azimuth {azimuth:.0f}, elevation {elevation:.0f} degrees"
+                f"{light_name(light, files)} stands about {off:.0f} degrees off its direction in the rig: its shadows "
+                f"point to azimuth {azimuth:.0f}, elevation {elevation:.0f} degrees"
             )
             complaints.append(Complaint(light, text, serious=bool(off > NEAR_DEG)))
         elif like.get(other) != light:

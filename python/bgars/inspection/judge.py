@@ -207,7 +207,7 @@ def _rocks(coplanarity: Coplanarity) -> bool:
 def _strayed_lights(change_deg: Array, files: Sequence[str]) -> list[str]:
     """Lights that the shadows put elsewhere: a wrong rig, or an image under another light's name."""
     return [
-        f"{light_name(index, files)} stands {change:.1f} degrees from where the rig says, by its shadows; over "
+        f"{light_name(index, files)} stands {change:.1f} degrees off its direction in the rig, by its shadows; over "
         f"{MAX_LIGHT_CHANGE_DEG:g} degrees the rig or the pairing of images and lights is wrong"
         for index, change in enumerate(change_deg)
         if change > MAX_LIGHT_CHANGE_DEG

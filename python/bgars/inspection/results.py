@@ -125,7 +125,7 @@ def measurement(found: FoundBalls, problem: Problem, fit: Fit | None, flats: Fla
     if fit.settled is not None:
         warnings += what_is_odd(fit.settled, problem.pitch_um)
     warnings += tuple(
-        f"{light_name(light, files)}: its shadows say that it stands {moved[light]:.1f} degrees from where the rig says"
+        f"{light_name(light, files)}: its shadows place it {moved[light]:.1f} degrees off its direction in the rig"
         for light in map(int, np.flatnonzero(moved > LIGHT_WARNING_DEG))
     )
     rows = np.array([fitted.get(index, -1) for index in range(len(balls))])

@@ -38,7 +38,7 @@ def what_is_odd(settled: Settled, pitch_um: float) -> tuple[str, ...]:
         percent = 100.0 * abs(float(common[ROUNDNESS])) + 100.0 * abs(float(np.tan(common[ELEVATION])))
         texts.append(
             f"either all balls are {'flatter' if common[ROUNDNESS] < 0 else 'taller'} than spheres, or all lamps stand "
-            f"{'higher' if common[ELEVATION] > 0 else 'lower'} than the rig says (probability {100 * round_:.0f} and "
+            f"{'higher' if common[ELEVATION] > 0 else 'lower'} than the rig states (probability {100 * round_:.0f} and "
             f"{100 * raised:.0f} %): heights are uncertain by about {percent:.1f} %. A calibrated rig ([lights] u_deg) "
             "or the balls' shape (aspect_ratio, u_aspect_ratio of the recipe) would decide"
         )

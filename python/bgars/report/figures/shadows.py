@@ -152,7 +152,7 @@ def _moved(result: PartResult, light: int) -> str:
     moved = result.light_change_deg[light] if light < len(result.light_change_deg) else math.nan
     if not is_fitted(result) or not math.isfinite(moved):
         return "not fitted"
-    return f"moved by {moved:.2f}°"
+    return f"refined by {moved:.2f}°"
 
 
 def _residual(value: float) -> str:
