@@ -119,8 +119,8 @@ def batch_table(folder: Path, parts: int, large_cpu_s: float) -> list[str]:
     lines = [
         f"**Batch:** {parts} parts of nine balls, 290 x 290 pixels, eight lights, one thread per process; load "
         f"{load:.1f} when it began.\n",
-        "| processes | parts a minute | efficiency (wall) | CPU s of all | of it the start | efficiency (CPU) "
-        "| without the start | processors had |",
+        "| processes | parts per minute | efficiency (wall) | CPU s of all | of it the start | efficiency (CPU) "
+        "| without the start | processors used |",
         "|---:|---:|---:|---:|---:|---:|---:|---:|",
     ]
     for processes, rate, used, start, had in rows:
@@ -131,14 +131,13 @@ def batch_table(folder: Path, parts: int, large_cpu_s: float) -> list[str]:
         )
     lines += [
         "",
-        "Efficiency (CPU) is what one process needs for all parts over what two need: what running side by side costs "
-        "by itself. The start is that of the command and of each process, once, whatever the number of parts: what the "
-        "same command takes when the store knows all of them. Beyond two it is calculated, not measured: the one "
-        f"process that writes the store needs {1e3 * append_s:.0f} ms per part, which is the limit of any number of "
-        "workers; images that are sent pass a network of 1 Gbit/s (32 MB for a part of 4 megapixels and eight "
-        "lights).\n",
-        f"| workers | parts a minute, these | what binds | parts a minute, 4 megapixels, "
-        f"{large_cpu_s:.1f} CPU s, images sent | what binds |",
+        "Efficiency (CPU) is the CPU time of one process for all parts, divided by that of two: the cost of running in "
+        "parallel. The start is the CPU time of the same command when the store knows all parts; it occurs once, "
+        "whatever their number. Rates beyond two processes are calculated: the process that writes the store needs "
+        f"{1e3 * append_s:.0f} ms per part, which limits any number of workers; sent images pass a network of 1 Gbit/s "
+        "(32 MB for a part of 4 megapixels and eight lights).\n",
+        f"| workers | parts per minute, these | limited by | parts per minute, 4 megapixels, "
+        f"{large_cpu_s:.1f} CPU s, images sent | limited by |",
         "|---:|---:|---|---:|---|",
     ]
     for workers in (4, 16, 64):

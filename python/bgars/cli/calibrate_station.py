@@ -54,13 +54,13 @@ FoldersArgument = Annotated[
 FolderArgument = Annotated[Path, typer.Argument(metavar="FOLDER", help="Capture folder.", show_default=False)]
 SphereOption = Annotated[
     Literal["mirror", "matt"],
-    typer.Option(help="mirror: a bearing ball, a chrome or glossy black one. matt: a dull, light one."),
+    typer.Option(help="mirror: a bearing ball, a chrome or glossy black one. matt: a matt, light-coloured one."),
 ]
 InViewOption = Annotated[
     Literal["mirror", "matt", "balls"],
     typer.Option(
-        help="mirror: a bearing ball, a chrome or glossy black one. matt: a dull, light one. balls: the solder balls "
-        "of a part; its capture.toml says where the lights are to some degrees."
+        help="mirror: a bearing ball, a chrome or glossy black one. matt: a matt, light-coloured one. "
+        "balls: the solder balls of a part, whose capture.toml gives the lights to within some degrees."
     ),
 ]
 RecipeOption = Annotated[
@@ -74,8 +74,8 @@ OutlineOption = Annotated[
     list[str] | None,
     typer.Option(
         metavar="COL,ROW,RADIUS",
-        help="Outline of the ball in pixels as an image viewer shows it (0,0 = middle of the first pixel), where it "
-        "cannot be found; once per folder, or several balls of one folder.",
+        help="Outline of a ball that is not found, in pixels as an image viewer shows them (0,0 = centre of the first "
+        "pixel); once per folder, or for several balls of one folder.",
         show_default=False,
     ),
 ]

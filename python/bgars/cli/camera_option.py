@@ -19,8 +19,8 @@ CameraOption = Annotated[
     str | None,
     typer.Option(
         metavar="telecentric|MM",
-        help="Lens, if capture.toml does not state it: telecentric, or its distance from the board in mm. Without, "
-        "either is allowed for in the uncertainty.",
+        help="Lens, if capture.toml does not state it: telecentric, or its distance from the board in mm. Otherwise "
+        "the uncertainty covers both.",
         show_default=False,
     ),
 ]
