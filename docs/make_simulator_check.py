@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 SCENES = ("A_one_ball_diffuse", "C_grid_4x4_paper", "D_grid_5x5_defects", "D2_grid_5x5_defects_bow")
 TRUTH_SCENES = ("F_grid_6x6_near", "H_bridge")
-"""Near lights, and a bridge: their images hold inter-reflections, so only truth is compared."""
+"""Near lights, and a bridge: their images hold interreflections, so only truth is compared."""
 NOISY_SCENE = "C2_grid_4x4_gamma"
 PAGE = Path(__file__).parent / "simulator.md"
 START, END = "<!-- tables: make simulator -->", "<!-- end of tables -->"

@@ -59,7 +59,7 @@ def init(
         answer = typer.prompt("Station file (empty: none)", default="", show_default=False)
         station = Path(answer) if answer else None
         if station is None:
-            ring = typer.prompt("Lights of an even ring: count, elevation in degrees", default="8,45")
+            ring = typer.prompt("Lights of a ring in equal steps: count,elevation in degrees", default="8,45")
         if station is None and pitch_um is None:
             answer = typer.prompt(
                 "Size of a pixel on the board in um (empty: not known)", default="", show_default=False

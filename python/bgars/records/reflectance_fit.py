@@ -32,7 +32,7 @@ class ReflectanceFit:
     own_material : tuple of bool
         Balls that were given a material of their own.
     residuals_learnt : bool
-        Whether each ball was corrected by what the others show beyond the material: inter-reflections.
+        Whether each ball was corrected by what the others show beyond the material: interreflections.
     deviation_deg : tuple of float
         Root mean square angle of each ball's normals to its circle's sphere, the errors of the normals taken off.
     flat_radius : tuple of (float or None)
