@@ -189,7 +189,7 @@ def test_a_recipe_says_what_to_write(text: str, words: list[str], tmp_path: Path
         (
             "light_directions.txt",
             "".join(f"LED{i} 0 0.{i} 0.9\n" for i in range(8)).encode(),
-            ["0 of 8", "take them out"],
+            ["0 of 8", "remove them"],
         ),
     ],
 )
