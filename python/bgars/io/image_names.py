@@ -118,7 +118,7 @@ def _by_stem(bases: list[str], files: list[str]) -> tuple[list[str], list[str]]:
 RULES = {
     "": _as_written,
     "by letters with accents written another way": _any_form,
-    "whatever the case of their letters": _any_case,
+    "ignoring the case of letters": _any_case,
     "by stem": _by_stem,
 }
 """How names are looked for in a folder, in this order, each in the words of a note."""

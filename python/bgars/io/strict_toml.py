@@ -41,7 +41,7 @@ class Strict(BaseModel):
         for old, new in cls.old_names.items() if isinstance(values, dict) else ():
             if old in values and new not in values:
                 place = f"{info.context}: " if info.context else ""
-                text = f"{place}{old} is called {new} now; the old name goes with the next release"
+                text = f"{place}{old} is called {new} now; the next release removes the old name"
                 warnings.warn(text, FutureWarning, stacklevel=2)
                 values = {new if key == old else key: value for key, value in values.items()}
         return values

@@ -85,9 +85,9 @@ class PartResult(ShownPart):
     method : str
         Estimator of the normals, which show flat tops.
     method_reason : str
-        What it did, and how well one material explains the balls; empty: no ball was looked at.
+        What it did, and how well one material explains the balls; empty: no ball was examined.
     material : PartMaterial or None
-        What the estimator fitted to the balls; None: another estimator, or no ball was looked at.
+        What the estimator fitted to the balls; None: another estimator, or no ball was examined.
     capture : str
         Name of the capture.
     serial : str
@@ -140,12 +140,12 @@ class PartResult(ShownPart):
     method_reason: Annotated[
         str,
         Key(
-            "what the estimator did, and how well one material explains the balls; empty = no ball looked at",
+            "what the estimator did, and how well one material explains the balls; empty = no ball examined",
             is_late=True,
             was="normals_choice",
         ),
     ] = ""
-    material: Annotated[PartMaterial | None, Key("null: another estimator, or no ball was looked at", is_late=True)] = (
+    material: Annotated[PartMaterial | None, Key("null: another estimator, or no ball was examined", is_late=True)] = (
         None
     )
     capture: Annotated[str, Key("name of the capture folder")] = ""

@@ -40,6 +40,6 @@ def _read(self: object, *, record: type, old: str, new: str) -> Any:  # noqa: AN
 
 def _told(record: type, old: str, new: str, level: int = 3) -> str:
     """Say that the old name goes, and return the new one."""
-    words = f"{record.__name__}.{old} is called {new} now; the old name goes with the next release"
+    words = f"{record.__name__}.{old} is called {new} now; the next release removes the old name"
     warnings.warn(words, DeprecationWarning, stacklevel=level)
     return new

@@ -62,7 +62,7 @@ def read_references(path: str | PathLike[str]) -> References:
             raise FileFormatError(msg)
         part, ball, name, text = (cell.strip() for cell in cells)
         if name in old:
-            told = f"{path}: {name} is called {old[name]} now; the old name goes with the next release"
+            told = f"{path}: {name} is called {old[name]} now; the next release removes the old name"
             warnings.warn(told, FutureWarning, stacklevel=2)
             name = old[name]
         if name not in known:

@@ -326,7 +326,7 @@ def _judged(
     doubts = []
     if math.isnan(index.value):
         told = f"{title}: no spread at all, so no Ppk"
-        doubts.append("look at the readings")
+        doubts.append("check the readings")
     if chart.signals:
         first = chart.signals[0]
         doubts.append(
