@@ -56,7 +56,7 @@ SAID = {
     "lp_winpath": ["last part of their paths", "img_01.png"],
     "lp_posixpath": ["last part of their paths"],
     "lp_rtibuilder_layout": ["assembly-files/coin.lp", "jpeg-exports"],
-    "lp_case": ["case of their letters", "IMG_01.PNG"],
+    "lp_case": ["case of letters", "IMG_01.PNG"],
     "lp_ext_differs": ["by stem", "img_01.CR2 as img_01.png"],
     "lp_nocount": ["no count", "8 lights"],
     "lp_comma_decimal": ["decimal commas"],

@@ -51,7 +51,7 @@ LP_DIALECTS = {
     "windows paths with slashes": (with_names(lambda name: f"D:/rti/{name}"), {}, ["last part of their paths"]),
     "posix paths": (with_names(lambda name: f"/home/me/rti/{name}"), {}, ["last part of their paths"]),
     "relative paths of elsewhere": (with_names(lambda name: f"../jpeg-exports/{name}"), {}, ["last part of"]),
-    "other case": (with_names(str.upper), {}, ["case of their letters"]),
+    "other case": (with_names(str.upper), {}, ["case of letters"]),
     "other extension": (with_names(lambda name: name.replace(".png", ".CR2")), {}, ["by stem"]),
     "no extension": (with_names(lambda name: name.replace(".png", "")), {}, ["by stem"]),
     "windows paths, other extension": (with_names(lambda name: "E:\\" + name.replace("png", "NEF")), {}, ["by stem"]),

@@ -122,8 +122,8 @@ def _integer_levels(
         return code_scale, code_scale
     if depth.clipped:
         notes.append(
-            f"the camera has {depth.bits} bits: {depth.reason}; {depth.saturation} is taken as the clipping "
-            f"level (saturation = ... in {RECIPE_NAME} overrides it)"
+            f"the camera has {depth.bits} bits: {depth.reason}; saturation = {depth.saturation} is assumed "
+            f"(saturation in {RECIPE_NAME} overrides it)"
         )
     return float(depth.saturation), float(depth.saturation)
 
