@@ -31,6 +31,7 @@ table { border-collapse: collapse; } td, th { padding: .15rem .7rem; text-align:
 th { border-bottom: 1px solid #888; font-weight: 600; } td:first-child, th:first-child { text-align: left; }
 .doubt, .fail { color: #a33; font-weight: 600; } svg { max-width: 100%; margin: 1rem 2rem 0 0; }
 .missing { color: #777; }
+@media (max-width: 40rem) { .wide::before { content: "↔ swipe sideways"; color: #777; font-size: .85rem; } }
 """
 SIDE = 300
 LEAST_RESIDUAL_PX = 0.0005
