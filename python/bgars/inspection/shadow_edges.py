@@ -14,10 +14,11 @@ displacement a and a change b of the spread:
 linear in four unknowns: least squares, then once more with Cauchy weights.
 
 Light that balls throw on the board beside them is not the same under all lights: T, a mean over lights, has too much
-of it on the far side of a ball, so that the lit level grows outward by a share g per pixel. A stretch knows its own g
-badly, all shadows of a part together know it well as a function of the place along the edge: a fifth column
-``hi T g d F`` is fitted for it, and the displacement is that of four columns with the usual g of its place taken out
-(exact, for least squares are linear).
+of it on the far side of a ball, so that the lit level grows outward by a share g per pixel. Two more columns take that
+up: ``T d F``, and ``T d`` for what grows on both sides, which moves no edge: what the profile of a real lens is blunter
+or sharper in its tails than F is as odd about the edge, and must not pass for growth of the lit level. A stretch knows
+its own growth badly, all shadows of a part together know it well as a function of the place along the edge: the
+displacement is that of four columns with the usual growth of its place taken out (exact, for least squares are linear).
 
 That holds for displacements below s. The coarse search goes by area: with H the unit step and r the reach,
 
@@ -250,8 +251,9 @@ class Stretches(NamedTuple):
 
     Coefficients (shadow and lit level, displacement and change of the spread times the contrast) and their standard
     uncertainties; mean texture and its relative growth outward per pixel; means over the lines of the tangent point's
-    angle, the way of the light and the spread, weighted by what they say about the displacement; growth of the lit
-    level outward per pixel where it is free, and the displacement then; 1 where there was enough to see, else 0.
+    angle, the way of the light and the spread, weighted by what they say about the displacement; what the lit level
+    grows outward per pixel more than the shadow where both are free, and the displacement that a growth of 1 passes for
+    where none is; 1 where there was enough to see, else 0.
     """
 
     low: Array
@@ -268,7 +270,7 @@ class Stretches(NamedTuple):
     way_px: Array
     spread_px: Array
     lit_growth: Array
-    moved_with_growth: Array
+    moved_by_growth: Array
     looked_at: Array
 
 
@@ -322,16 +324,15 @@ def _edges(
 
 def _without_growth(fit: Stretches, measured: NDArray[np.bool_]) -> Array:
     """(N, L, S) displacements times contrast without what the usual growth of the lit level outward adds to them."""
-    per_growth = np.where(fit.lit_growth != 0.0, fit.moved - fit.moved_with_growth, 0.0)
-    per_growth = per_growth / np.where(fit.lit_growth != 0.0, fit.lit_growth, 1.0)
     share = np.where(measured, fit.lit_growth / np.where(measured, fit.high, 1.0), np.nan)
     # Steeper ones are none: too little lit board to tell growth from displacement.
     plausible = np.abs(share) < STEEPEST_GROWTH
-    share, per_growth = np.where(plausible, share, np.nan), np.where(plausible, per_growth, 0.0)
+    share = np.where(plausible, share, np.nan)
     count = np.isfinite(share).sum(axis=(0, 1))
     # Left and right of the tip are alike.
     both = np.concatenate([share, share[..., ::-1]], axis=0)
     known = (count + count[::-1]) >= MIN_GROWTHS
     usual = np.where(known, np.nanmedian(np.where(known, both, 0.0), axis=(0, 1)), 0.0)
-    without: Array = fit.moved - per_growth * usual * np.where(measured, fit.high, 0.0)
+    by_growth = np.where(plausible, fit.moved_by_growth * fit.high, 0.0)
+    without: Array = fit.moved - by_growth * usual
     return without
