@@ -9,13 +9,11 @@ from bgars.inspection.board import Board
 from bgars.inspection.edge_fit import Group, fit_stretches, group_sum
 from bgars.inspection.radiance import Radiance
 from bgars.inspection.shadow_edges import (
-    FEWEST_SECTORS,
-    LINES_A_STRETCH,
-    SECTORS,
     WIDEST_RAD,
     EdgeSettings,
     Lines,
     edge_lines,
+    stretches_of,
 )
 from bgars.inspection.shadow_map import ShadowMap
 from bgars.inspection.shadow_model import Balls, Lights, Rays, edge_at, near_edge, rays
@@ -62,7 +60,7 @@ def slow_edges(
     """(N, L, S) arrays in the order of the fields of `Edges`."""
     angles = (np.arange(count) + 0.5) / count * 2.0 * WIDEST_RAD - WIDEST_RAD
     balls, lights = Balls.from_table(table), Lights.from_table(vectors, near)
-    sectors = int(np.clip(len(angles) // LINES_A_STRETCH, FEWEST_SECTORS, SECTORS))
+    sectors = stretches_of(len(angles), settings.reach_px / settings.stride_px)
     shape = (len(table), len(vectors), sectors)
     wide_balls, wide_lights = balls.spread(2), lights.spread(1, 1)
     edge = edge_at(angles[None, None, :], wide_balls, wide_lights, board)

@@ -53,7 +53,8 @@ LINE_SPACING_PX = 1.45
 MAX_LINES = 96
 FEW_LINES = 48
 FEWEST_LINES = 12
-LINES_A_STRETCH = 3
+LINES_A_STRETCH, PIXELS_A_STRETCH = 3, 16.0
+"""Least lines of a stretch, and pixels on them: 12 must be usable for its four unknowns."""
 REACH_SIGMAS, REACH_PX = 3.2, 1.2
 """How far pixels across an edge reach: spreads, and pixels more."""
 BEYOND = 1.25
@@ -156,7 +157,7 @@ def measure_edges(
     radius = float(np.median(table[:, 3]))
     most = MAX_LINES if settings.thorough else FEW_LINES
     count = int(np.clip(2.0 * WIDEST_RAD * radius / LINE_SPACING_PX, FEWEST_LINES, most))
-    sectors = int(np.clip(count // LINES_A_STRETCH, FEWEST_SECTORS, SECTORS))
+    sectors = stretches_of(count, settings.reach_px / settings.stride_px)
     angles_rad = (np.arange(count) + 0.5) / count * 2.0 * WIDEST_RAD - WIDEST_RAD
     stretches, noise = _bgars.measure_edges(
         kernel_capture(radiance.capture),
@@ -175,6 +176,12 @@ def measure_edges(
     fit = Stretches(*np.moveaxis(stretches, -1, 0).reshape(-1, *shape))
     balls = Balls.from_table(table).spread(2)
     return _edges(fit, noise, balls, vectors, near, board, settings, radiance.scale)
+
+
+def stretches_of(lines: int, reach: float) -> int:
+    """Into how many stretches the lines of a shadow are shared out, with pixels up to `reach` on both sides of each."""
+    together = max(LINES_A_STRETCH, int(np.ceil(PIXELS_A_STRETCH / (2.0 * reach))))
+    return int(np.clip(lines // together, FEWEST_SECTORS, SECTORS))
 
 
 class Lines(NamedTuple):
