@@ -178,7 +178,7 @@ def test_uncertainties_cover_the_truth_as_often_as_they_should(
 
 @pytest.mark.xfail(
     strict=True,
-    reason="0.97: simulated balls are rounder than 0.001, and rings better squared than 0.05 degrees, which u allows for",
+    reason="0.97: simulated balls are rounder than 0.001, rings better squared than 0.05 degrees, which u allows for",
 )
 def test_uncertainties_of_heights_are_not_too_large(six_parts: tuple[dict[str, float], dict[str, float]]) -> None:
     shares, _ = six_parts
