@@ -9,15 +9,14 @@ from bgars.inspection.board import Board
 from bgars.inspection.edge_fit import Group, fit_stretches, group_sum
 from bgars.inspection.radiance import Radiance
 from bgars.inspection.shadow_edges import (
-    FEWEST_SECTORS,
-    LINES_A_STRETCH,
+    BLUNT_PX,
     MIN_GROWTHS,
-    SECTORS,
     STEEPEST_GROWTH,
     WIDEST_RAD,
     EdgeSettings,
     Lines,
     edge_lines,
+    stretches_of,
 )
 from bgars.inspection.shadow_map import ShadowMap
 from bgars.inspection.shadow_model import Balls, Lights, Rays, edge_at, near_edge, rays
@@ -64,7 +63,7 @@ def slow_edges(
     """(N, L, S) arrays in the order of the fields of `Edges`."""
     angles = (np.arange(count) + 0.5) / count * 2.0 * WIDEST_RAD - WIDEST_RAD
     balls, lights = Balls.from_table(table), Lights.from_table(vectors, near)
-    sectors = int(np.clip(len(angles) // LINES_A_STRETCH, FEWEST_SECTORS, SECTORS))
+    sectors = stretches_of(len(angles), settings.reach_px / settings.stride_px)
     shape = (len(table), len(vectors), sectors)
     wide_balls, wide_lights = balls.spread(2), lights.spread(1, 1)
     edge = edge_at(angles[None, None, :], wide_balls, wide_lights, board)
@@ -229,7 +228,7 @@ def _solve(
     )
     moved = fit.solution[:, 2].reshape(shape)
     if coarse_px is None:
-        moved = moved - _by_growth(columns, pixels, spread, fit.weight, fit.solution, sector, shape, measured)
+        moved = moved - _by_growth(columns, pixels, spread, fit.weight, fit.solution, sector, mean_spread, measured)
     shift = blurred + 0.5 * settings.spread_px**2 * curvature - np.where(measured, moved / safe, 0.0)
     along, up = lamp_gradients(beam, balls, vectors)
     bad = ~measured
@@ -273,21 +272,22 @@ def _by_growth(
     weight: Array,
     solution: Array,
     sector: Index,
-    shape: tuple[int, int, int],
+    mean_spread: Array,
     measured: NDArray[np.bool_],
 ) -> Array:
     """(N, L, S) what the usual growth of the lit level, at each place along the edge, adds to the displacements."""
-    size = shape[0] * shape[1] * shape[2]
-    grown = [*columns, columns[1] * pixels.distance * spread[None, :]]
+    shape, size = mean_spread.shape, mean_spread.size
+    across = pixels.distance * spread[None, :]
+    both, lit_alone = (columns[0] + columns[1]) * across, columns[1] * across
     per_growth, share = np.zeros(size), np.full(size, np.nan)
-    for stretch in np.flatnonzero(measured.reshape(-1)):
+    for stretch in np.flatnonzero((measured & (mean_spread >= BLUNT_PX)).reshape(-1)):
         mine = sector == stretch
         root = np.sqrt(weight[:, mine].ravel())
-        system = np.stack([column[:, mine].ravel() for column in grown], axis=1) * root[:, None]
+        system = np.stack([column[:, mine].ravel() for column in (*columns, both, lit_alone)], axis=1) * root[:, None]
         free = np.linalg.lstsq(system, pixels.value[:, mine].ravel() * root, rcond=None)[0]
-        growth = free[4] / solution[stretch, 1]
+        growth = free[-1] / solution[stretch, 1]
         if abs(growth) < STEEPEST_GROWTH:
-            per_growth[stretch] = (solution[stretch, 2] - free[2]) / free[4]
+            per_growth[stretch] = np.linalg.lstsq(system[:, :-2], system[:, -1], rcond=None)[0][2]
             share[stretch] = growth
     share = share.reshape(shape)
     lit = np.where(measured, solution[:, 1].reshape(shape), 0.0)

@@ -110,7 +110,8 @@ def reading_budget(settled: Settled, priors: Priors, by_ball: Array) -> Budget:
         u = float(priors.u_common[term])
         if term in settled.mixtures:
             mixture, odd = settled.mixtures[term], settled.odd[term]
-            u = float(np.sqrt(odd * mixture.wide**2 + (1.0 - odd) * mixture.narrow**2))
+            # The mean of what both parts make uncertain, each with its probability.
+            u = float(1.0 / np.sqrt(odd / mixture.wide**2 + (1.0 - odd) / mixture.narrow**2))
         columns.append(with_border[:, first + term] / u)
         causes.append(COMMON_SOURCES[term])
     # Which of shifted images are the right ones nobody knows: where most are, or anywhere else that one is.

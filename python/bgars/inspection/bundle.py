@@ -184,11 +184,15 @@ def solve_bundle(
 
 
 def _relief(residual: Array, u_px: Array, vectors: Array) -> Array:
-    """(N, 5) variances by relief of the board: heights follow it by the tangent of the lights, places by their mean."""
-    square = np.square(relief_px(np.where(np.isfinite(u_px), residual, np.nan), u_px))
+    """(N, 5) variances by relief of the board: heights follow it by the tangent of the lights, places by their mean.
+
+    Heights twice: by what differs beside one ball, which residuals show, and by what all shadows of the ball have in
+    common, a layer of mask under all of them, which they do not show and which is as large on the average of the part.
+    """
+    square = np.square(relief_px(np.where(np.isfinite(u_px), residual, np.nan)))
     rise = float(np.median(vectors[:, 2] / np.maximum(np.hypot(vectors[:, 0], vectors[:, 1]), 1e-6)))
     aside = square / (2.0 * len(vectors))
-    return np.column_stack([aside, aside, rise**2 * square, aside, np.zeros_like(square)])
+    return np.column_stack([aside, aside, 2.0 * rise**2 * square, aside, np.zeros_like(square)])
 
 
 def _step(normal: NormalEquations) -> tuple[Array, Array]:

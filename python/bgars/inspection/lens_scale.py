@@ -24,9 +24,9 @@ __all__ = ["LensScale", "fit_lens_scale"]
 
 Array = NDArray[np.float64]
 
-PIXEL_PITCH = Mixture(0.0003, 0.006, 0.15)
+PIXEL_PITCH = Mixture(0.00017, 0.006, 0.15)
 """Relative error of the declared pixel pitch: calibrated with a grid (its lines 0.01 %, their image 0.1 of 1000 pixels,
-focus and temperature since then 0.02 %), or taken from a data sheet."""
+focus and temperature of a measuring lens since then 0.01 %), or taken from a data sheet."""
 DISTORTION = Mixture(0.0003, 0.004, 0.15)
 """Displacement at the image's corner over its distance from the middle: telecentric or macro lens, and others."""
 RECIPE_PITCH = 0.0003

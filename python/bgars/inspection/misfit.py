@@ -29,8 +29,6 @@ Array = NDArray[np.float64]
 BASIS = 3
 MIN_POINTS = 4
 """Of a shadow, to have a mean and two tilts."""
-USUAL_EXCESS_PX = 0.05
-"""More than pixel grid, penumbra and quantisation make points scatter beyond their own on a plain board: 0.03."""
 FARTHEST_PX = 3.0
 """Points farther off are no edge of this shadow."""
 PRIOR_FREEDOM = 6.0
@@ -62,22 +60,24 @@ def scatter_factors(model: EdgeModel, weight: Array) -> Array:
     return np.maximum(factor, 1.0)
 
 
-def relief_px(residual: Array, u_px: Array) -> Array:
+def relief_px(residual: Array) -> Array:
     """(N,) root mean square of what the board's relief puts the points of a ball's shadows off by, rejected ones too.
 
     The fit goes by the bulk of the points and rejects the others, but where the board is uneven nobody knows which of
     them lie on its plane: a ball whose shadows all fall on a trace or a second layer of mask is measured from there.
-    Half of the mean square is the ball's own, half that of the part.
+    Half of the mean square is the ball's own, half that of the part. Neighbouring stretches of an edge lie on the same
+    relief and scatter each for itself: the mean product of neighbours is the mean square of the relief alone.
 
     Parameters
     ----------
-    residual, u_px : (N, L, S) float64
-        Distances of points to their edges and their own uncertainties; NaN and inf where there is none.
+    residual : (N, L, S) float64
+        Distances of points to their edges in px, in order along them; NaN where there is none.
     """
-    known = np.isfinite(residual) & np.isfinite(u_px) & (np.abs(residual) < FARTHEST_PX)
-    square = np.where(known, np.square(residual) - np.square(np.where(known, u_px, 0.0)), 0.0).sum(axis=(1, 2))
-    count = known.sum(axis=(1, 2))
-    part = square.sum() / max(int(count.sum()), 1)
-    own = np.where(count > 0, square / np.maximum(count, 1), part)
-    relief: Array = np.sqrt(np.maximum(0.5 * (own + part) - USUAL_EXCESS_PX**2, 0.0))
+    near = np.where(np.abs(residual) < FARTHEST_PX, residual, np.nan)
+    product = near[..., 1:] * near[..., :-1]
+    count = np.isfinite(product).sum(axis=(1, 2))
+    total = np.nansum(product, axis=(1, 2))
+    part = total.sum() / max(int(count.sum()), 1)
+    own = np.where(count > 0, total / np.maximum(count, 1), part)
+    relief: Array = np.sqrt(np.maximum(0.5 * (own + part), 0.0))
     return relief

@@ -14,10 +14,11 @@ displacement a and a change b of the spread:
 linear in four unknowns: least squares, then once more with Cauchy weights.
 
 Light that balls throw on the board beside them is not the same under all lights: T, a mean over lights, has too much
-of it on the far side of a ball, so that the lit level grows outward by a share g per pixel. A stretch knows its own g
-badly, all shadows of a part together know it well as a function of the place along the edge: a fifth column
-``hi T g d F`` is fitted for it, and the displacement is that of four columns with the usual g of its place taken out
-(exact, for least squares are linear).
+of it on the far side of a ball, so that the lit level grows outward by a share g per pixel. Two more columns take that
+up: ``T d F``, and ``T d`` for what grows on both sides, which moves no edge: what the profile of a real lens is blunter
+or sharper in its tails than F is as odd about the edge, and must not pass for growth of the lit level. A stretch knows
+its own growth badly, all shadows of a part together know it well as a function of the place along the edge: the
+displacement is that of four columns with the usual growth of its place taken out (exact, for least squares are linear).
 
 That holds for displacements below s. The coarse search goes by area: with H the unit step and r the reach,
 
@@ -59,7 +60,8 @@ LINE_SPACING_PX = 1.45
 MAX_LINES = 96
 FEW_LINES = 48
 FEWEST_LINES = 12
-LINES_A_STRETCH = 3
+LINES_A_STRETCH, PIXELS_A_STRETCH = 3, 16.0
+"""Least lines of a stretch, and pixels on them: 12 must be usable for its four unknowns."""
 REACH_SIGMAS, REACH_PX = 3.2, 1.2
 """How far pixels across an edge reach: spreads, and pixels more."""
 BEYOND = 1.25
@@ -68,6 +70,8 @@ STEEPEST_GROWTH = 0.1
 """Growth of the lit level per pixel that reflected light can bring."""
 MIN_GROWTHS = 24
 """Stretches at one place of the edge whose median growth beats none: each knows its own to a per cent per pixel."""
+BLUNT_PX = 0.6
+"""Least spread of edges that growth moves: by its 0.3 % per pixel beside balls, times a fifth of the squared reach."""
 
 
 class EdgeSettings(NamedTuple):
@@ -166,7 +170,7 @@ def measure_edges(
     radius = float(np.median(table[:, 3]))
     most = MAX_LINES if settings.thorough else FEW_LINES
     count = int(np.clip(2.0 * WIDEST_RAD * radius / LINE_SPACING_PX, FEWEST_LINES, most))
-    sectors = int(np.clip(count // LINES_A_STRETCH, FEWEST_SECTORS, SECTORS))
+    sectors = stretches_of(count, settings.reach_px / settings.stride_px)
     angles_rad = (np.arange(count) + 0.5) / count * 2.0 * WIDEST_RAD - WIDEST_RAD
     stretches, noise = _bgars.measure_edges(
         kernel_capture(radiance.capture),
@@ -185,6 +189,12 @@ def measure_edges(
     fit = Stretches(*np.moveaxis(stretches, -1, 0).reshape(-1, *shape))
     balls = Balls.from_table(table).spread(2)
     return _edges(fit, noise, balls, vectors, near, board, settings, radiance.scale)
+
+
+def stretches_of(lines: int, reach: float) -> int:
+    """Into how many stretches the lines of a shadow are shared out, with pixels up to `reach` on both sides of each."""
+    together = max(LINES_A_STRETCH, int(np.ceil(PIXELS_A_STRETCH / (2.0 * reach))))
+    return int(np.clip(lines // together, FEWEST_SECTORS, SECTORS))
 
 
 class Lines(NamedTuple):
@@ -250,8 +260,9 @@ class Stretches(NamedTuple):
 
     Coefficients (shadow and lit level, displacement and change of the spread times the contrast) and their standard
     uncertainties; mean texture and its relative growth outward per pixel; means over the lines of the tangent point's
-    angle, the way of the light and the spread, weighted by what they say about the displacement; growth of the lit
-    level outward per pixel where it is free, and the displacement then; 1 where there was enough to see, else 0.
+    angle, the way of the light and the spread, weighted by what they say about the displacement; what the lit level
+    grows outward per pixel more than the shadow where both are free, and the displacement that a growth of 1 passes for
+    where none is; 1 where there was enough to see, else 0.
     """
 
     low: Array
@@ -268,7 +279,7 @@ class Stretches(NamedTuple):
     way_px: Array
     spread_px: Array
     lit_growth: Array
-    moved_with_growth: Array
+    moved_by_growth: Array
     looked_at: Array
 
 
@@ -322,16 +333,15 @@ def _edges(
 
 def _without_growth(fit: Stretches, measured: NDArray[np.bool_]) -> Array:
     """(N, L, S) displacements times contrast without what the usual growth of the lit level outward adds to them."""
-    per_growth = np.where(fit.lit_growth != 0.0, fit.moved - fit.moved_with_growth, 0.0)
-    per_growth = per_growth / np.where(fit.lit_growth != 0.0, fit.lit_growth, 1.0)
     share = np.where(measured, fit.lit_growth / np.where(measured, fit.high, 1.0), np.nan)
-    # Steeper ones are none: too little lit board to tell growth from displacement.
-    plausible = np.abs(share) < STEEPEST_GROWTH
-    share, per_growth = np.where(plausible, share, np.nan), np.where(plausible, per_growth, 0.0)
+    # Steeper ones are none: too little lit board to tell growth from displacement. Sharper ones have too few pixels.
+    plausible = (np.abs(share) < STEEPEST_GROWTH) & (fit.spread_px >= BLUNT_PX)
+    share = np.where(plausible, share, np.nan)
     count = np.isfinite(share).sum(axis=(0, 1))
     # Left and right of the tip are alike.
     both = np.concatenate([share, share[..., ::-1]], axis=0)
     known = (count + count[::-1]) >= MIN_GROWTHS
     usual = np.where(known, np.nanmedian(np.where(known, both, 0.0), axis=(0, 1)), 0.0)
-    without: Array = fit.moved - per_growth * usual * np.where(measured, fit.high, 0.0)
+    by_growth = np.where(plausible, fit.moved_by_growth * fit.high, 0.0)
+    without: Array = fit.moved - by_growth * usual
     return without

@@ -16,8 +16,9 @@ const MAX_GROWTH: f64 = 0.3;
 /// Numbers that [`Stretch::numbers`] gives.
 pub const STRETCH_FIELDS: usize = 16;
 
-/// Columns at most: shadow level, lit level, displacement, change of spread, growth of the lit level outward.
-pub(super) const COLUMNS: usize = 5;
+/// Columns at most: shadow level, lit level, displacement, change of spread, and growth outward, everywhere and on the lit
+/// side more than in the shadow.
+pub(super) const COLUMNS: usize = 6;
 
 /// A usable pixel near an edge.
 #[derive(Clone, Copy, Debug)]
@@ -58,7 +59,8 @@ pub struct Stretch {
     pub growth: f64,
     /// Means over the lines, weighted by what they say about the displacement: angle, way and spread.
     pub mean: [f64; 3],
-    /// With the lit level free to grow outward: this growth per pixel, and the displacement, times the contrast.
+    /// What the lit level grows more by per pixel outward than the shadow where both are free; and the displacement,
+    /// times the contrast, that a growth of 1 passes for where none is.
     pub grown: [f64; 2],
     /// Whether it has pixels enough.
     pub looked_at: bool,
@@ -102,7 +104,7 @@ pub(super) fn fit<const C: usize>(parts: &mut [Part<'_>], lines: &[Line], robust
                     pixel.weight = 1.0 / (1.0 + off * off);
                 }
             }
-            (stretch.solution, stretch.deviation) = solve::<C>(part.pixels);
+            (stretch.solution, stretch.deviation) = solve::<C>(part.pixels, |pixel| pixel.value);
             for pixel in &*part.pixels {
                 let off = residual::<C>(pixel, &stretch.solution);
                 square += pixel.weight * off * off;
@@ -117,8 +119,9 @@ pub(super) fn fit<const C: usize>(parts: &mut [Part<'_>], lines: &[Line], robust
         summarise(part, lines, stretch);
         if C == 4 {
             stretch.growth = growth(part.pixels);
-            let (with_growth, _) = solve::<COLUMNS>(part.pixels);
-            stretch.grown = [with_growth[4], with_growth[2]];
+            let (with_growth, _) = solve::<COLUMNS>(part.pixels, |pixel| pixel.value);
+            let (taken_for, _) = solve::<C>(part.pixels, |pixel| pixel.columns[5]);
+            stretch.grown = [with_growth[5], taken_for[2]];
         }
     }
     noise
@@ -128,14 +131,15 @@ fn residual<const C: usize>(pixel: &Pixel, solution: &[f64; COLUMNS]) -> f64 {
     (0..C).fold(pixel.value, |rest, c| rest - solution[c] * pixel.columns[c])
 }
 
-/// One round of least squares by the first `C` columns: the solution, and its standard uncertainty for noise of 1.
-fn solve<const C: usize>(pixels: &[Pixel]) -> ([f64; COLUMNS], [f64; COLUMNS]) {
+/// One round of least squares of a value by the first `C` columns: the solution, and its standard uncertainty for noise
+/// of 1.
+fn solve<const C: usize>(pixels: &[Pixel], value: impl Fn(&Pixel) -> f64) -> ([f64; COLUMNS], [f64; COLUMNS]) {
     let mut normal = SMatrix::<f64, C, C>::zeros();
     let mut right = SVector::<f64, C>::zeros();
     for pixel in pixels {
         for i in 0..C {
             let weighted = pixel.weight * pixel.columns[i];
-            right[i] += weighted * pixel.value;
+            right[i] += weighted * value(pixel);
             for j in 0..=i {
                 normal[(i, j)] += weighted * pixel.columns[j];
             }
