@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo docs wheel api test test-rust test-python data lint format accuracy inspection reality reality-scenes bilateral station station-balls simulator experiments method check-faults kills line watch-station schema constants studies performance bench fuzz clean
+.PHONY: demo docs wheel api test test-rust test-python data lint lint-rust lint-python format accuracy inspection reality reality-scenes bilateral station station-balls simulator experiments method check-faults kills line watch-station schema constants studies performance bench fuzz clean
 
 demo: $(VENV)/.run-time ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
@@ -19,9 +19,13 @@ test-python: $(VENV)/.installed
 	@.ci/find-browser || test "$$BGARS_REQUIRE_BROWSER" != 1
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal
 
-lint: $(VENV)/.installed ## Formatting, clippy, ruff, mypy, and the stub against the compiled module
+lint: lint-rust lint-python ## Formatting, clippy, ruff, mypy, and the stub against the compiled module
+
+lint-rust:
 	cargo fmt --check --all
 	cargo clippy --locked --workspace --all-targets -- -D warnings
+
+lint-python: $(VENV)/.installed
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -51,6 +52,7 @@ def rough_circles(folder: Path, pitch_um: float) -> tuple[FoundBalls, list[dict[
     return FoundBalls(tuple(balls), (), pairs, 1, 1, None, 0.0, (0.0, 0.0)), rows
 
 
+@cache
 def measure(folder: Path, bits: str = "", *, field: bool = False) -> Result:
     capture = bgars.read_capture(folder / bits)
     assert capture.pixel_pitch_um is not None
