@@ -61,8 +61,8 @@ EDGE_SHARE, BEND_SHARE, EXCESS_SHARE = 0.017, 0.25, 0.15
 """Edges too far out or in, shares of their spread s, of ``s^2 / R``, and of what points scatter beyond their own: what
 penumbra, reflected light and a board that light enters leave of the model. Drawn edges of 0.6 px agree with it to 0.004
 px, rendered ones to 0.01 px; what a wide lamp shifts an edge by is known to half of its own size, for how its light is
-shared out over it is not known (parts as fine as 5 x 5 instead of 5 x 3 move tops by 0.1 to 1 px); where points scatter,
-some of it is alike on all balls."""
+shared out over it is not known (parts as fine as 5 x 5 instead of 5 x 3 move tops by 0.1 to 1 px); where points
+scatter, some of it is alike on all balls."""
 EDGE_WAVES = (1.0, 1.0, 0.3, 0.3)
 """The same of all edges together, and by cos a, cos 2a, cos 3a along them."""
 COARSE_SPREAD_PX = 2.0
