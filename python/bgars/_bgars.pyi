@@ -19,6 +19,7 @@ __all__ = [
     "DEBUG_BUILD",
     "REFLECTANCE_MAX_LOSS",
     "REFLECTANCE_MIN_LIGHTS",
+    "assignment",
     "decode_stack",
     "draw_shadows",
     "edge_products",
@@ -50,6 +51,7 @@ DEBUG_BUILD: Final[bool]
 REFLECTANCE_MAX_LOSS: Final[float]
 REFLECTANCE_MIN_LIGHTS: Final[int]
 
+def assignment(costs: NDArray[np.float64]) -> NDArray[np.uintp]: ...
 def decode_stack(
     paths: Sequence[str | PathLike[str]],
     *,

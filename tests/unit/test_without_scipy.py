@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import scipy
+from bgars import _bgars
 from bgars.balls.outward import _fast_length, _largest_around
 from bgars.inspection.normal_distribution import normal_distribution
 from bgars.inspection.spread import _nonnegative
@@ -14,6 +15,15 @@ def test_the_normal_distribution_is_that_of_scipy() -> None:
     values = np.concatenate([np.linspace(-37.0, 9.0, 20_001), [np.inf, -np.inf, np.nan]]).reshape(4, -1)
     np.testing.assert_allclose(normal_distribution(values), scipy.special.ndtr(values), rtol=1e-12)
     assert normal_distribution(np.zeros((0, 3))).shape == (0, 3)
+
+
+def test_rows_and_columns_are_paired_as_scipy_pairs_them() -> None:
+    random = np.random.default_rng(2)
+    for count in (1, 2, 5, 8, 24, 64):
+        # Whole numbers have many equal sums; those of rounded ones are told apart by their last digits.
+        for costs in (random.random((count, count)), random.integers(0, 4, (count, count)).astype(np.float64)):
+            assert _bgars.assignment(costs).tolist() == scipy.optimize.linear_sum_assignment(costs)[1].tolist()
+    assert _bgars.assignment(np.zeros((0, 0))).shape == (0,)
 
 
 def test_nonnegative_least_squares_are_those_of_scipy() -> None:

@@ -12,9 +12,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy  # loads its modules when they are used
 from numpy.typing import NDArray
 
+from bgars import _bgars
 from bgars.checks.moments import lit_everywhere
 
 if TYPE_CHECKING:
@@ -112,5 +112,4 @@ def _misfit(seen: Array, table: Array) -> float:
 def _paired(seen: Array, table: Array) -> Order:
     """Row of the table for each row that is seen."""
     distance = np.square(seen[:, None] - table[None]).sum(axis=2)
-    order: Order = scipy.optimize.linear_sum_assignment(distance)[1]
-    return order
+    return _bgars.assignment(distance).astype(np.intp)

@@ -8,6 +8,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod assignment;
 pub mod blind;
 mod components;
 pub mod error;

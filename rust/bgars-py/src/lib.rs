@@ -1,6 +1,7 @@
 //! The compiled half of the Python package `bgars`: a list of functions. Every one of them releases the GIL once, around
 //! the whole of its work; `python/bgars/_bgars.pyi` documents them.
 
+mod assignment;
 mod bilateral;
 mod capture;
 mod convert;
@@ -17,6 +18,8 @@ mod shadows;
 
 #[pyo3::pymodule]
 mod _bgars {
+    #[pymodule_export]
+    use crate::assignment::assignment;
     #[pymodule_export]
     use crate::bilateral::integrate_bilateral;
     #[pymodule_export]
