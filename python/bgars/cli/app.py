@@ -12,6 +12,7 @@ import typer
 
 import bgars
 from bgars.cli.console import activation, print_json, say, shown_path, stage_progress
+from bgars.cli.drawing import OVERVIEW, picture_process
 from bgars.cli.evaluation import choice_in_words, evaluation_table
 from bgars.cli.lazy import LazyGroup
 from bgars.cli.options import (
@@ -90,9 +91,10 @@ def demo(
         return
     folder = bgars.sample_capture()
     _need_places(folder, output)
-    summary, files = _reconstruct_to(
-        bgars.read_capture(folder), output, bgars.reconstruct, mesh_format="ply", directx=False
-    )
+    with picture_process(OVERVIEW) as painter:
+        summary, files = _reconstruct_to(
+            bgars.read_capture(folder), output, bgars.reconstruct, mesh_format="ply", directx=False, painter=painter
+        )
     scores = {
         name: bgars.evaluate(bgars.read_capture(folder), method=name).to_dict()["normals"]
         for name in ("lambertian", DEFAULT_METHOD)
@@ -150,14 +152,15 @@ def reconstruct(
         )
 
     _need_places(folder, output)
-    capture = bgars.read_capture(folder, channel=channel, station=station)
-    if height_format is not None:
-        from bgars.io.height import check_height_file  # noqa: PLC0415 - loaded when it runs
+    with picture_process(OVERVIEW) as painter:
+        capture = bgars.read_capture(folder, channel=channel, station=station)
+        if height_format is not None:
+            from bgars.io.height import check_height_file  # noqa: PLC0415 - loaded when it runs
 
-        check_height_file(output / f"height.{height_format}", has_pitch=capture.pixel_pitch_um is not None)
-    findings = check_first(capture, force=force)
-    formats = {"mesh_format": mesh_format, "height_format": height_format}
-    summary, files = _reconstruct_to(capture, output, run, **formats, directx=directx, checked=findings.to_dict())
+            check_height_file(output / f"height.{height_format}", has_pitch=capture.pixel_pitch_um is not None)
+        checked = check_first(capture, force=force).to_dict()
+        options = {"mesh_format": mesh_format, "height_format": height_format, "directx": directx}
+        summary, files = _reconstruct_to(capture, output, run, **options, checked=checked, painter=painter)
     if as_json:
         print_json(summary)
         return

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import bgars
-from bgars.cli.console import may_start_processes, print_json, say, say_files, stage_progress, utc_now, warn
+from bgars.cli.console import print_json, say, say_files, stage_progress, utc_now, warn
+from bgars.cli.drawing import PART_PICTURES, picture_process
 from bgars.cli.first_check import check_first
 from bgars.cli.inspect_files import NAMES, Wanted, clear_places, refuse_foreign_places, write_result
 from bgars.cli.inspect_strip import inspect_strip, tell_strip
@@ -36,10 +36,7 @@ from bgars.records.part_identity import PartIdentity
 from bgars.report.html.budget import main_causes
 
 if TYPE_CHECKING:
-    from contextlib import AbstractContextManager
-
     from bgars.records.part_result import PartResult
-    from bgars.report.figures.process import PictureProcess
 
 __all__ = ["EXIT_NOT_PASSED", "register"]
 
@@ -135,9 +132,14 @@ def inspect(
     pictures = _is_drawn(pictures, "the pictures are left out: drawing them", "matplotlib")
     page = _is_drawn(page, "report.html is left out: it", "plotly")
     wanted = Wanted(pictures=pictures, page=page, parquet=parquet, cfx=cfx)
-    with stage_progress() as report, atomic_folder(output, NAMES) as place:
+    part = None if recipe is None else bgars.read_part_recipe(recipe)
+    is_drawn = pictures and (part is None or part.strip is None)
+    with (
+        picture_process(PART_PICTURES, wanted=is_drawn) as painter,
+        stage_progress() as report,
+        atomic_folder(output, NAMES) as place,
+    ):
         clear_places(output)
-        part = None if recipe is None else bgars.read_part_recipe(recipe)
         capture = bgars.read_capture(folder, station=station)
         told = told_by(check_first(capture, force=force))
         named, identity = identity_of(
@@ -149,11 +151,10 @@ def inspect(
                 capture, part, part.strip, output, place, wanted, method, serial, identity, told, report
             )
         else:
-            with _painter(wanted=pictures) as painter:
-                result = bgars.inspect(capture, part, method=method, surface=page, check=False, progress=report)
-                result = replace(result, serial=serial, identity=identity, inspected_utc=utc_now())
-                result = replace(result, warnings=(*told, *result.warnings))
-                files = write_result(result, capture, place, wanted, painter)
+            result = bgars.inspect(capture, part, method=method, surface=page, check=False, progress=report)
+            result = replace(result, serial=serial, identity=identity, inspected_utc=utc_now())
+            result = replace(result, warnings=(*told, *result.warnings))
+            files = write_result(result, capture, place, wanted, painter)
     if part is not None and part.strip is not None:
         tell_strip(rows, output, as_json=as_json, log_line=log_line)
         verdicts = {row.verdict for row in rows}
@@ -167,15 +168,6 @@ def inspect(
             _tell(result, output, files)
     if verdicts != {"pass"}:
         raise typer.Exit(EXIT_NOT_PASSED)
-
-
-def _painter(*, wanted: bool) -> AbstractContextManager[PictureProcess | None]:
-    """A process for the pictures, where this one is the command's own and may use more than one core."""
-    if not wanted or not may_start_processes():
-        return nullcontext()
-    from bgars.report.figures.process import PictureProcess  # noqa: PLC0415 - loaded when it is used
-
-    return PictureProcess()
 
 
 def _is_drawn(wanted: bool, words: str, package: str) -> bool:

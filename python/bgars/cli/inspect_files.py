@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import bgars
+from bgars.cli.drawing import PART_PICTURES
 from bgars.errors import FileFormatError
 from bgars.io.atomic import FolderNames, atomic_folder
 from bgars.io.own_files import foreign_files
 from bgars.line.strip_page import PLACE
-from bgars.report.figures.part import PICTURES
+from bgars.report.figures.part import PICTURES, check_pictures, thinned
 from bgars.report.html.files import REPORT_FILES
 
 if TYPE_CHECKING:
@@ -56,14 +58,16 @@ def write_result(
     """
     files = dict(FILES)
     if painter is not None:
-        painter.start(result, capture, place)
+        check_pictures(result, capture)
+        painter.start(PART_PICTURES, "draw_part_pictures", replace(result, surface=None), thinned(capture), place)
     elif wanted.pictures:
         files |= bgars.write_part_pictures(result, capture, place)
     (place / "result.json").write_text(result.to_json(), encoding="utf-8")
     (place / "balls.csv").write_text(result.to_csv(), encoding="utf-8")
     pages = bgars.write_report(result, place / "report.html", capture=capture) if wanted.page else {}
     if painter is not None:
-        files |= painter.finish()
+        painter.finish()
+        files |= PICTURES
     files = {name: pages.pop(name) for name in ("report.html",) if wanted.page} | files | pages
     if wanted.parquet:
         bgars.write_parquet(result, place / PARQUET)
