@@ -143,22 +143,30 @@ def reconstruct(
     that it does not touch, such as a ball above its board, is not measured. The capture is checked first ('bgars
     check'): where its lights and images do not fit, nothing is written (exit code 2) unless --force says so.
     """
-    from bgars.cli.first_check import check_first  # noqa: PLC0415 - loaded when it runs
-
-    def run(capture: bgars.Capture, **options: Any) -> bgars.Reconstruction:  # noqa: ANN401
-        surface = _material_from(material, capture)
-        return bgars.reconstruct(
-            capture, method=method, threshold=threshold, material=surface, flatten=flatten, check=False, **options
-        )
-
     _need_places(folder, output)
     with picture_process(OVERVIEW) as painter:
+        from bgars.cli.first_check import tell_first  # noqa: PLC0415 - loaded when it runs, while the process starts
+        from bgars.pipelines.reconstruct import reconstructed  # noqa: PLC0415
+
         capture = bgars.read_capture(folder, channel=channel, station=station)
         if height_format is not None:
             from bgars.io.height import check_height_file  # noqa: PLC0415 - loaded when it runs
 
             check_height_file(output / f"height.{height_format}", has_pitch=capture.pixel_pitch_um is not None)
-        checked = check_first(capture, force=force).to_dict()
+        checked: dict[str, Any] = {}
+
+        def tell(findings: bgars.Findings) -> tuple[str, ...]:
+            checked.update(tell_first(capture, findings, force=force).to_dict())
+            return ()
+
+        run = partial(
+            reconstructed,
+            tell=tell,
+            method=method,
+            threshold=threshold,
+            material=_material_from(material, capture),
+            flatten=flatten,
+        )
         options = {"mesh_format": mesh_format, "height_format": height_format, "directx": directx}
         summary, files = _reconstruct_to(capture, output, run, **options, checked=checked, painter=painter)
     if as_json:

@@ -12,7 +12,7 @@ import typer
 import bgars
 from bgars.cli.console import print_json, say, say_files, stage_progress, utc_now, warn
 from bgars.cli.drawing import PART_PICTURES, picture_process
-from bgars.cli.first_check import check_first
+from bgars.cli.first_check import check_first, tell_first
 from bgars.cli.inspect_files import NAMES, Wanted, clear_places, refuse_foreign_places, write_result
 from bgars.cli.inspect_strip import inspect_strip, tell_strip
 from bgars.cli.options import (
@@ -32,6 +32,7 @@ from bgars.io.given_paths import need_file, need_folder, need_output
 from bgars.line.naming import identity_of
 from bgars.normals.methods import DEFAULT_METHOD
 from bgars.pipelines.check import told_by
+from bgars.pipelines.inspect import inspected
 from bgars.records.part_identity import PartIdentity
 from bgars.report.html.budget import main_causes
 
@@ -141,19 +142,25 @@ def inspect(
     ):
         clear_places(output)
         capture = bgars.read_capture(folder, station=station)
-        told = told_by(check_first(capture, force=force))
         named, identity = identity_of(
             capture, PartIdentity(lot=lot, station=station_name, operator=operator, round=round_)
         )
         serial = serial or named
         if part is not None and part.strip is not None:
+            told = told_by(check_first(capture, force=force))
             rows = inspect_strip(
                 capture, part, part.strip, output, place, wanted, method, serial, identity, told, report
             )
         else:
-            result = bgars.inspect(capture, part, method=method, surface=page, check=False, progress=report)
+            result = inspected(
+                capture,
+                part,
+                tell=lambda findings: told_by(tell_first(capture, findings, force=force)),
+                method=method,
+                surface=page,
+                progress=report,
+            )
             result = replace(result, serial=serial, identity=identity, inspected_utc=utc_now())
-            result = replace(result, warnings=(*told, *result.warnings))
             files = write_result(result, capture, place, wanted, painter)
     if part is not None and part.strip is not None:
         tell_strip(rows, output, as_json=as_json, log_line=log_line)

@@ -66,7 +66,7 @@ def write_reconstruction(
 
     The output folder is tried first, so that no work is lost to an unwritable one. What an earlier reconstruction left
     there goes when the new files come. `height_format`: gsf, sdf or x3p, besides. `checked`: what the check of the
-    capture found. `painter` draws the picture while the other files are written.
+    capture found, by the time that `run` returns. `painter` draws the picture while the other files are written.
     """
     with atomic_folder(output, RECONSTRUCTION) as folder:
         result = run()
