@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from contextlib import ExitStack
 from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,7 +15,7 @@ import bgars
 from bgars.cli.console import print_json, say, say_files, stage_progress, utc_now, warn
 from bgars.cli.drawing import PART_PICTURES, picture_process
 from bgars.cli.first_check import check_first, tell_first
-from bgars.cli.inspect_files import NAMES, Wanted, clear_places, refuse_foreign_places, write_result
+from bgars.cli.inspect_files import NAMES, Wanted, clear_places, refuse_foreign_places, start_pictures, write_result
 from bgars.cli.inspect_strip import inspect_strip, tell_strip
 from bgars.cli.options import (
     ForceOption,
@@ -37,6 +39,8 @@ from bgars.records.part_identity import PartIdentity
 from bgars.report.html.budget import main_causes
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from bgars.records.part_result import PartResult
 
 __all__ = ["EXIT_NOT_PASSED", "register"]
@@ -133,14 +137,11 @@ def inspect(
     pictures = _is_drawn(pictures, "the pictures are left out: drawing them", "matplotlib")
     page = _is_drawn(page, "report.html is left out: it", "plotly")
     wanted = Wanted(pictures=pictures, page=page, parquet=parquet, cfx=cfx)
-    part = None if recipe is None else bgars.read_part_recipe(recipe)
-    is_drawn = pictures and (part is None or part.strip is None)
-    with (
-        picture_process(PART_PICTURES, wanted=is_drawn) as painter,
-        stage_progress() as report,
-        atomic_folder(output, NAMES) as place,
-    ):
+    with stage_progress() as report, atomic_folder(output, NAMES) as place, ExitStack() as beside:
         clear_places(output)
+        part = None if recipe is None else bgars.read_part_recipe(recipe)
+        is_drawn = pictures and (part is None or part.strip is None)
+        painter = beside.enter_context(picture_process(PART_PICTURES, wanted=is_drawn))
         capture = bgars.read_capture(folder, station=station)
         named, identity = identity_of(
             capture, PartIdentity(lot=lot, station=station_name, operator=operator, round=round_)
@@ -152,6 +153,12 @@ def inspect(
                 capture, part, part.strip, output, place, wanted, method, serial, identity, told, report
             )
         else:
+            stamped = partial(_stamped, serial, identity, cache(utc_now))
+
+            def judged(result: PartResult) -> None:
+                if painter is not None:
+                    start_pictures(painter, stamped(result), capture, place)
+
             result = inspected(
                 capture,
                 part,
@@ -159,8 +166,9 @@ def inspect(
                 method=method,
                 surface=page,
                 progress=report,
+                judged=judged,
             )
-            result = replace(result, serial=serial, identity=identity, inspected_utc=utc_now())
+            result = stamped(result)
             files = write_result(result, capture, place, wanted, painter)
     if part is not None and part.strip is not None:
         tell_strip(rows, output, as_json=as_json, log_line=log_line)
@@ -175,6 +183,10 @@ def inspect(
             _tell(result, output, files)
     if verdicts != {"pass"}:
         raise typer.Exit(EXIT_NOT_PASSED)
+
+
+def _stamped(serial: str, identity: PartIdentity, now: Callable[[], str], result: PartResult) -> PartResult:
+    return replace(result, serial=serial, identity=identity, inspected_utc=now())
 
 
 def _is_drawn(wanted: bool, words: str, package: str) -> bool:

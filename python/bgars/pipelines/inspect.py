@@ -117,8 +117,12 @@ def inspected(
     surface: bool = False,
     threads: int | None = None,
     progress: Callable[[InspectionStage, float], object] | None = None,
+    judged: Callable[[PartResult], object] | None = None,
 ) -> PartResult:
-    """Inspect a part; its capture is checked while the balls are looked for, and `tell` says what was found."""
+    """Inspect a part; its capture is checked while the balls are looked for, and `tell` says what was found.
+
+    `judged` is called with the result before its surface is made.
+    """
     threads = thread_count(threads)
     if recipe is not None and not isinstance(recipe, PartRecipe):
         recipe = read_part_recipe(recipe)
@@ -166,6 +170,8 @@ def inspected(
         material=None if fit is None else part_material(fit, from_file=material is not None),
         capture=capture.name,
     )
+    if judged is not None:
+        judged(result)
     if surface and field is not None:
         report("surface", 0.0)
         result = replace(result, surface=part_surface(result, field, board, BOARD_STEP, threads=threads))
