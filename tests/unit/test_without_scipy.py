@@ -1,4 +1,4 @@
-"""Small substitutes for scipy, whose import takes as long as a small part: the same values."""
+"""Small substitutes for scipy, whose import takes as long as a small part, and for slow functions: the same values."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from bgars import _bgars
 from bgars.balls.outward import _fast_length, _largest_around
 from bgars.inspection.normal_distribution import normal_distribution
 from bgars.inspection.spread import _nonnegative
+from bgars.records.light_median import light_median
 from bgars.surface.anchoring import _blurred
 
 
@@ -55,3 +56,14 @@ def test_the_blur_is_that_of_scipy() -> None:
     for sigma_px in (0.8, 5.0, 40.0):
         expected = scipy.ndimage.gaussian_filter(values, sigma_px, mode="constant")
         np.testing.assert_allclose(_blurred(values, sigma_px), expected, atol=1e-13)
+
+
+def test_the_median_over_lights_is_that_of_numpy() -> None:
+    random = np.random.default_rng(6)
+    for lights in (1, 2, 3, 8, 25):
+        for kind in (np.float32, np.float64):
+            values = random.random((lights, 9, 11)).astype(kind)
+            values[-1, 3, 4] = np.nan
+            found = light_median(values)
+            assert found.dtype == kind
+            np.testing.assert_array_equal(found, np.median(values, axis=0))
