@@ -143,7 +143,7 @@ def serve() -> None:
             known.append(bgars.inspect(capture, check=False))
         return replace(known[0], capture=capture.name, files=checksums(capture_files(capture)))
 
-    job.inspect = instant  # type: ignore[assignment]
+    job.inspected = instant  # type: ignore[assignment]
     sys.argv = [sys.argv[0], *sys.argv[2:]]
     bgars_main()
 

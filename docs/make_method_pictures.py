@@ -12,7 +12,7 @@ from typing import NamedTuple
 import bgars
 import numpy as np
 from bgars.records.surface_material import SurfaceLobe, SurfaceMaterial
-from bgars.report.figures.prior import prior_share, show_prior
+from bgars.report.figures.prior import prior_overlay, prior_share, show_prior
 from bgars.simulate import Defect
 from matplotlib.colors import LogNorm
 from matplotlib.patches import Circle
@@ -256,7 +256,7 @@ def measured_prior() -> None:
                 cmap="viridis_r",
                 norm=LogNorm(*ERROR_LIMITS_DEG),
             )
-            show_prior(axes, part.field, extent, legend=False)
+            show_prior(axes, prior_overlay(part.field), extent)
             axes.set(xlabel="x (µm)", ylabel="y (µm)", title=title, xlim=(-900, 900), ylim=(-900, 900))
         bar = figure.colorbar(picture, ax=line, label="angle (°)", shrink=0.85, ticks=(0.02, 0.1, 0.5, 2, 10))
         bar.ax.set_yticklabels(["0.02", "0.1", "0.5", "2", "10"])

@@ -14,7 +14,8 @@ from typing import NamedTuple
 import bgars
 import numpy as np
 from bgars.records.ball_layout import BallLayout
-from bgars.report.figures.style import figure_style, new_figure, save
+from bgars.report.figure_file import write_png
+from bgars.report.figures.style import figure_style, new_figure
 from bgars.studies.gauge import GaugeFigures
 from bgars.studies.study_folder import Run
 from bgars.studies.svg import PLACEMENT_COLORS
@@ -146,7 +147,7 @@ def draw(all_figures: dict[Setting, dict[str, GaugeFigures]]) -> None:
         axes.spines[["top", "right"]].set_visible(False)
         figure.legend(loc="outside right upper")
         PICTURE.parent.mkdir(parents=True, exist_ok=True)
-        save(figure, PICTURE)
+        write_png(figure, PICTURE)
 
 
 def main() -> None:

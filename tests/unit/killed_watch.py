@@ -84,7 +84,7 @@ def census(inbox: Path, store: Path) -> tuple[int, int, int]:
 def main() -> None:
     """``killed_watch.py watch ...``: the command; ``killed_watch.py FOLDER KILLS PARTS``: the long test."""
     if sys.argv[1] == "watch":
-        job.inspect = instant
+        job.inspected = instant
         from bgars.cli import main as bgars_main  # noqa: PLC0415 - the inspection is replaced first
 
         bgars_main()

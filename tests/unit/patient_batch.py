@@ -10,17 +10,17 @@ import bgars
 from bgars.line import job
 
 GO = "BGARS_TEST_GO"
-inspect = job.inspect
+inspected = job.inspected
 
 
 def patient(capture: bgars.Capture, *given: object, **options: object) -> bgars.PartResult:
     while capture.name != "A0" and not Path(os.environ[GO]).exists():
         time.sleep(0.02)
-    return inspect(capture, *given, **options)
+    return inspected(capture, *given, **options)
 
 
 if os.environ.get(GO):
-    job.inspect = patient  # in every process: each imports the program
+    job.inspected = patient  # in every process: each imports the program
 
 if __name__ == "__main__":
     from bgars.cli import main

@@ -278,16 +278,16 @@ def _by_growth(
     """(N, L, S) what the usual growth of the lit level, at each place along the edge, adds to the displacements."""
     shape, size = mean_spread.shape, mean_spread.size
     across = pixels.distance * spread[None, :]
-    both, lit_alone = (columns[0] + columns[1]) * across, columns[1] * across
+    lit_alone = columns[1] * across
     per_growth, share = np.zeros(size), np.full(size, np.nan)
     for stretch in np.flatnonzero((measured & (mean_spread >= BLUNT_PX)).reshape(-1)):
         mine = sector == stretch
         root = np.sqrt(weight[:, mine].ravel())
-        system = np.stack([column[:, mine].ravel() for column in (*columns, both, lit_alone)], axis=1) * root[:, None]
+        system = np.stack([column[:, mine].ravel() for column in (*columns, lit_alone)], axis=1) * root[:, None]
         free = np.linalg.lstsq(system, pixels.value[:, mine].ravel() * root, rcond=None)[0]
         growth = free[-1] / solution[stretch, 1]
         if abs(growth) < STEEPEST_GROWTH:
-            per_growth[stretch] = np.linalg.lstsq(system[:, :-2], system[:, -1], rcond=None)[0][2]
+            per_growth[stretch] = np.linalg.lstsq(system[:, :-1], system[:, -1], rcond=None)[0][2]
             share[stretch] = growth
     share = share.reshape(shape)
     lit = np.where(measured, solution[:, 1].reshape(shape), 0.0)

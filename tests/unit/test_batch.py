@@ -17,6 +17,7 @@ from bgars.cli.app import app
 from bgars.line import job
 from bgars.line.folders import capture_folders
 from bgars.line.local_pool import share_cores
+from bgars.pipelines.inspect import inspected
 from bgars.records.part_identity import PartIdentity
 from line_captures import RECIPE, captures, copy_capture
 from typer.testing import CliRunner
@@ -90,9 +91,9 @@ def test_files_that_change_meanwhile_give_no_result(tmp_path: Path, monkeypatch:
     def meddling(*arguments: object, **options: object) -> bgars.PartResult:
         with (folder / "capture.toml").open("a") as file:
             file.write("\n# changed\n")
-        return bgars.inspect(*arguments, **options)
+        return inspected(*arguments, **options)
 
-    monkeypatch.setattr(job, "inspect", meddling)
+    monkeypatch.setattr(job, "inspected", meddling)
     (outcome,) = job.run_job(job.Job(str(folder)))
     assert outcome.result is None
     assert "changed while they were read" in outcome.reason

@@ -16,6 +16,7 @@ from bgars.checks.evidence import critical_t, paired_t
 from bgars.checks.hypotheses import alternatives
 from bgars.line.job import Job, run_job
 from bgars.normals.noise_floor import without_background
+from bgars.pipelines.check import checked_beside
 from bgars.records.plain_arrays import every_pixel
 from bgars.surface.flatten import find_bow, flattened
 from numpy.typing import NDArray
@@ -215,8 +216,9 @@ def test_python_checks_before_any_number(balls: bgars.Capture) -> None:
 
 def test_what_is_found_is_warned_of_and_kept_with_the_part(balls: bgars.Capture) -> None:
     veiled = replace(balls, images=np.minimum(balls.images, 245) + np.uint8(10))
-    with pytest.warns(bgars.CaptureWarning, match="ambient: the deepest shadows still have"):
+    with pytest.warns(bgars.CaptureWarning, match="ambient: the deepest shadows still have") as told:
         result = bgars.inspect(veiled, method="robust-filter")
+    assert {warning.filename for warning in told} == {__file__}
     assert result.warnings[0].startswith("capture: ambient: the deepest shadows")
     assert not any("ambient" in each for each in bgars.inspect(veiled, method="robust-filter", check=False).warnings)
 
@@ -317,3 +319,24 @@ def test_black_background_is_not_measured(relief: bgars.Capture) -> None:
     field = without_background(bgars.estimate_normals(capture, method="lambertian"), capture)
     assert field.is_measured[:, :80].mean() < 0.05
     assert field.is_measured[:, 82:].mean() > 0.99
+
+
+@pytest.mark.parametrize("threads", [1, None])
+def test_what_the_check_refuses_comes_before_what_the_work_says(threads: int | None) -> None:
+    capture = bgars.read_capture(bgars.sample_capture())
+    done: list[bgars.Findings] = []
+
+    def refuse(findings: bgars.Findings) -> tuple[str, ...]:
+        done.append(findings)
+        raise bgars.InputError("images: in another order")
+
+    def fail() -> None:
+        raise bgars.InputError("balls: none")
+
+    with pytest.raises(bgars.InputError, match="in another order"):
+        checked_beside(capture, refuse, fail, threads=threads)
+    assert done == [bgars.check(capture)]
+    with pytest.raises(bgars.InputError, match="balls: none"):
+        checked_beside(capture, lambda _: (), fail, threads=threads)
+    assert checked_beside(capture, lambda _: ("told",), lambda: 7, threads=threads) == (("told",), 7)
+    assert checked_beside(capture, None, lambda: 7, threads=threads) == ((), 7)

@@ -9,8 +9,10 @@ from pathlib import Path
 import bgars
 import pytest
 from bgars.cli.app import app
+from bgars.report.figure_file import Drawn
 from bgars.report.identity import identity_facts, identity_line
 from line_captures import copy_capture
+from matplotlib.figure import Figure
 from stored_parts import part
 from typer.testing import CliRunner
 
@@ -134,12 +136,18 @@ def test_one_inspection_takes_its_identity_from_side_file_and_options(tmp_path: 
 
 
 def test_pictures_say_which_part_they_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from bgars.report.figures import style as part_style  # noqa: PLC0415
+    from bgars.report.figures import part_drawing  # noqa: PLC0415
 
     capture = bgars.read_capture(bgars.sample_capture())
     result = bgars.inspect(capture)
     said: list[str] = []
-    monkeypatch.setattr(part_style, "save", lambda figure, _: said.append(figure.texts[-1].get_text()))
+    as_it_is = part_drawing.drawn
+
+    def drawn(figure: Figure) -> Drawn:
+        said.append(figure.texts[-1].get_text())
+        return as_it_is(figure)
+
+    monkeypatch.setattr(part_drawing, "drawn", drawn)
     bgars.write_part_pictures(result, capture, tmp_path)
     assert len(said) == 4
     assert all("capture one_ball" in line for line in said)

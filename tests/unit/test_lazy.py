@@ -62,8 +62,13 @@ for name in ("inspect", "reconstruct"):
     sys.argv = ["bgars", name, {str(bgars.sample_capture())!r}, "-o", {str(tmp_path)!r} + "/" + name, "--json"]
     with contextlib.suppress(SystemExit):
         main()
+import bgars
+# Enough of a part for its lights to be tried in every order, and for a layout.
+scene, rig, camera = bgars.Scene.ball_array(2, 3), bgars.LightRig.ring(8), bgars.Camera(pixel_pitch_um=20.0)
+layout = bgars.BallLayout(rows=2, cols=3, pitch_um=1000.0)
+bgars.inspect(bgars.simulate(scene, rig, bgars.Material(), camera)[0], bgars.PartRecipe("part", layout))
 print()
-print("loaded", *(name for name in sys.modules if name in {{"scipy.fft", "scipy.ndimage", "scipy.optimize"}}))
+print("loaded", *({{"scipy.fft", "scipy.ndimage", "scipy.optimize", "scipy.spatial"}} & set(sys.modules)))
 """
     run = subprocess.run([sys.executable, "-c", call], capture_output=True, text=True, check=True)
     assert run.stdout.splitlines()[-1] == "loaded"

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from bgars.inspection.judge import judge_part
 from bgars.report.figures.overview import _show_input
+from bgars.report.figures.overview_content import overview_content
 from bgars.report.figures.shadows import shadow_figure
 from bgars.report.html.photograph import lamps_of
 from bgars.report.html.source import PageSource
@@ -40,7 +41,7 @@ def test_shadow_panels_are_titled_by_the_file_they_show() -> None:
 def test_the_overview_names_the_image_that_it_shows() -> None:
     capture = bgars.read_capture(bgars.sample_capture())
     figure = Figure()
-    _show_input(figure, figure.subplots(), bgars.reconstruct(capture, method="lambertian"))
+    _show_input(figure, figure.subplots(), overview_content(bgars.reconstruct(capture, method="lambertian")))
     assert titles(figure)[0].startswith("Input: light 0 (light_00.png) of 8")
 
 

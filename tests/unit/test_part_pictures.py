@@ -10,6 +10,7 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 from bgars.inspection.judge import judge_part
+from bgars.report.figures.part import thinned
 from bgars.report.figures.process import PictureProcess
 from bgars.report.figures.shadow_outline import shadow_outline_um
 from matplotlib.path import Path as Outline
@@ -17,6 +18,7 @@ from synthetic_parts import measured_part
 
 CAMERA = bgars.Camera(pixel_pitch_um=25.0)
 RIG = bgars.LightRig.ring(4)
+DRAWING = "bgars.report.figures.part_drawing"
 
 
 def inspected(scene: bgars.Scene, recipe: bgars.PartRecipe | None = None) -> tuple[bgars.PartResult, bgars.Capture]:
@@ -92,25 +94,21 @@ def test_a_process_of_their_own_draws_the_same_pictures(tmp_path: Path) -> None:
     for name in ("here", "beside", "after all"):
         (tmp_path / name).mkdir()
     files = bgars.write_part_pictures(result, capture, tmp_path / "here")
-    with PictureProcess() as painter:
-        painter.start(result, capture, tmp_path / "beside")
-        assert painter.finish() == files
-    with PictureProcess() as painter:
+    with PictureProcess(DRAWING) as painter:
+        painter.start(DRAWING, "draw_part_pictures", result, thinned(capture), tmp_path / "beside")
+        painter.finish()
+    with PictureProcess(DRAWING) as painter:
         assert painter._process is not None
         painter._process.kill()
-        painter.start(result, capture, tmp_path / "after all")
-        assert painter.finish() == files
+        painter.start(DRAWING, "draw_part_pictures", result, thinned(capture), tmp_path / "after all")
+        painter.finish()
     for name in files:
         assert (tmp_path / "here" / name).read_bytes() == (tmp_path / "beside" / name).read_bytes()
         assert (tmp_path / "here" / name).read_bytes() == (tmp_path / "after all" / name).read_bytes()
 
 
-def test_the_process_ends_with_what_started_it(tmp_path: Path) -> None:
-    with pytest.raises(RuntimeError), PictureProcess() as painter:
+def test_the_process_ends_with_what_started_it() -> None:
+    with pytest.raises(RuntimeError), PictureProcess(DRAWING) as painter:
         raise RuntimeError
     assert painter._process is not None
     assert painter._process.poll() is not None
-    result, capture = inspected(bgars.Scene.ball(600.0, height_um=500.0))
-    with PictureProcess() as painter, pytest.raises(bgars.InputError, match="pixel_pitch_um"):
-        painter.start(result, replace(capture, pixel_pitch_um=None), tmp_path)
-    assert list(tmp_path.iterdir()) == []

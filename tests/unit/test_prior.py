@@ -5,7 +5,15 @@ from __future__ import annotations
 import bgars
 import numpy as np
 import pytest
-from bgars.report.figures.prior import prior_label, prior_pixels, prior_share, show_prior, stripes
+from bgars.report.figures.prior import (
+    prior_label,
+    prior_legend,
+    prior_overlay,
+    prior_pixels,
+    prior_share,
+    show_prior,
+    stripes,
+)
 from matplotlib.figure import Figure
 
 SHAPE = (60, 80)
@@ -36,7 +44,7 @@ def test_the_legend_says_where_the_normals_come_from_and_how_many(metal: bgars.N
     assert metal.mask[prior].all()
     assert "sphere of its circle" in prior_label(metal)
     axes = Figure().subplots()
-    show_prior(axes, metal, EXTENT, legend=True)
+    show_prior(axes, prior_overlay(metal), EXTENT, legend=prior_legend(metal))
     assert axes.get_legend().get_texts()[0].get_text() == f"{prior_label(metal)}: {prior_share(metal)}"
     assert prior_share(metal).endswith("of the normals on balls")
     # All priors are on balls, and balls are a part of the image only.
@@ -46,6 +54,7 @@ def test_the_legend_says_where_the_normals_come_from_and_how_many(metal: bgars.N
 def test_nothing_is_drawn_where_everything_is_measured() -> None:
     capture = bgars.read_capture(bgars.sample_capture())
     axes = Figure().subplots()
-    show_prior(axes, bgars.estimate_normals(capture, method="lambertian"), EXTENT, legend=True)
+    field = bgars.estimate_normals(capture, method="lambertian")
+    show_prior(axes, prior_overlay(field), EXTENT, legend=prior_legend(field))
     assert not axes.images
     assert axes.get_legend() is None

@@ -27,7 +27,7 @@ from line_captures import copy_capture
 
 @pytest.fixture
 def inbox(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr(job, "inspect", instant)
+    monkeypatch.setattr(job, "inspected", instant)
     folder = tmp_path / "in"
     folder.mkdir()
     (tmp_path / "rig.toml").write_text(RIG)

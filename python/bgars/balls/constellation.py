@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bgars.balls.highlights import MIN_CONTRAST, HighlightCircles, half_vectors, highlight_circles
+from bgars.records.light_median import light_median
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -47,7 +48,7 @@ def shining_circles(levels: Levels, reduced: FloatArray, row: Array, col: Array,
         Rough centres and scales, in pixels of `reduced`.
     """
     factor = levels.height // reduced.shape[1]
-    contrast = (reduced - np.median(reduced, axis=0)).astype(np.float32)
+    contrast = (reduced - light_median(reduced)).astype(np.float32)
     half = half_vectors(levels, (row + 0.5) * factor - 0.5, (col + 0.5) * factor - 0.5)
     radii = scale_px[:, None] * SIZES
     figure = _weakest(contrast, row, col, radii, half)

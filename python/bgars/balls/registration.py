@@ -6,7 +6,6 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import scipy  # loads its modules when they are used
 
 from bgars.errors import InputError
 
@@ -27,6 +26,8 @@ MIN_MATCHED = 0.6
 """Of the balls: every other ball of a square lattice is one, too, turned by 45 degrees and wider, with half of them."""
 NEIGHBOURS, NEIGHBOURS_OF_PLACE = 6, 12
 """Nearest balls and places whose directions are compared; of places more, because balls may be missing."""
+BLOCK = 256
+"""Points whose distances to all others are in memory at once."""
 SOME_BALLS = 200
 TURNS, SCALES = 180, 35
 """Cells of a turn of 2 degrees, and of 4 % from half to twice the scale: balls stand off their places by less."""
@@ -124,21 +125,28 @@ def _wrong_scale(layout: BallLayout, ratio: float, pixel_pitch_um: float) -> str
     return f"layout: pitch_um: must be {at}, which is {ratio * layout.pitch_um:.4g}, got {layout.pitch_um:g}"
 
 
-def _to_neighbours(points: Points, count: int) -> Points:
-    """(N, count) vectors from each point to its nearest others."""
-    flat = np.stack([points.real, points.imag], axis=1)
-    _, index = scipy.spatial.cKDTree(flat).query(flat, k=min(count + 1, len(points)))
-    vectors: Points = points[np.asarray(index)[:, 1:]] - points[:, None]
-    return vectors
+def _to_neighbours(points: Points, count: int, every: int = 1) -> Points:
+    """Vectors from every so many points to their nearest others: `count` each, or more where some are equally far."""
+    found = []
+    count = min(count, len(points) - 1)
+    for first in range(0, len(points), every * BLOCK):
+        here = points[first : first + every * BLOCK : every]
+        vectors = points - here[:, None]
+        # Rounded, so that which of the equally far ones are taken is no chance: all of them.
+        apart = np.round(np.abs(vectors), 6)
+        # A point is the nearest to itself.
+        farthest = np.partition(apart, count, axis=1)[:, count]
+        apart[np.arange(len(here)), first + every * np.arange(len(here))] = np.inf
+        found.append(vectors[apart <= farthest[:, None]])
+    return np.concatenate(found)
 
 
 def _turns(points: Points, nominal: Points) -> list[complex]:
     """Turns with scale that carry neighbours in the layout to neighbours in the image, most frequent first."""
     if len(points) < 2:  # noqa: PLR2004 - a direction needs two
         return [1.0 + 0.0j]
-    some = slice(None, None, math.ceil(len(points) / SOME_BALLS))
-    here = _to_neighbours(points, NEIGHBOURS)[some].ravel()
-    there = np.unique(np.round(_to_neighbours(nominal, NEIGHBOURS_OF_PLACE).ravel(), 3))
+    here = _to_neighbours(points, NEIGHBOURS, math.ceil(len(points) / SOME_BALLS))
+    there = np.unique(np.round(_to_neighbours(nominal, NEIGHBOURS_OF_PLACE), 3))
     there = there[:: math.ceil(len(there) / SOME_BALLS)]
     ratio = (here[:, None] / there).ravel()
     ratio = ratio[np.abs(np.log2(np.abs(ratio))) < 1.0]
@@ -169,7 +177,6 @@ def _vote(points: Points, nominal: Points, reach: float) -> tuple[complex, compl
 
     Among equals the right scale, then the least turn, then the shift nearest to none.
     """
-    tree = scipy.spatial.cKDTree(np.stack([points.real, points.imag], axis=1))
     some = points[:: math.ceil(len(points) / SOME_BALLS)]
     best: tuple[tuple[float, ...], complex, complex] = ((-1.0,), 1.0 + 0.0j, 0.0j)
     for turn in _turns(points, nominal):
@@ -178,8 +185,8 @@ def _vote(points: Points, nominal: Points, reach: float) -> tuple[complex, compl
             near = np.abs(shifts - kind * reach) < 1.5 * reach
             shift = complex(np.median(shifts[near].real) + 1j * np.median(shifts[near].imag))
             placed = nominal * turn + shift
-            apart, ball = tree.query(np.stack([placed.real, placed.imag], axis=1))
-            hits = len(np.unique(np.asarray(ball)[apart < reach * abs(turn)]))
+            place, ball = _pairs(placed, points, reach * abs(turn))
+            hits = len(np.unique(ball[np.unique(place, return_index=True)[1]]))
             right = abs(abs(turn) - 1.0) <= WRONG_SCALE
             degrees = abs(round(math.degrees(float(np.angle(turn)))))
             score = (float(hits), float(right), -float(degrees), -float(round(abs(shift) / reach)))
@@ -205,11 +212,25 @@ def _frequent(shifts: Points) -> Points:
 
 def _nearest(points: Points, placed: Points, reach: float) -> NDArray[np.int64]:
     """Index of the ball nearest to each place within reach, one place a ball; -1 for none."""
-    trees = [scipy.spatial.cKDTree(np.stack([at.real, at.imag], axis=1)) for at in (placed, points)]
-    pairs = trees[0].sparse_distance_matrix(trees[1], reach, output_type="ndarray")
     ball = np.full(len(placed), -1, np.int64)
     taken = np.zeros(len(points), np.bool_)
-    for _, place, point in sorted(zip(pairs["v"].tolist(), pairs["i"].tolist(), pairs["j"].tolist(), strict=True)):
+    for place, point in zip(*(index.tolist() for index in _pairs(placed, points, reach)), strict=True):
         if ball[place] < 0 and not taken[point]:
             ball[place], taken[point] = point, True
     return ball
+
+
+def _pairs(places: Points, points: Points, reach: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Places and points within reach of each other, the nearest pair first.
+
+    A place is compared with the points of a strip as wide, which are few: ``scipy.spatial`` takes longer to import.
+    """
+    by_x = np.argsort(points.real, kind="stable")
+    x = points.real[by_x]
+    first, end = np.searchsorted(x, places.real - reach), np.searchsorted(x, places.real + reach, "right")
+    place = np.repeat(np.arange(len(places)), end - first)
+    point = by_x[np.arange(len(place)) - np.repeat(np.cumsum(end - first) - end, end - first)]
+    apart = np.abs(points[point] - places[place])
+    near = np.flatnonzero(apart <= reach)
+    near = near[np.lexsort((point[near], place[near], apart[near]))]
+    return place[near], point[near]

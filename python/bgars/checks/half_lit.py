@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from bgars.checks.matt_fit import MIN_LIGHTS, promised
 from bgars.records.findings import Finding
+from bgars.records.light_median import light_median
 
 if TYPE_CHECKING:
     from bgars.checks.view import View
@@ -65,8 +66,9 @@ class Step(NamedTuple):
 def check_half_lit(view: View) -> list[Finding]:
     """Find frames with a step along rows or columns, or with rows that belong to the image before or after."""
     found = []
+    ratio = _of_promised(view) if len(view.lights) > MIN_LIGHTS else None
     for axis, word in ((1, "row"), (2, "column")):
-        steps = _steps(view, axis) if len(view.lights) > MIN_LIGHTS else []
+        steps = [] if ratio is None else _steps(ratio, view.use, axis)
         if not steps:
             continue
         index = int(np.argmax([abs(step.size) * (step.score > STANDS_OUT) for step in steps]))
@@ -91,13 +93,18 @@ def check_half_lit(view: View) -> list[Finding]:
     return _late(view)
 
 
-def _steps(view: View, axis: int) -> list[Step]:
-    """The largest step of each image along rows (axis 1) or columns (axis 2)."""
+def _of_promised(view: View) -> Array:
+    """(L, h, w) light over what the other images promise; NaN where that is little.
+
+    Shading and shadows on the side away from the light are in the promise: what steps there is no shutter.
+    """
     promise = promised(view)
-    usual = np.median(view.values, axis=0)
-    # Shading and shadows on the side away from the light are in the promise: what steps there is no shutter.
-    ratio = np.where(promise > LIT * usual, view.values / np.maximum(promise, 1e-6), np.nan)
-    use = view.use
+    usual = light_median(view.values)
+    return np.where(promise > LIT * usual, view.values / np.maximum(promise, 1e-6), np.nan)
+
+
+def _steps(ratio: Array, use: Mask, axis: int) -> list[Step]:
+    """The largest step of each image along rows (axis 1) or columns (axis 2)."""
     if axis == 2:  # noqa: PLR2004 - columns
         ratio, use = ratio.transpose(0, 2, 1), use.T
     ratio, use = _pooled(ratio, use)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars.records.light_median import light_median
+
 if TYPE_CHECKING:
     from bgars.checks.view import View
 
@@ -42,7 +44,7 @@ class MattFit(NamedTuple):
 def matt_lights(view: View) -> Mask:
     """(L, h, w) lights that show the matt part of a pixel."""
     values = view.values
-    median = np.median(values, axis=0)
+    median = light_median(values)
     keep: Mask = (values > SHADOWED * median) & ~view.clipped & view.use
     if len(values) >= DROPS_FROM:
         last = len(values) - len(values) // DROPPED

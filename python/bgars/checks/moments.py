@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars.records.light_median import light_median
+
 if TYPE_CHECKING:
     from bgars.checks.view import View
 
@@ -27,7 +29,7 @@ SPREAD = 4.0
 
 def lit_everywhere(view: View, lights: Array, *, matt: bool = True) -> Mask:
     """(h, w) pixels that every light reaches, without highlights; `matt`: that fit the table as most of them do."""
-    middle = np.median(view.values, axis=0)
+    middle = light_median(view.values)
     ratio = view.values / np.maximum(middle, np.float32(1e-6))
     lit: Mask = view.use & (ratio.min(axis=0) > SHADOWED) & (ratio.max(axis=0) < SHINES) & ~view.clipped.any(axis=0)
     if matt and lit.any() and len(lights) > 4:  # noqa: PLR2004 - with one degree of freedom nothing tells which image is off
@@ -49,7 +51,7 @@ def loo_weights(lights: Array) -> Array:
 def moments_by(view: View, lit: Mask, groups: NDArray[np.intp], count: int) -> Array:
     """(G, L, L) sums of products of values, relative to the pixel's median, by group of pixels."""
     values = view.values[:, lit].astype(np.float64)
-    values /= np.maximum(np.median(values, axis=0), 1e-9)
+    values /= np.maximum(light_median(values), 1e-9)
     number = groups[lit]
     order = np.argsort(number, kind="stable")
     edges = np.searchsorted(number[order], np.arange(count + 1))

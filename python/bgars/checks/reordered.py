@@ -2,9 +2,9 @@
 
 Values of matt pixels under all lights span three dimensions, those of the table of lights but for a linear map. So with
 both made orthonormal they differ by a rotation, a mirror, and the order of their rows. The means of the rows give all
-of the rotation but one angle; that is tried all round, and each time rows are paired (H. W. Kuhn, The Hungarian method
-for the assignment problem, 1955) and the rotation is fitted again (P. H. Schoenemann, A generalized solution of the
-orthogonal Procrustes problem, 1966). On an even ring many orders fit alike; `geometry` tells them apart.
+of the rotation but one angle; that is tried all round, and each time rows are paired, the nearest two first, and the
+rotation is fitted again (P. H. Schoenemann, A generalized solution of the orthogonal Procrustes problem, 1966). On an
+even ring many orders fit alike; `geometry` tells them apart.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy  # loads its modules when they are used
 from numpy.typing import NDArray
 
 from bgars.checks.moments import lit_everywhere
@@ -110,7 +109,11 @@ def _misfit(seen: Array, table: Array) -> float:
 
 
 def _paired(seen: Array, table: Array) -> Order:
-    """Row of the table for each row that is seen."""
+    """Row of the table for each row that is seen, every row once: of what is left, always the nearest two."""
     distance = np.square(seen[:, None] - table[None]).sum(axis=2)
-    order: Order = scipy.optimize.linear_sum_assignment(distance)[1]
+    order = np.zeros(len(seen), dtype=np.intp)
+    for _ in range(len(seen)):
+        row, column = divmod(int(distance.argmin()), len(table))
+        order[row] = column
+        distance[row] = distance[:, column] = np.inf
     return order

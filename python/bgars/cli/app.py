@@ -12,6 +12,7 @@ import typer
 
 import bgars
 from bgars.cli.console import activation, print_json, say, shown_path, stage_progress
+from bgars.cli.drawing import OVERVIEW, picture_process
 from bgars.cli.evaluation import choice_in_words, evaluation_table
 from bgars.cli.lazy import LazyGroup
 from bgars.cli.options import (
@@ -92,9 +93,10 @@ def demo(
         return
     folder = bgars.sample_capture()
     _need_places(folder, output)
-    summary, files = _reconstruct_to(
-        bgars.read_capture(folder), output, bgars.reconstruct, mesh_format="ply", directx=False
-    )
+    with picture_process(OVERVIEW) as painter:
+        summary, files = _reconstruct_to(
+            bgars.read_capture(folder), output, bgars.reconstruct, mesh_format="ply", directx=False, painter=painter
+        )
     scores = {
         name: bgars.evaluate(bgars.read_capture(folder), method=name).to_dict()["normals"]
         for name in ("lambertian", DEFAULT_METHOD)
@@ -146,26 +148,33 @@ def reconstruct(
     above its board, are not measured. The capture is checked first ('bgars check'): if lights and
     images do not fit, nothing is written (exit code 2) unless --force is given.
     """
-    from bgars.cli.first_check import check_first  # noqa: PLC0415 - loaded when it runs
-
-    def run(capture: bgars.Capture, **options: Any) -> bgars.Reconstruction:  # noqa: ANN401
-        surface = _material_from(material, capture)
-        return bgars.reconstruct(
-            capture, method=method, threshold=threshold, material=surface, flatten=flatten, check=False, **options
-        )
-
     _need_places(folder, output)
-    capture = bgars.read_capture(folder, channel=channel, station=station)
-    if height_format is not None:
-        from bgars.io.height import check_height_file  # noqa: PLC0415 - loaded when it runs
+    with picture_process(OVERVIEW) as painter:
+        from bgars.cli.first_check import tell_first  # noqa: PLC0415 - loaded when it runs, while the process starts
+        from bgars.pipelines.reconstruct import reconstructed  # noqa: PLC0415
 
-        check_height_file(output / f"height.{height_format}", has_pitch=capture.pixel_pitch_um is not None)
-    findings = check_first(capture, force=force)
-    formats = {"mesh_format": mesh_format, "height_format": height_format}
-    albedos = partial(bgars.colour_albedo, folder, channel=channel, station=station) if colour else None
-    summary, files = _reconstruct_to(
-        capture, output, run, **formats, directx=directx, checked=findings.to_dict(), colour=albedos
-    )
+        capture = bgars.read_capture(folder, channel=channel, station=station)
+        if height_format is not None:
+            from bgars.io.height import check_height_file  # noqa: PLC0415 - loaded when it runs
+
+            check_height_file(output / f"height.{height_format}", has_pitch=capture.pixel_pitch_um is not None)
+        checked: dict[str, Any] = {}
+
+        def tell(findings: bgars.Findings) -> tuple[str, ...]:
+            checked.update(tell_first(capture, findings, force=force).to_dict())
+            return ()
+
+        run = partial(
+            reconstructed,
+            tell=tell,
+            method=method,
+            threshold=threshold,
+            material=_material_from(material, capture),
+            flatten=flatten,
+        )
+        albedos = partial(bgars.colour_albedo, folder, channel=channel, station=station) if colour else None
+        options = {"mesh_format": mesh_format, "height_format": height_format, "directx": directx, "colour": albedos}
+        summary, files = _reconstruct_to(capture, output, run, **options, checked=checked, painter=painter)
     if as_json:
         print_json(summary)
         return

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from bgars.records.capture import Capture
     from bgars.records.findings import Finding, Findings
 
-__all__ = ["check_first", "warn"]
+__all__ = ["check_first", "tell_first", "warn"]
 
 WAY_OUT = "'bgars check' shows it; --force continues nevertheless"
 
@@ -24,7 +24,11 @@ def check_first(capture: Capture, *, force: bool) -> Findings:
     InputError
         Errors of geometry without `force`.
     """
-    findings = check(capture)
+    return tell_first(capture, check(capture), force=force)
+
+
+def tell_first(capture: Capture, findings: Findings, *, force: bool) -> Findings:
+    """Print what the check of a capture found, and return it; raise as :func:`check_first` does."""
     if not force:
         refuse_wrong_geometry(findings, capture.name, way_out=WAY_OUT)
     for finding in findings.told:

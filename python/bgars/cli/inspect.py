@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from contextlib import nullcontext
+from contextlib import ExitStack
 from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 import bgars
-from bgars.cli.console import may_start_processes, print_json, say, say_files, stage_progress, utc_now, warn
-from bgars.cli.first_check import check_first
-from bgars.cli.inspect_files import NAMES, Wanted, clear_places, refuse_foreign_places, write_result
+from bgars.cli.console import print_json, say, say_files, stage_progress, utc_now, warn
+from bgars.cli.drawing import PART_PICTURES, picture_process
+from bgars.cli.first_check import check_first, tell_first
+from bgars.cli.inspect_files import NAMES, Wanted, clear_places, refuse_foreign_places, start_pictures, write_result
 from bgars.cli.inspect_strip import inspect_strip, tell_strip
 from bgars.cli.options import (
     ForceOption,
@@ -32,14 +34,14 @@ from bgars.io.given_paths import need_file, need_folder, need_output
 from bgars.line.naming import identity_of
 from bgars.normals.methods import DEFAULT_METHOD
 from bgars.pipelines.check import told_by
+from bgars.pipelines.inspect import inspected
 from bgars.records.part_identity import PartIdentity
 from bgars.report.html.budget import main_causes
 
 if TYPE_CHECKING:
-    from contextlib import AbstractContextManager
+    from collections.abc import Callable
 
     from bgars.records.part_result import PartResult
-    from bgars.report.figures.process import PictureProcess
 
 __all__ = ["EXIT_NOT_PASSED", "register"]
 
@@ -133,25 +135,39 @@ def inspect(
     pictures = _is_drawn(pictures, "the pictures are left out: drawing them", "matplotlib")
     page = _is_drawn(page, "report.html is left out: it", "plotly")
     wanted = Wanted(pictures=pictures, page=page, parquet=parquet, cfx=cfx)
-    with stage_progress() as report, atomic_folder(output, NAMES) as place:
+    with stage_progress() as report, atomic_folder(output, NAMES) as place, ExitStack() as beside:
         clear_places(output)
         part = None if recipe is None else bgars.read_part_recipe(recipe)
+        is_drawn = pictures and (part is None or part.strip is None)
+        painter = beside.enter_context(picture_process(PART_PICTURES, wanted=is_drawn))
         capture = bgars.read_capture(folder, station=station)
-        told = told_by(check_first(capture, force=force))
         named, identity = identity_of(
             capture, PartIdentity(lot=lot, station=station_name, operator=operator, round=round_)
         )
         serial = serial or named
         if part is not None and part.strip is not None:
+            told = told_by(check_first(capture, force=force))
             rows = inspect_strip(
                 capture, part, part.strip, output, place, wanted, method, serial, identity, told, report
             )
         else:
-            with _painter(wanted=pictures) as painter:
-                result = bgars.inspect(capture, part, method=method, surface=page, check=False, progress=report)
-                result = replace(result, serial=serial, identity=identity, inspected_utc=utc_now())
-                result = replace(result, warnings=(*told, *result.warnings))
-                files = write_result(result, capture, place, wanted, painter)
+            stamped = partial(_stamped, serial, identity, cache(utc_now))
+
+            def judged(result: PartResult) -> None:
+                if painter is not None:
+                    start_pictures(painter, stamped(result), capture, place)
+
+            result = inspected(
+                capture,
+                part,
+                tell=lambda findings: told_by(tell_first(capture, findings, force=force)),
+                method=method,
+                surface=page,
+                progress=report,
+                judged=judged,
+            )
+            result = stamped(result)
+            files = write_result(result, capture, place, wanted, painter)
     if part is not None and part.strip is not None:
         tell_strip(rows, output, as_json=as_json, log_line=log_line)
         verdicts = {row.verdict for row in rows}
@@ -167,13 +183,8 @@ def inspect(
         raise typer.Exit(EXIT_NOT_PASSED)
 
 
-def _painter(*, wanted: bool) -> AbstractContextManager[PictureProcess | None]:
-    """A process for the pictures, where this one is the command's own and may use more than one core."""
-    if not wanted or not may_start_processes():
-        return nullcontext()
-    from bgars.report.figures.process import PictureProcess  # noqa: PLC0415 - loaded when it is used
-
-    return PictureProcess()
+def _stamped(serial: str, identity: PartIdentity, now: Callable[[], str], result: PartResult) -> PartResult:
+    return replace(result, serial=serial, identity=identity, inspected_utc=now())
 
 
 def _is_drawn(wanted: bool, words: str, package: str) -> bool:

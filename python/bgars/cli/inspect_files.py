@@ -7,11 +7,12 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, NamedTuple
 
 import bgars
+from bgars.cli.drawing import PART_PICTURES
 from bgars.errors import FileFormatError
 from bgars.io.atomic import FolderNames, atomic_folder
 from bgars.io.own_files import foreign_files
 from bgars.line.strip_page import PLACE
-from bgars.report.figures.part import PICTURES
+from bgars.report.figures.part import PICTURES, check_pictures, thinned
 from bgars.report.html.files import REPORT_FILES
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from bgars.records.part_result import PartResult
     from bgars.report.figures.process import PictureProcess
 
-__all__ = ["NAMES", "STRIP_FILES", "Wanted", "clear_places", "refuse_foreign_places", "write_result"]
+__all__ = ["NAMES", "STRIP_FILES", "Wanted", "clear_places", "refuse_foreign_places", "start_pictures", "write_result"]
 
 FILES = {
     "result.json": "everything: readings, uncertainties, limits, verdicts, reasons, checksums of the input",
@@ -47,23 +48,28 @@ class Wanted(NamedTuple):
     cfx: bool
 
 
+def start_pictures(painter: PictureProcess, result: PartResult, capture: Capture, place: Path) -> None:
+    """Begin to draw the pictures of a part, which need no surface."""
+    check_pictures(result, capture)
+    painter.start(PART_PICTURES, "draw_part_pictures", result, thinned(capture), place)
+
+
 def write_result(
     result: PartResult, capture: Capture, place: Path, wanted: Wanted, painter: PictureProcess | None = None
 ) -> dict[str, str]:
     """Write the files of a part into a folder; return their names and what they are.
 
-    `painter` draws the pictures while the page is written.
+    `painter` draws the pictures since :func:`start_pictures`.
     """
     files = dict(FILES)
-    if painter is not None:
-        painter.start(result, capture, place)
-    elif wanted.pictures:
+    if painter is None and wanted.pictures:
         files |= bgars.write_part_pictures(result, capture, place)
     (place / "result.json").write_text(result.to_json(), encoding="utf-8")
     (place / "balls.csv").write_text(result.to_csv(), encoding="utf-8")
     pages = bgars.write_report(result, place / "report.html", capture=capture) if wanted.page else {}
     if painter is not None:
-        files |= painter.finish()
+        painter.finish()
+        files |= PICTURES
     files = {name: pages.pop(name) for name in ("report.html",) if wanted.page} | files | pages
     if wanted.parquet:
         bgars.write_parquet(result, place / PARQUET)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 import imageio.v3 as iio
@@ -12,6 +11,7 @@ import numpy as np
 
 import bgars
 from bgars.cli.console import warn
+from bgars.cli.drawing import OVERVIEW
 from bgars.errors import FileFormatError, InputError
 from bgars.extras import how_to_install, missing
 from bgars.io.areal_files import AREAL_PACKAGES
@@ -21,6 +21,7 @@ from bgars.io.formats import check_normals_file
 from bgars.io.given_paths import need_folder, need_output
 from bgars.io.mesh_files import MESH_SUFFIXES, NATIVE_SUFFIXES
 from bgars.pipelines.reconstruct import summarise_field
+from bgars.report.figures.overview_content import overview_content
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from bgars.pipelines.reconstruct import Reconstruction
     from bgars.records.normal_field import NormalField
     from bgars.records.pixels import FloatArray
+    from bgars.report.figures.process import PictureProcess
 
 __all__ = ["need_normals_place", "write_normals", "write_reconstruction"]
 
@@ -42,9 +44,6 @@ RECONSTRUCTION = FolderNames(
 )
 
 COLOUR = {"albedo_rgb.tif": "diffuse reflectance in red, green and blue, float32"}
-
-WRITERS = ("write_mesh", "write_normal_map", "write_height")
-
 NORMALS = FolderNames(
     frozenset({"normals.png", "albedo.tif", "albedo_rgb.tif", "confidence.tif", "measured.png", "lights_kept.png"}),
     frozenset(),
@@ -64,12 +63,14 @@ def write_reconstruction(
     height_format: str | None = None,
     checked: dict[str, Any] | None = None,
     colour: Callable[[NormalField], FloatArray] | None = None,
+    painter: PictureProcess | None = None,
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Run a reconstruction and write its results; return its summary and what each file is.
 
     The output folder is tried first, so that no work is lost to an unwritable one. What an earlier reconstruction left
     there goes when the new files come. `height_format`: gsf, sdf or x3p, besides. `checked`: what the check of the
-    capture found. `colour`: makes albedo_rgb.tif of the normals.
+    capture found, by the time that `run` returns. `colour`: makes albedo_rgb.tif of the normals. `painter` draws the
+    picture while the other files are written.
     """
     with atomic_folder(output, RECONSTRUCTION) as folder:
         result = run()
@@ -87,16 +88,15 @@ def write_reconstruction(
         if missing("matplotlib"):
             del files["overview.png"]
             warn(f"overview.png is left out: it {how_to_install('matplotlib')}")
-        for name in WRITERS:
-            getattr(bgars, name)  # loaded by one thread
-        with ThreadPoolExecutor(1) as beside:
-            # Compressing and writing leave the interpreter to the picture.
-            written = beside.submit(_write_files, result, folder, mesh_format, directx, height_format)
-            if "overview.png" in files:
-                bgars.write_overview(result, folder / "overview.png")
-            written.result()
+        if painter is not None:
+            painter.start(OVERVIEW, "draw_overview", overview_content(result), folder / "overview.png")
+        elif "overview.png" in files:
+            bgars.write_overview(result, folder / "overview.png")
+        _write_files(result, folder, mesh_format, directx, height_format)
         if colour is not None:
             write_described(folder / "albedo_rgb.tif", colour(result.field), "albedo of red, green, blue")
+        if painter is not None:
+            painter.finish()
         summary = {
             "format": "bgars-reconstruction",
             "bgars": bgars.__version__,

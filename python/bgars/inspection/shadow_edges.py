@@ -14,11 +14,11 @@ displacement a and a change b of the spread:
 linear in four unknowns: least squares, then once more with Cauchy weights.
 
 Light that balls throw on the board beside them is not the same under all lights: T, a mean over lights, has too much
-of it on the far side of a ball, so that the lit level grows outward by a share g per pixel. Two more columns take that
-up: ``T d F``, and ``T d`` for what grows on both sides, which moves no edge: what the profile of a real lens is blunter
-or sharper in its tails than F is as odd about the edge, and must not pass for growth of the lit level. A stretch knows
-its own growth badly, all shadows of a part together know it well as a function of the place along the edge: the
-displacement is that of four columns with the usual growth of its place taken out (exact, for least squares are linear).
+of it on the far side of a ball, so that the lit level grows outward by a share g per pixel. That moves blunt edges, as
+of low lights beside the next ball. A stretch knows its own g badly, all shadows of a part together know it well as a
+function of the place along the edge: a fifth column ``hi T g d F`` is fitted for it, and the displacement is that of
+four columns with the usual g of its place taken out (exact, for least squares are linear). Sharp edges keep theirs:
+there, the tails of a real lens pass for growth.
 
 That holds for displacements below s. The coarse search goes by area: with H the unit step and r the reach,
 
@@ -71,7 +71,8 @@ STEEPEST_GROWTH = 0.1
 MIN_GROWTHS = 24
 """Stretches at one place of the edge whose median growth beats none: each knows its own to a per cent per pixel."""
 BLUNT_PX = 0.6
-"""Least spread of edges that growth moves: by its 0.3 % per pixel beside balls, times a fifth of the squared reach."""
+"""Least spread of edges that growth is taken from. It moves edges by a fifth of the squared reach: those of 0.5 px by
+less than 0.01 px beside balls, where the tails of a lens of 0.5 px pass for 0.014; tails of blunter ones for less."""
 
 
 class EdgeSettings(NamedTuple):
@@ -260,9 +261,9 @@ class Stretches(NamedTuple):
 
     Coefficients (shadow and lit level, displacement and change of the spread times the contrast) and their standard
     uncertainties; mean texture and its relative growth outward per pixel; means over the lines of the tangent point's
-    angle, the way of the light and the spread, weighted by what they say about the displacement; what the lit level
-    grows outward per pixel more than the shadow where both are free, and the displacement that a growth of 1 passes for
-    where none is; 1 where there was enough to see, else 0.
+    angle, the way of the light and the spread, weighted by what they say about the displacement; growth of the lit
+    level outward per pixel where it is free, and the displacement that a growth of 1 passes for where it is not; 1
+    where there was enough to see, else 0.
     """
 
     low: Array
@@ -334,7 +335,7 @@ def _edges(
 def _without_growth(fit: Stretches, measured: NDArray[np.bool_]) -> Array:
     """(N, L, S) displacements times contrast without what the usual growth of the lit level outward adds to them."""
     share = np.where(measured, fit.lit_growth / np.where(measured, fit.high, 1.0), np.nan)
-    # Steeper ones are none: too little lit board to tell growth from displacement. Sharper ones have too few pixels.
+    # Steeper ones are none: too little lit board to tell growth from displacement.
     plausible = (np.abs(share) < STEEPEST_GROWTH) & (fit.spread_px >= BLUNT_PX)
     share = np.where(plausible, share, np.nan)
     count = np.isfinite(share).sum(axis=(0, 1))

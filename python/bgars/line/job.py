@@ -6,7 +6,7 @@ import os
 import tempfile
 import time
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,7 @@ from bgars.io.provenance import capture_files, checksums
 from bgars.line.naming import Naming, last_written_utc
 from bgars.normals.methods import DEFAULT_METHOD, Method
 from bgars.pipelines.check import check, refuse_wrong_geometry, told_by
-from bgars.pipelines.inspect import inspect
+from bgars.pipelines.inspect import inspected
 from bgars.pipelines.strip import inspect_place, places_of_strip
 from bgars.store.keys import key_of, part_key
 from bgars.version import __version__
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from bgars.records.capture import Capture
+    from bgars.records.findings import Findings
     from bgars.records.part_identity import PartIdentity
     from bgars.records.part_recipe import PartRecipe
     from bgars.records.part_result import PartResult
@@ -148,7 +149,7 @@ def _inspected(job: Job, folder: Path, recipe_file: str, started: float) -> tupl
     serial = job.naming.of_capture(folder, capture, serial)
     digests = [digest for _, digest in checksums((*capture_files(capture), *([Path(recipe_file)] if recipe else [])))]
     identity = replace(identity, captured_utc=last_written_utc(capture))
-    told = cache(lambda: _checked(capture))  # at most once, and not where the store has all
+    told = cache(lambda: _tell(capture, check(capture)))  # at most once, and not where the store has all
     if recipe is None or recipe.strip is None:
         return (_part(job, capture, recipe, "", serial, identity, digests, told, started),)
     places = places_of_strip(capture, recipe)
@@ -164,9 +165,8 @@ def _inspected(job: Job, folder: Path, recipe_file: str, started: float) -> tupl
     return tuple(outcomes)
 
 
-def _checked(capture: Capture) -> tuple[str, ...]:
+def _tell(capture: Capture, findings: Findings) -> tuple[str, ...]:
     """What the check of a capture says, for its results; wrong geometry is refused."""
-    findings = check(capture)
     refuse_wrong_geometry(findings, capture.name, way_out="'bgars check' shows it")
     return told_by(findings)
 
@@ -186,12 +186,13 @@ def _part(
     key = key_of(digests, serial=serial, method=job.method, version=__version__)
     if key in job.known:
         return Outcome(job.folder, serial, is_known=True, seconds=time.perf_counter() - started)
-    found = told()
     if recipe is not None and place:
+        found = told()
         result = inspect_place(capture, recipe, place, method=job.method, check=False, threads=job.threads)
+        result = replace(result, warnings=(*found, *result.warnings))
     else:
-        result = inspect(capture, recipe, method=job.method, check=False, threads=job.threads)
-    result = replace(result, warnings=(*found, *result.warnings))
+        tell = partial(_tell, capture)
+        result = inspected(capture, recipe, tell=tell, method=job.method, threads=job.threads)
     if recipe is not None and job.content:  # as it is where the folder is seen
         given = Path(job.recipe)
         files = tuple(f._replace(name=given.name) if f.name == Path(RECIPE).name else f for f in result.files)

@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from bgars.checks.run import check_capture
-from bgars.errors import CaptureWarning, InputError
+from bgars.errors import BgarsError, CaptureWarning, InputError
 from bgars.io.capture import read_capture
 from bgars.records.capture import Capture
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import TypeAlias
+
     from bgars.records.findings import Findings
 
-__all__ = ["check", "check_before", "refuse_wrong_geometry", "told_by"]
+    Tell: TypeAlias = Callable[[Findings], tuple[str, ...]]
+
+__all__ = ["check", "checked_beside", "refuse_wrong_geometry", "tell_before", "told_by"]
+
+Done = TypeVar("Done")
 
 
 def check(capture: Capture | str | PathLike[str]) -> Findings:
@@ -63,31 +71,67 @@ def told_by(findings: Findings) -> tuple[str, ...]:
     return tuple(f"capture: {each.kind}: {each.message}; {each.advice}" for each in findings.told)
 
 
-def check_before(capture: Capture, *, stacklevel: int = 3) -> tuple[str, ...]:
-    """Check a capture before a number is made of it.
+def tell_before(capture: Capture, *, stacklevel: int) -> Tell:
+    """What a library call says of a capture before a number is made of it.
 
     Parameters
     ----------
     capture : Capture
     stacklevel : int
-        Of the warnings: 3 shows the line that called the caller.
+        Of the warnings, counted from what is returned.
+
+    Returns
+    -------
+    callable
+        Takes the findings. It returns what was found, each also a :class:`~bgars.CaptureWarning`, and raises InputError
+        where every normal would be wrong.
+    """
+
+    def tell(findings: Findings) -> tuple[str, ...]:
+        way_out = "bgars.check shows it; check=False continues nevertheless"
+        refuse_wrong_geometry(findings, capture.name, way_out=way_out)
+        texts = told_by(findings)
+        for text in texts:
+            warnings.warn(f"{capture.name}: {text.removeprefix('capture: ')}", CaptureWarning, stacklevel=stacklevel)
+        return texts
+
+    return tell
+
+
+def checked_beside(
+    capture: Capture, tell: Tell | None, work: Callable[[], Done], *, threads: int | None
+) -> tuple[tuple[str, ...], Done]:
+    """Check a capture on a thread of its own while the first work on it goes on.
+
+    Parameters
+    ----------
+    capture : Capture
+    tell : callable or None
+        What is done with the findings, when the work ends; None = no check. What it refuses comes before what the work
+        says: images in another order have no balls where their lights say so.
+    work : callable
+    threads : int or None
+        With one thread the check comes first.
 
     Returns
     -------
     tuple of str
-        What was found, each also a :class:`~bgars.CaptureWarning`.
-
-    Raises
-    ------
-    InputError
-        Where every normal would be wrong.
+        What `tell` returned.
+    object
+        What the work returned.
     """
-    findings = check_capture(capture)
-    refuse_wrong_geometry(findings, capture.name, way_out="bgars.check shows it; check=False continues nevertheless")
-    texts = told_by(findings)
-    for text in texts:
-        warnings.warn(f"{capture.name}: {text.removeprefix('capture: ')}", CaptureWarning, stacklevel=stacklevel)
-    return texts
+    if tell is None:
+        return (), work()
+    if threads == 1:
+        return tell(check_capture(capture)), work()
+    with ThreadPoolExecutor(1) as beside:
+        findings = beside.submit(check_capture, capture)
+        try:
+            done = work()
+        except BgarsError:
+            tell(findings.result())
+            raise
+        return tell(findings.result()), done
 
 
 def refuse_wrong_geometry(findings: Findings, name: str, *, way_out: str) -> None:

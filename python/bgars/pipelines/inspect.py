@@ -17,7 +17,7 @@ from bgars.io.material_file import read_material
 from bgars.io.part_recipe import read_part_recipe
 from bgars.io.provenance import capture_files, checksums
 from bgars.normals.methods import DEFAULT_METHOD, Method
-from bgars.pipelines.check import check_before
+from bgars.pipelines.check import checked_beside, tell_before
 from bgars.pipelines.normals import ball_normals, estimate_normals
 from bgars.pipelines.part_surface import part_surface
 from bgars.records.circle_pixels import inside_circles
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from os import PathLike
 
+    from bgars.pipelines.check import Tell
     from bgars.records.capture import Capture
     from bgars.records.found_balls import FoundBalls
     from bgars.records.measured_balls import BallMeasurement
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     from bgars.records.part_result import PartResult
     from bgars.records.surface_material import SurfaceMaterial
 
-__all__ = ["inspect"]
+__all__ = ["inspect", "inspected"]
 
 InspectionStage = Literal["find", "measure", "judge", "surface"]
 BOARD_STEP = 4
@@ -96,6 +97,32 @@ def inspect(
     CalibrationError
         Images that do not show what the rig says.
     """
+    return inspected(
+        capture,
+        recipe,
+        tell=tell_before(capture, stacklevel=5) if check else None,
+        method=method,
+        surface=surface,
+        threads=threads,
+        progress=progress,
+    )
+
+
+def inspected(
+    capture: Capture,
+    recipe: PartRecipe | str | PathLike[str] | None,
+    *,
+    tell: Tell | None,
+    method: Method = DEFAULT_METHOD,
+    surface: bool = False,
+    threads: int | None = None,
+    progress: Callable[[InspectionStage, float], object] | None = None,
+    judged: Callable[[PartResult], object] | None = None,
+) -> PartResult:
+    """Inspect a part; its capture is checked while the balls are looked for, and `tell` says what was found.
+
+    `judged` is called with the result before its surface is made.
+    """
     threads = thread_count(threads)
     if recipe is not None and not isinstance(recipe, PartRecipe):
         recipe = read_part_recipe(recipe)
@@ -107,15 +134,17 @@ def inspect(
         if progress is not None:
             progress(stage, fraction)
 
+    def look() -> FoundBalls:
+        check_capture(capture)
+        return _found(capture, recipe, threads, report)
+
     need_whole(capture)
-    check_capture(capture)
-    found_first = check_before(capture) if check else ()
     material, warnings = _material(recipe, method, len(capture.rig))
     report("find", 0.0)
     with ThreadPoolExecutor(1) as background:
         # The board's normals need no balls: they are made while the balls are looked for.
         started = background.submit(_board_normals, capture, threads)
-        found = _found(capture, recipe, threads, report)
+        found_first, found = checked_beside(capture, tell, look, threads=threads)
         report("find", 1.0)
         board = started.result()
         measurement, field = _measured(capture, found, board, method, material, recipe, threads, report, surface)
@@ -141,6 +170,8 @@ def inspect(
         material=None if fit is None else part_material(fit, from_file=material is not None),
         capture=capture.name,
     )
+    if judged is not None:
+        judged(result)
     if surface and field is not None:
         report("surface", 0.0)
         result = replace(result, surface=part_surface(result, field, board, BOARD_STEP, threads=threads))

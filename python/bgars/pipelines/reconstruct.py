@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from bgars.normals.methods import DEFAULT_METHOD, Method
 from bgars.normals.noise_floor import without_background
-from bgars.pipelines.check import check_before
+from bgars.pipelines.check import checked_beside, tell_before
 from bgars.pipelines.normals import estimate_normals
 from bgars.records.scalar_checks import thread_count
 from bgars.records.whole_capture import need_whole
@@ -23,13 +23,14 @@ if TYPE_CHECKING:
 
     import trimesh
 
+    from bgars.pipelines.check import Tell
     from bgars.records.capture import Capture
     from bgars.records.height_map import HeightMap
     from bgars.records.normal_field import NormalField
     from bgars.records.reflectance_fit import ReflectanceFit
     from bgars.records.surface_material import SurfaceMaterial
 
-__all__ = ["Reconstruction", "reconstruct", "solver_fraction", "summarise_field", "summarise_fit"]
+__all__ = ["Reconstruction", "reconstruct", "reconstructed", "solver_fraction", "summarise_field", "summarise_fit"]
 
 Stage = Literal["normals", "height"]
 
@@ -148,6 +149,34 @@ def reconstruct(
     >>> result.height.unit, len(result.height.components)
     ('um', 1)
     """
+    return reconstructed(
+        capture,
+        tell=tell_before(capture, stacklevel=5) if check else None,
+        method=method,
+        threshold=threshold,
+        material=material,
+        difference=difference,
+        weights=weights,
+        flatten=flatten,
+        threads=threads,
+        progress=progress,
+    )
+
+
+def reconstructed(
+    capture: Capture,
+    *,
+    tell: Tell | None,
+    method: Method = DEFAULT_METHOD,
+    threshold: float | None = None,
+    material: SurfaceMaterial | None = None,
+    difference: Difference = "trapezoid",
+    weights: Literal["confidence"] | None = None,
+    flatten: Flatten | None = None,
+    threads: int | None = None,
+    progress: Callable[[Stage, float], object] | None = None,
+) -> Reconstruction:
+    """Reconstruct a surface; its capture is checked while its normals are estimated, and `tell` says what was found."""
     threads = thread_count(threads)
 
     def report(stage: Stage, fraction: float) -> None:
@@ -155,10 +184,9 @@ def reconstruct(
             progress(stage, fraction)
 
     need_whole(capture)
-    if check:
-        check_before(capture)
     report("normals", 0.0)
-    field = estimate_normals(
+    estimate = partial(
+        estimate_normals,
         capture,
         method=method,
         threshold=threshold,
@@ -166,6 +194,7 @@ def reconstruct(
         threads=threads,
         progress=lambda fraction: report("normals", fraction),
     )
+    _, field = checked_beside(capture, tell, estimate, threads=threads)
     field = without_background(field, capture)
     report("normals", 1.0)
     height = integrate_normals(

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from bgars.errors import InputError
-from bgars.io.atomic import atomic_file
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from bgars.records.part_result import PartResult
     from bgars.records.pixels import PixelArray
 
-__all__ = ["PICTURES", "check_pictures", "draw_part_pictures", "thinned", "write_part_pictures"]
+__all__ = ["PICTURES", "check_pictures", "thinned", "write_part_pictures"]
 
 MAX_PICTURE_PX = 1100
 """Longer sides are thinned."""
@@ -56,6 +55,9 @@ def write_part_pictures(result: PartResult, capture: Capture, folder: str | Path
     FileFormatError
         A file cannot be written.
     """
+    # The names of the pictures are wanted where matplotlib is not.
+    from bgars.report.figures.part_drawing import draw_part_pictures  # noqa: PLC0415
+
     check_pictures(result, capture)
     draw_part_pictures(result, thinned(capture), Path(folder))
     return dict(PICTURES)
@@ -83,27 +85,3 @@ def thinned(capture: Capture) -> Capture:
         dark=None,
         response=None,
     )
-
-
-def draw_part_pictures(result: PartResult, capture: Capture, folder: Path) -> None:
-    """Draw and write them, from a thinned capture."""
-    # Imported here: the names of the pictures are wanted where matplotlib is not.
-    from bgars.report.figures.balls import part_figure  # noqa: PLC0415
-    from bgars.report.figures.histograms import histogram_figure  # noqa: PLC0415
-    from bgars.report.figures.maps import deviation_figure  # noqa: PLC0415
-    from bgars.report.figures.shadows import shadow_figure  # noqa: PLC0415
-    from bgars.report.figures.style import figure_style, save  # noqa: PLC0415
-    from bgars.report.identity import identity_line  # noqa: PLC0415
-
-    line = identity_line(result.to_dict())
-    with figure_style():
-        figures = {
-            "part.png": part_figure(result, capture),
-            "shadows.png": shadow_figure(result, capture),
-            "deviations.png": deviation_figure(result),
-            "histograms.png": histogram_figure(result),
-        }
-        for name, figure in figures.items():
-            figure.text(0.995, 0.997, line, ha="right", va="top", fontsize=6, color="0.35", parse_math=False)
-            with atomic_file(folder / name) as temporary:
-                save(figure, temporary)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.patches import Patch
 
 from bgars.records.circle_pixels import inside_circles
 
@@ -15,7 +14,16 @@ if TYPE_CHECKING:
 
     from bgars.records.normal_field import NormalField
 
-__all__ = ["STRIPE_COLOR", "prior_label", "prior_overlay", "prior_pixels", "prior_share", "show_prior", "stripes"]
+__all__ = [
+    "STRIPE_COLOR",
+    "prior_label",
+    "prior_legend",
+    "prior_overlay",
+    "prior_pixels",
+    "prior_share",
+    "show_prior",
+    "stripes",
+]
 
 STRIPE_COLOR = (0.08, 0.08, 0.08)
 STRIPE_ALPHA = 0.75
@@ -64,25 +72,22 @@ def prior_overlay(field: NormalField) -> NDArray[np.uint8] | None:
 
 
 def show_prior(
-    axes: Axes,
-    field: NormalField,
-    extent: tuple[float, float, float, float],
-    *,
-    legend: bool,
-    overlay: NDArray[np.uint8] | None = None,
+    axes: Axes, overlay: NDArray[np.uint8] | None, extent: tuple[float, float, float, float], *, legend: str = ""
 ) -> None:
-    """Lay stripes over a picture where its normals are a prior, and say so below it; nothing where none are.
-
-    `overlay` is what :func:`prior_overlay` returns, where several pictures share it.
-    """
-    overlay = prior_overlay(field) if overlay is None else overlay
+    """Lay what :func:`prior_overlay` returns over a picture, and say below it what it is; nothing where it is None."""
     if overlay is None:
         return
     axes.imshow(overlay, extent=extent, interpolation="antialiased")
     if legend:
+        from matplotlib.patches import Patch  # noqa: PLC0415 - what is shown is also made where nothing is drawn
+
         patch = Patch(facecolor="white", edgecolor=STRIPE_COLOR, hatch="//////", linewidth=0.8)
-        text = f"{prior_label(field)}: {prior_share(field)}"
-        axes.legend([patch], [text], loc="upper center", bbox_to_anchor=(0.5, -0.13), frameon=False, fontsize=9)
+        axes.legend([patch], [legend], loc="upper center", bbox_to_anchor=(0.5, -0.13), frameon=False, fontsize=9)
+
+
+def prior_legend(field: NormalField) -> str:
+    """Where the prior normals come from, and how many they are."""
+    return f"{prior_label(field)}: {prior_share(field)}"
 
 
 def prior_share(field: NormalField) -> str:

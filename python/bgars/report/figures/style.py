@@ -14,12 +14,10 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from bgars.records.shown import ABSENT, VERDICT_COLORS, counted
-from bgars.report.figure_file import write_png
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from contextlib import AbstractContextManager
-    from pathlib import Path
 
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
@@ -45,7 +43,6 @@ __all__ = [
     "part_frame",
     "part_title",
     "part_window",
-    "save",
     "shown_image",
     "window_size_in",
 ]
@@ -80,11 +77,6 @@ def add_axes(figure: Figure, left_in: float, bottom_in: float, width_in: float, 
     """Add axes at a place of the figure that is given in inches."""
     width, height = (float(side) for side in figure.get_size_inches())
     return figure.add_axes((left_in / width, bottom_in / height, width_in / width, height_in / height))
-
-
-def save(figure: Figure, path: Path) -> None:
-    """Write a PNG without the traces of the software that made it: the same figure, the same file."""
-    write_png(figure, path)
 
 
 def discs(axes: Axes, places: Sequence[tuple[float, float]], radii: Sequence[float], **look: Any) -> None:  # noqa: ANN401

@@ -6,6 +6,7 @@ import importlib.util
 import json
 from base64 import b64encode
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
 from hashlib import sha256
@@ -110,12 +111,17 @@ def write_report(
     else:
         source = read_page_source(Path(result))
     written = {path.name: REPORT_FILES["report.html"]}
-    write_page(source, path)
-    if capture is not None and source.photograph is not None:
-        for name, content in side_files(source.photograph, source.lamps, source.surface).items():
-            with atomic_file(path.with_name(name)) as temporary:
-                temporary.write_bytes(content)
-            written[name] = REPORT_FILES[name]
+    if capture is None or source.photograph is None:
+        write_page(source, path)
+        return written
+    with ThreadPoolExecutor(1) as beside:
+        # To compress the surface leaves the interpreter to the page.
+        others = beside.submit(side_files, source.photograph, source.lamps, source.surface)
+        write_page(source, path)
+    for name, content in others.result().items():
+        with atomic_file(path.with_name(name)) as temporary:
+            temporary.write_bytes(content)
+        written[name] = REPORT_FILES[name]
     return written
 
 

@@ -16,9 +16,8 @@ const MAX_GROWTH: f64 = 0.3;
 /// Numbers that [`Stretch::numbers`] gives.
 pub const STRETCH_FIELDS: usize = 16;
 
-/// Columns at most: shadow level, lit level, displacement, change of spread, and growth outward, everywhere and on the lit
-/// side more than in the shadow.
-pub(super) const COLUMNS: usize = 6;
+/// Columns at most: shadow level, lit level, displacement, change of spread, growth of the lit level outward.
+pub(super) const COLUMNS: usize = 5;
 
 /// A usable pixel near an edge.
 #[derive(Clone, Copy, Debug)]
@@ -59,8 +58,8 @@ pub struct Stretch {
     pub growth: f64,
     /// Means over the lines, weighted by what they say about the displacement: angle, way and spread.
     pub mean: [f64; 3],
-    /// What the lit level grows more by per pixel outward than the shadow where both are free; and the displacement,
-    /// times the contrast, that a growth of 1 passes for where none is.
+    /// Growth of the lit level outward per pixel where it is free; and the displacement, times the contrast, that a growth
+    /// of 1 passes for where it is not.
     pub grown: [f64; 2],
     /// Whether it has pixels enough.
     pub looked_at: bool,
@@ -120,8 +119,8 @@ pub(super) fn fit<const C: usize>(parts: &mut [Part<'_>], lines: &[Line], robust
         if C == 4 {
             stretch.growth = growth(part.pixels);
             let (with_growth, _) = solve::<COLUMNS>(part.pixels, |pixel| pixel.value);
-            let (taken_for, _) = solve::<C>(part.pixels, |pixel| pixel.columns[5]);
-            stretch.grown = [with_growth[5], taken_for[2]];
+            let (taken_for, _) = solve::<C>(part.pixels, |pixel| pixel.columns[4]);
+            stretch.grown = [with_growth[4], taken_for[2]];
         }
     }
     noise
