@@ -178,7 +178,7 @@ def test_uncertainties_cover_the_truth_as_often_as_they_should(
 
 @pytest.mark.xfail(
     strict=True,
-    reason="0.96 and 0.94: simulated balls are rounder than 0.001, rings better squared than 0.05 degrees, as u allows for",
+    reason="0.96 and 0.94: simulated balls are rounder than 0.001, rings better squared than 0.05 degrees",
 )
 def test_uncertainties_are_not_too_large(six_parts: tuple[dict[str, float], dict[str, float]]) -> None:
     shares, _ = six_parts
