@@ -9,9 +9,6 @@ from bgars.inspection.board import Board
 from bgars.inspection.edge_fit import Group, fit_stretches, group_sum
 from bgars.inspection.radiance import Radiance
 from bgars.inspection.shadow_edges import (
-    BLUNT_PX,
-    MIN_GROWTHS,
-    STEEPEST_GROWTH,
     WIDEST_RAD,
     EdgeSettings,
     Lines,
@@ -227,8 +224,6 @@ def _solve(
         0.0 if coarse_px is not None else sharp_px**2 * _texture_growth(pixels, spread, sector, size).reshape(shape)
     )
     moved = fit.solution[:, 2].reshape(shape)
-    if coarse_px is None:
-        moved = moved - _by_growth(columns, pixels, spread, fit.weight, fit.solution, sector, mean_spread, measured)
     shift = blurred + 0.5 * settings.spread_px**2 * curvature - np.where(measured, moved / safe, 0.0)
     along, up = lamp_gradients(beam, balls, vectors)
     bad = ~measured
@@ -263,38 +258,3 @@ def _texture_growth(pixels: _Pixels, spread: Array, sector: Index, size: int) ->
     growth = (mixed - first * level / total) / np.maximum(variance, 1e-9)
     relative: Array = np.where((variance > 0) & (level > 0), growth * total / np.maximum(level, 1e-9), 0.0)
     return np.clip(relative, -MAX_GROWTH, MAX_GROWTH)
-
-
-def _by_growth(
-    columns: list[Array],
-    pixels: _Pixels,
-    spread: Array,
-    weight: Array,
-    solution: Array,
-    sector: Index,
-    mean_spread: Array,
-    measured: NDArray[np.bool_],
-) -> Array:
-    """(N, L, S) what the usual growth of the lit level, at each place along the edge, adds to the displacements."""
-    shape, size = mean_spread.shape, mean_spread.size
-    across = pixels.distance * spread[None, :]
-    lit_alone = columns[1] * across
-    per_growth, share = np.zeros(size), np.full(size, np.nan)
-    for stretch in np.flatnonzero((measured & (mean_spread >= BLUNT_PX)).reshape(-1)):
-        mine = sector == stretch
-        root = np.sqrt(weight[:, mine].ravel())
-        system = np.stack([column[:, mine].ravel() for column in (*columns, lit_alone)], axis=1) * root[:, None]
-        free = np.linalg.lstsq(system, pixels.value[:, mine].ravel() * root, rcond=None)[0]
-        growth = free[-1] / solution[stretch, 1]
-        if abs(growth) < STEEPEST_GROWTH:
-            per_growth[stretch] = np.linalg.lstsq(system[:, :-1], system[:, -1], rcond=None)[0][2]
-            share[stretch] = growth
-    share = share.reshape(shape)
-    lit = np.where(measured, solution[:, 1].reshape(shape), 0.0)
-    added = np.zeros(shape)
-    for place in range(shape[2]):
-        alike = np.concatenate([share[..., place].ravel(), share[..., shape[2] - 1 - place].ravel()])
-        alike = alike[np.isfinite(alike)]
-        if len(alike) >= MIN_GROWTHS:
-            added[..., place] = per_growth.reshape(shape)[..., place] * np.median(alike) * lit[..., place]
-    return added

@@ -57,12 +57,14 @@ ROUND = Mixture(0.001, 0.05, 0.1)
 above their equator (Bond number 0.003 to 0.02); coined or sagged lots are not, one in ten."""
 CAMERA_MM = Mixture(1.0 / 3000.0, 1.0 / 40.0, 0.2)
 """Inverse distance of the camera: telecentric lenses are so to a fraction of a degree, others stand at 20 to 300 mm."""
-EDGE_SHARE, BEND_SHARE, EXCESS_SHARE = 0.017, 0.25, 0.15
+EDGE_SHARE, BEND_SHARE, EXCESS_SHARE = 0.01, 0.25, 0.15
 """Edges too far out or in, shares of their spread s, of ``s^2 / R``, and of what points scatter beyond their own: what
-penumbra, reflected light and a board that light enters leave of the model. Drawn edges of 0.6 px agree with it to 0.004
-px, rendered ones to 0.01 px; what a wide lamp shifts an edge by is known to half of its own size, for how its light is
-shared out over it is not known (parts as fine as 5 x 5 instead of 5 x 3 move tops by 0.1 to 1 px); where points
-scatter, some of it is alike on all balls."""
+penumbra, reflected light and a board that light enters leave of the model. Drawn and rendered edges of 0.5 px agree
+with it to 0.004 px; what a wide lamp shifts an edge by is known to half of its own size, for how its light is shared
+out over it is not known (parts as fine as 5 x 5 instead of 5 x 3 move tops by 0.1 to 1 px); where points scatter, some
+of it is alike on all balls."""
+LEAST_EDGE_PX = 0.006
+"""Sharper edges are known no better than those of 0.6 px: pixels are not alike over their area."""
 EDGE_WAVES = (1.0, 1.0, 0.3, 0.3)
 """The same of all edges together, and by cos a, cos 2a, cos 3a along them."""
 COARSE_SPREAD_PX = 2.0
@@ -142,7 +144,7 @@ def with_edges(
     `free_rig`: lights may be raised together as far as they may be off; not before edges are sharp.
     """
     parts = EDGE_SHARE * spread_px, BEND_SHARE * spread_px**2 / radius_px, EXCESS_SHARE * excess_px
-    size_px = float(np.linalg.norm(parts))
+    size_px = max(float(np.linalg.norm(parts)), LEAST_EDGE_PX)
     u_common = priors.u_common.copy()
     if u_common[ELEVATION] >= np.radians(RIG_DEG):
         u_common[ELEVATION] = np.radians(RAISED_DEG if free_rig else RIG_DEG)

@@ -13,13 +13,6 @@ displacement a and a change b of the spread:
 
 linear in four unknowns: least squares, then once more with Cauchy weights.
 
-Light that balls throw on the board beside them is not the same under all lights: T, a mean over lights, has too much
-of it on the far side of a ball, so that the lit level grows outward by a share g per pixel. That moves blunt edges, as
-of low lights beside the next ball. A stretch knows its own g badly, all shadows of a part together know it well as a
-function of the place along the edge: a fifth column ``hi T g d F`` is fitted for it, and the displacement is that of
-four columns with the usual g of its place taken out (exact, for least squares are linear). Sharp edges keep theirs:
-there, the tails of a real lens pass for growth.
-
 That holds for displacements below s. The coarse search goes by area: with H the unit step and r the reach,
 
     I = lo T (1 - H) + hi T H - (hi - lo) a T [|d| < r/2] / r
@@ -66,13 +59,6 @@ REACH_SIGMAS, REACH_PX = 3.2, 1.2
 """How far pixels across an edge reach: spreads, and pixels more."""
 BEYOND = 1.25
 """Profiles go this much farther than the reach: smaller balls have sharper edges."""
-STEEPEST_GROWTH = 0.1
-"""Growth of the lit level per pixel that reflected light can bring."""
-MIN_GROWTHS = 24
-"""Stretches at one place of the edge whose median growth beats none: each knows its own to a per cent per pixel."""
-BLUNT_PX = 0.6
-"""Least spread of edges that growth is taken from. It moves edges by a fifth of the squared reach: those of 0.5 px by
-less than 0.01 px beside balls, where the tails of a lens of 0.5 px pass for 0.014; tails of blunter ones for less."""
 
 
 class EdgeSettings(NamedTuple):
@@ -261,9 +247,8 @@ class Stretches(NamedTuple):
 
     Coefficients (shadow and lit level, displacement and change of the spread times the contrast) and their standard
     uncertainties; mean texture and its relative growth outward per pixel; means over the lines of the tangent point's
-    angle, the way of the light and the spread, weighted by what they say about the displacement; growth of the lit
-    level outward per pixel where it is free, and the displacement that a growth of 1 passes for where it is not; 1
-    where there was enough to see, else 0.
+    angle, the way of the light and the spread, weighted by what they say about the displacement; 1 where there was
+    enough to see, else 0.
     """
 
     low: Array
@@ -279,8 +264,6 @@ class Stretches(NamedTuple):
     angle_rad: Array
     way_px: Array
     spread_px: Array
-    lit_growth: Array
-    moved_by_growth: Array
     looked_at: Array
 
 
@@ -311,8 +294,7 @@ def _edges(
     curvature = (1.0 - tangent_along**2) / (beam.distance * beam.slope)
     # And texture that grows outward by g a pixel, blurred with the shadow, moves its edge inward by g s^2.
     blurred = settings.spread_px**2 * (fit.growth + 0.5 * curvature)
-    moved = fit.moved if settings.coarse else _without_growth(fit, measured)
-    shift = blurred - np.where(measured, moved / safe, 0.0)
+    shift = blurred - np.where(measured, fit.moved / safe, 0.0)
     along, up = lamp_gradients(beam, balls, vectors)
     return Edges(
         x=np.where(measured, edge.x + shift * beam.gradient_x / beam.slope, 0.0),
@@ -330,19 +312,3 @@ def _edges(
         noise_levels=noise / scale,
         looked_at=looked_at,
     )
-
-
-def _without_growth(fit: Stretches, measured: NDArray[np.bool_]) -> Array:
-    """(N, L, S) displacements times contrast without what the usual growth of the lit level outward adds to them."""
-    share = np.where(measured, fit.lit_growth / np.where(measured, fit.high, 1.0), np.nan)
-    # Steeper ones are none: too little lit board to tell growth from displacement.
-    plausible = (np.abs(share) < STEEPEST_GROWTH) & (fit.spread_px >= BLUNT_PX)
-    share = np.where(plausible, share, np.nan)
-    count = np.isfinite(share).sum(axis=(0, 1))
-    # Left and right of the tip are alike.
-    both = np.concatenate([share, share[..., ::-1]], axis=0)
-    known = (count + count[::-1]) >= MIN_GROWTHS
-    usual = np.where(known, np.nanmedian(np.where(known, both, 0.0), axis=(0, 1)), 0.0)
-    by_growth = np.where(plausible, fit.moved_by_growth * fit.high, 0.0)
-    without: Array = fit.moved - by_growth * usual
-    return without

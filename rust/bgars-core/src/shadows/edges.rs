@@ -211,7 +211,7 @@ impl<P: crate::Pixel> Scene<'_, P> {
         Profile { limit: limit[place], nodes: &profiles[(light * angles_rad.len() + place) * nodes..][..*nodes] }
     }
 
-    /// Columns of the model: shadow, light, displacement, spread, growth of the light outward.
+    /// Columns of the model: shadow, light, displacement, spread.
     fn columns(
         &self,
         across_px: f64,
@@ -223,12 +223,12 @@ impl<P: crate::Pixel> Scene<'_, P> {
         if self.settings.coarse {
             let lit = if across_px >= 0.0 { texture } else { 0.0 };
             let box_ = if across_px.abs() < 0.5 * reach { texture / reach } else { 0.0 };
-            return [texture - lit, lit, box_, 0.0, 0.0];
+            return [texture - lit, lit, box_, 0.0];
         }
         let scaled = across_px / spread_px;
         let [lit, growth] = profile.at(scaled);
         let bell = growth / spread_px * texture;
-        [texture * (1.0 - lit), texture * lit, bell, bell * scaled, texture * lit * across_px]
+        [texture * (1.0 - lit), texture * lit, bell, bell * scaled]
     }
 
     /// Value under the shadow's light, and texture: the mean of the lights that reach the pixel, each over its gain.

@@ -14,15 +14,15 @@ const RIDGE: f64 = 1e-9;
 const MAX_GROWTH: f64 = 0.3;
 
 /// Numbers that [`Stretch::numbers`] gives.
-pub const STRETCH_FIELDS: usize = 16;
+pub const STRETCH_FIELDS: usize = 14;
 
-/// Columns at most: shadow level, lit level, displacement, change of spread, growth of the lit level outward.
-pub(super) const COLUMNS: usize = 5;
+/// Columns at most: shadow level, lit level, displacement, change of spread.
+pub(super) const COLUMNS: usize = 4;
 
 /// A usable pixel near an edge.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pixel {
-    /// Columns of the model; the last ones are 0 where it has three.
+    /// Columns of the model; the last one is 0 where it has three.
     pub columns: [f64; COLUMNS],
     pub value: f64,
     pub texture: f64,
@@ -58,9 +58,6 @@ pub struct Stretch {
     pub growth: f64,
     /// Means over the lines, weighted by what they say about the displacement: angle, way and spread.
     pub mean: [f64; 3],
-    /// Growth of the lit level outward per pixel where it is free; and the displacement, times the contrast, that a growth
-    /// of 1 passes for where it is not.
-    pub grown: [f64; 2],
     /// Whether it has pixels enough.
     pub looked_at: bool,
 }
@@ -75,8 +72,7 @@ impl Stretch {
         numbers[8] = self.texture;
         numbers[9] = self.growth;
         numbers[10..13].copy_from_slice(&self.mean);
-        numbers[13..15].copy_from_slice(&self.grown);
-        numbers[15] = f64::from(u8::from(self.looked_at));
+        numbers[13] = f64::from(u8::from(self.looked_at));
         numbers
     }
 }
@@ -103,7 +99,7 @@ pub(super) fn fit<const C: usize>(parts: &mut [Part<'_>], lines: &[Line], robust
                     pixel.weight = 1.0 / (1.0 + off * off);
                 }
             }
-            (stretch.solution, stretch.deviation) = solve::<C>(part.pixels, |pixel| pixel.value);
+            (stretch.solution, stretch.deviation) = solve::<C>(part.pixels);
             for pixel in &*part.pixels {
                 let off = residual::<C>(pixel, &stretch.solution);
                 square += pixel.weight * off * off;
@@ -118,9 +114,6 @@ pub(super) fn fit<const C: usize>(parts: &mut [Part<'_>], lines: &[Line], robust
         summarise(part, lines, stretch);
         if C == 4 {
             stretch.growth = growth(part.pixels);
-            let (with_growth, _) = solve::<COLUMNS>(part.pixels, |pixel| pixel.value);
-            let (taken_for, _) = solve::<C>(part.pixels, |pixel| pixel.columns[4]);
-            stretch.grown = [with_growth[4], taken_for[2]];
         }
     }
     noise
@@ -130,15 +123,14 @@ fn residual<const C: usize>(pixel: &Pixel, solution: &[f64; COLUMNS]) -> f64 {
     (0..C).fold(pixel.value, |rest, c| rest - solution[c] * pixel.columns[c])
 }
 
-/// One round of least squares of a value by the first `C` columns: the solution, and its standard uncertainty for noise
-/// of 1.
-fn solve<const C: usize>(pixels: &[Pixel], value: impl Fn(&Pixel) -> f64) -> ([f64; COLUMNS], [f64; COLUMNS]) {
+/// One round of least squares by the first `C` columns: the solution, and its standard uncertainty for noise of 1.
+fn solve<const C: usize>(pixels: &[Pixel]) -> ([f64; COLUMNS], [f64; COLUMNS]) {
     let mut normal = SMatrix::<f64, C, C>::zeros();
     let mut right = SVector::<f64, C>::zeros();
     for pixel in pixels {
         for i in 0..C {
             let weighted = pixel.weight * pixel.columns[i];
-            right[i] += weighted * value(pixel);
+            right[i] += weighted * pixel.value;
             for j in 0..=i {
                 normal[(i, j)] += weighted * pixel.columns[j];
             }
