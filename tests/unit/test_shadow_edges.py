@@ -39,7 +39,7 @@ def photographs(lens_px: float) -> NDArray[np.float32]:
 
 @pytest.mark.parametrize("lens_px", [0.35, 0.5, 0.8])
 def test_blur_moves_no_edge(lens_px: float) -> None:
-    """The profile of pixels and lens is blunter in its tails than the model's: no growth of the lit level."""
+    """The profile of pixels and lens is blunter in its tails than the model's, on both sides alike."""
     capture = bgars.Capture(photographs(lens_px), RIG, np.ones((HEIGHT, WIDTH), dtype=np.bool_))
     radiance, board = Radiance(capture), Board()
     shadows = ShadowMap(
