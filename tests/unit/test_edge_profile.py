@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import bgars
 import numpy as np
 import pytest
 from bgars.inspection.board import Board
-from bgars.inspection.edge_profile import Lamp, edge_profiles, pixel_step
+from bgars.inspection.edge_profile import Lamp, edge_bends_px, edge_profiles, pixel_step
 from bgars.inspection.shadow_model import Balls, Lights, edge_at, rays
+from bgars.inspection.spread import EdgeSpread
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -79,3 +81,30 @@ def test_a_pixel_is_the_mean_over_its_square(turn_deg: float) -> None:
     spread = 0.06 * np.random.default_rng(1).standard_normal((200, 1, 1))
     seen = [float((d + offset[None] + spread > 0).mean()) for d in at]
     np.testing.assert_allclose(value, seen, atol=6e-3)
+
+
+@pytest.mark.parametrize("elevation_deg", [25.0, 45.0, 65.0])
+def test_the_curvature_of_a_shadow_is_that_of_its_ellipse(elevation_deg: float) -> None:
+    sine, radius = np.sin(np.radians(elevation_deg)), BALL[0, 3]
+    rig, balls, board = bgars.LightRig.ring(3, elevation_deg=elevation_deg), Balls.from_table(BALL).spread(2), Board()
+    lights = Lights.from_table(rig.directions, False).spread(1, 1)
+    edge = edge_at(np.radians([0.0, 90.0]), balls, lights, board)
+    tip, side = np.moveaxis(rays(edge.x, edge.y, balls, lights, board).curvature, -1, 0)
+    np.testing.assert_allclose(tip, 1.0 / (radius * sine), rtol=1e-9)
+    np.testing.assert_allclose(side, sine**2 / radius, rtol=1e-9)
+
+
+def test_drawn_out_tips_are_known_less() -> None:
+    """Edges of low lights: bent and blunt at the tip alone, so that cosines of all orders are unsure, cos 3 a, too."""
+    spread = EdgeSpread(0.5, 0.0075, 0.0075, 0.0075)
+
+    def unsure_px(elevation_deg: float) -> Array:
+        vectors = bgars.LightRig.ring(8, elevation_deg=elevation_deg).directions
+        return edge_bends_px(BALL[0], vectors, False, Board(), spread)
+
+    low, usual = unsure_px(25.0), unsure_px(45.0)
+    assert (low[1:] > 3.0 * usual[1:]).all()
+    assert low[3] > 0.5 * low[0] > 4.0 * usual[3]
+    # Twice the blur by lens and lamp is four times the bend.
+    doubled = edge_bends_px(BALL[0], LIGHT, False, Board(), EdgeSpread(1.0, 0.015, 0.015, 0.015))
+    np.testing.assert_allclose(doubled, 4.0 * edge_bends_px(BALL[0], LIGHT, False, Board(), spread), rtol=1e-9)

@@ -21,14 +21,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.inspection.normal_distribution import normal_distribution
-from bgars.inspection.shadow_model import Lights, rays
+from bgars.inspection.shadow_model import Balls, Lights, edge_at, rays
 from bgars.inspection.spread import lamp_gradients
 
 if TYPE_CHECKING:
     from bgars.inspection.board import Board
-    from bgars.inspection.shadow_model import Balls, Edge, Rays
+    from bgars.inspection.shadow_model import Edge, Rays
+    from bgars.inspection.spread import EdgeSpread
 
-__all__ = ["NODES", "Lamp", "edge_profiles", "pixel_step"]
+__all__ = ["NODES", "WIDEST_RAD", "Lamp", "edge_bends_px", "edge_profiles", "pixel_step"]
 
 Array = NDArray[np.float64]
 
@@ -44,6 +45,10 @@ THINNEST = 0.02
 """Least width of a pixel's square across an edge, in pixels: beyond it, the trapezoid is a box to 1e-4."""
 LEAST_COSINE = 0.2
 """Lamps closer to the axis than this are not pieces of a ring."""
+WIDEST_RAD = np.radians(100.0)
+"""Half of the arc of a shadow, from its tip, that is looked at: beyond, the ball hides it."""
+ANGLES, WAVES = 40, 4
+"""Places along an edge that its bends are known at, and cosines along it: one for each common term of edges."""
 
 
 class Lamp(NamedTuple):
@@ -90,6 +95,32 @@ def edge_profiles(
         share += light[:, None, None] * lit
         growth += light[:, None, None] * steep
     return share, growth
+
+
+def edge_bends_px(ball: Array, vectors: Array, near: bool, board: Board, spread: EdgeSpread) -> Array:
+    """(WAVES,) blur of a ball's shadow edges, squared, times their curvature: sizes of its cosines cos k a along them.
+
+    a is the angle from the tip; mean over all lights. A low light draws the shadow out, and its tip becomes both the
+    bluntest and the most curved part of the edge.
+
+    Parameters
+    ----------
+    ball : (5,) float64
+        x, y, z, radius, q.
+    vectors, near, board
+        Lights, whether they are positions, and what the shadows lie on.
+    spread : EdgeSpread
+        Of edges, by lens and lamp.
+    """
+    angles_rad = (np.arange(ANGLES) + 0.5) / ANGLES * 2.0 * WIDEST_RAD - WIDEST_RAD
+    balls, lights = Balls.from_table(ball[None]).spread(2), Lights.from_table(vectors, near).spread(1, 1)
+    edge = edge_at(angles_rad, balls, lights, board)
+    beam = rays(edge.x, edge.y, balls, lights, board)
+    lamp = Lamp(spread.lamp_azimuth_rad, spread.lamp_elevation_rad)
+    bends_px = (spread.sharp_px**2 + _penumbra_variance(beam, balls, vectors, lamp)) * beam.curvature
+    order = np.arange(WAVES)
+    sizes: Array = np.abs(np.cos(order[:, None] * angles_rad) @ bends_px.mean(axis=(0, 1))) / ANGLES
+    return np.where(order > 0, 2.0, 1.0) * sizes
 
 
 def pixel_step(distance: Array, blur: Array, across_x: Array, across_y: Array) -> tuple[Array, Array]:

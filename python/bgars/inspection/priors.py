@@ -137,18 +137,18 @@ def first_priors(problem: Problem, table: Array, field: NormalField | None, refi
 
 
 def with_edges(
-    priors: Priors, spread_px: float, radius_px: float, excess_px: float, bias_px: float, free_rig: bool
+    priors: Priors, spread_px: float, bends_px: Array, excess_px: float, bias_px: float, free_rig: bool
 ) -> Priors:
-    """Edges as good as their spread and scatter let them be; `bias_px` by rounded grey levels on top, of all together.
+    """Edges as good as their spread, bends (:func:`bgars.inspection.edge_profile.edge_bends_px`) and scatter let them.
 
+    `bias_px` by rounded grey levels on top, of all together.
     `free_rig`: lights may be raised together as far as they may be off; not before edges are sharp.
     """
-    parts = EDGE_SHARE * spread_px, BEND_SHARE * spread_px**2 / radius_px, EXCESS_SHARE * excess_px
-    size_px = max(float(np.linalg.norm(parts)), LEAST_EDGE_PX)
+    size_px = max(math.hypot(EDGE_SHARE * spread_px, EXCESS_SHARE * excess_px), LEAST_EDGE_PX)
     u_common = priors.u_common.copy()
     if u_common[ELEVATION] >= np.radians(RIG_DEG):
         u_common[ELEVATION] = np.radians(RAISED_DEG if free_rig else RIG_DEG)
-    u_common[list(EDGE_TERMS)] = size_px * np.array(EDGE_WAVES)
+    u_common[list(EDGE_TERMS)] = np.hypot(size_px * np.array(EDGE_WAVES), BEND_SHARE * bends_px)
     u_common[EDGE] = np.hypot(u_common[EDGE], bias_px)
     return priors._replace(u_common=u_common)
 

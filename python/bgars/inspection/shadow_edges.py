@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars import _bgars
-from bgars.inspection.edge_profile import NODES, Lamp, edge_profiles
+from bgars.inspection.edge_profile import NODES, WIDEST_RAD, Lamp, edge_profiles
 from bgars.inspection.shadow_map import Casters
 from bgars.inspection.shadow_model import Balls, Lights, edge_at, rays
 from bgars.inspection.spread import lamp_gradients
@@ -46,8 +46,6 @@ __all__ = ["EdgeSettings", "Edges", "Lines", "edge_lines", "measure_edges"]
 Array = NDArray[np.float64]
 
 SECTORS, FEWEST_SECTORS = 20, 4
-WIDEST_RAD = np.radians(100.0)
-"""Half of the arc of a shadow, from its tip, that is looked at: beyond, the ball hides it."""
 LINE_SPACING_PX = 1.45
 """Distance of neighbouring lines along the edge: above sqrt(2), so that no two lines share a pixel."""
 MAX_LINES = 96
@@ -290,10 +288,8 @@ def _edges(
         widened = widened - np.where(measured, fit.widened / safe, 0.0)
         u_widened = np.where(measured, fit.u_widened / safe, np.inf)
     # A blurred convex shadow looks smaller than it is, by half of the squared spread times the curvature of its edge.
-    tangent_along = (beam.toward_y * beam.gradient_x - beam.toward_x * beam.gradient_y) / beam.slope
-    curvature = (1.0 - tangent_along**2) / (beam.distance * beam.slope)
     # And texture that grows outward by g a pixel, blurred with the shadow, moves its edge inward by g s^2.
-    blurred = settings.spread_px**2 * (fit.growth + 0.5 * curvature)
+    blurred = settings.spread_px**2 * (fit.growth + 0.5 * beam.curvature)
     shift = blurred - np.where(measured, fit.moved / safe, 0.0)
     along, up = lamp_gradients(beam, balls, vectors)
     return Edges(

@@ -130,6 +130,13 @@ class Rays(NamedTuple):
         """Length of the gradient of D on the board."""
         return np.hypot(self.gradient_x, self.gradient_y)
 
+    @property
+    def curvature(self) -> Array:
+        """Of the edge on the board, 1 / px, where the rays graze the ball."""
+        along = (self.toward_y * self.gradient_x - self.toward_x * self.gradient_y) / self.slope
+        bent: Array = (1.0 - along**2) / (self.distance * self.slope)
+        return bent
+
 
 def rays(x: Array, y: Array, balls: Balls, lights: Lights, board: Board) -> Rays:
     """Rays from board points (x, y) past balls to lights; everything broadcasts."""

@@ -11,6 +11,7 @@ from bgars.inspection.board import Board
 from bgars.inspection.bundle import Priors, Solution, solve_bundle
 from bgars.inspection.bundle_model import State
 from bgars.inspection.common_terms import PERSPECTIVE
+from bgars.inspection.edge_profile import edge_bends_px
 from bgars.inspection.image_shifts import ImageShifts, agreed_shifts, image_shifts, with_texture
 from bgars.inspection.outline import Outlines, moved_back, outline_centres
 from bgars.inspection.plateaus import edge_bias_px
@@ -189,9 +190,12 @@ class ShadowPasses:
         """How well edges can be known, in the priors."""
         radiance, sharp_px = self.problem.radiance, self.spread.sharp_px
         bias_px = edge_bias_px(radiance, self.used, sharp_px) if self.is_last else 0.0
-        width_px = COARSE_SPREAD_PX if settings.coarse else _typical_spread_px(self.spread, radius)
-        free_rig = self.turn > len(COARSE)
-        self.priors = with_edges(self.priors, width_px, radius, self.excess_px, bias_px, free_rig=free_rig)
+        spread = EdgeSpread(COARSE_SPREAD_PX, 0.0) if settings.coarse else self.spread
+        state, near = self.state, self.problem.near
+        usual = np.median(state.balls[self.index], axis=0)
+        bends_px = edge_bends_px(usual, state.vectors, near, Board(state.board), spread)
+        width_px, free_rig = _typical_spread_px(spread, radius), self.turn > len(COARSE)
+        self.priors = with_edges(self.priors, width_px, bends_px, self.excess_px, bias_px, free_rig=free_rig)
 
     def _solve(self) -> Solution | None:
         """Bundle; once edges are sharp, scatter of lights, q and outlines is taken from the result (empirical Bayes).
