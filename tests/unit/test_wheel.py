@@ -25,9 +25,10 @@ def test_the_wheel_installs_and_runs_the_demo(tmp_path: Path) -> None:
     wheels = list((tmp_path / "dist").glob("bgars-*.whl"))
     assert len(wheels) == 1
     assert "abi3" in wheels[0].name
-    venv.create(tmp_path / "clean", with_pip=True)
+    venv.create(tmp_path / "clean")
     python = tmp_path / "clean" / "bin" / "python"
-    run(python, "-m", "pip", "install", "--quiet", f"{wheels[0]}[report]", cwd=tmp_path)
+    install = ("install", "--quiet", "--no-compile", f"{wheels[0]}[report]")
+    run(sys.executable, "-m", "pip", "--python", python, *install, cwd=tmp_path)
     output = run(tmp_path / "clean" / "bin" / "bgars", "demo", "-o", "demo", cwd=tmp_path)
     assert "overview.png" in output
     assert (tmp_path / "demo" / "mesh.ply").stat().st_size > 100_000
