@@ -132,7 +132,7 @@ def _unit(table: LightTable, path: Path, notes: list[str]) -> tuple[NDArray[np.f
     if alike:
         notes.append(f"{path.name}: vectors of length {np.median(lengths):.4g} taken as directions")
         return units, table.intensities
-    if lengths.max() > STRONGEST:
+    if lengths.max() > STRONGEST or table.kind == "positions_mm":
         msg = (
             f"{path}: its vectors are {lengths.min():.4g} to {lengths.max():.4g} long, so they are not directions; "
             f'if they are positions of LEDs, write in {RECIPE_NAME}, under [lights]: positions_mm = "{path.name}"'
