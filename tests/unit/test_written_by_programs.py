@@ -235,6 +235,13 @@ def test_a_mask_that_is_no_file_is_not_passed_over(tmp_path: Path) -> None:
         ('lights = "x.lp"\n', ["lights: must be a table", "'x.lp'"]),
         ("[lights]\nangles_deg = [[1, 2, 3]]\n", ["lights.angles_deg.0: must hold 2 numbers", "[1, 2, 3]"]),
         ("response = 2.2\n[lights]\nring = { count = 8 }\n", ["response", "{ gamma = 2.2 }", "got 2.2"]),
+        ("response = { gamma = 0.4545 }\n[lights]\nring = { count = 8 }\n", ["gamma", "write 2.2, got 0.4545"]),
+        ("saturation = 4095\n[lights]\nring = { count = 8 }\n", ["saturation", "can exceed 255, got 4095"]),
+        (f"pixel_pitch_um = 10\n[lights]\npositions_mm = {VECTORS}\n", ["positions_mm", "write directions"]),
+        (
+            f"pixel_pitch_um = 50\n[lights]\npositions_mm = {(LIGHTS * 0.3).tolist()}\n",
+            ["capture.toml", "within 0.3 mm of the image centre", "are positions_mm in mm"],
+        ),
     ],
 )
 def test_a_recipe_says_what_to_write(text: str, words: list[str], tmp_path: Path) -> None:

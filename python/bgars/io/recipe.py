@@ -39,6 +39,14 @@ class GammaResponse(Strict):
 
     gamma: Positive
 
+    @field_validator("gamma")
+    @classmethod
+    def _encodes(cls, value: float) -> float:
+        if value < 1.0:
+            msg = f"must be at least 1, since the image is signal^(1/gamma): for this exponent write {1.0 / value:.3g}"
+            raise ValueError(msg)
+        return value
+
 
 class TableResponse(Strict):
     """Measured response: a CSV of grey level and radiance."""
