@@ -88,7 +88,7 @@ def _between(capture: Capture, view: View, gone: list[int]) -> list[Finding]:
         view = view.without(index)
     if len(kept) < 4:  # noqa: PLR2004 - three images fit any surface
         return []
-    found, lights = check_table(view)
+    found, lights = check_table(capture, view)
     # A frame that is lit in part upsets all that follows, as it does the comparison of tables.
     halves = check_half_lit(view.with_lights(lights))
     if halves:
