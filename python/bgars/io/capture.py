@@ -243,9 +243,9 @@ def _load(
     if stack:
         notes.append(f"{names[0]} taken as a stack of {len(paths)} images, in the order of the lights")
     headers = read_headers(paths[:1] if stack else paths, stack=stack)
-    if headers.lossy and "response" not in recipe.model_fields_set:
+    if headers.doubt and "response" not in recipe.model_fields_set:
         notes.append(
-            f"{headers.lossy} is hardly ever linear in light, but is taken as linear; if a camera or phone made it, "
+            f"{headers.doubt}, but is taken as linear; if a camera or phone made it, "
             f'write response = "srgb" in {RECIPE_NAME}, or "linear" to confirm'
         )
     decoding = Decoding(paths, stack, channel, max_megapixels, threads)
