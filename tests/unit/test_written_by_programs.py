@@ -237,6 +237,7 @@ def test_a_mask_that_is_no_file_is_not_passed_over(tmp_path: Path) -> None:
         ("response = 2.2\n[lights]\nring = { count = 8 }\n", ["response", "{ gamma = 2.2 }", "got 2.2"]),
         ("response = { gamma = 0.4545 }\n[lights]\nring = { count = 8 }\n", ["gamma", "write 2.2, got 0.4545"]),
         ("saturation = 4095\n[lights]\nring = { count = 8 }\n", ["saturation", "can exceed 255, got 4095"]),
+        ("pixel_pitch_um = 0.0034\n[lights]\nring = { count = 8 }\n", ["pixel_pitch_um", "is it in mm?, got 0.0034"]),
         (f"pixel_pitch_um = 10\n[lights]\npositions_mm = {VECTORS}\n", ["positions_mm", "write directions"]),
         (
             f"pixel_pitch_um = 50\n[lights]\npositions_mm = {(LIGHTS * 0.3).tolist()}\n",
