@@ -148,8 +148,9 @@ def test_a_list_of_names_with_quotes_and_a_comment(tmp_path: Path) -> None:
     reads_right(tmp_path)
 
 
-def test_lights_in_a_folder_beside_the_images(tmp_path: Path) -> None:
-    write_images(tmp_path)
+@pytest.mark.parametrize("images", [".", "images"])
+def test_lights_in_a_folder_beside_the_images(images: str, tmp_path: Path) -> None:
+    write_images(tmp_path / images)
     (tmp_path / "calibration").mkdir()
     write_directions(tmp_path / "calibration")
     reads_right(tmp_path, "lights taken from calibration/light_directions.txt")

@@ -129,7 +129,7 @@ def _other_file(folder: Path, listing: Listing, notes: list[str]) -> str:
     if len(about) == 1:
         notes.append(f"lights taken from {about[0]}")
         return about[0]
-    if not about and listing.images:
+    if not about and (listing.images or any(list_folder(folder / name).images for name in listing.folders)):
         about = _below(folder, listing)
         if len(about) == 1:
             notes.append(f"lights taken from {about[0]}")
