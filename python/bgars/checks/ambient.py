@@ -48,13 +48,14 @@ DROPPED = 4
 MIN_SHARE = 0.01
 """Shadowed places, of all pairs of place and light: fewer are slips of the promise."""
 VEILS = (0.5, 0.7)
-"""Of the lit level: under so much ambient light shadows are no longer dark, and are found once it is taken away."""
+"""Of the lit level: under so much ambient light shadows are no longer dark. They are found once it is taken away, and
+must hold more than that."""
 NEVER_DARK = 0.3
 """Of the lit level: where one place in a hundred is darker, there is no such veil."""
 CASTS = 0.5
 """Sine between the usual light and the axis, at least: where lights stand steeper, nothing need be dark."""
-CONSISTENT = 0.9
-"""Of a veil that was taken away, that must be left in the deepest shadows."""
+NEARLY = 0.9
+"""Of what a veil is taken for: if one place in a hundred is darker, it is none."""
 BLOCK_PX = 3
 FAINT = 3.0 / 255.0
 """Lit level below which everything is dark."""
@@ -92,7 +93,7 @@ def shadow_floor(capture: Capture, lights: Array) -> ShadowFloor | None:
     casts = float(np.median(np.hypot(lights[:, 0], lights[:, 1]))) > CASTS
     for veil in VEILS if casts and darkest > NEVER_DARK else ():
         strong = _floor(places, lights, gains, veil)
-        if strong is not None and strong.floor > max(CONSISTENT * veil * strong.lit, found.floor if found else 0.0):
+        if strong is not None and strong.floor > max(veil * strong.lit, found.floor if found else 0.0):
             return strong
     return found
 
@@ -115,8 +116,17 @@ def _floor(places: list[tuple[Floats, Floats]], lights: Array, gains: Floats, ve
     percents = (percent, (percent * HIGH_PERCENT) ** 0.5, HIGH_PERCENT)
     usual_lit = float(np.median(np.concatenate([usual for _, usual in places])))
     # Light in the lens is the same on all pixels; light on the part goes with what they reflect.
-    floor = max(_lower_end(dark, percents), usual_lit * _lower_end(np.concatenate(shares), percents))
-    return ShadowFloor(floor, usual_lit, int(dark.size))
+    ends = [_lower_end(dark, percents), usual_lit * _lower_end(np.concatenate(shares), percents)]
+    if veil > 0.0:  # of slopes that lamps hardly reach much is darker, of a veil nothing
+        lowest = [np.percentile(np.concatenate(each), LOW_PERCENT) for each in _levels_and_shares(places, gains)]
+        ends = [end for end, low in zip(ends, (lowest[0], usual_lit * lowest[1]), strict=True) if low > NEARLY * end]
+    return ShadowFloor(max(ends), usual_lit, int(dark.size)) if ends else None
+
+
+def _levels_and_shares(places: list[tuple[Floats, Floats]], gains: Floats) -> tuple[list[Floats], list[Floats]]:
+    """Every level, and every share of the lit level."""
+    levels = [(levels * gains[:, None]).ravel() for levels, _ in places]
+    return levels, [(levels * gains[:, None] / usual).ravel() for levels, usual in places]
 
 
 def _lower_end(values: Floats, percents: tuple[float, float, float]) -> float:
