@@ -22,7 +22,7 @@ from case_captures import (
     write_directions,
     write_images,
 )
-from PIL import Image
+from PIL import Image, ImageCms
 
 LOSSY = "hardly ever linear"
 
@@ -197,6 +197,23 @@ def test_jpeg_is_doubted_until_the_recipe_says_what_it_is(tmp_path: Path) -> Non
     write_directions(tmp_path, "l.txt")
     recipe(tmp_path, 'response = "linear"\n[lights]\ndirections = "l.txt"\n')
     assert read_with_notes(tmp_path)[1] == []
+
+
+@pytest.mark.parametrize("suffix", [".png", ".tif"])
+def test_a_colour_profile_is_doubted_as_jpeg_is(tmp_path: Path, suffix: str) -> None:
+    profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    write_directions(tmp_path)
+    for name, image in zip(names_of("a{}" + suffix), levels(), strict=True):
+        Image.fromarray(np.dstack([image] * 3)).save(tmp_path / name, icc_profile=profile)
+    reads_right(tmp_path, "colour profile (a1.", LOSSY)
+
+
+def test_an_animation_is_not_one_image(tmp_path: Path) -> None:
+    write_images(tmp_path)
+    write_directions(tmp_path)
+    frames = [Image.fromarray(image) for image in levels()[:2]]
+    frames[0].save(tmp_path / "img_03.png", save_all=True, append_images=frames[1:])
+    refused(tmp_path, "img_03.png", "holds 2 images")
 
 
 @pytest.mark.parametrize("bits", [10, 12, 14])

@@ -13,6 +13,7 @@ from case_captures import (
     COUNT,
     LIGHTS,
     PLAIN,
+    levels,
     lp_lines,
     reads_right,
     refused,
@@ -118,6 +119,13 @@ def test_the_tree_of_rtibuilder(tmp_path: Path, folders: tuple[str, str], inside
     if inside and lp_folder != "assembly-files":
         pytest.skip("the search from inside knows the folder as RTIBuilder names it")
     reads_right(tmp_path / lp_folder if inside else tmp_path, image_folder)
+
+
+def test_cropped_images_are_those_that_the_file_names(tmp_path: Path) -> None:
+    write_images(tmp_path / "jpeg-exports", images=np.pad(levels(), ((0, 0), (4, 4), (4, 4))))
+    names = write_images(tmp_path / "cropped-files")
+    write_lp(tmp_path, lp_lines([rf"C:\coin\cropped-files\{name}" for name in names]), name="assembly-files/coin.lp")
+    reads_right(tmp_path, "cropped-files")
 
 
 @pytest.mark.parametrize(

@@ -211,6 +211,27 @@ def test_intensities_in_rows_or_columns(tmp_path: Path, shape: tuple[int, int]) 
     np.testing.assert_allclose(reads_right(tmp_path).rig.intensities, strength)
 
 
+@pytest.mark.parametrize(
+    "name", ["light_intensities.csv", "intensities.txt", "LightIntensities.npy", "led_strengths.dat"]
+)
+def test_intensities_of_other_names_are_used(name: str, tmp_path: Path) -> None:
+    strength = np.linspace(1.0, 0.5, COUNT)
+    write_images(tmp_path, images=np.rint(255 * strength[:, None, None] * radiances()).astype(np.uint8))
+    write_directions(tmp_path)
+    if name.endswith(".npy"):
+        np.save(tmp_path / name, strength)
+    else:
+        np.savetxt(tmp_path / name, strength)
+    np.testing.assert_allclose(reads_right(tmp_path, f"taken from {name}").rig.intensities, strength)
+
+
+def test_intensities_that_are_not_used_are_said(tmp_path: Path) -> None:
+    write_images(tmp_path)
+    write_directions(tmp_path)
+    savemat(tmp_path / "light_intensities.mat", {"I": np.ones(COUNT)})
+    reads_right(tmp_path, "not used: light_intensities.mat")
+
+
 def test_positions_are_no_directions(tmp_path: Path) -> None:
     write_images(tmp_path)
     write_directions(tmp_path, vectors=LIGHTS * np.linspace(200, 300, COUNT)[:, None])
@@ -261,7 +282,14 @@ def test_leds_of_near_light_data_need_the_distance(tmp_path: Path) -> None:
         ("lights.json", b"{", ["lights.json", "not valid JSON"]),
         ("lights.json", b"[" * 100_000, ["lights.json", "nested too deeply"]),
         ("lights.json", b'{"a": [1, 2]}', ["three numbers", "[1, 2]"]),
-        ("lights.json", b'{"lights": [{"intensity": [1, 1, 1]}]}', ["without a direction"]),
+        ("lights.json", b'{"lights": [{"intensity": [1, 1, 1]}]}', ["three numbers per light, got {'intensity'"]),
+        (
+            "lights.json",
+            b"[[0, 0.1, 0.2, 0.9], [1, 0.3, 0.1, 0.9]]",
+            ["three numbers per light, got [0, 0.1"],
+        ),
+        ("lights.json", b'[{"azimuth": 3, "elevation": 52}]', ["got {'azimuth': 3", "lights.angles_deg"]),
+        ("lights.json", b'{"lights": [[0, 0, 1]], "intensities": [1, 2]}', ["2 intensities, but 1 lights"]),
         ("lights.json", b'{"a.png": [1e999, 0, 1]}', ["finite"]),
         ("lights.dome", b'{"lights": 5}', ["neither directions nor positions"]),
         ("lights.npy", b"\x93NUMPY nonsense", ["lights.npy", "not a NumPy array"]),

@@ -7,15 +7,19 @@ import os
 import unicodedata
 from pathlib import Path
 
+import bgars
 import numpy as np
 import pytest
 import tifffile
 from case_captures import (
+    AZIMUTHS_DEG,
     COUNT,
+    ELEVATIONS_DEG,
     LIGHTS,
     levels,
     lp_lines,
     names_of,
+    radiances,
     reads_right,
     recipe,
     refused,
@@ -59,6 +63,13 @@ def table(header: str, pattern: str, order: slice = slice(None)) -> str:
     return "\n".join([header, *lines[order]]) + "\n"
 
 
+BACKWARDS = slice(None, None, -1)
+ANGLES = "\n".join(
+    ["led,azimuth,elevation"]
+    + [f"{index},{AZIMUTHS_DEG[index]},{ELEVATIONS_DEG[index]}" for index in range(COUNT)][BACKWARDS]
+)
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -66,13 +77,41 @@ def table(header: str, pattern: str, order: slice = slice(None)) -> str:
         (table("x,y,z,filename", "{x},{y},{z},{n}", slice(None, None, -1)), "lights taken"),
         (table("intensity;Lx;Ly;Lz", "1.0;{x};{y};{z}"), "fourth number"),
         (table("x,y,z,azimuth,elevation", "{x},{y},{z},10,20"), "not used: azimuth, elevation"),
+        (table("led,x,y,z", "{i},{x},{y},{z}", BACKWARDS), "sorted by their numbers"),
+        (table("Lamp;Lx;Ly;Lz", "LED {i};{x};{y};{z}", BACKWARDS), "sorted by their numbers"),
+        (table("# a table", "{i} {x} {y} {z}", BACKWARDS), "sorted by their numbers"),
+        (table("# a table", "{i} {n} {x} {y} {z}", BACKWARDS), "number of the light"),
+        (ANGLES, "sorted by their numbers"),
     ],
-    ids=["index of pandas", "name last, reversed", "intensity first", "angles besides"],
+    ids=[
+        "index of pandas",
+        "name last, reversed",
+        "intensity first",
+        "angles besides",
+        "numbers backwards",
+        "numbered names backwards",
+        "numbers without a header",
+        "numbers before names",
+        "numbers of angles",
+    ],
 )
 def test_columns_are_found_by_their_header(text: str, said: str, tmp_path: Path) -> None:
     write_images(tmp_path)
     (tmp_path / "LightDirs.csv").write_text(text, encoding="utf-8")
     reads_right(tmp_path, said)
+
+
+@pytest.mark.parametrize(("header", "per_mm"), [("x_mm,y_mm,z_mm", 1.0), ("X [m],Y [m],Z [m]", 1e-3)])
+def test_positions_have_the_unit_of_their_header(header: str, per_mm: float, tmp_path: Path) -> None:
+    write_images(tmp_path)
+    places_mm = LIGHTS * np.linspace(200.0, 400.0, COUNT)[:, None]
+    rows = "\n".join(",".join(f"{value:.6f}" for value in place) for place in places_mm * per_mm)
+    (tmp_path / "lights.csv").write_text(f"{header}\n{rows}\n", encoding="utf-8")
+    refused(tmp_path, "lights.csv", "not directions", "positions_mm")
+    recipe(tmp_path, 'pixel_pitch_um = 10\n[lights]\npositions_mm = "lights.csv"\n')
+    capture = bgars.read_capture(tmp_path)
+    assert capture.rig.positions_um is not None
+    np.testing.assert_allclose(capture.rig.positions_um, places_mm * 1000.0, atol=1.0)
 
 
 def test_rows_of_an_lp_file_that_look_like_numbers(tmp_path: Path) -> None:
@@ -109,8 +148,9 @@ def test_a_list_of_names_with_quotes_and_a_comment(tmp_path: Path) -> None:
     reads_right(tmp_path)
 
 
-def test_lights_in_a_folder_beside_the_images(tmp_path: Path) -> None:
-    write_images(tmp_path)
+@pytest.mark.parametrize("images", [".", "images"])
+def test_lights_in_a_folder_beside_the_images(images: str, tmp_path: Path) -> None:
+    write_images(tmp_path / images)
     (tmp_path / "calibration").mkdir()
     write_directions(tmp_path / "calibration")
     reads_right(tmp_path, "lights taken from calibration/light_directions.txt")
@@ -130,6 +170,32 @@ def test_json_in_three_rows_and_with_axes(tmp_path: Path) -> None:
     (tmp_path / "lights.json").write_text(json.dumps(LIGHTS.T.tolist()), encoding="utf-8")
     reads_right(tmp_path, "3 rows of 8 numbers")
     values = {"lights": [dict(zip("xyz", vector, strict=True)) for vector in LIGHTS.tolist()]}
+    (tmp_path / "lights.json").write_text(json.dumps(values), encoding="utf-8")
+    reads_right(tmp_path, "lights taken")
+
+
+STRENGTHS = [1.0, 0.5, 0.9, 0.8, 0.7, 0.6, 1.0, 0.9]
+VECTORS = LIGHTS.tolist()
+IN_ORDER = list(zip(names_of("img_{:02d}.png"), VECTORS, STRENGTHS, strict=True))
+
+
+def write_images_under_lamps(folder: Path) -> None:
+    write_images(folder, images=np.rint(255 * np.array(STRENGTHS)[:, None, None] * radiances()).astype(np.uint8))
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"lights": [{"direction": vector, "intensity": strength} for _, vector, strength in IN_ORDER]},
+        [{"X": x, "Y": y, "Z": z, "intensity": strength} for _, (x, y, z), strength in IN_ORDER],
+        [{"name": n, "x": x, "y": y, "z": z, "intensity": strength} for n, (x, y, z), strength in IN_ORDER[::-1]],
+        {"directions": VECTORS, "intensities": STRENGTHS},
+        {"lights": VECTORS, "light_intensities": [[strength] * 3 for strength in STRENGTHS]},
+    ],
+    ids=["with a direction", "with X, Y, Z", "with a name", "beside directions", "beside lights, of colours"],
+)
+def test_json_with_intensities(values: object, tmp_path: Path) -> None:
+    write_images_under_lamps(tmp_path)
     (tmp_path / "lights.json").write_text(json.dumps(values), encoding="utf-8")
     reads_right(tmp_path, "lights taken")
 
@@ -170,6 +236,14 @@ def test_a_mask_that_is_no_file_is_not_passed_over(tmp_path: Path) -> None:
         ('lights = "x.lp"\n', ["lights: must be a table", "'x.lp'"]),
         ("[lights]\nangles_deg = [[1, 2, 3]]\n", ["lights.angles_deg.0: must hold 2 numbers", "[1, 2, 3]"]),
         ("response = 2.2\n[lights]\nring = { count = 8 }\n", ["response", "{ gamma = 2.2 }", "got 2.2"]),
+        ("response = { gamma = 0.4545 }\n[lights]\nring = { count = 8 }\n", ["gamma", "write 2.2, got 0.4545"]),
+        ("saturation = 4095\n[lights]\nring = { count = 8 }\n", ["saturation", "can exceed 255, got 4095"]),
+        ("pixel_pitch_um = 0.0034\n[lights]\nring = { count = 8 }\n", ["pixel_pitch_um", "is it in mm?, got 0.0034"]),
+        (f"pixel_pitch_um = 10\n[lights]\npositions_mm = {VECTORS}\n", ["positions_mm", "write directions"]),
+        (
+            f"pixel_pitch_um = 50\n[lights]\npositions_mm = {(LIGHTS * 0.3).tolist()}\n",
+            ["capture.toml", "within 0.3 mm of the image centre", "are positions_mm in mm"],
+        ),
     ],
 )
 def test_a_recipe_says_what_to_write(text: str, words: list[str], tmp_path: Path) -> None:

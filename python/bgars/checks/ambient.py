@@ -47,6 +47,15 @@ DROPPED = 4
 """One light in so many, the brightest ones, may be a highlight."""
 MIN_SHARE = 0.01
 """Shadowed places, of all pairs of place and light: fewer are slips of the promise."""
+VEILS = (0.5, 0.7)
+"""Of the lit level: under so much ambient light shadows are no longer dark. They are found once it is taken away, and
+must hold more than that."""
+NEVER_DARK = 0.3
+"""Of the lit level: where one place in a hundred is darker, there is no such veil."""
+CASTS = 0.5
+"""Sine between the usual light and the axis, at least: where lights stand steeper, nothing need be dark."""
+NEARLY = 0.9
+"""Of what a veil is taken for: if one place in a hundred is darker, it is none."""
 BLOCK_PX = 3
 FAINT = 3.0 / 255.0
 """Lit level below which everything is dark."""
@@ -67,7 +76,7 @@ def shadow_floor(capture: Capture, lights: Array) -> ShadowFloor | None:
     gains = capture.rig.intensities.astype(np.float32)
     if len(gains) != len(lights):
         return None
-    shadows, shares, lit, pairs = [], [], [], 0
+    places = []
     for patch in cut_patches(capture):
         if min(patch.inside.shape) < BLOCK_PX:
             continue
@@ -76,23 +85,48 @@ def shadow_floor(capture: Capture, lights: Array) -> ShadowFloor | None:
         levels[box_blocks(patch.clipped.astype(np.float32), BLOCK_PX)[:, inside] > 0] = np.inf
         usual = np.quantile(levels, LIT_QUANTILE, axis=0, method="lower")
         used = np.isfinite(usual) & (usual > FAINT)
-        levels, usual = levels[:, used], usual[used]
-        shadowed = _in_shadow(levels, usual, lights)
+        places.append((levels[:, used], usual[used]))
+    if not sum(levels.size for levels, _ in places):
+        return None
+    found = _floor(places, lights, gains, 0.0)
+    darkest = np.percentile(np.concatenate([(levels / usual).ravel() for levels, usual in places]), LOW_PERCENT)
+    casts = float(np.median(np.hypot(lights[:, 0], lights[:, 1]))) > CASTS
+    for veil in VEILS if casts and darkest > NEVER_DARK else ():
+        strong = _floor(places, lights, gains, veil)
+        if strong is not None and strong.floor > max(veil * strong.lit, found.floor if found else 0.0):
+            return strong
+    return found
+
+
+def _floor(places: list[tuple[Floats, Floats]], lights: Array, gains: Floats, veil: float) -> ShadowFloor | None:
+    """Return what is left in shadows that show once a share of the lit level is taken away."""
+    shadows, shares, counts = [], [], np.zeros(len(lights))
+    for levels, usual in places:
+        shadowed = _in_shadow(levels - np.float32(veil) * usual, np.float32(1.0 - veil) * usual, lights)
         shadows.append((levels * gains[:, None])[shadowed])
         shares.append((levels * gains[:, None] / usual)[shadowed])
-        lit.append(usual)
-        pairs += levels.size
-    if not lit or pairs == 0:
-        return None
+        counts += shadowed.sum(axis=1)
     dark = np.concatenate(shadows)
     percent = max(LOW_PERCENT, 100.0 * LOW_PLACES / max(dark.size, 1))
-    if dark.size < MIN_SHARE * pairs or percent > MOST_LOW_PERCENT:
+    if dark.size < MIN_SHARE * sum(levels.size for levels, _ in places) or percent > MOST_LOW_PERCENT:
+        return None
+    # A lamp that is weaker than stated is dim everywhere, and looks like shadow once enough is taken away.
+    if veil > 0.0 and len(counts) * float(np.median(counts)) < MIN_SHARE * sum(levels.size for levels, _ in places):
         return None
     percents = (percent, (percent * HIGH_PERCENT) ** 0.5, HIGH_PERCENT)
-    usual_lit = float(np.median(np.concatenate(lit)))
+    usual_lit = float(np.median(np.concatenate([usual for _, usual in places])))
     # Light in the lens is the same on all pixels; light on the part goes with what they reflect.
-    floor = max(_lower_end(dark, percents), usual_lit * _lower_end(np.concatenate(shares), percents))
-    return ShadowFloor(floor, usual_lit, int(dark.size))
+    ends = [_lower_end(dark, percents), usual_lit * _lower_end(np.concatenate(shares), percents)]
+    if veil > 0.0:  # of slopes that lamps hardly reach much is darker, of a veil nothing
+        lowest = [np.percentile(np.concatenate(each), LOW_PERCENT) for each in _levels_and_shares(places, gains)]
+        ends = [end for end, low in zip(ends, (lowest[0], usual_lit * lowest[1]), strict=True) if low > NEARLY * end]
+    return ShadowFloor(max(ends), usual_lit, int(dark.size)) if ends else None
+
+
+def _levels_and_shares(places: list[tuple[Floats, Floats]], gains: Floats) -> tuple[list[Floats], list[Floats]]:
+    """Every level, and every share of the lit level."""
+    levels = [(levels * gains[:, None]).ravel() for levels, _ in places]
+    return levels, [(levels * gains[:, None] / usual).ravel() for levels, usual in places]
 
 
 def _lower_end(values: Floats, percents: tuple[float, float, float]) -> float:

@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.checks.matt_fit import MIN_LIGHTS, promised
+from bgars.checks.row_levels import clear_step
 from bgars.records.findings import Finding
 from bgars.records.light_median import light_median
 
 if TYPE_CHECKING:
+    from bgars.checks.row_levels import RowStep
     from bgars.checks.view import View
 
 __all__ = ["check_half_lit"]
@@ -65,32 +67,34 @@ class Step(NamedTuple):
 
 def check_half_lit(view: View) -> list[Finding]:
     """Find frames with a step along rows or columns, or with rows that belong to the image before or after."""
-    found = []
     ratio = _of_promised(view) if len(view.lights) > MIN_LIGHTS else None
-    for axis, word in ((1, "row"), (2, "column")):
-        steps = [] if ratio is None else _steps(ratio, view.use, axis)
-        if not steps:
-            continue
-        index = int(np.argmax([abs(step.size) * (step.score > STANDS_OUT) for step in steps]))
-        step = steps[index]
-        if abs(step.size) < STEP or step.score < STANDS_OUT:
-            continue
-        share = 1.0 - float(np.exp(-abs(step.size)))
-        found.append(
-            Finding(
-                "half-lit",
-                "error" if share > 0.3 else "warning",  # noqa: PLR2004 - most of the light
-                f"{view.names[index]} is partly lit: at {100 * step.place:.0f} % of its {word}s its light changes by "
-                f"{100 * share:.0f} %, which the other images do not show",
-                WORDS,
-                image=index,
-                value=share,
-                limit=1.0 - float(np.exp(-STEP)),
-                unit="of the light",
-            )
-        )
-        return found
-    return _late(view)
+    axes = () if ratio is None else ((ratio, view.use, "row"), (ratio.transpose(0, 2, 1), view.use.T, "column"))
+    for along, use, word in axes:
+        steps = _steps(along, use)
+        index = int(np.argmax([abs(step.size) * (step.score > STANDS_OUT) for step in steps])) if steps else 0
+        if steps and abs(steps[index].size) >= STEP and steps[index].score >= STANDS_OUT:
+            return [_partly_lit(view, index, steps[index], word)]
+    late = _late(view)
+    for along, use, word in () if late else axes:
+        clear = clear_step(along, use)
+        if clear is not None:
+            return [_partly_lit(view, *clear, word)]
+    return late
+
+
+def _partly_lit(view: View, index: int, step: Step | RowStep, word: str) -> Finding:
+    share = 1.0 - float(np.exp(-abs(step.size)))
+    return Finding(
+        "half-lit",
+        "error" if share > 0.3 else "warning",  # noqa: PLR2004 - most of the light
+        f"{view.names[index]} is partly lit: at {100 * step.place:.0f} % of its {word}s its light changes by "
+        f"{100 * share:.0f} %, which the other images do not show",
+        WORDS,
+        image=index,
+        value=share,
+        limit=1.0 - float(np.exp(-STEP)),
+        unit="of the light",
+    )
 
 
 def _of_promised(view: View) -> Array:
@@ -103,10 +107,8 @@ def _of_promised(view: View) -> Array:
     return np.where(promise > LIT * usual, view.values / np.maximum(promise, 1e-6), np.nan)
 
 
-def _steps(ratio: Array, use: Mask, axis: int) -> list[Step]:
-    """The largest step of each image along rows (axis 1) or columns (axis 2)."""
-    if axis == 2:  # noqa: PLR2004 - columns
-        ratio, use = ratio.transpose(0, 2, 1), use.T
+def _steps(ratio: Array, use: Mask) -> list[Step]:
+    """The largest step of each image between its rows."""
     ratio, use = _pooled(ratio, use)
     rows, length = np.flatnonzero(use.any(axis=1)), len(use)
     if len(rows) < 4 * BESIDE:

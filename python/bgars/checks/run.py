@@ -24,6 +24,7 @@ from bgars.checks.table import check_table
 from bgars.checks.view import TILES, make_view
 from bgars.checks.vignetting import check_vignetting
 from bgars.checks.windows import cut_windows, noise_of
+from bgars.errors import InputError
 from bgars.records.findings import Finding, Findings
 from bgars.records.whole_capture import need_whole
 
@@ -37,6 +38,8 @@ __all__ = ["check_capture"]
 
 MOST_CLIPPED = 0.5
 """Share of the image that is overexposed from which on images are not compared with each other."""
+LEAST_CONDITIONING = 1e-6
+"""27 det(L^T L) / tr(L^T L)^3 of the lights below which no method estimates normals: 1 for three at right angles."""
 FEW_LIT = 200
 """Pixels of the small copy, lit and matt, below which single images are not judged."""
 
@@ -54,8 +57,14 @@ def check_capture(capture: Capture) -> Findings:
     -------
     Findings
         The worst first. A capture without evidence (a flat, evenly lit field) has no findings on what it cannot show.
+
+    Raises
+    ------
+    InputError
+        Lights in one plane, or all near one direction: nothing can be measured under them.
     """
     need_whole(capture)
+    _refuse_flat_lights(capture)
     view = make_view(capture)
     inside = view.values.max(axis=0) > 0.0
     below = check_below(view)
@@ -69,6 +78,19 @@ def check_capture(capture: Capture) -> Findings:
     gone = [each.image for each in found if each.kind == "lamp-dead" and each.image is not None]
     found += _between(capture, view, gone)
     return Findings.of([_with_file(each, capture) for each in found])
+
+
+def _refuse_flat_lights(capture: Capture) -> None:
+    directions = capture.rig.directions
+    product = directions.T @ directions
+    conditioning = 27.0 * float(np.linalg.det(product)) / max(float(np.trace(product)), 1e-12) ** 3
+    if conditioning < LEAST_CONDITIONING:
+        msg = (
+            f"{capture.name}: the lights stand in one plane, or all near one direction (conditioning "
+            f"{conditioning:.1e}, at least {LEAST_CONDITIONING:g} is needed), so that no surface can be measured; "
+            "directions are x, y, z, and angles are in degrees"
+        )
+        raise InputError(msg)
 
 
 def _with_file(finding: Finding, capture: Capture) -> Finding:
@@ -88,7 +110,7 @@ def _between(capture: Capture, view: View, gone: list[int]) -> list[Finding]:
         view = view.without(index)
     if len(kept) < 4:  # noqa: PLR2004 - three images fit any surface
         return []
-    found, lights = check_table(view)
+    found, lights = check_table(capture, view)
     # A frame that is lit in part upsets all that follows, as it does the comparison of tables.
     halves = check_half_lit(view.with_lights(lights))
     if halves:

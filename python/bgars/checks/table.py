@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bgars.checks.ambient import LIT_QUANTILE, shadow_floor
 from bgars.checks.cast_shadows import judge_shadows
 from bgars.checks.geometry import judge_table
 from bgars.records.findings import Finding
@@ -14,6 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bgars.checks.view import View
+    from bgars.records.capture import Capture
 
 __all__ = ["check_table"]
 
@@ -24,13 +27,14 @@ HALF_TURN = (
 HALF_TURN_ADVICE = "change the sign of x and y in the table of lights, or turn the images by 180 degrees"
 
 
-def check_table(view: View) -> tuple[list[Finding], NDArray[np.float64]]:
+def check_table(capture: Capture, view: View) -> tuple[list[Finding], NDArray[np.float64]]:
     """Compare the table of lights with what the images show.
 
     Parameters
     ----------
+    capture : Capture
     view : View
-        Its lights stand above the surface.
+        Of the capture; its lights stand above the surface.
 
     Returns
     -------
@@ -41,6 +45,8 @@ def check_table(view: View) -> tuple[list[Finding], NDArray[np.float64]]:
     verdict = judge_table(view)
     lights = view.lights if verdict.better is None else verdict.better.lights
     shadows = judge_shadows(view.with_lights(lights))
+    if shadows.turned:
+        shadows = judge_shadows(_without_veil(capture, view.with_lights(lights)))
     findings = []
     if verdict.better is not None:
         text = verdict.better.told + (", and all by half a turn besides" if shadows.turned else "")
@@ -59,3 +65,12 @@ def check_table(view: View) -> tuple[list[Finding], NDArray[np.float64]]:
     if shadows.turned:
         lights = lights * np.array([-1.0, -1.0, 1.0])
     return findings, lights
+
+
+def _without_veil(capture: Capture, view: View) -> View:
+    """Take ambient light away: under it cast shadows are not dark, and what is dark nevertheless is something else."""
+    found = shadow_floor(capture, view.lights)
+    if found is None or found.floor <= 0.0:
+        return view
+    lit = float(np.median(np.quantile(view.values[:, view.use], LIT_QUANTILE, axis=0)))
+    return replace(view, values=view.values - np.float32(found.floor / found.lit * lit))

@@ -12,7 +12,7 @@ from bgars.errors import CaptureWarning, InputError
 from bgars.io.bracket import bracket_names, lights_in_bracket, merge_exposures, recipe_of_exposure
 from bgars.io.capture_headers import Headers, read_headers
 from bgars.io.capture_images import choose_images, match
-from bgars.io.capture_lights import Lights, read_lights
+from bgars.io.capture_lights import Lights, check_near_lights, read_lights
 from bgars.io.capture_radiometry import (
     Decoding,
     Levels,
@@ -243,9 +243,9 @@ def _load(
     if stack:
         notes.append(f"{names[0]} taken as a stack of {len(paths)} images, in the order of the lights")
     headers = read_headers(paths[:1] if stack else paths, stack=stack)
-    if headers.lossy and "response" not in recipe.model_fields_set:
+    if headers.doubt and "response" not in recipe.model_fields_set:
         notes.append(
-            f"{headers.lossy} is hardly ever linear in light, but is taken as linear; if a camera or phone made it, "
+            f"{headers.doubt}, but is taken as linear; if a camera or phone made it, "
             f'write response = "srgb" in {RECIPE_NAME}, or "linear" to confirm'
         )
     decoding = Decoding(paths, stack, channel, max_megapixels, threads)
@@ -274,9 +274,7 @@ def _load(
         np.ones(len(paths)) if in_values else _one_intensity(lights.intensities, channel), files=files
     )
     pitch_um = lights.pixel_pitch_um if recipe.pixel_pitch_um is None else recipe.pixel_pitch_um
-    if rig.is_near and pitch_um is None:
-        msg = f"{folder / RECIPE_NAME}: pixel_pitch_um: needed with lights.positions_mm, to place pixels under lights"
-        raise InputError(msg)
+    check_near_lights(rig, pitch_um, images.shape[1:], str(folder / RECIPE_NAME))
     return Capture(
         images=images,
         rig=rig,

@@ -22,14 +22,14 @@ class Headers(NamedTuple):
     ----------
     orientation : int
         As in EXIF, of all images.
-    lossy : str
-        Name of a format that was made for the eye, where there is one among them; else "".
+    doubt : str
+        Why the values may not be linear in light, as the beginning of a sentence; "" where no header speaks against it.
     with_alpha : tuple of Path
         Files with an opacity.
     """
 
     orientation: int
-    lossy: str
+    doubt: str
     with_alpha: tuple[Path, ...]
 
 
@@ -56,6 +56,10 @@ def read_headers(paths: Sequence[Path], *, stack: bool) -> Headers:
                 "the camera turned them differently; export them without rotation"
             )
             raise FileFormatError(msg)
-    lossy = next((kind.name for kind in kinds if kind.lossy), "")
+    doubted = [kind.name for kind in kinds if kind.lossy]
+    doubted += [
+        f"an image with a colour profile ({path.name})" for path, tag in zip(paths, tags, strict=True) if tag.profile
+    ]
+    doubt = f"{doubted[0]} is hardly ever linear in light" if doubted else ""
     with_alpha = tuple(path for path, tag in zip(paths, tags, strict=True) if tag.alpha)
-    return Headers(tags[0].orientation, lossy, with_alpha)
+    return Headers(tags[0].orientation, doubt, with_alpha)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
     from bgars.io.recipe import CaptureRecipe, LightsRecipe
 
-__all__ = ["Lights", "read_lights"]
+__all__ = ["Lights", "check_near_lights", "read_lights"]
 
 UNIT_WITHIN = 0.01
 """Vectors whose lengths differ from 1, or from each other, by less are directions."""
@@ -115,11 +116,42 @@ def _rig(
         if table.kind == "camera_mm":
             return _near_rig(table, path, recipe, notes)
     if lights.positions_mm is not None:
+        _refuse_unit_lengths(table)
         distance_um = None if lights.intensity_distance_mm is None else lights.intensity_distance_mm * 1000.0
         rig = LightRig.from_positions(table.vectors * 1000.0, intensity_distance_um=distance_um)
         return replace(rig, files=table.files), table.intensities, None
     vectors, strength = (table.vectors, None) if path is None else _unit(table, path, notes)
     return LightRig.from_directions(vectors, files=table.files), strength, None
+
+
+def _refuse_unit_lengths(table: LightTable) -> None:
+    lengths = np.linalg.norm(table.vectors, axis=1)
+    if len(lengths) > 1 and (np.abs(lengths - 1.0) < UNIT_WITHIN).all():
+        msg = "positions_mm: all are 1 mm from the image centre, so they are directions: write directions = ..."
+        raise InputError(msg)
+
+
+def check_near_lights(rig: LightRig, pixel_pitch_um: float | None, shape: tuple[int, ...], where: str) -> None:
+    """Refuse near lights without a scale, and such that all stand within the picture: they would hide the part.
+
+    Raises
+    ------
+    InputError
+        No pixel pitch; or all are nearer to the image centre than its corners, as if metres were taken for millimetres.
+    """
+    if rig.positions_um is None:
+        return
+    if pixel_pitch_um is None:
+        msg = f"{where}: pixel_pitch_um: needed with lights.positions_mm, to place pixels under lights"
+        raise InputError(msg)
+    farthest_um = float(np.linalg.norm(rig.positions_um, axis=1).max())
+    corner_um = math.hypot(*shape) / 2.0 * pixel_pitch_um
+    if farthest_um < corner_um:
+        msg = (
+            f"{where}: all lights are within {farthest_um / 1000.0:.3g} mm of the image centre, but the corners of the "
+            f"image are {corner_um / 1000.0:.3g} mm from it: are positions_mm in mm, and pixel_pitch_um in um?"
+        )
+        raise InputError(msg)
 
 
 def _unit(table: LightTable, path: Path, notes: list[str]) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
@@ -132,7 +164,7 @@ def _unit(table: LightTable, path: Path, notes: list[str]) -> tuple[NDArray[np.f
     if alike:
         notes.append(f"{path.name}: vectors of length {np.median(lengths):.4g} taken as directions")
         return units, table.intensities
-    if lengths.max() > STRONGEST:
+    if lengths.max() > STRONGEST or table.kind == "positions_mm":
         msg = (
             f"{path}: its vectors are {lengths.min():.4g} to {lengths.max():.4g} long, so they are not directions; "
             f'if they are positions of LEDs, write in {RECIPE_NAME}, under [lights]: positions_mm = "{path.name}"'

@@ -93,6 +93,12 @@ def levels_of(
     notes: list[str],
 ) -> Levels:
     """Full scale of the camera, clip and black level in the grey levels of the files."""
+    if code_scale is not None and recipe.saturation is not None and recipe.saturation > code_scale:
+        msg = (
+            f"{folder / RECIPE_NAME}: saturation: no pixel of these images can exceed {code_scale:g}, "
+            f"got {recipe.saturation:g}"
+        )
+        raise InputError(msg)
     if code_scale is not None:
         full_scale, saturation = _integer_levels(recipe, images, code_scale, notes)
     elif recipe.saturation is not None:

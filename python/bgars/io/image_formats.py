@@ -136,8 +136,11 @@ def read_pixels(path: Path, max_megapixels: float, kind: ImageFormat | None = No
     except (FileFormatError, MemoryError):
         raise
     except ImportError as error:
-        extra = {"raw": "raw", "exr": "exr"}.get(kind.decoder, "")
-        msg = f"{path}: {kind.name} needs an optional package: pip install 'bgars[{extra}]' ({error})"
+        extra = {"raw": "raw", "exr": "exr"}.get(kind.decoder)
+        if extra is None:
+            msg = f"{path}: {kind.name} of this kind is not read; save it without compression or with LZW ({error})"
+        else:
+            msg = f"{path}: {kind.name} needs an optional package: pip install 'bgars[{extra}]' ({error})"
         raise FileFormatError(msg) from error
     except Exception as error:  # decoders raise whatever their libraries raise; here all of it means one thing
         reason = " ".join(str(error).split())[:200]

@@ -42,7 +42,8 @@ def find_named_images(
                 return [posixpath.normpath(name) for name in written], []
     bases = [_base_name(name) for name in names]
     best: tuple[int, str] = (-1, "")
-    for place in _places(folder, source, subfolders):
+    parents = {name.replace("\\", "/").rpartition("/")[0].rpartition("/")[2] for name in names}
+    for place in _places(folder, source, subfolders, parents.pop() if len(parents) == 1 else ""):
         files = _image_files(place)
         for rule, find in RULES.items():
             found, missing = find(bases, files)
@@ -78,7 +79,7 @@ def _told(
     return relative, notes
 
 
-def _places(folder: Path, source: Path | None, subfolders: Sequence[str]) -> list[Path]:
+def _places(folder: Path, source: Path | None, subfolders: Sequence[str], named: str) -> list[Path]:
     bases = [folder] if source is None or source.parent == folder else [folder, source.parent, source.parent.parent]
     candidates = [*bases, *(base / name for base in bases for name in RTI_FOLDERS)]
     if source is not None and source.parent.name.lower() in ("assembly-files", "finished-files"):
@@ -86,7 +87,9 @@ def _places(folder: Path, source: Path | None, subfolders: Sequence[str]) -> lis
     if folder.name.lower() in ("assembly-files", "finished-files"):
         candidates += [folder.parent / name for name in RTI_FOLDERS]
     candidates += [folder / name for name in subfolders]
-    return [place for place in dict.fromkeys(candidates) if place.is_dir()]
+    places = [place for place in dict.fromkeys(candidates) if place.is_dir()]
+    # The folder that the file names comes first: cropped images lie beside whole ones of the same names.
+    return sorted(places, key=lambda place: place.name.lower() != named.lower())
 
 
 def _image_files(place: Path) -> list[str]:

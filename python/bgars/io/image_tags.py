@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["ImageTags", "read_tags", "upright"]
 
 UPRIGHT = 1
-ORIENTATION, SUBFILE, EXTRA_SAMPLES = 274, 254, 338
+ORIENTATION, SUBFILE, EXTRA_SAMPLES, PROFILE = 274, 254, 338, 34675
 REDUCED = 1
 SHORT, LONG = 3, 4
 MAX_PAGES = 10_000
@@ -44,12 +44,15 @@ class ImageTags(NamedTuple):
         The file has a channel of opacity.
     preview_first : bool
         The first page is a reduced copy.
+    profile : bool
+        The file declares sRGB or another profile for the display of its colours.
     """
 
     orientation: int = UPRIGHT
     pages: int = 1
     alpha: bool = False
     preview_first: bool = False
+    profile: bool = False
 
 
 def read_tags(path: Path, kind: ImageFormat) -> ImageTags:
@@ -87,11 +90,12 @@ def _tiff_tags(file: BinaryIO) -> ImageTags:
     full = [page for page in pages if not page.get(SUBFILE, 0) & REDUCED] or pages
     first = full[0] if full else {}
     orientation, count = _valid(first.get(ORIENTATION, UPRIGHT)), max(len(full), 1)
-    return ImageTags(orientation, count, EXTRA_SAMPLES in first, preview_first=bool(pages) and first is not pages[0])
+    preview_first = bool(pages) and first is not pages[0]
+    return ImageTags(orientation, count, EXTRA_SAMPLES in first, preview_first, PROFILE in first)
 
 
 def _directories(file: BinaryIO, only_first: bool = False) -> Iterator[dict[int, int]]:
-    """Yield the single numbers in each image file directory of a TIFF structure."""
+    """Yield the first numbers in each image file directory of a TIFF structure, of a profile the offset."""
     head = file.read(16)
     order = "<" if head[:2] == b"II" else ">"
     big = struct.unpack_from(order + "H", head, 2)[0] == 43  # noqa: PLR2004 - BigTIFF
@@ -110,7 +114,7 @@ def _directories(file: BinaryIO, only_first: bool = False) -> Iterator[dict[int,
             tag, form = struct.unpack_from(order + "HH", entries, place)
             number = struct.unpack_from(order + ("Q" if big else "I"), entries, place + 4)[0]
             value_at = place + (12 if big else 8)
-            if form in (SHORT, LONG) and number >= 1:
+            if (form in (SHORT, LONG) or tag == PROFILE) and number >= 1:
                 values[tag] = struct.unpack_from(order + ("H" if form == SHORT else "I"), entries, value_at)[0]
         yield values
         if only_first:
@@ -133,20 +137,23 @@ def _jpeg_tags(file: BinaryIO) -> ImageTags:
 
 def _png_tags(file: BinaryIO) -> ImageTags:
     file.seek(8)
-    orientation, alpha = UPRIGHT, False
+    orientation, alpha, pages, profile = UPRIGHT, False, 1, False
     for _ in range(MAX_CHUNKS):
         length, name = struct.unpack(">I4s", file.read(8))
         if name == b"IHDR":
             alpha = file.read(length)[9] in PNG_WITH_ALPHA
         elif name == b"eXIf" and length <= EXIF_BYTES:
             orientation = _exif_orientation(file.read(length))
+        elif name == b"acTL":  # an animation
+            (pages,) = struct.unpack_from(">I", file.read(length))
         elif name == b"IEND":
             break
         else:
             alpha |= name == b"tRNS"
+            profile |= name in (b"sRGB", b"iCCP")
             file.seek(length, io.SEEK_CUR)
         file.seek(4, io.SEEK_CUR)
-    return ImageTags(orientation, alpha=alpha)
+    return ImageTags(orientation, pages, alpha, profile=profile)
 
 
 def _webp_tags(file: BinaryIO) -> ImageTags:

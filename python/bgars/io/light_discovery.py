@@ -20,6 +20,8 @@ DIRECTIONS, INTENSITIES = "light_directions.txt", "light_intensities.txt"
 SUFFIXES = frozenset(suffix for kind in LIGHT_FORMATS for suffix in kind.suffixes)
 ABOUT_LIGHTS = re.compile(r"(?<![a-z])(light|lights|led|leds|dir|dirs|direction|directions)(?![a-z])|^[ls]$")
 ABOUT_STRENGTH = re.compile(r"intensit|strength|brightness")
+INTENSITY_FILE = re.compile(r"((light|lamp|led)s?[ _-]?)?(intensit(y|ies)|strengths?)")
+INTENSITY_SUFFIXES = (".txt", ".csv", ".tsv", ".dat", ".npy")
 ABOUT_PLACES = re.compile(r"position|(?<![a-z])pos(?![a-z])")
 RTI_FOLDERS = ("assembly-files", "finished-files")
 PREFERRED = ("light_directions", "lights", "light")
@@ -44,10 +46,24 @@ def default_recipe(folder: Path, listing: Listing, notes: list[str]) -> CaptureR
             raise InputError(msg)
         name = lp_files[0] if lp_files else _other_file(folder, listing, notes)
         lights["lp" if lp_files else "directions"] = name
-    strength = [name for name in listing.others if name.lower() == INTENSITIES]
-    if strength:
-        lights["intensities"] = strength[0]
+    strength = _strength_file(listing, notes)
+    if strength is not None:
+        lights["intensities"] = strength
     return CaptureRecipe.model_validate({"lights": lights, "mask": choose_mask(listing, notes)})
+
+
+def _strength_file(listing: Listing, notes: list[str]) -> str | None:
+    """The file of the intensities: of the usual name, else the only one that is called so; others are said."""
+    named = [name for name in listing.others if INTENSITY_FILE.fullmatch(Path(name).stem.lower())]
+    usual = [name for name in named if name.lower() == INTENSITIES]
+    candidates = usual or [name for name in named if Path(name).suffix.lower() in INTENSITY_SUFFIXES]
+    chosen = candidates[0] if len(candidates) == 1 else None
+    if chosen is not None and not usual:
+        notes.append(f"intensities taken from {chosen}")
+    ignored = [name for name in named if name != chosen]
+    if ignored:
+        notes.append(f"files about intensities that are not used: {some_of(ignored)}")
+    return chosen
 
 
 def choose_mask(listing: Listing, notes: list[str]) -> str | None:
@@ -113,7 +129,7 @@ def _other_file(folder: Path, listing: Listing, notes: list[str]) -> str:
     if len(about) == 1:
         notes.append(f"lights taken from {about[0]}")
         return about[0]
-    if not about and listing.images:
+    if not about and (listing.images or any(list_folder(folder / name).images for name in listing.folders)):
         about = _below(folder, listing)
         if len(about) == 1:
             notes.append(f"lights taken from {about[0]}")

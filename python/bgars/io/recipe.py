@@ -30,6 +30,8 @@ Uncertainty = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
 Vector = tuple[float, float, float]
 FileName = Annotated[str, AfterValidator(lambda name: name.replace("\\", "/"))]
 """Relative to the folder of the recipe; Windows writes its paths with backslashes."""
+FINEST_PITCH_UM = 0.05
+"""Pixels of a quarter of what visible light resolves (0.2 um, E. Abbe): smaller ones are given in another unit."""
 PITCH_OVER_U = 10.0
 """Least ratio of the pixel pitch to its standard uncertainty: below it the pitch is a guess, or the unit is wrong."""
 
@@ -38,6 +40,14 @@ class GammaResponse(Strict):
     """Camera that encodes ``signal^(1/gamma)``."""
 
     gamma: Positive
+
+    @field_validator("gamma")
+    @classmethod
+    def _encodes(cls, value: float) -> float:
+        if value < 1.0:
+            msg = f"must be at least 1, since the image is signal^(1/gamma): for this exponent write {1.0 / value:.3g}"
+            raise ValueError(msg)
+        return value
 
 
 class TableResponse(Strict):
@@ -114,6 +124,14 @@ class CaptureRecipe(Strict):
     lights: LightsRecipe | None = None
     part: PartIdentityTable | None = None
     station: str | None = None
+
+    @field_validator("pixel_pitch_um")
+    @classmethod
+    def _resolvable(cls, value: float | None) -> float | None:
+        if value is not None and value < FINEST_PITCH_UM:
+            msg = f"must be at least {FINEST_PITCH_UM} um, as light resolves no more; is it in mm?"
+            raise ValueError(msg)
+        return value
 
     @field_validator("camera", mode="before")
     @classmethod

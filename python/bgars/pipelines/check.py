@@ -46,7 +46,7 @@ def check(capture: Capture | str | PathLike[str]) -> Findings:
     Raises
     ------
     FileFormatError, InputError
-        As :func:`bgars.read_capture`.
+        As :func:`bgars.read_capture`; and lights in one plane, or all near one direction.
 
     References
     ----------

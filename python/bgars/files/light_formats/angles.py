@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bgars.errors import FileFormatError
-from bgars.files.light_formats.columns import data_lines, find_style, parse_row
-from bgars.files.light_formats.headed import axes_of
+from bgars.files.light_formats.columns import Row, by_number, data_lines, find_style, parse_row
+from bgars.files.light_formats.headed import INDICES, SORTED, axes_of
 from bgars.files.light_formats.table import MAX_LIGHTS, LightTable, checked_vectors
 from bgars.files.safe_files import read_text
 
@@ -51,6 +51,9 @@ def read_angle_table(path: Path) -> LightTable | None:
         raise FileFormatError(msg)
     style = find_style(lines[1:], ANGLES)
     rows = [parse_row(line.text, style) for line in lines[1:]]
+    notes: list[str] = []
+    if len(names) == ANGLES + 1 and names[0] in INDICES:
+        names, rows = angles, _by_index(rows, notes)
     for row, line in zip(rows, lines[1:], strict=True):
         if row is None or len(row.numbers) != ANGLES or bool(row.name) != (len(names) > ANGLES):
             msg = f"{path}: line {line.number} must hold {' and '.join(angles)}, as the header says, got {line.text!r}"
@@ -65,7 +68,17 @@ def read_angle_table(path: Path) -> LightTable | None:
     vectors = np.column_stack([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])
     files = tuple(row.name for row in rows if row is not None) if len(names) > ANGLES else ()
     note = f"{angles[0]} and {angles[1]} taken in {'radians' if is_radian else 'degrees'}, {_way(angles)}"
-    return LightTable(checked_vectors(vectors, path, files), files=files, notes=(note,))
+    return LightTable(checked_vectors(vectors, path, files), files=files, notes=(note, *notes))
+
+
+def _by_index(rows: list[Row | None], notes: list[str]) -> list[Row | None]:
+    """Rows without the number of the light in front, in the order of these numbers."""
+    whole = [row for row in rows if row is not None and len(row.numbers) + bool(row.name) == ANGLES + 1]
+    order = by_number([row.name or f"{row.numbers[0]:g}" for row in whole])
+    if order is None or len(whole) != len(rows):
+        return rows
+    notes.extend([SORTED] if order != sorted(order) else [])
+    return [Row("", whole[place].numbers[-ANGLES:]) for place in order]
 
 
 def _kind(name: str) -> str:

@@ -12,10 +12,11 @@ from bgars.files.light_formats.matrices import as_lines
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["Line", "Row", "Style", "as_number", "data_lines", "find_style", "parse_row"]
+__all__ = ["Line", "Row", "Style", "as_number", "by_number", "data_lines", "find_style", "parse_row"]
 
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf)", re.IGNORECASE | re.ASCII)
 DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?", re.ASCII)
+NUMBER_AT_END = re.compile(r"(?<![\d.])(\d{1,6})(?:\.0*)?$", re.ASCII)
 PLAIN_INTEGER = re.compile(r"[-+]?\d+", re.ASCII)
 NAME_WITH_SUFFIX = re.compile(r".*\.[A-Za-z][A-Za-z0-9]{1,4}")
 SUFFIX_AND_NUMBER = re.compile(rf"(?P<name>{NAME_WITH_SUFFIX.pattern})\s+(?P<number>{NUMBER.pattern})", re.IGNORECASE)
@@ -129,6 +130,21 @@ def as_number(field: str, style: Style) -> float | None:
     if len(field) > LONGEST_NUMBER or not NUMBER.fullmatch(field):
         return None
     return float(field)
+
+
+def by_number(labels: Sequence[str]) -> list[int] | None:
+    """Places of some labels in the order of the numbers at their ends; None where these are not one of each.
+
+    Examples
+    --------
+    >>> by_number(["LED 2", "LED 1", "LED 10"]), by_number(["left", "right"])
+    ([1, 0, 2], None)
+    """
+    ends = [NUMBER_AT_END.search(label) for label in labels]
+    numbers = [int(end[1]) for end in ends if end]
+    if not len(set(numbers)) == len(numbers) == len(labels):
+        return None
+    return sorted(range(len(numbers)), key=numbers.__getitem__)
 
 
 def _is_decimal_comma(field: str) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,9 +21,11 @@ __all__ = ["read_dome_table", "read_json_table"]
 
 AXES = ("x", "y", "z")
 CHANNELS = ("r", "g", "b")
+TABLES = ("lights", "directions", "light_directions")
+STRENGTHS = ("intensities", "light_intensities")
 EXPECTED = (
     'expected {"image.png": [x, y, z], ...}, a list of [x, y, z], or Meshroom\'s {"lights": [{"direction": [x, y, z], '
-    '"intensity": [r, g, b]}, ...]}'
+    '"intensity": [r, g, b]}, ...]}; azimuth and elevation are given as lights.angles_deg in capture.toml'
 )
 
 
@@ -37,19 +40,29 @@ def read_json_table(path: Path) -> LightTable:
         The file is no JSON, or holds something else.
     """
     values = _load(path)
-    if isinstance(values, dict) and isinstance(values.get("lights"), list | dict):
-        return _meshroom(values["lights"], path)
-    if isinstance(values, list) and values and all(isinstance(v, dict) and "direction" in v for v in values):
-        return _meshroom(values, path)
+    beside = None
     if isinstance(values, dict):
-        for key in ("directions", "light_directions"):
-            if isinstance(values.get(key), list | dict):
-                values = values[key]
-                break
+        beside = next((values[key] for key in STRENGTHS if isinstance(values.get(key), list)), None)
+        values = next((values[key] for key in TABLES if isinstance(values.get(key), list | dict)), values)
+    table = _read(values, path)
+    if beside is None or table.intensities is not None:
+        return table
+    intensities = _strengths(beside, path)
+    if len(beside) != len(table.vectors):
+        msg = f"{path}: {len(beside)} intensities, but {len(table.vectors)} lights"
+        raise FileFormatError(msg)
+    return replace(table, intensities=intensities)
+
+
+def _read(values: list[Any] | dict[str, Any], path: Path) -> LightTable:
+    entries = list(values.values()) if isinstance(values, dict) else values
+    if entries and all(isinstance(entry, dict) and "direction" in entry for entry in entries):
+        return _meshroom(values, path)
+    intensities = _strengths([entry.get("intensity") if isinstance(entry, dict) else None for entry in entries], path)
     if isinstance(values, dict):
         files = tuple(str(name) for name in values)
-        vectors = np.array([_vector(vector, path) for vector in values.values()]).reshape(-1, 3)
-        return LightTable(checked_vectors(vectors, path, files), files=files)
+        vectors = np.array([_vector(vector, path) for vector in entries]).reshape(-1, 3)
+        return LightTable(checked_vectors(vectors, path, files), intensities=intensities, files=files)
     if (
         len(values) == len(AXES)
         and all(isinstance(row, list) and len(row) > len(AXES) for row in values)
@@ -58,8 +71,8 @@ def read_json_table(path: Path) -> LightTable:
         lists, told = [_vector(each, path) for each in zip(*values, strict=True)], len(values[0])
         note = f"3 rows of {told} numbers taken as x, y and z of the lights"
         return LightTable(checked_vectors(np.array(lists).reshape(-1, 3), path), notes=(note,))
-    vectors = np.array([_vector(vector, path) for vector in values]).reshape(-1, 3)
-    return LightTable(checked_vectors(vectors, path))
+    vectors, files = np.array([_vector(vector, path) for vector in values]).reshape(-1, 3), _names(values)
+    return LightTable(checked_vectors(vectors, path, files), intensities=intensities, files=files)
 
 
 def read_dome_table(path: Path) -> LightTable:
@@ -101,17 +114,8 @@ def _dome_keys(values: dict[str, Any]) -> tuple[str, ...]:
 def _meshroom(lights: list[Any] | dict[str, Any], path: Path) -> LightTable:
     entries = list(lights.values()) if isinstance(lights, dict) else lights
     files = tuple(str(name) for name in lights) if isinstance(lights, dict) else _names(entries)
-    if not all(isinstance(entry, dict) and "direction" in entry for entry in entries):
-        if all(isinstance(entry, list) or (isinstance(entry, dict) and set(AXES) <= set(entry)) for entry in entries):
-            vectors = np.array([_vector(entry, path) for entry in entries]).reshape(-1, 3)
-            return LightTable(checked_vectors(vectors, path, files), files=files)
-        msg = f"{path}: lights without a direction; {EXPECTED}"
-        raise FileFormatError(msg)
     vectors = np.array([_vector(entry["direction"], path) for entry in entries]).reshape(-1, 3)
-    strength = [entry.get("intensity") for entry in entries]
-    intensities = None
-    if all(isinstance(value, list | dict) for value in strength):
-        intensities = np.array([_vector(value, path, CHANNELS) for value in strength]).reshape(-1, 3)
+    intensities = _strengths([entry.get("intensity") for entry in entries], path)
     notes: tuple[str, ...] = ()
     if not files:
         notes = ("lights taken in the order of the images, since Meshroom numbers views without their file names",)
@@ -121,6 +125,15 @@ def _meshroom(lights: list[Any] | dict[str, Any], path: Path) -> LightTable:
     return LightTable(
         checked_vectors(vectors, path, files), intensities=intensities, files=files, free_length=True, notes=notes
     )
+
+
+def _strengths(values: list[Any], path: Path) -> NDArray[np.float64] | None:
+    """(L, 1) or (L, 3) intensities; None where no light has one."""
+    if all(value is None for value in values):
+        return None
+    if all(isinstance(value, int | float) for value in values):
+        return np.array([_vector([value], path, CHANNELS[:1]) for value in values])
+    return np.array([_vector(value, path, CHANNELS) for value in values]).reshape(-1, 3)
 
 
 def _names(entries: list[Any]) -> tuple[str, ...]:
@@ -133,15 +146,16 @@ def _names(entries: list[Any]) -> tuple[str, ...]:
 
 
 def _vector(value: Any, path: Path, keys: tuple[str, ...] = AXES) -> list[float]:  # noqa: ANN401 - whatever a file held
+    numbers = value
     if isinstance(value, dict):
-        value = [value.get(key) for key in keys]
-    if isinstance(value, list | tuple) and len(value) >= len(keys):
-        numbers = value[: len(keys)]
-        if all(isinstance(number, int | float) and not isinstance(number, bool) for number in numbers):
-            try:
-                return [float(number) for number in numbers]
-            except OverflowError:
-                pass
+        named = {str(key).lower(): number for key, number in value.items()}
+        numbers = [named.get(key) for key in keys]
+    is_vector = isinstance(numbers, list | tuple) and len(numbers) == len(keys)
+    if is_vector and all(isinstance(number, int | float) and not isinstance(number, bool) for number in numbers):
+        try:
+            return [float(number) for number in numbers]
+        except OverflowError:
+            pass
     msg = f"{path}: must hold three numbers per light, got {repr(value)[:80]}; {EXPECTED}"
     raise FileFormatError(msg)
 

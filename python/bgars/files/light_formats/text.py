@@ -10,7 +10,7 @@ import numpy as np
 from bgars.errors import FileFormatError
 from bgars.files.light_formats.angles import read_angle_table
 from bgars.files.light_formats.columns import AXES, Line, Row, Style, as_number, data_lines, find_style, parse_row
-from bgars.files.light_formats.headed import axes_of, rows_under
+from bgars.files.light_formats.headed import SORTED, axes_of, rows_under
 from bgars.files.light_formats.table import MAX_LIGHTS, LightTable, checked_vectors
 from bgars.files.safe_files import read_text
 
@@ -39,6 +39,7 @@ class Rows(NamedTuple):
     lines: list[Line]
     notes: tuple[str, ...]
     counted: bool
+    unit_mm: float | None = None
 
 
 def read_rows(path: Path, *, named: bool = False) -> Rows:
@@ -74,7 +75,7 @@ def read_rows(path: Path, *, named: bool = False) -> Rows:
         header, lines = lines[0], lines[1:]
         headed = rows_under(header, lines, style)
         if headed is not None and lines:
-            return Rows(headed[0], lines, (*notes, *headed[1]), counted)
+            return Rows(headed.rows, headed.lines, (*notes, *headed.notes), counted, headed.unit_mm)
     if not lines:
         msg = f"{path}: holds no light"
         raise FileFormatError(msg)
@@ -141,8 +142,10 @@ def read_text_table(path: Path, *, names_needed: bool = False) -> LightTable:
         notes.append(f"no count on the first line, so {len(rows)} lights were counted")
     numbers = np.array([row.numbers for row in rows], dtype=np.float64).reshape(len(rows), columns or AXES)
     if columns == WITH_INTENSITY and not named and _is_index(numbers[:, 0]):
-        numbers, columns = numbers[:, 1:], AXES
+        order = np.argsort(numbers[:, 0])
         notes.append("the first column taken as the number of the light")
+        notes.extend([SORTED] if (np.diff(order) < 0).any() else [])
+        numbers, columns = numbers[order, 1:], AXES
     intensities = None if columns == AXES else numbers[:, AXES:]
     if columns == WITH_INTENSITY:
         notes.append("the fourth number of a line taken as the intensity of the light")
@@ -150,15 +153,22 @@ def read_text_table(path: Path, *, names_needed: bool = False) -> LightTable:
         notes.append("the last three numbers of a line taken as red, green and blue intensity of the light")
     files = tuple(row.name for row in rows) if named else ()
     _refuse_twice(path, files)
-    vectors = checked_vectors(np.ascontiguousarray(numbers[:, :AXES]), path, files)
-    return LightTable(vectors, intensities=intensities, files=files, free_length=names_needed, notes=tuple(notes))
+    vectors = checked_vectors(np.ascontiguousarray(numbers[:, :AXES] * (parsed.unit_mm or 1.0)), path, files)
+    return LightTable(
+        vectors,
+        "directions" if parsed.unit_mm is None else "positions_mm",
+        intensities,
+        files,
+        free_length=names_needed,
+        notes=tuple(notes),
+    )
 
 
 def _without_index(rows: list[Row], notes: list[str]) -> list[Row]:
     """Rows whose names do not begin with the number of the light, where all did."""
     numbers = [NUMBERED.fullmatch(row.name) for row in rows]
     found = [int(number["index"]) for number in numbers if number]
-    if len(rows) <= AXES or found not in (list(range(len(rows))), list(range(1, len(rows) + 1))):
+    if len(rows) <= AXES or sorted(found) not in (list(range(len(rows))), list(range(1, len(rows) + 1))):
         return rows
     notes.append("the first column taken as the number of the light")
     return [Row(number["name"], row.numbers) for number, row in zip(numbers, rows, strict=True) if number]
@@ -210,8 +220,8 @@ def _refuse_order(path: Path, header: Line) -> None:
 
 
 def _is_index(column: NDArray[np.float64]) -> bool:
-    count = np.arange(len(column))
-    return len(column) > AXES and (np.array_equal(column, count) or np.array_equal(column, count + 1))
+    counted = np.sort(column) - np.arange(len(column))
+    return len(column) > AXES and bool((counted == 0).all() or (counted == 1).all())
 
 
 def _equal(rows: list[Row]) -> bool:
