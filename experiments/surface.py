@@ -37,17 +37,11 @@ def draw_surface(axes: Any, height_px: FloatArray, heights: Normalize) -> None: 
         Colour scale and z range, the same for all surfaces of a figure.
     """
     x, y, z = _polar(height_px)
-    axes.plot_surface(
-        x,
-        y,
-        z,
-        facecolors=_shaded(x, y, z, heights),
-        rcount=z.shape[0],
-        ccount=z.shape[1],
-        linewidth=0,
-        antialiased=False,
-        shade=False,
+    facets = axes.plot_surface(
+        x, y, z, rcount=z.shape[0], ccount=z.shape[1], linewidth=0, antialiased=False, shade=False
     )
+    # An array at once: as an argument of plot_surface, colours are converted one by one.
+    facets.set_facecolor(_shaded(x, y, z, heights)[:-1, :-1].reshape(-1, 4))
     low, high = float(heights.vmin or 0.0), float(heights.vmax or 1.0)
     axes.set_zlim(low, high)
     axes.set_box_aspect((np.ptp(x), np.ptp(y), high - low), zoom=1.5)
