@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 SIDE, PITCH_UM, LIGHTS, FULL = 290, 16.0, 8, 255.0
 OFF_DEG, VIGNETTING, GAMMA, DISTORTION, NOISE = 3.0, 0.2, 1.8, 0.005, 1.0
 GRID_PX = 20.0
+CHROME = complex(3.2, 3.3)
+"""Refractive index of chromium, which calibration balls are plated with, in green light (Johnson and Christy 1974)."""
 
 
 @dataclass(frozen=True)
@@ -104,6 +106,7 @@ def calibrated(real: Hardware) -> bgars.Station:
         blur_px=0.5,
         lamp_level=1.2,
         samples=3,
+        refraction=CHROME,
     )
     mirror = as_capture(spoiled(ball / 65535.0, real.rng), nominal)
     lights = bgars.calibrate_lights(bgars.with_station(mirror, seen), "mirror")

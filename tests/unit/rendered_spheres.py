@@ -17,12 +17,12 @@ def unit(vectors: Array) -> Array:
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
-def dielectric(cosine: Array, index: float) -> Array:
-    """Fresnel's equations for a real refractive index, by Snell's law."""
+def mirrored_share(cosine: Array, index: complex) -> Array:
+    """Fresnel's equations by Snell's law; the refractive index of a metal is complex."""
     inner = np.sqrt(1.0 - (1.0 - cosine**2) / index**2)
     across = (cosine - index * inner) / (cosine + index * inner)
     along = (inner - index * cosine) / (inner + index * cosine)
-    return 0.5 * (across**2 + along**2)
+    return 0.5 * (np.abs(across) ** 2 + np.abs(along) ** 2)
 
 
 def ring(count: int, elevation_deg: float, azimuth0_deg: float = 10.0) -> Array:
@@ -85,7 +85,7 @@ def render(
     seed: int = 0,
     samples: int = 5,
     bits: int = 8,
-    refraction: float | None = None,
+    refraction: complex | None = None,
 ) -> NDArray[np.uint8]:
     """Return (L, H, W) images; `ball` is x, y, radius in pixels from the image centre, y up; it rests on the board.
 
@@ -134,7 +134,7 @@ def render(
             ground = points + reach[..., None] * mirrored
             ground[..., 2] = 0.0
             seen = np.where(down, board_level(ground), seen)
-            share = 0.6 if refraction is None else dielectric(normals[..., 2], refraction)
+            share = 0.6 if refraction is None else mirrored_share(normals[..., 2], refraction)
             level = np.where(inside, share * seen, board_level(points * [1, 1, 0]))
         else:
             shade = albedo * (room + power[index] * fall * np.maximum(np.sum(normals * way, axis=-1), 0.0))
