@@ -48,3 +48,14 @@ def test_a_dim_lamp_and_a_slope_of_light_are_no_step(balls: bgars.Capture) -> No
     assert clear_step(ratio, every_pixel((144, 144))) is None
     ratio[3] *= np.linspace(0.7, 1.3, 144)[:, None]
     assert clear_step(ratio, every_pixel((144, 144))) is None
+
+
+@pytest.mark.parametrize("along", [1, 2])
+@pytest.mark.parametrize("width", [1, 2, 3, 5, 8, 12, 20])
+def test_strips_narrower_than_what_is_looked_for_are_checked(balls: bgars.Capture, width: int, along: int) -> None:
+    """Shadows reach farther than such a strip is wide, and so do shifts."""
+    for start in range(0, 300, 30):
+        strip = np.s_[start : start + width]
+        place = np.s_[strip, :] if along == 1 else np.s_[:, strip]
+        images, mask = (np.ascontiguousarray(each) for each in (balls.images[(..., *place)], balls.mask[place]))
+        assert all(finding.message for finding in bgars.check(replace(balls, images=images, mask=mask)))

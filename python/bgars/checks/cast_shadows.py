@@ -134,7 +134,8 @@ def _near(upright: Mask, direction: Array) -> Mask:
 
 
 def _ranges(size: int, shift: int) -> tuple[slice, slice]:
-    """Slices of the places that look by `shift`, and of the places they look at."""
+    """Slices of the places that look by `shift`, and of the places they look at; empty where that is past the end."""
+    shift = max(-size, min(shift, size))
     if shift >= 0:
         return slice(0, size - shift), slice(shift, size)
     return slice(-shift, size), slice(0, size + shift)

@@ -69,6 +69,8 @@ def image_shifts(capture: Capture, kept: NDArray[np.intp]) -> ImageShifts | None
 
 def _surfaces(patch: Patch, levels: Floats) -> Iterator[Array]:
     """(L, 2 R + 1, 2 R + 1) correlation of each image with the others, of every tile."""
+    if min(patch.inside.shape) < 2 * (PASSES + REACH_PX) + 1:
+        return  # Smaller than the shifts that are looked for.
     edges = edge_products(levels, PASSES)
     inside = patch.inside[PASSES:-PASSES, PASSES:-PASSES]
     rows, cols = inside.shape
