@@ -144,7 +144,7 @@ def test_the_compatible_solver_goes_as_far_as_it_says_on_small_masks(shape: tupl
 def test_a_bilateral_system_too_hard_to_solve_is_told_not_raised() -> None:
     """Nearly every system of such a mask is too hard; the small masks are followed until the energy rests."""
     unsolved = 0
-    for seed in range(10):
+    for seed in range(25):
         random = np.random.default_rng(seed)
         shape = tuple(random.integers(20, 110, 2))
         normals, mask = rough_normals(shape, seed, 0.5, 0.02), random.random(shape) < 0.55
@@ -153,7 +153,7 @@ def test_a_bilateral_system_too_hard_to_solve_is_told_not_raised() -> None:
         assert np.isfinite(height.height_px[mask]).all()
         assert height.bilateral is not None
         unsolved += height.residual > 1e-6
-    assert unsolved > 8
+    assert unsolved > 20
 
 
 def test_arrays_that_lie_anyhow_are_copied() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
@@ -11,7 +10,6 @@ import pytest
 @pytest.mark.filterwarnings("ignore::bgars.CaptureWarning")
 def test_a_calibrated_station_measures_as_exact_knowledge_does(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "docs"))
-    monkeypatch.delitem(sys.modules, "station_trial", raising=False)
     from station_trial import trial  # noqa: PLC0415 - a script of the documentation
 
     exact, calibrated, uncalibrated = trial(4)

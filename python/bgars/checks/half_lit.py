@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.checks.matt_fit import MIN_LIGHTS, promised
-from bgars.checks.row_levels import clear_step
+from bgars.checks.row_levels import CLEAR_STEP, clear_step
 from bgars.records.findings import Finding
 from bgars.records.light_median import light_median
 
@@ -73,16 +73,16 @@ def check_half_lit(view: View) -> list[Finding]:
         steps = _steps(along, use)
         index = int(np.argmax([abs(step.size) * (step.score > STANDS_OUT) for step in steps])) if steps else 0
         if steps and abs(steps[index].size) >= STEP and steps[index].score >= STANDS_OUT:
-            return [_partly_lit(view, index, steps[index], word)]
+            return [_partly_lit(view, index, steps[index], word, STEP)]
     late = _late(view)
     for along, use, word in () if late else axes:
         clear = clear_step(along, use)
         if clear is not None:
-            return [_partly_lit(view, *clear, word)]
+            return [_partly_lit(view, *clear, word, CLEAR_STEP)]
     return late
 
 
-def _partly_lit(view: View, index: int, step: Step | RowStep, word: str) -> Finding:
+def _partly_lit(view: View, index: int, step: Step | RowStep, word: str, least: float) -> Finding:
     share = 1.0 - float(np.exp(-abs(step.size)))
     return Finding(
         "half-lit",
@@ -92,7 +92,7 @@ def _partly_lit(view: View, index: int, step: Step | RowStep, word: str) -> Find
         WORDS,
         image=index,
         value=share,
-        limit=1.0 - float(np.exp(-STEP)),
+        limit=1.0 - float(np.exp(-least)),
         unit="of the light",
     )
 

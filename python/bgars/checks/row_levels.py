@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["RowStep", "clear_step"]
+__all__ = ["CLEAR_STEP", "RowStep", "clear_step"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -23,7 +23,7 @@ SEEN = 0.3
 """Share of the most columns that tell of any row, from which on a row is judged."""
 MIN_COLUMNS = 4
 MIN_ROWS = 32
-STEP = 0.18
+CLEAR_STEP = 0.18
 """Step, natural logarithm, that is told: light on either side of it may be off its promise by a tenth, which highlights
 and light from neighbours leave (`geometry.MATT`)."""
 EXPLAINS = 0.8
@@ -51,7 +51,7 @@ def clear_step(ratio: Array, use: Mask) -> tuple[int, RowStep] | None:
     """
     told = [(index, step) for index, step in enumerate(_row_steps(ratio, use)) if step.share > EXPLAINS]
     index, step = max(told, key=lambda each: abs(each[1].size), default=(0, RowStep(0.0, 0.0, 0.0)))
-    return (index, step) if abs(step.size) > STEP else None
+    return (index, step) if abs(step.size) > CLEAR_STEP else None
 
 
 def _row_steps(ratio: Array, use: Mask) -> list[RowStep]:

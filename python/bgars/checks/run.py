@@ -39,7 +39,8 @@ __all__ = ["check_capture"]
 MOST_CLIPPED = 0.5
 """Share of the image that is overexposed from which on images are not compared with each other."""
 LEAST_CONDITIONING = 1e-6
-"""27 det(L^T L) / tr(L^T L)^3 of the lights below which no method estimates normals: 1 for three at right angles."""
+"""27 det(L^T L) / tr(L^T L)^3 of the lights below which no method estimates normals (`MIN_CONDITIONING` of the core);
+1 for three at right angles."""
 FEW_LIT = 200
 """Pixels of the small copy, lit and matt, below which single images are not judged."""
 

@@ -58,15 +58,15 @@ above their equator (Bond number 0.003 to 0.02); coined or sagged lots are not, 
 CAMERA_MM = Mixture(1.0 / 3000.0, 1.0 / 40.0, 0.2)
 """Inverse distance of the camera: telecentric lenses are so to a fraction of a degree, others stand at 20 to 300 mm."""
 EDGE_SHARE, BEND_SHARE, EXCESS_SHARE = 0.01, 0.25, 0.15
-"""Edges too far out or in, shares of their spread s, of ``s^2 / R``, and of what points scatter beyond their own: what
-penumbra, reflected light and a board that light enters leave of the model. Drawn and rendered edges of 0.5 px agree
-with it to 0.004 px; what a wide lamp shifts an edge by is known to half of its own size, for how its light is shared
-out over it is not known (parts as fine as 5 x 5 instead of 5 x 3 move tops by 0.1 to 1 px); where points scatter, some
-of it is alike on all balls."""
+"""Edges too far out or in, shares of their spread, of its square times their curvature, and of what points scatter
+beyond their own: what penumbra, reflected light and a board that light enters leave of the model. Drawn and rendered
+edges of 0.5 px agree with it to 0.004 px; what a wide lamp shifts an edge by is known to half of its own size, for how
+its light is shared out over it is not known (parts as fine as 5 x 5 instead of 5 x 3 move tops by 0.1 to 1 px); where
+points scatter, some of it is alike on all balls."""
 LEAST_EDGE_PX = 0.006
 """Sharper edges are known no better than those of 0.6 px: pixels are not alike over their area."""
 EDGE_WAVES = (1.0, 1.0, 0.3, 0.3)
-"""The same of all edges together, and by cos a, cos 2a, cos 3a along them."""
+"""Shares of spread and scatter by all edges together, and by cos a, cos 2a, cos 3a along them; bends have their own."""
 COARSE_SPREAD_PX = 2.0
 """What coarse edges are as good as."""
 WIDE_EDGE_PX, WIDE_EDGE_SHARE = 0.3, 0.05
