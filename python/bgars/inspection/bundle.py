@@ -27,7 +27,16 @@ from bgars.inspection.shadow_model import BALL_TERMS
 if TYPE_CHECKING:
     from bgars.inspection.shadow_edges import Edges
 
-__all__ = ["LIGHT_TERMS", "Priors", "Solution", "angles_rad", "solve_bundle"]
+__all__ = [
+    "LIGHT_TERMS",
+    "Priors",
+    "Solution",
+    "angles_rad",
+    "honest_weights",
+    "relief_variances",
+    "robust_weights",
+    "solve_bundle",
+]
 
 Array = NDArray[np.float64]
 
@@ -148,7 +157,7 @@ def solve_bundle(
         model = linearise_edges(edges, state, near)
         excess = _excess(model.residual[known], edges.u_px[known])
         variance = np.where(known, edges.u_px**2 + excess**2, 1.0)
-        weight = _weights(model.residual, variance, known, redescend)
+        weight = robust_weights(model.residual, variance, known, redescend)
         normal = normal_equations(model, weight, state, priors)
         table_step, border_step = _step(normal)
         state = _moved(state, table_step, border_step)
@@ -158,13 +167,13 @@ def solve_bundle(
         ):
             break
     model = linearise_edges(edges, state, near)
-    honest = _honest_weights(model.residual, variance, known, redescend)
+    honest = honest_weights(model.residual, variance, known, redescend)
     factor = scatter_factors(model, honest)
     normal = normal_equations(model, honest / factor[:, None, None], state, priors)
     inverse = np.linalg.inv(normal.balls)
     lever = -inverse @ normal.cross
     reduced = normal.corner + _of_all_balls(normal.cross, lever)
-    relief = _relief(model.residual, edges.u_px, state.vectors)
+    relief = relief_variances(model.residual, edges.u_px, state.vectors)
     return Solution(
         state.balls,
         state.vectors,
@@ -183,7 +192,7 @@ def solve_bundle(
     )
 
 
-def _relief(residual: Array, u_px: Array, vectors: Array) -> Array:
+def relief_variances(residual: Array, u_px: Array, vectors: Array) -> Array:
     """(N, 5) variances by relief of the board: heights follow it by the tangent of the lights, places by their mean.
 
     Heights twice: by what differs beside one ball, which residuals show, and by what all shadows of the ball have in
@@ -239,14 +248,14 @@ def _moved(state: State, table_step: Array, border_step: Array) -> State:
     )
 
 
-def _weights(residual: Array, variance: Array, known: NDArray[np.bool_], redescend: float | None) -> Array:
+def robust_weights(residual: Array, variance: Array, known: NDArray[np.bool_], redescend: float | None) -> Array:
     """(N, L, S) robust weights over variances."""
     square = residual**2 / variance
     loss = 1.0 + square / CAUCHY**2 if redescend is None else (1.0 + square / redescend**2) ** 2
     return np.where(known, 1.0 / (variance * loss), 0.0)
 
 
-def _honest_weights(residual: Array, variance: Array, known: NDArray[np.bool_], redescend: float | None) -> Array:
+def honest_weights(residual: Array, variance: Array, known: NDArray[np.bool_], redescend: float | None) -> Array:
     """Weights that give the covariance of the robust estimate: E[psi^2] / E[psi']^2 of Huber (1981), section 7.6.
 
     Points that were rejected count as little as they did in the fit.

@@ -57,19 +57,26 @@ class NormalEquations(NamedTuple):
     right_border: Array
 
 
-def normal_equations(model: EdgeModel, weight: Array, state: State, priors: Priors) -> NormalEquations:
-    """Normal equations of edge points and priors."""
+def normal_equations(
+    model: EdgeModel, weight: Array, state: State, priors: Priors, by_shape: Array | None = None
+) -> NormalEquations:
+    """Normal equations of edge points and priors.
+
+    `by_shape` (N, L, S, K) are derivatives by K more terms of each ball, which have no prior here.
+    """
     count, lights = model.residual.shape[:2]
     first_shared = LIGHT_TERMS * lights
     border = first_shared + SHARED_TERMS
-    products = _bgars.edge_products(model.rows, weight)  # of every shadow, (N, L, T + 1, T + 1)
-    ball, lamp = slice(BALL_TERMS), slice(BALL_TERMS, BALL_TERMS + LIGHT_TERMS)
-    shared = slice(BALL_TERMS + LIGHT_TERMS, -1)
+    # Of every shadow, (N, L, T + 1, T + 1).
+    products = _bgars.edge_products(model.rows, weight) if by_shape is None else _products(model, weight, by_shape)
+    terms = BALL_TERMS + (0 if by_shape is None else by_shape.shape[-1])
+    ball, lamp = slice(terms), slice(terms, terms + LIGHT_TERMS)
+    shared = slice(terms + LIGHT_TERMS, -1)
     # Of what is shared, edges know the board and how far out all of them are measured.
     at = first_shared + np.concatenate([np.arange(SHAPE_TERMS), SHAPE_TERMS + np.array(EDGE_TERMS)])
     of_balls, of_lights = products.sum(axis=1), products.sum(axis=0)
-    cross = np.zeros((count, BALL_TERMS, border))
-    cross[..., :first_shared] = products[:, :, ball, lamp].swapaxes(1, 2).reshape(count, BALL_TERMS, first_shared)
+    cross = np.zeros((count, terms, border))
+    cross[..., :first_shared] = products[:, :, ball, lamp].swapaxes(1, 2).reshape(count, terms, first_shared)
     cross[..., at] = of_balls[:, ball, shared]
     corner, right_border = np.zeros((border, border)), np.zeros(border)
     for light in range(lights):
@@ -86,14 +93,22 @@ def normal_equations(model: EdgeModel, weight: Array, state: State, priors: Prio
     return normal
 
 
+def _products(model: EdgeModel, weight: Array, by_shape: Array) -> Array:
+    """Weighted products of derivatives and distance, summed over the points of every shadow."""
+    rows = [model.rows[..., :BALL_TERMS], by_shape, model.rows[..., BALL_TERMS:-2], model.residual[..., None]]
+    seen = np.where(weight[..., None] > 0, np.concatenate(rows, axis=-1), 0.0)
+    products: Array = (seen * weight[..., None]).swapaxes(-1, -2) @ seen
+    return products
+
+
 def _add_ball_priors(normal: NormalEquations, state: State, priors: Priors) -> None:
     """Outlines, heights somewhere near the radius, and q around that of all balls."""
     first = normal.corner.shape[0] - COMMON_TERMS
     residual, by_ball, by_common = outline_rows(state, priors.outlines)
     weight = priors.u_outlines**-2.0
-    normal.balls[:] += np.einsum("nki,nk,nkj->nij", by_ball, weight, by_ball)
-    normal.right[:] -= np.einsum("nki,nk,nk->ni", by_ball, weight, residual)
-    normal.cross[:, :, first:] += np.einsum("nki,nk,nkj->nij", by_ball, weight, by_common)
+    normal.balls[:, :BALL_TERMS, :BALL_TERMS] += np.einsum("nki,nk,nkj->nij", by_ball, weight, by_ball)
+    normal.right[:, :BALL_TERMS] -= np.einsum("nki,nk,nk->ni", by_ball, weight, residual)
+    normal.cross[:, :BALL_TERMS, first:] += np.einsum("nki,nk,nkj->nij", by_ball, weight, by_common)
     normal.corner[first:, first:] += np.einsum("nki,nk,nkj->ij", by_common, weight, by_common)
     normal.right_border[first:] -= np.einsum("nki,nk,nk->i", by_common, weight, residual)
     pull = 1.0 / priors.outlines[:, 2] ** 2

@@ -19,9 +19,11 @@ from bgars.inspection.checks import (
 from bgars.inspection.common_terms import ROUNDNESS
 from bgars.inspection.image_shifts import check_shifts, displaced_images
 from bgars.inspection.in_view import lights_in_view, unjudged_lights
+from bgars.inspection.own_shape import free_shapes
+from bgars.inspection.population import FREE
 from bgars.inspection.priors import common_mixtures, first_priors
 from bgars.inspection.settle import Settled, settle
-from bgars.inspection.shadow_passes import ShadowPasses
+from bgars.inspection.shadow_passes import REDESCEND, ShadowPasses
 from bgars.inspection.start import first_heights, radius_at
 
 if TYPE_CHECKING:
@@ -99,7 +101,7 @@ def fit_shadows(
         warnings = _warnings(problem, complaints, edges, None, enough)
         return Fit(problem, index, usability, None, edges, spread, warnings)
     mixtures = common_mixtures(problem, passes.priors, refine_lights)
-    settled = settle(passes.solution, passes.priors, mixtures)
+    settled = settle(_free_shapes(passes, passes.solution), passes.priors, mixtures)
     moved = abs(float(settled.solution.common[ROUNDNESS] - passes.solution.common[ROUNDNESS]))
     if ROUNDNESS in mixtures and moved > LINEAR_ROUNDNESS:
         u_common = passes.priors.u_common.copy()
@@ -107,7 +109,7 @@ def fit_shadows(
         passes.from_elsewhere(settled.solution.state, u_common)
         edges, usability = passes.edges, passes.usability
         if passes.solution is not None:
-            settled = settle(passes.solution, passes.priors, mixtures)
+            settled = settle(_free_shapes(passes, passes.solution), passes.priors, mixtures)
     # First heights may be wrong, and what lies in the image with them.
     in_view &= lights_in_view(problem, passes.state.balls)
     warnings = _warnings(problem, complaints, passes.used, passes.solution, in_view)
@@ -116,6 +118,15 @@ def fit_shadows(
         warnings += check_shifts(passes.shifts, files)
         doubts = displaced_images(passes.outlines, files)
     return Fit(problem, index, usability, settled.solution, edges, spread, warnings, doubts, passes.priors, settled)
+
+
+def _free_shapes(passes: ShadowPasses, solution: Solution) -> Solution:
+    """Balls that are unlike the others get shapes of their own, and priors to match."""
+    chosen, u_q = passes.index[passes.usability.usable], passes.priors.u_q.copy()
+    solution, odd = free_shapes(solution, passes.used, passes.priors.of_balls(chosen), passes.problem.near, REDESCEND)
+    u_q[chosen[odd]] = FREE
+    passes.priors = passes.priors._replace(u_q=u_q)
+    return solution
 
 
 def _warnings(

@@ -1,0 +1,117 @@
+"""Tilted and oval balls among round ones, their shadows exact."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bgars.inspection.bundle import Solution, solve_bundle
+from bgars.inspection.bundle_normal import Priors
+from bgars.inspection.common_terms import COMMON_TERMS, EDGE_TERMS, ELEVATION, ROUNDNESS
+from bgars.inspection.own_shape import free_shapes
+from numpy.typing import NDArray
+from test_budget import points
+
+Array = NDArray[np.float64]
+NOISE_PX = 0.03
+ODD = 5
+RADIUS = 25.0
+SHAPES = {
+    "tilted": (1.0, 1.0, 0.9, 20.0),
+    "tilted and high": (1.0, 1.0, 1.08, 25.0),
+    "oval": (1.04, 0.96, 1.0, 0.0),
+}
+
+
+def ellipsoid(along: float, across: float, q: float, tilt_deg: float) -> Array:
+    """Symmetric matrix (3, 3) that takes the unit sphere to it, turned about an axis that is none of the image's."""
+    tilt, turn = np.radians(tilt_deg), np.radians(40.0)
+    about = np.array([[np.cos(turn), -np.sin(turn), 0.0], [np.sin(turn), np.cos(turn), 0.0], [0.0, 0.0, 1.0]])
+    down = np.array([[np.cos(tilt), 0.0, np.sin(tilt)], [0.0, 1.0, 0.0], [-np.sin(tilt), 0.0, np.cos(tilt)]])
+    axes = about @ down
+    return RADIUS * axes @ np.diag([along, across, q]) @ axes.T
+
+
+def edge_points(centre: Array, matrix: Array, light: Array, angles: Array) -> Array:
+    """Points (M, 2) of the edge of a shadow on the plane z = 0: the contour of the ellipsoid seen along the light."""
+    side = np.array([-light[1], light[0], 0.0]) / np.hypot(light[0], light[1])
+    up = np.cross(light, side)
+    normals = np.cos(angles)[:, None] * np.where(up[2] > 0, 1.0, -1.0) * up + np.sin(angles)[:, None] * side
+    surface = centre + normals @ matrix.T @ matrix / np.linalg.norm(normals @ matrix.T, axis=1)[:, None]
+    way = surface[:, 2:] / light[2]
+    return np.asarray((surface - way * light)[:, :2])
+
+
+def fitted(shape: str | None, seed: int) -> tuple[Solution, Solution, Array]:
+    """Twelve balls, one of a shape: their fit as spheroids, the same with free shapes, and the truth."""
+    edges, state, outlines = points(45.0, seed, NOISE_PX)
+    truth = state.balls.copy()
+    if shape is not None:
+        random = np.random.default_rng([seed, 7])
+        x, y = edges.x.copy(), edges.y.copy()
+        angles = np.radians(np.linspace(-60.0, 60.0, x.shape[2]))
+        centre = np.array([truth[ODD, 0], truth[ODD, 1], truth[ODD, 2]])
+        for light, vector in enumerate(state.vectors):
+            exact = edge_points(centre, ellipsoid(*SHAPES[shape]), vector, angles)
+            noisy = exact + NOISE_PX * random.standard_normal(exact.shape)
+            x[ODD, light], y[ODD, light] = noisy.T
+        edges = replace(edges, x=x, y=y)
+        # What a circle makes of an outline that is none.
+        outlines[ODD] += [0.5, -0.3, 0.3]
+    count = len(outlines)
+    u_common = np.full(COMMON_TERMS, 0.01)
+    u_common[list(EDGE_TERMS)] = 0.003
+    u_common[ELEVATION], u_common[ROUNDNESS] = np.radians(0.05), 1e-3
+    priors = Priors(
+        outlines,
+        np.full((count, 3), 0.1),
+        np.full(count, 3e-4),
+        state.vectors,
+        np.full(8, np.radians(0.01)),
+        np.zeros((8, 2)),
+        np.full((8, 2), 1e-3),
+        np.zeros(5),
+        np.full(5, 1e-9),
+        np.zeros(COMMON_TERMS),
+        u_common,
+    )
+    spheroids = solve_bundle(edges, state, False, priors, redescend=3.5)
+    free, odd = free_shapes(spheroids, edges, priors, False, 3.5)
+    assert np.flatnonzero(odd).tolist() == ([] if shape is None else [ODD])
+    return spheroids, free, truth
+
+
+def u_of(solution: Solution, ball: int) -> Array:
+    return np.asarray(np.sqrt(np.diag(solution.covariance[ball])))
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_ball_of_its_own_shape_stands_where_it_stands(shape: str) -> None:
+    before, after = [], []
+    for seed in range(3):
+        spheroids, free, truth = fitted(shape, seed)
+        off = np.abs(free.balls - truth)[ODD]
+        before.append(np.abs(spheroids.balls - truth)[ODD, :2].max())
+        after.append((off[:2] / u_of(free, ODD)[:2]).max())
+        assert off[:2].max() < 0.15
+        assert free.factor[ODD] < 0.7 * spheroids.factor[ODD]
+        assert np.array_equal(np.delete(free.balls, ODD, axis=0), np.delete(spheroids.balls, ODD, axis=0))
+    if shape != "oval":  # Its shadows are those of no ball that stands elsewhere.
+        assert min(before) > 0.15
+    assert np.median(after) < 2.0
+
+
+@pytest.mark.parametrize("shape", ["tilted", "tilted and high"])
+def test_the_top_of_a_tilted_ball(shape: str) -> None:
+    matrix = ellipsoid(*SHAPES[shape])
+    for seed in range(3):
+        _, free, truth = fitted(shape, seed)
+        top = free.balls[ODD] @ [0.0, 0.0, 1.0, 0.0, 0.0] + free.balls[ODD, 3] * free.balls[ODD, 4]
+        assert top == pytest.approx(truth[ODD, 2] + np.linalg.norm(matrix[2]), abs=0.25)
+
+
+def test_balls_that_are_alike_stay_as_they_are() -> None:
+    for seed in range(6):
+        spheroids, free, _ = fitted(None, 50 + seed)
+        assert free is spheroids
