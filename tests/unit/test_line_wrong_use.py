@@ -89,3 +89,8 @@ def test_wrong_use_of_batch_leaves_no_store(tmp_path: Path, options: list[str]) 
     run = bgars_command("batch", tmp_path / options[0], *options[1:], "-o", tmp_path / "store")
     assert run.code == 2, run.stdout
     assert list(tmp_path.iterdir()) == []
+
+
+def test_adding_no_result_leaves_no_store(tmp_path: Path) -> None:
+    run = bgars_command("store", "add", tmp_path / "store", tmp_path / "nothing")
+    assert (run.code, list(tmp_path.iterdir())) == (2, [])
