@@ -30,7 +30,6 @@ from bgars.line.batch import Batch, Progress, inspect_many
 from bgars.line.naming import Naming
 from bgars.normals.methods import DEFAULT_METHOD
 from bgars.records.part_identity import PartIdentity
-from bgars.store import open_store
 
 __all__ = ["register"]
 
@@ -60,12 +59,13 @@ def batch(
         int | None,
         typer.Option(
             min=1,
+            max=1024,
             help="Number of processes, each with one part; by default together with --threads one thread per core.",
             show_default=False,
         ),
     ] = None,
     threads: Annotated[
-        int | None, typer.Option(min=1, help="Number of threads of each process.", show_default=False)
+        int | None, typer.Option(min=1, max=1024, help="Number of threads of each process.", show_default=False)
     ] = None,
     scheduler: Annotated[
         str | None,
@@ -94,12 +94,11 @@ def batch(
     be written. 130: interrupted; run it again to continue.
     """
     naming = Naming(serial_from, PartIdentity(lot=lot, station=station_name, operator=operator, round=round_))
-    store = open_store(output, create=True)
     with _progress() as report:
         done = inspect_many(
             folders,
             recipe,
-            store=store,
+            store=output,  # made when folders and recipe were found
             method=method,
             naming=naming,
             processes=processes,

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
+import numpy as np
 import typer
 
 import bgars
-from bgars.cli.calibrate_station import FolderArgument, JsonOption, OutputOption, keep_part, said_values, tell_findings
+from bgars.cli.calibrate_station import FolderArgument, JsonOption, OutputOption, said_values
 from bgars.cli.console import print_json, say
+from bgars.cli.station_output import existing_station, keep_part, tell_findings
 from bgars.errors import InputError
 from bgars.io.capture import read_unlit
 from bgars.records.remark import Remark
 from bgars.station import response_from_bracket, response_from_sums, srgb_response
+
+if TYPE_CHECKING:
+    from bgars.records.response_curve import ResponseCurve
+    from bgars.records.station import Station
 
 __all__ = ["register"]
 
@@ -49,6 +55,7 @@ def response(
     if [exposures is not None, sums, srgb].count(True) != 1:
         msg = "--exposures, --sums, --srgb: give one of them"
         raise InputError(msg)
+    known = existing_station(output)
     findings: tuple[Remark, ...] = ()
     if srgb:
         curve = srgb_response()
@@ -65,6 +72,7 @@ def response(
                 msg = f"{folder}: --sums needs three images (a, b, both), got {len(capture.images)}"
                 raise InputError(msg)
             curve, findings = response_from_sums(capture.images[0], capture.images[1], capture.images[2], full)
+    findings = (*findings, *_made_before(known, curve))
     keep_part(output, {"response": curve}, findings)
     if as_json:
         values = {"levels": curve.levels.tolist(), "radiances": curve.radiances.tolist(), "gamma": curve.gamma}
@@ -91,6 +99,7 @@ def scale(
     as_json: JsonOption = False,
 ) -> None:
     """Measure the pixel pitch on a grid that lies where parts lie; says how much the lens distorts."""
+    existing_station(output)
     u_um = None if u_pitch_mm is None else 1000.0 * u_pitch_mm
     found, findings = bgars.calibrate_scale(read_unlit(folder), 1000.0 * pitch_mm, target=target, u_pitch_um=u_um)
     keep_part(output, {"scale": found}, findings)
@@ -108,6 +117,20 @@ def scale(
         return
     say(f"A pixel is {found.pixel_pitch_um:.4f} um (u {found.pixel_pitch_u_um:.2g} um), by {found.points} points.")
     tell_findings(findings, output)
+
+
+def _made_before(known: Station, curve: ResponseCurve) -> list[Remark]:
+    """What the station holds that was measured by other levels than this response gives."""
+    before = known.response
+    if before is not None and np.array_equal(before.radiances, curve.radiances):
+        return []
+    again = "was calibrated without this response, and is wrong with it: calibrate it again"
+    found = []
+    if known.flat is not None:
+        found.append(Remark("doubt", f"the flat field {again}", "flat-before-response"))
+    if known.lights is not None and known.lights.sphere == "matt":
+        found.append(Remark("doubt", f"what a matt ball showed of the lights {again}", "lights-before-response"))
+    return found
 
 
 def _times(text: str) -> list[float]:

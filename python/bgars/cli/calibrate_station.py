@@ -11,13 +11,12 @@ import typer
 import bgars
 from bgars.cli.calibrated_lights import lights_values, said_values, tell_lights
 from bgars.cli.camera_option import CameraOption, seen_by
-from bgars.cli.console import print_json, say, stage_progress, utc_now
-from bgars.errors import FileFormatError, InputError
+from bgars.cli.console import print_json, say, stage_progress
+from bgars.cli.station_output import existing_station, keep_part, need_different, shown_severity, tell_findings
+from bgars.errors import InputError
 from bgars.io.capture import read_unlit
-from bgars.io.own_files import need_new_or_own
-from bgars.io.station_file import is_station_file, read_station, write_station
+from bgars.io.station_file import read_station
 from bgars.report.figures.station_balls import write_balls
-from bgars.report.html.station_page import write_station_page
 from bgars.station import drift as station_drift
 from bgars.station.flat import falloff_findings
 
@@ -29,10 +28,10 @@ if TYPE_CHECKING:
     from bgars.records.remark import Remark
     from bgars.records.station import Station
 
-__all__ = ["FolderArgument", "JsonOption", "OutputOption", "keep_part", "register", "said_values", "tell_findings"]
+__all__ = ["FolderArgument", "JsonOption", "OutputOption", "register", "said_values"]
 
 EXIT_MOVED = 1
-CIRCLE = 3
+BALL_AGAIN = "photograph the ball once for each of its places"
 
 OutputOption = Annotated[
     Path,
@@ -118,7 +117,8 @@ def lights(
 
     Exit code 2 where there is no ball, or a light does not show on it; nothing is written then.
     """
-    known = _existing(output)
+    need_different(folders, BALL_AGAIN)
+    known = existing_station(output)
     read = bgars.read_capture if sphere == "balls" else read_unlit
     captures = [seen_by(_raw(folder, known, read), camera) for folder in folders]
     found = _calibrate_lights(captures, sphere, outline, near, diameter_mm, recipe)
@@ -137,7 +137,7 @@ def flat(folder: FolderArgument, output: OutputOption, as_json: JsonOption = Fal
     Inspection and reconstruction with that station then divide by these maps: vignetting, unequal lights and their
     fall-off no longer bend the surface.
     """
-    known = _existing(output)
+    known = existing_station(output)
     found, findings = bgars.calibrate_flat(_raw(folder, replace(known, scale=None)))
     if known.lights is not None and known.scale is not None:
         findings = (*findings, *falloff_findings(found, known.lights, known.scale.pixel_pitch_um))
@@ -173,30 +173,33 @@ def station(
     name: Annotated[str, typer.Option(help="Name of the station.")] = "station",
     as_json: JsonOption = False,
 ) -> None:
-    """Calibrate everything at once: scale from a grid, lights from a ball, evenness from a board."""
+    """Calibrate scale from a grid, lights from a ball, evenness from a board, in one run.
+
+    A response that station.toml has is used: calibrate it first.
+    """
     if (grid is None) != (grid_pitch_mm is None):
         msg = "--grid and --grid-pitch-mm: give both or none"
         raise InputError(msg)
-    _existing(output)
+    need_different(folders, BALL_AGAIN)
+    known = existing_station(output)
     parts: dict[str, Any] = {}
     findings: list[Remark] = []
     with stage_progress() as report:
         if grid is not None and grid_pitch_mm is not None:
             parts["scale"], said = bgars.calibrate_scale(read_unlit(grid), 1000.0 * grid_pitch_mm, target=target)
             findings += said
+            known = replace(known, scale=parts["scale"])
         report("scale", 1.0)
-        captures = [seen_by(read_unlit(folder), camera) for folder in folders]
-        if "scale" in parts:
-            captures = [replace(one, pixel_pitch_um=parts["scale"].pixel_pitch_um) for one in captures]
+        captures = [seen_by(_raw(folder, known), camera) for folder in folders]
         found = _calibrate_lights(captures, sphere, outline, near, diameter_mm)
         parts["lights"] = found
         findings += found.findings
         report("lights", 1.0)
         if board is not None:
-            parts["flat"], said = bgars.calibrate_flat(read_unlit(board))
+            parts["flat"], said = bgars.calibrate_flat(_raw(board, replace(known, scale=None)))
             findings += said
-            if "scale" in parts:
-                findings += falloff_findings(parts["flat"], found, parts["scale"].pixel_pitch_um)
+            if known.scale is not None:
+                findings += falloff_findings(parts["flat"], found, known.scale.pixel_pitch_um)
         report("flat", 1.0)
     write_balls(captures, found, output.with_suffix(".balls.svg"))
     keep_part(output, parts, tuple(findings), name=name)
@@ -290,46 +293,7 @@ def _circles(outline: list[str] | None, captures: list[Capture]) -> list[list[li
     return [[circle] for circle in found]
 
 
-def _existing(path: Path) -> Station:
-    if path.suffix.lower() != ".toml":
-        msg = f"{path}: a station file must end in .toml"
-        raise InputError(msg)
-    if not path.parent.is_dir():
-        msg = f"{path}: cannot be written (no such folder)"
-        raise FileFormatError(msg)
-    if not path.exists():
-        return bgars.Station(path.stem)
-    if not is_station_file(path):
-        msg = f"{path}: exists and is not a station file; name another one"
-        raise InputError(msg)
-    return read_station(path)
-
-
 def _raw(folder: Path, known: Station, read: Callable[[Path], Capture] = read_unlit) -> Capture:
     """A capture with the response, scale and distortion that are known already."""
     capture = read(folder)
     return bgars.with_station(capture, bgars.Station(known.name, response=known.response, scale=known.scale))
-
-
-def keep_part(output: Path, parts: dict[str, Any], findings: tuple[Remark, ...], name: str | None = None) -> None:
-    """Write the station with its new parts, and its page."""
-    known = _existing(output)
-    for beside in (output.with_suffix(".html"), output.with_name(f"{output.stem}.flat.npz")):
-        need_new_or_own(beside)
-    codes = {finding.code for finding in findings}
-    kept = tuple(finding for finding in known.findings if finding.code not in codes)
-    new = replace(known, **parts, calibrated_utc=utc_now(), findings=(*kept, *findings), name=name or known.name)
-    write_station(new, output)
-    write_station_page(new, output.with_suffix(".html"))
-
-
-def shown_severity(finding: Remark) -> str:
-    """The word before a message: what a station file keeps as a doubt is a warning to whoever runs the command."""
-    return "warning" if finding.severity == "doubt" else finding.severity
-
-
-def tell_findings(findings: tuple[Remark, ...], output: Path) -> None:
-    """Say what was noticed, and where the result is."""
-    for finding in findings:
-        say(f"{shown_severity(finding)}: {finding.message}")
-    say(f"Written: {output}, and its page {output.with_suffix('.html')}")

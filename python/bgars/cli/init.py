@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -14,6 +15,7 @@ from bgars.errors import InputError
 from bgars.io.atomic import atomic_file
 from bgars.io.given_paths import need_file, need_folder
 from bgars.io.recipe import RECIPE_NAME, read_recipe
+from bgars.io.station_file import read_station
 
 __all__ = ["register"]
 
@@ -68,16 +70,22 @@ def init(
     if (station is None) == (ring is None):
         msg = "--station or --ring: give one of them, to say where the lights are"
         raise InputError(msg)
-    lines = [] if pitch_um is None else [f"pixel_pitch_um = {pitch_um:g}"]
-    lines += [] if dark is None else [f"dark = {json.dumps(dark)}"]
+    lines = [] if pitch_um is None else [f"pixel_pitch_um = {pitch_um!r}"]
+    if dark is not None:
+        need_file(folder / dark)
+        lines.append(f"dark = {json.dumps(dark)}")
     if station is not None:
-        need_file(station)
+        read_station(station)
         lines.append(f"station = {json.dumps(str(station.resolve()))}")
     if ring is not None:
         lines += ["", "[lights]", f"ring = {_ring(ring)}"]
     with atomic_file(place) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        read_recipe(temporary)
+        try:
+            read_recipe(temporary)
+        except InputError as error:  # what is wrong was given here, not in a file that anybody knows
+            msg = str(error).removeprefix(f"{temporary}: ")
+            raise InputError(msg) from None
     say(f"Written: {place}. Next: bgars info {folder}")
 
 
@@ -85,10 +93,12 @@ def _ring(text: str) -> str:
     """The ring as an inline table."""
     values = [_number(part) for part in text.split(",")]
     names = ("count", "elevation_deg", "azimuth0_deg")
-    if not 1 < len(values) <= len(names) or values[0] != int(values[0]):
+    if not 1 < len(values) <= len(names) or not all(map(math.isfinite, values)) or values[0] != int(values[0]):
         msg = f"--ring: must be COUNT,ELEVATION or COUNT,ELEVATION,AZIMUTH0, got {text!r}"
         raise InputError(msg)
-    pairs = [f"{name} = {value:g}" for name, value in zip(names, values, strict=False)]
+    pairs = [
+        f"{name} = {int(value) if name == 'count' else value!r}" for name, value in zip(names, values, strict=False)
+    ]
     return "{ " + ", ".join(pairs) + " }"
 
 

@@ -75,6 +75,7 @@ RoundOption = Annotated[
     typer.Option(
         "--round",
         min=1,
+        max=999_999,
         help="Number of the inspection of this serial number: 1 before rework, 2 after it; a store counts itself.",
         show_default=False,
     ),

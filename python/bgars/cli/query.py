@@ -121,8 +121,8 @@ def add(
     as_json: JsonOption = False,
 ) -> None:
     """Add results that bgars inspect wrote; makes the store where there is none."""
-    opened = open_store(store, create=True)
     read = [(path, read_result(path)) for path in results]
+    opened = open_store(store, create=True)
     count = sum(opened.append(result, capture_folder=str(path)) for path, result in read)
     if as_json:
         print_json({"added": count, "known": len(read) - count})

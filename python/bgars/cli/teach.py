@@ -10,6 +10,7 @@ import typer
 import bgars
 from bgars.cli.console import print_json, say, stage_progress
 from bgars.cli.options import StationOption
+from bgars.cli.station_output import need_different
 from bgars.errors import InputError
 from bgars.io.atomic import atomic_file
 from bgars.station.teach import teach as learn
@@ -44,6 +45,7 @@ def teach(
     if output.exists() and not force:
         msg = f"{output}: exists; --force replaces it"
         raise InputError(msg)
+    need_different(golden, "every part must have images of its own")
     results = []
     with stage_progress() as report:
         for index, folder in enumerate(golden):

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import bgars
-from bgars.cli.calibrate_station import said_values, shown_severity
+from bgars.cli.calibrate_station import said_values
 from bgars.cli.console import print_json, say, stage_progress, utc_now
+from bgars.cli.station_output import need_different, need_places, shown_severity, write_pages
 from bgars.errors import InputError
-from bgars.io.station_file import read_station, write_station
-from bgars.report.html.station_page import write_station_page
+from bgars.io.station_file import read_station
 from bgars.station.verify import READINGS, read_known
 from bgars.station.verify import verify as compare
 
@@ -66,8 +66,10 @@ def verify(
     if mpe_um is not None and not (math.isfinite(mpe_um) and mpe_um > 0):
         msg = f"--mpe-um: must be finite and above 0, got {mpe_um:g}"
         raise InputError(msg)
+    need_different(folders, "take the part out and put it back in between")
     sizes = read_known(known)
     kept = read_station(station)
+    need_places(station)
     results = []
     with stage_progress() as report:
         for index, folder in enumerate(folders):
@@ -80,13 +82,11 @@ def verify(
             one, remarks = compare(results, sizes, quantity=quantity, mpe_um=mpe_um)
             found.append(one)
             said += remarks
-    others = tuple(one for one in kept.findings if one.code not in {remark.code for remark in said})
-    new = replace(kept, verified=tuple(found), verified_utc=utc_now(), findings=(*others, *said))
-    write_station(new, station)
-    write_station_page(new, station.with_suffix(".html"))
+    new = replace(kept, verified=tuple(found), verified_utc=utc_now())
+    write_pages(new, ["verified"], tuple(said), station)
     broken = any(remark.severity == "fail" for remark in said)
     if as_json:
-        print_json({"station": str(station), "verified": [vars(one) for one in found], **said_values(tuple(said))})
+        print_json({"station": str(station), "verified": [_values(one) for one in found], **said_values(tuple(said))})
     else:
         for one in found:
             slope = (
@@ -103,3 +103,8 @@ def verify(
             say(f"{shown_severity(remark)}: {remark.message}")
     if broken:
         raise typer.Exit(EXIT_BROKEN)
+
+
+def _values(one: Verification) -> dict[str, object]:
+    """A comparison as plain values; what was not measured is null."""
+    return {key: None if value != value else value for key, value in vars(one).items()}  # noqa: PLR0124 - NaN

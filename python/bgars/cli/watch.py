@@ -77,7 +77,7 @@ def watch(
     settle: Annotated[
         float, typer.Option(min=0.0, help="Time without a change after which a part is complete, in s.")
     ] = 0.5,
-    poll: Annotated[float, typer.Option(min=0.01, help="Polling interval, in s.")] = 0.1,
+    poll: Annotated[float, typer.Option(min=0.01, max=3600.0, help="Polling interval, in s.")] = 0.1,
     patience: Annotated[
         float, typer.Option(min=0.0, help="Time after which an incomplete or unreadable part counts as failed, in s.")
     ] = 60.0,

@@ -151,7 +151,10 @@ def read_unlit(folder: str | PathLike[str], *, channel: ChannelName | None = Non
     if recipe.exposures_ms is not None:
         lights = _by_order(LightRig.ring(max(lights_in_bracket(folder, recipe), 3)), str(folder))
         return _load_bracket(folder, recipe, lights, listing, channel, MAX_MEGAPIXELS, None, notes, None)
-    lights = _by_order(LightRig.ring(max(len(recipe.images or listing.images), 3)), str(folder))
+    if (count := len(recipe.images or listing.images)) in {1, 2}:
+        msg = f"{folder}: {count} image{'s'[: count - 1]}, 3 are needed or more; of a grid, copies will do"
+        raise InputError(msg)
+    lights = _by_order(LightRig.ring(max(count, 3)), str(folder))
     return _load_chosen(folder, recipe, lights, listing, None, channel, MAX_MEGAPIXELS, None, notes)
 
 

@@ -29,6 +29,7 @@ OWN_JSON = re.compile(rb'\A\s*\{\s*"(?:format"\s*:\s*"bgars-|bgars"\s*:\s*")')
 OWN_TEXT = {
     # Generators of pages, descriptions of TIFF files, comments of meshes, metadata of tables.
     ".html": re.compile(rb'<meta name="generator" content="bgars'),
+    ".svg": re.compile(rb"\A<svg [^>]*><title>Balls: outline"),
     ".tif": re.compile(rb'"content": "bgars '),
     ".ply": re.compile(rb"\Aply\n.*comment bgars mesh", re.DOTALL),
     ".obj": re.compile(rb"\A# bgars mesh"),

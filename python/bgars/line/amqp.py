@@ -8,10 +8,10 @@ import logging
 import os
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote, urlsplit
+from urllib.parse import unquote
 
 from bgars.errors import InputError
-from bgars.line.credentials import credentials
+from bgars.line.credentials import credentials, split_address
 
 __all__ = ["Amqp"]
 
@@ -37,7 +37,7 @@ class Amqp:
     """
 
     def __init__(self, url: str) -> None:
-        parts = urlsplit(url)
+        parts = split_address(url, "amqp")
         if parts.scheme not in {"amqp", "amqps"} or not parts.hostname or not parts.path.strip("/"):
             msg = "amqp: must be amqp://HOST/NODE or amqps://HOST/NODE"
             raise InputError(msg)

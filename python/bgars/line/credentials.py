@@ -1,13 +1,14 @@
-"""User and password of a broker: from the environment or a file, never from an address or an option."""
+"""Address of a broker, and user and password: from the environment or a file, never from an address or an option."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
+from urllib.parse import SplitResult, urlsplit
 
 from bgars.errors import InputError
 
-__all__ = ["credentials"]
+__all__ = ["credentials", "split_address"]
 
 
 def credentials(user: str, password: str) -> tuple[str, str]:
@@ -29,3 +30,20 @@ def credentials(user: str, password: str) -> tuple[str, str]:
     except (OSError, UnicodeDecodeError) as error:
         msg = f"{password}_FILE: {file}: cannot be read ({getattr(error, 'strerror', None) or 'not UTF-8'})"
         raise InputError(msg) from None
+
+
+def split_address(url: str, name: str) -> SplitResult:
+    """Return the parts of an address.
+
+    Raises
+    ------
+    InputError
+        It cannot be one; the message does not hold it, as there may be a password in it.
+    """
+    try:
+        parts = urlsplit(url)
+        _ = parts.port  # looked at when it is asked for
+    except ValueError as error:
+        msg = f"{name}: is no address ({error})"
+        raise InputError(msg) from None
+    return parts

@@ -11,10 +11,11 @@ from bgars.errors import InputError
 from bgars.line.flat import FlatFiles
 from bgars.line.folders import IMAGES
 
-__all__ = ["Inbox", "Waiting"]
+__all__ = ["HIDDEN", "Inbox", "Waiting"]
 
 Signature = tuple[tuple[str, int, int], ...]
 HIDDEN = (".", "_")
+"""How the names of folders begin that are no parts."""
 
 
 @dataclass
@@ -61,7 +62,7 @@ class Inbox:
     Raises
     ------
     InputError
-        A pattern without its names, or without a count.
+        A pattern without its names, or without a count; a trigger that is a path.
     """
 
     def __init__(self, folder: Path, *, count: int | None, trigger: str, settle_s: float, files: str = "") -> None:
@@ -71,6 +72,9 @@ class Inbox:
         self.settle_s = settle_s
         if files and count is None:
             msg = "--files: goes with --count, which tells when a part is complete"
+            raise InputError(msg)
+        if trigger != Path(trigger).name or trigger in {".", ".."}:
+            msg = f"--trigger: must be the name of a file in the folder of a part, got {trigger!r}"
             raise InputError(msg)
         self.flat = FlatFiles(folder, files, count=count, settle_s=settle_s) if files and count else None
         self._waiting: dict[str, Waiting] = {}

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from bgars.errors import BgarsError, InputError
+from bgars.line.credentials import split_address
 from bgars.store.append import write_durably
 
 if TYPE_CHECKING:
@@ -52,12 +53,12 @@ class Notifier:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be reached, before the first part."""
-        if self.url and urlsplit(self.url).scheme not in {"http", "https"}:
+        if self.url and split_address(self.url, "--post").scheme not in {"http", "https"}:
             msg = f"--post: must be an http:// or https:// address, got {self.url!r}"
             raise InputError(msg)
         if self.tcp:
             host, _, port = self.tcp.rpartition(":")
-            if not host or not port.isdecimal():
+            if not host or not port.isdecimal() or not 0 < int(port) < 1 << 16:
                 msg = f"--tcp: must be HOST:PORT, got {self.tcp!r}"
                 raise InputError(msg)
         if self.command:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections import Counter
 from pathlib import Path
@@ -20,6 +21,11 @@ if TYPE_CHECKING:
     from bgars.store import Store
 
 __all__ = ["page_name", "write_part_page"]
+
+RESERVED = re.compile(r"\Aindex\Z|\.round\d+\Z", re.IGNORECASE)
+"""The overview of a lot, and a part's earlier rounds, have pages of these names."""
+LONGEST = 60
+"""Characters of a serial number in the name of its page: file systems allow 255 bytes."""
 
 
 def write_part_page(store: Store, serial: str, page: Path | None = None, *, round_: int | None = None) -> PageSource:
@@ -55,14 +61,18 @@ def write_part_page(store: Store, serial: str, page: Path | None = None, *, roun
 
 
 def page_name(serial: str, round_: int | None = None) -> str:
-    """File of a part's page.
+    """File of a part's page, of no other part: a serial number that cannot be a name gets a checksum.
 
     Examples
     --------
-    >>> page_name("SN/1"), page_name("SN1", 2)
+    >>> page_name("SN_1"), page_name("SN1", 2)
     ('SN_1.html', 'SN1.round2.html')
+    >>> page_name("SN/1")
+    'SN_1-fc16d0dd.html'
     """
-    name = re.sub(r"[^\w.+-]", "_", serial) or "_"
+    name = re.sub(r"[^\w.+-]", "_", serial)[:LONGEST] or "_"
+    if name != serial or RESERVED.search(name):
+        name += f"-{hashlib.sha256(serial.encode()).hexdigest()[:8]}"
     return f"{name}.html" if round_ is None else f"{name}.round{round_}.html"
 
 

@@ -12,12 +12,11 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from urllib.parse import urlsplit
 
 from bgars.errors import FileFormatError, InputError
 from bgars.io.result_file import RESULT_NAME, parse_result
 from bgars.line.cfx import to_cfx
-from bgars.line.credentials import credentials
+from bgars.line.credentials import credentials, split_address
 from bgars.line.notify import message
 from bgars.store.append import write_durably
 
@@ -51,7 +50,7 @@ class Mqtt:
     """
 
     def __init__(self, url: str) -> None:
-        parts = urlsplit(url)
+        parts = split_address(url, "mqtt")
         if parts.scheme not in {"mqtt", "mqtts"} or not parts.hostname or not parts.path.strip("/"):
             msg = "mqtt: must be mqtt://HOST/TOPIC or mqtts://HOST/TOPIC"
             raise InputError(msg)

@@ -13,9 +13,9 @@ from typing import IO, TYPE_CHECKING
 
 from bgars.errors import BgarsError, FileFormatError, InputError
 from bgars.io.part_recipe import read_part_recipe
-from bgars.io.recipe import RECIPE_NAME
+from bgars.io.recipe import RECIPE_NAME, read_recipe
 from bgars.line.batch import store_outcome
-from bgars.line.inbox import Inbox, Waiting
+from bgars.line.inbox import HIDDEN, Inbox, Waiting
 from bgars.line.job import Job, Outcome, run_job
 from bgars.line.naming import Naming
 from bgars.line.notify import Notifier
@@ -78,7 +78,10 @@ class Watch:
         """Look at everything that can be wrong before the first part."""
         if self.recipe is not None:
             self._name = read_part_recipe(self.recipe).name
+        if self.rig is not None:
+            read_recipe(self.rig / RECIPE_NAME if self.rig.is_dir() else self.rig)
         for place in (self.done, self.failed):
+            self._need_outside(place)
             try:
                 place.mkdir(parents=True, exist_ok=True)
             except OSError as error:
@@ -88,6 +91,16 @@ class Watch:
                 msg = f"{place}: must be on the drive of {self.inbox.folder}: parts are renamed into it, never copied"
                 raise InputError(msg)
         self._warn_of_clock()
+
+    def _need_outside(self, place: Path) -> None:
+        """Refuse a folder for parts that would itself be taken for a part that arrives."""
+        inbox, whole = self.inbox.folder.resolve(), place.resolve()
+        if not whole.is_relative_to(inbox):
+            return
+        below = whole.relative_to(inbox).parts
+        if not below or not below[0].startswith(HIDDEN):
+            msg = f"{place}: would be taken for a part: name a folder outside {inbox}, or one of it as _NAME"
+            raise InputError(msg)
 
     def run(self, *, most: int | None = None) -> None:
         """Watch until :attr:`is_stopping`, or so many parts were taken; the part at hand is always finished."""

@@ -98,6 +98,8 @@ def outlines_of(
             raise CalibrationError(msg)
         outlines.append(found)
     for index, circle in enumerate(() if given is None else given):
+        if circle[2] > max(height, width):
+            _judge(capture, as_outline(circle), height, width)
         seen = refine_outline(pictures, circle, steps)
         name = "outline" if given is None or len(given) == 1 else f"outline {index}"
         if seen is None or seen.arc < SEEN_ARC:
@@ -143,7 +145,7 @@ def outlines_of(
 def _judge(capture: Capture, outline: Outline, height: int, width: int) -> list[Remark]:
     if not outline.inside(height, width):
         msg = (
-            f"{capture.name}: the ball is cut off: radius {outline.radius_px:.1f} px at ({outline.x_px:.1f}, "
+            f"{capture.name}: the ball is cut off: radius {outline.radius_px:.6g} px at ({outline.x_px:.6g}, "
             f"{outline.y_px:.1f}) from the middle of an image of {width} x {height} pixels"
         )
         raise CalibrationError(msg)

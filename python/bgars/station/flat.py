@@ -55,7 +55,7 @@ def calibrate_flat(capture: Capture) -> tuple[FlatField, tuple[Remark, ...]]:
     Raises
     ------
     CalibrationError
-        An image too dark or clipped.
+        An image too dark or clipped, or no even board.
 
     Examples
     --------
@@ -91,7 +91,11 @@ def calibrate_flat(capture: Capture) -> tuple[FlatField, tuple[Remark, ...]]:
     off = np.sqrt(np.average((means - fitted) ** 2, axis=1, weights=weights))
     left = np.sqrt(np.maximum(off**2 - float(np.average(noise**2, weights=weights)), 0.0)) / fitted.mean(axis=1)
     flat = FlatField(np.array(coefficients.T, dtype=np.float64), degree, (height, width), float(left.max()))
-    return flat, tuple(_findings(capture, flat, left))
+    least = min(float(flat_maps(flat, index).min()) for index in range(len(flat.coefficients)))
+    if least <= 0:
+        msg = f"{capture.name}: a map falls to 0: the board must be flat, of one colour, and fill the image"
+        raise CalibrationError(msg)
+    return flat, tuple(_findings(capture, left, least))
 
 
 def falloff_findings(flat: FlatField, lights: LightCalibration, pitch_um: float) -> list[Remark]:
@@ -170,7 +174,7 @@ def _degree(means: Array, weights: Array, x: Array, y: Array, noise: Array) -> i
     return chosen
 
 
-def _findings(capture: Capture, flat: FlatField, left: Array) -> list[Remark]:
+def _findings(capture: Capture, left: Array, least: float) -> list[Remark]:
     found = []
     for light in np.flatnonzero(left > STRUCTURE):
         name = light_name(int(light), capture.files)
@@ -179,8 +183,6 @@ def _findings(capture: Capture, flat: FlatField, left: Array) -> list[Remark]:
             "dust, gloss or a shadow"
         )
         found.append(Remark("doubt", message, "flat-structure", float(left[light]), STRUCTURE, "", int(light)))
-    corners = [flat_maps(flat, light) for light in range(len(flat.coefficients))]
-    least = min(float(one.min()) for one in corners)
     found.append(
         Remark(
             "note",

@@ -71,6 +71,8 @@ def calibrate_lights(
             raise InputError(msg)
         near = False
     check_pitch(diameter_um, "diameter_um")
+    for each in captures:
+        _need_scale_of_camera(each, sphere, diameter_um)
     seen = observe(captures, sphere, outlines_a_capture(captures, outline), diameter_um, progress)
     balls, findings = seen.balls, seen.findings
     solution, pitch_um = _solve(captures, seen, diameter_um, near, findings)
@@ -95,6 +97,19 @@ def calibrate_lights(
         lamp_deg=seen.lamp_deg,
         findings=tuple(findings),
     )
+
+
+def _need_scale_of_camera(capture: Capture, sphere: str, diameter_um: float | None) -> None:
+    """Refuse a camera at a distance in mm where no scale says how many pixels that is: it would count as infinite."""
+    distance_mm = capture.camera_distance_mm
+    if sphere == "matt" or distance_mm is None or math.isinf(distance_mm):
+        return
+    if capture.pixel_pitch_um is None and diameter_um is None:
+        msg = (
+            f"{capture.name}: a camera at {distance_mm:g} mm needs a scale: calibrate it first, state pixel_pitch_um "
+            "in capture.toml, or the diameter of the ball"
+        )
+        raise InputError(msg)
 
 
 def _solve(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import TYPE_CHECKING
 
@@ -54,9 +55,9 @@ def response_from_bracket(
     Raises
     ------
     InputError
-        Fewer than two images, or exposures that are not above 0.
+        Fewer than two images, or exposures that are not above 0, or all alike.
     CalibrationError
-        Too few pixels that two exposures show well.
+        Too few pixels that two exposures show well, or images that do not get brighter with the exposure.
 
     References
     ----------
@@ -78,6 +79,9 @@ def response_from_bracket(
         )
         raise InputError(msg)
     levels = np.stack([np.asarray(image, dtype=np.float64).ravel() for image in images], axis=1) / full_scale
+    if times.min() == times.max():
+        msg = f"exposures: must be two different times or more, got {times.tolist()}"
+        raise InputError(msg)
     good = ((levels > LOW) & (levels < HIGH)).sum(axis=1) >= 2  # noqa: PLR2004 - two exposures
     if int(good.sum()) < LEAST_PIXELS:
         msg = f"exposures: only {int(good.sum())} pixels are well exposed in two images, {LEAST_PIXELS} are needed"
@@ -93,11 +97,26 @@ def response_from_bracket(
             steps.append(np.full(len(pair), math.log(times[second] / times[first])))
             weights.append(pair.min(axis=1))  # noise of a logarithm goes by one over the level
     weight = np.concatenate(weights)
+    _need_brighter(levels, use, times)
     matrix, right = np.concatenate(rows), np.concatenate(steps)
     bend = _bend(SMOOTH * math.sqrt(float(np.square(weight).sum())))
     slopes, _ = nnls(np.vstack([matrix * weight[:, None], bend]), np.append(right * weight, np.zeros(len(bend))))
     off = matrix @ slopes - right
     return _curve(slopes, 0.5 * 1.4826 * float(np.median(np.abs(off * weight))), f"exposure bracket of {len(times)}")
+
+
+def _need_brighter(levels: Array, use: NDArray[np.bool_], times: Array) -> None:
+    """Refuse images that do not get brighter with their exposure times: no curve explains them, but one of zeros."""
+    order = np.argsort(times)
+    for first, second in itertools.pairwise(order):
+        both = use[:, first] & use[:, second]
+        longer = times[second] > times[first]
+        if longer and both.any() and np.median(levels[both, second] - levels[both, first]) <= 0:
+            msg = (
+                f"exposures: image {second} ({times[second]:g}) is no brighter than image {first} ({times[first]:g}), "
+                "counted from 0: give the exposure times in the order of the images"
+            )
+            raise CalibrationError(msg)
 
 
 def response_from_sums(

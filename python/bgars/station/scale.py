@@ -34,6 +34,8 @@ ON_GRID = 0.25
 OUTLIER_SIGMAS = 5.0
 SEEN_SIGMAS = 3.0
 """Tilt and distortion are kept where they are so many standard deviations from 0."""
+ROUGH_PX = 0.5
+"""Residual from which on the points are no square grid: another pitch across than down, or a bent sheet."""
 UNKNOWN_PITCH_U = 1e-4
 """Relative standard uncertainty of a grid's pitch where none is stated: etched glass is better, print worse."""
 
@@ -64,10 +66,13 @@ def calibrate_scale(
     CalibrationError
         Fewer than 12 points on one grid.
     InputError
-        A pitch that is not above 0.
+        A pitch that is not above 0, or an uncertainty that is negative or no smaller than it.
     """
     if not (math.isfinite(pitch_um) and pitch_um > 0):
         msg = f"pitch_um: must be finite and above 0, got {pitch_um:g}"
+        raise InputError(msg)
+    if u_pitch_um is not None and not (math.isfinite(u_pitch_um) and 0 <= u_pitch_um < pitch_um):
+        msg = f"u_pitch_um: must be 0 or more, and below the pitch of {pitch_um:g}, got {u_pitch_um:g}"
         raise InputError(msg)
     picture = linear_levels(capture).images.mean(axis=0)
     points = _dots(picture) if target == "dots" else _crossings(picture)
@@ -115,16 +120,11 @@ def fit_grid(
     u = pitch * math.hypot(u_px / step_px, u_grid / pitch_um)
     tilted = math.hypot(px, py) > SEEN_SIGMAS * math.sqrt(float(covariance[4, 4] + covariance[5, 5]))
     bent = abs(k) > SEEN_SIGMAS * math.sqrt(float(covariance[6, 6]))
-    findings = [
-        Remark(
-            "note",
-            f"{name}: {count} of {len(places_px)} points on the grid, residual {rms:.3f} px",
-            "grid",
-            rms,
-            None,
-            "px",
-        )
-    ]
+    words = f"{name}: {count} of {len(places_px)} points on the grid, residual {rms:.3f} px"
+    findings = [Remark("note", words, "grid", rms, ROUGH_PX, "px")]
+    if rms > ROUGH_PX:
+        words += ": no square grid, or not flat; the pitch is off by more than its uncertainty"
+        findings = [Remark("doubt", words, "grid", rms, ROUGH_PX, "px")]
     if bent:
         findings.append(
             Remark(

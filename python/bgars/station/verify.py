@@ -48,21 +48,30 @@ def read_known(path: Path) -> dict[str, Known]:
     Raises
     ------
     FileFormatError
-        The file is missing, or lacks a column.
+        The file is missing, lacks a column, or holds no ball.
     InputError
-        A value that is no number above 0, or a name that comes twice.
+        A value that is no number above 0, more values than columns, or a name that comes twice.
     """
     try:
-        lines = list(csv.DictReader(io.StringIO(read_text(path).content, newline="")))
+        table = csv.DictReader(io.StringIO(read_text(path).content, newline=""))
+        lines = list(table)
     except csv.Error as error:
         msg = f"{path}: cannot be read as CSV ({error})"
         raise FileFormatError(msg) from error
-    columns = set(lines[0]) if lines else set()
+    columns = set(table.fieldnames or ())
     if "name" not in columns or not columns & {"height_um", "diameter_um"}:
-        msg = f"{path}: needs the columns name and height_um or diameter_um, got {', '.join(sorted(map(str, columns)))}"
+        got = ", ".join(sorted(columns)) or "none"
+        got += "; commas separate columns" if ";" in got or "\t" in got else ""
+        msg = f"{path}: needs the columns name and height_um or diameter_um, got {got}"
+        raise FileFormatError(msg)
+    if not lines:
+        msg = f"{path}: holds no ball"
         raise FileFormatError(msg)
     found: dict[str, Known] = {}
     for number, line in enumerate(lines, 2):
+        if None in line:  # such as 500,3 for 500.3
+            msg = f"{path}: line {number}: must have {len(columns)} values, one a column, with decimal points"
+            raise InputError(msg)
         name = (line["name"] or "").strip()
         if not name or name in found:
             msg = f"{path}: line {number}: name must be there once, got {name!r}"
@@ -109,7 +118,8 @@ def verify(
     Verification
         Bias, slope and repeatability with standard uncertainties.
     tuple of Remark
-        ``fail`` where the limit is broken or cannot be shown to be kept, ``doubt`` for a bias or slope that is real.
+        ``fail`` where the limit is broken or cannot be shown to be kept, as of a ball that was not measured; ``doubt``
+        for a bias or slope that is real.
 
     Raises
     ------
@@ -150,7 +160,21 @@ def verify(
         float(np.abs(error).max()),
         mpe_um,
     )
-    return found, _judge(found, error, u_known)
+    read_of = {(row[0], row[1]) for row in rows}
+    wanted = [name for name, size in known.items() if math.isfinite(getattr(size, f"{quantity}_um"))]
+    unread = [name for turn in range(len(results)) for name in wanted if (turn, name) not in read_of]
+    return found, (*_judge(found, error, u_known), *_unread(unread, found))
+
+
+def _unread(names: list[str], found: Verification) -> list[Remark]:
+    """Say which balls of the table have no reading: a limit is kept by every ball, or not shown to be kept."""
+    if not names:
+        return []
+    shown = ", ".join(list(dict.fromkeys(names))[:6])
+    words = f"{found.quantity}: {len(names)} readings of balls of the table are missing ({shown})"
+    if found.mpe_um is None:
+        return [Remark("doubt", words, f"unread-{found.quantity}", len(names))]
+    return [Remark("fail", f"{words}: not shown to be within the limit", f"unread-{found.quantity}", len(names))]
 
 
 def _line(sizes: np.ndarray, errors: np.ndarray, u_known: float) -> tuple[float, float, float, float]:

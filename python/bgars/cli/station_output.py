@@ -1,0 +1,103 @@
+"""Where ``bgars calibrate`` and ``bgars verify`` keep what they found: a station file and its page."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import bgars
+from bgars.cli.console import say, utc_now
+from bgars.errors import FileFormatError, InputError
+from bgars.io.own_files import need_new_or_own
+from bgars.io.station_file import is_station_file, read_station, write_station
+from bgars.report.html.station_page import write_station_page
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+    from bgars.records.remark import Remark
+    from bgars.records.station import Station
+
+__all__ = [
+    "existing_station", "keep_part", "need_different", "need_places", "shown_severity", "tell_findings", "write_pages",
+]  # fmt: skip
+
+SECTIONS = {
+    "flat": ("flat-structure", "evenness", "falloff", "flat-before-response"),
+    "response": ("linear", "not-linear"),
+    "scale": ("grid", "distortion", "tilt"),
+    "verified": ("mpe", "mpe-open", "bias-", "slope-", "unread-"),
+}
+"""How the codes of findings begin, by section of the station file; all others are of the lights."""
+
+
+def existing_station(path: Path) -> Station:
+    """Return the station of a file, or a new one where there is no file yet.
+
+    Raises
+    ------
+    FileFormatError, InputError
+        A name that cannot be one of a station, or a file there, or beside it, that bgars did not write.
+    """
+    if path.suffix.lower() != ".toml":
+        msg = f"{path}: a station file must end in .toml"
+        raise InputError(msg)
+    if not path.parent.is_dir():
+        msg = f"{path}: cannot be written (no such folder)"
+        raise FileFormatError(msg)
+    need_places(path)
+    if not path.exists():
+        return bgars.Station(path.stem)
+    if not is_station_file(path):
+        msg = f"{path}: exists and is not a station file; name another one"
+        raise InputError(msg)
+    return read_station(path)
+
+
+def need_places(path: Path) -> None:
+    """Raise InputError where a file beside the station would be replaced that bgars did not write."""
+    for beside in (path.with_suffix(".html"), path.with_suffix(".balls.svg"), path.with_name(f"{path.stem}.flat.npz")):
+        need_new_or_own(beside)
+
+
+def need_different(folders: Iterable[Path], what: str) -> None:
+    """Raise InputError where a folder comes twice: a copy repeats perfectly, and says nothing new."""
+    seen: set[Path] = set()
+    for folder in folders:
+        place = folder.resolve()
+        if place in seen:
+            msg = f"{folder}: is given twice; {what}"
+            raise InputError(msg)
+        seen.add(place)
+
+
+def keep_part(output: Path, parts: dict[str, Any], findings: tuple[Remark, ...], name: str | None = None) -> None:
+    """Write the station with its new parts, and its page; what was found of the old ones goes."""
+    known = existing_station(output)
+    write_pages(replace(known, **parts, calibrated_utc=utc_now(), name=name or known.name), parts, findings, output)
+
+
+def write_pages(station: Station, parts: Iterable[str], findings: tuple[Remark, ...], output: Path) -> None:
+    """Write a station and its page, with new findings in place of those of the same parts."""
+    codes, new = {finding.code for finding in findings}, set(parts)
+    kept = [one for one in station.findings if one.code not in codes and _section(one.code) not in new]
+    station = replace(station, findings=(*kept, *findings))
+    write_station(station, output)
+    write_station_page(station, output.with_suffix(".html"))
+
+
+def shown_severity(finding: Remark) -> str:
+    """The word before a message: what a station file keeps as a doubt is a warning to whoever runs the command."""
+    return "warning" if finding.severity == "doubt" else finding.severity
+
+
+def tell_findings(findings: tuple[Remark, ...], output: Path) -> None:
+    """Say what was noticed, and where the result is."""
+    for finding in findings:
+        say(f"{shown_severity(finding)}: {finding.message}")
+    say(f"Written: {output}, and its page {output.with_suffix('.html')}")
+
+
+def _section(code: str) -> str:
+    return next((name for name, starts in SECTIONS.items() if code.startswith(starts)), "lights")
