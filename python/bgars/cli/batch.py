@@ -30,7 +30,6 @@ from bgars.line.batch import Batch, Progress, inspect_many
 from bgars.line.naming import Naming
 from bgars.normals.methods import DEFAULT_METHOD
 from bgars.records.part_identity import PartIdentity
-from bgars.store import open_store
 
 __all__ = ["register"]
 
@@ -94,12 +93,11 @@ def batch(
     be written. 130: interrupted; run it again to continue.
     """
     naming = Naming(serial_from, PartIdentity(lot=lot, station=station_name, operator=operator, round=round_))
-    store = open_store(output, create=True)
     with _progress() as report:
         done = inspect_many(
             folders,
             recipe,
-            store=store,
+            store=output,
             method=method,
             naming=naming,
             processes=processes,
