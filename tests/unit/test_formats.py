@@ -57,6 +57,24 @@ def test_normals_as_exr_have_alpha_where_there_is_one(field: bgars.NormalField, 
     assert bgars.angular_error_deg(again, normals)[valid].max() < 0.05
 
 
+@pytest.mark.parametrize("suffix", [".png", ".tif", ".exr", ".npz"])
+def test_what_is_no_normal_is_none_in_a_file(suffix: str, tmp_path: Path) -> None:
+    normals = np.ma.masked_array(np.tile([0.6, 0.0, 0.8], (4, 4, 1)), mask=False)
+    normals[0] = np.ma.masked
+    normals[1] = 0.0
+    normals[2, :, 1] = np.nan
+    bgars.write_normals(normals, tmp_path / f"n{suffix}")
+    back = bgars.read_normal_map(tmp_path / f"n{suffix}")
+    assert np.isnan(back[:3]).all()
+    np.testing.assert_allclose(back[3], normals[3], atol=1e-4)
+    for wrong, words in ((3.0 * normals, "row 3, column 0: must have length 1 within 0.1, got 3"), (normals[:0], "0")):
+        with pytest.raises(bgars.InputError, match=words):
+            bgars.write_normals(wrong, tmp_path / f"wrong{suffix}")
+    with pytest.raises(bgars.InputError, match="normals: must be an array of numbers"):
+        bgars.write_normals("abc", tmp_path / f"wrong{suffix}")
+    assert [path.name for path in tmp_path.iterdir()] == [f"n{suffix}"]
+
+
 def test_points_lie_where_the_vertices_of_the_mesh_lie(field: bgars.NormalField, tmp_path: Path) -> None:
     height = bgars.integrate_normals(field)
     expected = bgars.mesh_from_height(height, field).vertices

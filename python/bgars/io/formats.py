@@ -11,7 +11,7 @@ from bgars.errors import InputError
 from bgars.extras import how_to_install, missing
 from bgars.io.atomic import atomic_file
 from bgars.io.described_tiff import write_described
-from bgars.io.normal_map import write_normal_map
+from bgars.io.normal_map import vectors_to_write, write_normal_map
 from bgars.records.normal_field import NormalField
 
 if TYPE_CHECKING:
@@ -36,14 +36,15 @@ def write_normals(field: NormalField | NDArray[np.floating], path: str | PathLik
     Parameters
     ----------
     field : NormalField or (H, W, 3) floating
-        The normals.
+        The normals; NaN, masked or a vector of 0 = invalid.
     path : path
         File to write.
 
     Raises
     ------
     InputError
-        An unknown suffix, an array of another shape, a package that is not installed.
+        An unknown suffix, an array of another shape, vectors that are not of length 1 within 0.1, a package that is
+        not installed.
     FileFormatError
         The file cannot be written.
 
@@ -56,10 +57,7 @@ def write_normals(field: NormalField | NDArray[np.floating], path: str | PathLik
     ...     np.load(pathlib.Path(folder) / "n.npz")["normals"].round(1).tolist()
     [[[0.6000000238418579, 0.0, 0.800000011920929]]]
     """
-    normals = field.normals if isinstance(field, NormalField) else np.asarray(field, dtype=np.float32)
-    if normals.ndim != len(("row", "col", "axis")) or normals.shape[2] != len("xyz"):
-        msg = f"normals: must have shape (H, W, 3), got {normals.shape}"
-        raise InputError(msg)
+    normals = vectors_to_write(field)
     write, path = check_normals_file(path)
     with atomic_file(path) as temporary:
         write(field, normals, temporary)
