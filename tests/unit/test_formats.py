@@ -90,6 +90,24 @@ def test_points_lie_where_the_vertices_of_the_mesh_lie(field: bgars.NormalField,
         bgars.write_points(height, tmp_path / "p.las")
 
 
+@pytest.mark.parametrize("scale_px", [2.0, 6.0])
+@pytest.mark.parametrize("is_disc", [False, True])
+def test_edges_of_the_surface_are_no_dents(scale_px: float, is_disc: bool) -> None:
+    row, col = np.mgrid[-40:40, -50:50]
+    inside = np.hypot(row, col) < 35 if is_disc else np.ones(row.shape, bool)
+    plane = bgars.HeightMap.from_array(np.where(inside, 3.0 * col - 2.0 * row, np.nan), pixel_pitch_um=10.0)
+    shape = bgars.shape_images(plane, scale_px=scale_px)
+    seen = np.isfinite(shape.slope_deg)
+    assert seen.sum() > 0.9 * inside.sum()
+    np.testing.assert_allclose(shape.slope_deg[seen], np.degrees(np.arctan(np.hypot(0.3, 0.2))), atol=1e-3)
+    assert np.nanmax(np.abs(shape.flattened)) < 1e-3
+    assert np.nanmax(np.abs(shape.mean_curvature)) < 1e-6
+    ball = bgars.HeightMap.from_array(np.where(inside, np.sqrt(200.0**2 - row**2 - col**2), np.nan))
+    found = bgars.shape_images(ball, scale_px=scale_px).mean_curvature * 200.0
+    assert -1.8 < np.nanmin(found) < np.nanmax(found) < -0.2
+    assert found[40, 50] == pytest.approx(-1.0, abs=1e-2)
+
+
 def test_shape_of_a_ball_with_a_scratch() -> None:
     row, col = np.mgrid[-30:31, -30:31]
     heights = np.sqrt(80.0**2 - row**2 - col**2).astype(np.float32) * 5.0
