@@ -12,6 +12,7 @@ from bgars.extras import how_to_install, missing
 from bgars.io.atomic import atomic_file
 from bgars.io.described_tiff import write_described
 from bgars.io.normal_map import vectors_to_write, write_normal_map
+from bgars.records.height_map import need_height
 from bgars.records.normal_field import NormalField
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ def write_points(height: HeightMap, path: str | PathLike[str], *, field: NormalF
     Raises
     ------
     InputError
-        An unknown suffix, or a field of another size.
+        An unknown suffix, a field of another size, or no valid pixel.
     FileFormatError
         The file cannot be written.
 
@@ -103,8 +104,11 @@ def write_points(height: HeightMap, path: str | PathLike[str], *, field: NormalF
     ...     print((pathlib.Path(folder) / "p.xyz").read_text().splitlines()[0])
     -5.00000 5.00000 1.00000
     """
-    height.check_field(field)
+    need_height(height, field)
     write, path = _writer(POINT_FORMATS, path, "a point cloud")
+    if not height.mask.any():
+        msg = f"height: has no valid pixel to write to {path}"
+        raise InputError(msg)
     rows, cols = np.nonzero(height.mask)
     pitch = 1.0 if height.pixel_pitch_um is None else height.pixel_pitch_um
     x, y = (cols + 0.5 - height.mask.shape[1] / 2) * pitch, (height.mask.shape[0] / 2 - rows - 0.5) * pitch

@@ -10,6 +10,8 @@ import numpy as np
 import scipy  # loads its modules when they are used
 
 from bgars.errors import InputError
+from bgars.records.height_map import need_height
+from bgars.records.scalar_checks import number
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -85,8 +87,10 @@ def shape_images(height: HeightMap, *, scale_px: float = 2.0) -> ShapeImages:
     >>> round(float(shape.mean_curvature[20, 20]), 3), round(float(shape.slope_deg[20, 30]), 0)
     (-0.02, 12.0)
     """
+    need_height(height)
+    scale_px = number("scale_px", scale_px)
     if not (math.isfinite(scale_px) and scale_px > 0):
-        msg = f"scale_px: must be finite and above 0, got {scale_px}"
+        msg = f"scale_px: must be finite and above 0, got {scale_px:g}"
         raise InputError(msg)
     if min(height.mask.shape) < len(("one", "two")):
         msg = f"height: must have 2 x 2 pixels at least, got {height.mask.shape}"
