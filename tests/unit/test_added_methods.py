@@ -175,6 +175,18 @@ def test_a_package_adds_a_method_to_the_command_line(tmp_path: Path) -> None:
     assert not (tmp_path / "b").exists()
 
 
+def test_an_entry_point_that_cannot_be_called_is_said(
+    capture: bgars.Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    info = tmp_path / "data-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: data\nVersion: 1.0\n", encoding="utf-8")
+    (info / "entry_points.txt").write_text("[bgars.methods]\nconstant = math:pi\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(bgars.InputError, match=r"method: constant \(math:pi\) must be callable, got float"):
+        bgars.estimate_normals(capture, method="constant")
+
+
 def test_a_line_of_each_table_is_a_method(capture: bgars.Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(TABLE, "median-filter", methods.NormalsMethod("median-filter", "as CONTRIBUTING.md has it."))
     monkeypatch.setitem(RUNNERS, "median-filter", lambda capture, **_: bgars.estimate_normals(capture, method="blind"))
