@@ -278,6 +278,7 @@ def test_arrays() -> None:
         (lambda: bgars.LightRig.ring(2), "at least 3"),
         (lambda: bgars.LightRig.ring(4, u_deg=-0.1), r"u_deg\[0\].*above 0, got -0.1"),
         (lambda: bgars.LightRig.ring(4, u_deg=[0.1, 0.1]), r"u_deg.*\(4,\), one per light, got \(2,\)"),
+        (lambda: rig.with_u_deg("a"), "u_deg: must be an array of numbers"),
         (lambda: rig.with_u_deg([0.1, 0.1, np.nan, 0.1]), r"u_deg\[2\].*finite and above 0, got nan"),
         (lambda: bgars.integrate_normals(np.zeros((2, 2))), r"\(H, W, 3\)"),
         (lambda: bgars.integrate_normals(np.full((2, 2, 3), np.nan)), "no pixel"),
