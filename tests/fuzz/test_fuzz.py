@@ -69,10 +69,28 @@ def test_a_capture_made_by_hand_must_fit_together() -> None:
         (bgars.Capture(images, rig, mask.T), r"mask: must have shape \(6, 7\)"),
         (bgars.Capture(images, rig, mask, dark=images[0, :3]), r"dark: must have shape \(6, 7\)"),
         (bgars.Capture(images, rig, mask, saturation="x"), "saturation: must be a number"),  # type: ignore[arg-type]
+        (bgars.Capture(images, rig, mask, dark=np.full((6, 7), 5.5)), "dark: must have the dtype of the images, uint8"),
+        (bgars.Capture(images / 255, rig, mask, dark=np.full((6, 7), np.nan, np.float32)), "dark: must be finite"),
+        (bgars.Capture(images, rig, mask, response=np.arange(256)[::-1]), "response: must be finite and must not fall"),
+        (bgars.Capture(images, rig, mask, response=np.full(256, np.nan)), "response: must be finite and must not fall"),
+        (bgars.Capture(images, rig, mask, full_scale=0.0), "full_scale: must be finite and above 0, got 0"),
     ):
         for function in (bgars.check, bgars.find_balls, bgars.estimate_normals):
             with pytest.raises(bgars.InputError, match=said):
                 function(wrong)
+
+
+def test_directions_are_no_rig() -> None:
+    with pytest.raises(bgars.InputError, match=r"rig: must be a LightRig, as bgars.LightRig.from_directions.* ndarray"):
+        bgars.Capture(np.zeros((4, 6, 7), np.uint8), bgars.LightRig.ring(4).directions, np.ones((6, 7), bool))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("value", "is_used"), [(90, False), (np.nan, True)])
+def test_a_board_without_pixels_or_numbers_has_no_flat_field(value: float, is_used: bool) -> None:
+    images = np.full((4, 6, 7), value, np.float32)
+    capture = bgars.Capture(images, bgars.LightRig.ring(4), np.full((6, 7), is_used), full_scale=255.0)
+    with pytest.raises(bgars.CalibrationError, match="must be finite" if is_used else "the mask has 0 pixels"):
+        bgars.calibrate_flat(capture)
 
 
 def test_nor_does_a_masked_stack_take_any_mask() -> None:

@@ -57,6 +57,52 @@ def test_a_registered_function_is_a_method_like_others(capture: bgars.Capture) -
     assert bgars.inspect(capture, method="upward").method == "upward"
 
 
+def a_field(shape: tuple[int, int], normals: np.ndarray[Any, Any], **others: Any) -> bgars.NormalField:  # noqa: ANN401
+    ones, every = np.ones(shape, np.float32), np.ones(shape, bool)
+    given = {"albedo": ones, "mask": every, "confidence": ones, "is_measured": every, "lights_kept": ones} | others
+    return bgars.NormalField(normals, **given, method="")
+
+
+@pytest.mark.usefixtures("registered")
+def test_a_field_of_others_has_unit_normals_or_none_and_the_pitch(capture: bgars.Capture) -> None:
+    shape = capture.mask.shape
+    given = np.zeros((*shape, 3), np.float32)
+    given[100:, :, 2] = 2.0
+    given[200:, 0] = np.nan
+    hidden = np.broadcast_to(given.sum(axis=2, keepdims=True) == 0, given.shape)
+    for made in (a_field(shape, given), np.ma.masked_array(np.where(hidden, [1, 0, 0], given), mask=hidden)):
+        bgars.register_method("sloppy", lambda _, made=made: made)
+        field = bgars.estimate_normals(capture, method="sloppy")
+        assert field.mask.sum() == (shape[0] - 100) * shape[1] - (shape[0] - 200)
+        assert np.allclose(field.normals[field.mask], [0, 0, 1])
+        assert np.isnan(field.normals[~field.mask]).all()
+        assert field.pixel_pitch_um == capture.pixel_pitch_um
+    none = a_field(shape, np.zeros((*shape, 3)))
+    assert bgars.evaluate(capture, method=none).normals.mean_deg > 30.0, "no normal is no perfect one"
+    with pytest.raises(bgars.InputError, match=r"albedo must have shape \(240, 256\), got \(2, 2\)"):
+        bgars.evaluate(capture, method=a_field(shape, given, albedo=np.ones((2, 2))))
+
+
+def test_some_normals_that_face_away_do_not_end_an_evaluation(capture: bgars.Capture) -> None:
+    normals = bgars.read_truth(bgars.sample_capture()).normals.copy()
+    normals[120, 128] *= -1
+    found = bgars.evaluate(capture, method=normals)
+    assert found.ball_height_rmse_um is not None
+    assert found.normals.mean_deg > 0.0
+
+
+def test_the_angle_to_no_normal_is_that_to_the_vertical_and_of_no_truth_nan() -> None:
+    slanted = np.float32([0.6, 0.0, 0.8])
+    estimate = np.ma.masked_array([slanted, [0, 0, 0], slanted, slanted], mask=np.eye(4, 3, -2, bool))
+    errors = bgars.angular_error_deg(estimate, np.stack([slanted, slanted, slanted, 0 * slanted]))
+    np.testing.assert_allclose(errors, [0.0, 36.87, 36.87, np.nan], atol=0.01)
+    assert bgars.angular_error_deg([[0, 0, 1]], [[0, 0, 1]]).tolist() == [0.0]
+    with pytest.raises(bgars.InputError, match=r"shapes that fit, got \(2, 3\) and \(4, 3\)"):
+        bgars.angular_error_deg(np.ones((2, 3)), np.ones((4, 3)))
+    with pytest.raises(bgars.InputError, match=r"truth: must have shape \(..., 3\), got \(4, 2\)"):
+        bgars.angular_error_deg(np.ones((4, 3)), np.ones((4, 2)))
+
+
 @pytest.mark.usefixtures("registered")
 def test_a_function_is_given_the_options_that_it_names(capture: bgars.Capture) -> None:
     told: dict[str, Any] = {}
@@ -127,6 +173,18 @@ def test_a_package_adds_a_method_to_the_command_line(tmp_path: Path) -> None:
     assert run.returncode == 2
     assert "blind, broken, upward; got 'magic'" in " ".join(run.stderr.replace("│", " ").split())
     assert not (tmp_path / "b").exists()
+
+
+def test_an_entry_point_that_cannot_be_called_is_said(
+    capture: bgars.Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    info = tmp_path / "data-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: data\nVersion: 1.0\n", encoding="utf-8")
+    (info / "entry_points.txt").write_text("[bgars.methods]\nconstant = math:pi\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(bgars.InputError, match=r"method: constant \(math:pi\) must be callable, got float"):
+        bgars.estimate_normals(capture, method="constant")
 
 
 def test_a_line_of_each_table_is_a_method(capture: bgars.Capture, monkeypatch: pytest.MonkeyPatch) -> None:

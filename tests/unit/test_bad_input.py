@@ -234,6 +234,31 @@ def test_a_path_is_no_capture(function: Callable[[Any], object]) -> None:
         function("folder")
 
 
+@pytest.mark.parametrize(
+    "call",
+    [
+        bgars.read_truth,
+        bgars.read_references,
+        lambda path: bgars.write_normals(np.tile(np.float32([0, 0, 1]), (2, 2, 1)), f"{path}.png"),
+        lambda path: bgars.write_height(bgars.HeightMap.from_array(np.ones((2, 2))), f"{path}.npy"),
+        lambda path: bgars.write_points(bgars.HeightMap.from_array(np.ones((2, 2))), f"{path}.xyz"),
+    ],
+)
+def test_a_name_that_no_file_can_have(call: Callable[[str], object]) -> None:
+    with pytest.raises(bgars.FileFormatError, match=r"^a\\x00b.*: (cannot be|no such)"):
+        call("a\0b")
+
+
+def test_a_path_is_no_station() -> None:
+    capture = bgars.read_capture(bgars.sample_capture())
+    with pytest.raises(bgars.InputError, match=r"station: must be a Station, as bgars.read_station\(FILE\).*got str"):
+        bgars.with_station(capture, "station.toml")
+    with pytest.raises(bgars.FileFormatError, match=r"no\.toml"):
+        bgars.inspect_place(capture, "no.toml", "R1C1")
+    with pytest.raises(bgars.InputError, match="strip: the recipe names none"):
+        bgars.inspect_place(capture, bgars.sample_part_recipe(), "R1C1")
+
+
 def test_arrays() -> None:
     rig = bgars.LightRig.ring(4)
     images = np.zeros((4, 2, 2), np.uint8)
@@ -253,6 +278,7 @@ def test_arrays() -> None:
         (lambda: bgars.LightRig.ring(2), "at least 3"),
         (lambda: bgars.LightRig.ring(4, u_deg=-0.1), r"u_deg\[0\].*above 0, got -0.1"),
         (lambda: bgars.LightRig.ring(4, u_deg=[0.1, 0.1]), r"u_deg.*\(4,\), one per light, got \(2,\)"),
+        (lambda: rig.with_u_deg("a"), "u_deg: must be an array of numbers"),
         (lambda: rig.with_u_deg([0.1, 0.1, np.nan, 0.1]), r"u_deg\[2\].*finite and above 0, got nan"),
         (lambda: bgars.integrate_normals(np.zeros((2, 2))), r"\(H, W, 3\)"),
         (lambda: bgars.integrate_normals(np.full((2, 2, 3), np.nan)), "no pixel"),

@@ -156,6 +156,15 @@ def test_the_program_expands_patterns(tmp_path: Path) -> None:
         capture_folders([tmp_path / "C"])
     with pytest.raises(bgars.InputError, match="folders: must be at least one capture"):
         capture_folders([])
+    bgars.open_store(tmp_path / "in" / "A-store", create=True)
+    for given in (tmp_path / "in", tmp_path / "in" / "*"):
+        assert [path.name for path in capture_folders([given])] == ["A1", "A2", "B1"]
+
+
+def test_a_mistyped_folder_leaves_no_store(tmp_path: Path) -> None:
+    run = CliRunner().invoke(app, ["batch", str(tmp_path / "nothing"), "-o", str(tmp_path / "store")])
+    assert isinstance(run.exception, bgars.FileFormatError)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_bad_numbers_and_recipes_are_refused_before_any_work(tmp_path: Path) -> None:

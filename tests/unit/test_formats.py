@@ -57,6 +57,24 @@ def test_normals_as_exr_have_alpha_where_there_is_one(field: bgars.NormalField, 
     assert bgars.angular_error_deg(again, normals)[valid].max() < 0.05
 
 
+@pytest.mark.parametrize("suffix", [".png", ".tif", ".exr", ".npz"])
+def test_what_is_no_normal_is_none_in_a_file(suffix: str, tmp_path: Path) -> None:
+    normals = np.ma.masked_array(np.tile([0.6, 0.0, 0.8], (4, 4, 1)), mask=False)
+    normals[0] = np.ma.masked
+    normals[1] = 0.0
+    normals[2, :, 1] = np.nan
+    bgars.write_normals(normals, tmp_path / f"n{suffix}")
+    back = bgars.read_normal_map(tmp_path / f"n{suffix}")
+    assert np.isnan(back[:3]).all()
+    np.testing.assert_allclose(back[3], normals[3], atol=1e-4)
+    for wrong, words in ((3.0 * normals, "row 3, column 0: must have length 1 within 0.1, got 3"), (normals[:0], "0")):
+        with pytest.raises(bgars.InputError, match=words):
+            bgars.write_normals(wrong, tmp_path / f"wrong{suffix}")
+    with pytest.raises(bgars.InputError, match="normals: must be an array of numbers"):
+        bgars.write_normals("abc", tmp_path / f"wrong{suffix}")
+    assert [path.name for path in tmp_path.iterdir()] == [f"n{suffix}"]
+
+
 def test_points_lie_where_the_vertices_of_the_mesh_lie(field: bgars.NormalField, tmp_path: Path) -> None:
     height = bgars.integrate_normals(field)
     expected = bgars.mesh_from_height(height, field).vertices
@@ -70,6 +88,24 @@ def test_points_lie_where_the_vertices_of_the_mesh_lie(field: bgars.NormalField,
     assert len(np.unique(cloud.colors[:, 0])) > 10
     with pytest.raises(bgars.InputError, match=r"must end in \.xyz, \.ply"):
         bgars.write_points(height, tmp_path / "p.las")
+
+
+@pytest.mark.parametrize("scale_px", [2.0, 6.0])
+@pytest.mark.parametrize("is_disc", [False, True])
+def test_edges_of_the_surface_are_no_dents(scale_px: float, is_disc: bool) -> None:
+    row, col = np.mgrid[-40:40, -50:50]
+    inside = np.hypot(row, col) < 35 if is_disc else np.ones(row.shape, bool)
+    plane = bgars.HeightMap.from_array(np.where(inside, 3.0 * col - 2.0 * row, np.nan), pixel_pitch_um=10.0)
+    shape = bgars.shape_images(plane, scale_px=scale_px)
+    seen = np.isfinite(shape.slope_deg)
+    assert seen.sum() > 0.9 * inside.sum()
+    np.testing.assert_allclose(shape.slope_deg[seen], np.degrees(np.arctan(np.hypot(0.3, 0.2))), atol=1e-3)
+    assert np.nanmax(np.abs(shape.flattened)) < 1e-3
+    assert np.nanmax(np.abs(shape.mean_curvature)) < 1e-6
+    ball = bgars.HeightMap.from_array(np.where(inside, np.sqrt(200.0**2 - row**2 - col**2), np.nan))
+    found = bgars.shape_images(ball, scale_px=scale_px).mean_curvature * 200.0
+    assert -1.8 < np.nanmin(found) < np.nanmax(found) < -0.2
+    assert found[40, 50] == pytest.approx(-1.0, abs=1e-2)
 
 
 def test_shape_of_a_ball_with_a_scratch() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bgars
 import matplotlib as mpl
 import numpy as np
@@ -62,3 +64,38 @@ def test_normals_of_others_are_evaluated_as_one_s_own_are() -> None:
 def test_a_light_without_a_direction_relights_nothing(records: dict[str, object], direction: object) -> None:
     with pytest.raises(bgars.InputError, match="direction: must be three finite numbers"):
         records["NormalField"].relight(direction)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("direction", ["up", (0, 0, 1j), [[1], [2, 3]]])
+def test_what_are_no_numbers_relight_nothing(records: dict[str, object], direction: object) -> None:
+    with pytest.raises(bgars.InputError, match="direction: must be"):
+        records["NormalField"].relight(direction)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("light", [8, -9, 1.5, "0", None, True])
+def test_a_light_that_is_not_there_is_not_drawn(records: dict[str, object], light: object) -> None:
+    with pytest.raises(bgars.InputError, match="light: must be a whole number from 0 to 7, got"):
+        records["Capture"].plot(light)  # type: ignore[attr-defined]
+
+
+def test_an_array_is_no_height_map(tmp_path: Path) -> None:
+    heights = np.zeros((4, 4), np.float32)
+    calls = [
+        bgars.mesh_from_height,
+        bgars.shape_images,
+        lambda given: bgars.simplified_mesh(given, max_error_um=1.0),
+        lambda given: bgars.write_height(given, tmp_path / "h.npy"),
+        lambda given: bgars.write_points(given, tmp_path / "p.xyz"),
+    ]
+    for call in calls:
+        with pytest.raises(bgars.InputError, match=r"must be a HeightMap.* got ndarray"):
+            call(heights)
+    with pytest.raises(bgars.InputError, match=r"mesh: must be a trimesh\.Trimesh or a HeightMap, got ndarray"):
+        bgars.write_mesh(heights, tmp_path / "m.ply")
+    with pytest.raises(bgars.InputError, match=r"field: must be a NormalField.* got ndarray"):
+        bgars.mesh_from_height(bgars.HeightMap.from_array(heights), np.ones((4, 4, 3)))
+    nothing = bgars.HeightMap.from_array(np.full((4, 4), np.nan))
+    assert np.isnan(nothing.summary()["height_range_px"]).all()
+    with pytest.raises(bgars.InputError, match="has no valid pixel to write to"):
+        bgars.write_points(nothing, tmp_path / "p.xyz")
+    assert list(tmp_path.iterdir()) == []

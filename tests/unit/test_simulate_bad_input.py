@@ -28,6 +28,8 @@ def run(scene: bgars.Scene | None = None, rig: bgars.LightRig = RIG, **options: 
 BALL = bgars.Ball(0, 0, 300, 200, name="A")
 
 CASES: list[tuple[Callable[[], object], list[str]]] = [
+    (lambda: run(rig=RIG.directions), ["rig: must be a bgars.LightRig, got ndarray"]),  # type: ignore[arg-type]
+    (lambda: run("one-ball"), ["scene: must be a bgars.Scene, got str"]),  # type: ignore[arg-type]
     # Scenes
     (lambda: ARRAY(2, 2, pitch_um=599.0), ["scene.balls", "A1 and A2 overlap", "without a bridge", "600", "599"]),
     (lambda: ARRAY(1, 3, pitch_um=550.0, bridges=[bgars.Bridge("A1", "A2")]), ["A2 and A3 overlap", "550"]),

@@ -58,3 +58,9 @@ def test_a_golden_part_teaches_its_recipe(tmp_path: Path) -> None:
     run = bgars_command("teach", tmp_path / "golden", "-o", tmp_path / "part.toml")
     assert run.code == 2
     assert "--force replaces it" in run.stderr
+    capture = tmp_path / "golden" / "capture.toml"
+    before = capture.read_bytes()
+    run = bgars_command("teach", tmp_path / "golden", "-o", capture, "--force")
+    assert run.code == 2
+    assert "exists and is not a part recipe" in run.stderr
+    assert capture.read_bytes() == before

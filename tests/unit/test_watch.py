@@ -16,6 +16,7 @@ from pathlib import Path
 
 import bgars
 import pytest
+from bgars.cli.app import app
 from bgars.line import job
 from bgars.line.inbox import Inbox
 from bgars.line.notify import Notifier
@@ -23,6 +24,7 @@ from bgars.line.watch import Watch, watched
 from bgars.store import append
 from killed_watch import RIG, command, drop, instant, kill_often
 from line_captures import copy_capture
+from typer.testing import CliRunner
 
 
 @pytest.fixture
@@ -276,6 +278,15 @@ def test_a_second_watch_is_refused(inbox: Path) -> None:
         pass
     with pytest.raises(bgars.FileFormatError, match="no such folder"), watched(inbox / "none"):
         pass
+
+
+@pytest.mark.parametrize("option", ["-o", "--done", "--failed"])
+@pytest.mark.parametrize("place", ["results", "results/deep", "."])
+def test_no_folder_of_the_watch_lies_among_the_parts(inbox: Path, option: str, place: str) -> None:
+    options = {"-o": inbox.parent / "store"} | {option: inbox / place}
+    run = CliRunner().invoke(app, ["watch", str(inbox), *(str(word) for pair in options.items() for word in pair)])
+    assert "where every folder is a part" in str(run.exception)
+    assert list(inbox.iterdir()) == []
 
 
 def test_sigterm_finishes_the_part_at_hand(tmp_path: Path) -> None:

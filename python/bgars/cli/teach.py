@@ -42,9 +42,7 @@ def teach(
     The limits are what these parts keep with a margin; limits from a drawing are better. Exit code 2 where the parts
     differ.
     """
-    if output.exists() and not force:
-        msg = f"{output}: exists; --force replaces it"
-        raise InputError(msg)
+    _check_place(output, force=force)
     need_different(golden, "every part must have images of its own")
     results = []
     with stage_progress() as report:
@@ -65,3 +63,18 @@ def teach(
     parts = f"{taught.parts} part{'' if taught.parts == 1 else 's'}"
     say(f"balls of {taught.diameter_um:.1f} um, {taught.height_um:.1f} um high, from {parts}.")
     say(f"Written: {output}. Check its limits before you use it.")
+
+
+def _check_place(output: Path, *, force: bool) -> None:
+    """Raise InputError where writing would replace a file that is not to be replaced: before long work."""
+    if not output.exists():
+        return
+    if not force:
+        msg = f"{output}: exists; --force replaces it"
+        raise InputError(msg)
+    try:
+        bgars.read_part_recipe(output)
+    except bgars.BgarsError as error:
+        # Recipes bear no mark of bgars, as people write them: what cannot be read as one may be anything.
+        msg = f"{output}: exists and is not a part recipe, which is all that --force replaces; name another file"
+        raise InputError(msg) from error

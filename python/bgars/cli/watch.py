@@ -23,7 +23,7 @@ from bgars.line.inbox import Inbox
 from bgars.line.naming import Naming
 from bgars.line.notify import Notifier
 from bgars.line.warm import warm_up
-from bgars.line.watch import Watch, watched
+from bgars.line.watch import Watch, need_outside, watched
 from bgars.normals.methods import DEFAULT_METHOD
 from bgars.records.part_identity import PartIdentity
 from bgars.store import open_store
@@ -130,14 +130,16 @@ def watch(
     for path in (recipe, rig):
         if path is not None:
             need_path(path)
+    done, failed = done or inbox / "_done", failed or inbox / "_failed"
+    need_outside(inbox, output, done, failed, *(() if rig is None or rig.parent == inbox else (rig,)))
     with watched(inbox):
         watching = Watch(
             Inbox(inbox, count=count, trigger=trigger, settle_s=settle, files=files),
             open_store(output, create=True),
             recipe,
             rig,
-            done or inbox / "_done",
-            failed or inbox / "_failed",
+            done,
+            failed,
             method=method,
             naming=Naming(serial_from, PartIdentity(lot=lot, station=station_name, operator=operator)),
             notifier=Notifier(on_result, post, result_file, tcp),

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from bgars.errors import FileFormatError
+from bgars.files.safe_files import shown
 from bgars.io.own_files import foreign_files, is_own, sign
 
 if TYPE_CHECKING:
@@ -49,6 +50,9 @@ class FolderNames(NamedTuple):
 @contextmanager
 def _write_errors(path: Path) -> Iterator[None]:
     """Turn what the system says into one message that names the output."""
+    if "\0" in str(path):
+        msg = f"{shown(path)}: cannot be written (a name cannot hold a null character)"
+        raise FileFormatError(msg)
     try:
         yield
     except FileFormatError:

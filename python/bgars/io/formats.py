@@ -11,7 +11,8 @@ from bgars.errors import InputError
 from bgars.extras import how_to_install, missing
 from bgars.io.atomic import atomic_file
 from bgars.io.described_tiff import write_described
-from bgars.io.normal_map import write_normal_map
+from bgars.io.normal_map import vectors_to_write, write_normal_map
+from bgars.records.height_map import need_height
 from bgars.records.normal_field import NormalField
 
 if TYPE_CHECKING:
@@ -36,14 +37,15 @@ def write_normals(field: NormalField | NDArray[np.floating], path: str | PathLik
     Parameters
     ----------
     field : NormalField or (H, W, 3) floating
-        The normals.
+        The normals; NaN, masked or a vector of 0 = invalid.
     path : path
         File to write.
 
     Raises
     ------
     InputError
-        An unknown suffix, an array of another shape, a package that is not installed.
+        An unknown suffix, an array of another shape, vectors that are not of length 1 within 0.1, a package that is
+        not installed.
     FileFormatError
         The file cannot be written.
 
@@ -56,10 +58,7 @@ def write_normals(field: NormalField | NDArray[np.floating], path: str | PathLik
     ...     np.load(pathlib.Path(folder) / "n.npz")["normals"].round(1).tolist()
     [[[0.6000000238418579, 0.0, 0.800000011920929]]]
     """
-    normals = field.normals if isinstance(field, NormalField) else np.asarray(field, dtype=np.float32)
-    if normals.ndim != len(("row", "col", "axis")) or normals.shape[2] != len("xyz"):
-        msg = f"normals: must have shape (H, W, 3), got {normals.shape}"
-        raise InputError(msg)
+    normals = vectors_to_write(field)
     write, path = check_normals_file(path)
     with atomic_file(path) as temporary:
         write(field, normals, temporary)
@@ -92,7 +91,7 @@ def write_points(height: HeightMap, path: str | PathLike[str], *, field: NormalF
     Raises
     ------
     InputError
-        An unknown suffix, or a field of another size.
+        An unknown suffix, a field of another size, or no valid pixel.
     FileFormatError
         The file cannot be written.
 
@@ -105,8 +104,11 @@ def write_points(height: HeightMap, path: str | PathLike[str], *, field: NormalF
     ...     print((pathlib.Path(folder) / "p.xyz").read_text().splitlines()[0])
     -5.00000 5.00000 1.00000
     """
-    height.check_field(field)
+    need_height(height, field)
     write, path = _writer(POINT_FORMATS, path, "a point cloud")
+    if not height.mask.any():
+        msg = f"height: has no valid pixel to write to {path}"
+        raise InputError(msg)
     rows, cols = np.nonzero(height.mask)
     pitch = 1.0 if height.pixel_pitch_um is None else height.pixel_pitch_um
     x, y = (cols + 0.5 - height.mask.shape[1] / 2) * pitch, (height.mask.shape[0] / 2 - rows - 0.5) * pitch

@@ -13,6 +13,7 @@ from bgars.io.areal_files import check_areal, write_gsf, write_sdf, write_x3p
 from bgars.io.atomic import atomic_file
 from bgars.io.described_tiff import OWN, write_described
 from bgars.io.guarded import load_npy, load_tiff
+from bgars.records.height_map import need_height
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -87,6 +88,7 @@ def write_height(height: HeightMap, path: str | PathLike[str]) -> None:
     ...     np.load(pathlib.Path(folder) / "h.npy").tolist()
     [[1.0, 1.0]]
     """
+    need_height(height)
     path = Path(path)
     check_height_file(path, has_pitch=height.pixel_pitch_um is not None)
     if not height.mask.any():

@@ -89,6 +89,9 @@ def write_mesh(
     if field is not None:
         msg = "field: goes with a height map; a mesh brings its own normals and colours"
         raise InputError(msg)
+    if not hasattr(mesh, "faces"):
+        msg = f"mesh: must be a trimesh.Trimesh or a HeightMap, got {type(mesh).__name__}"
+        raise InputError(msg)
     if len(mesh.faces) == 0:
         msg = f"mesh: has no faces to write to {path}"
         raise InputError(msg)

@@ -15,7 +15,7 @@ from bgars.io.atomic import atomic_file
 from bgars.io.guarded import stored_shape
 from bgars.io.height import HEIGHT_SUFFIXES
 from bgars.io.masks import read_mask
-from bgars.io.normal_map_encoding import Normals, normals_of
+from bgars.io.normal_map_encoding import UNIT_WITHIN, Normals, normals_of
 from bgars.io.normal_map_pixels import NORMAL_MAP_SUFFIXES, is_normal_array, read_pixels
 from bgars.io.own_files import is_own, sign
 from bgars.records.normal_field import NormalField
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from bgars.records.pixels import FloatArray
 
-__all__ = ["holds_normals", "read_normal_map", "read_stored_normals", "write_normal_map"]
+__all__ = ["holds_normals", "read_normal_map", "read_stored_normals", "vectors_to_write", "write_normal_map"]
 
 FULL = 65535.0
 NORMALS_NDIM = 3
@@ -37,7 +37,7 @@ NORMALS_NDIM = 3
 def write_normal_map(normals: NormalField | FloatArray, path: str | PathLike[str], *, directx: bool = False) -> None:
     """Write normals as a 16-bit RGB PNG: ``round((n + 1) / 2 * 65535)``, R = x, G = y up (OpenGL), B = z.
 
-    Invalid pixels (NaN) are black, which no unit normal encodes to.
+    Invalid pixels (NaN, or a vector of 0) are black, which no unit normal encodes to.
 
     Parameters
     ----------
@@ -51,16 +51,12 @@ def write_normal_map(normals: NormalField | FloatArray, path: str | PathLike[str
     Raises
     ------
     InputError
-        Wrong shape or suffix.
+        Wrong shape or suffix, or vectors that are not of length 1 within 0.1.
     FileFormatError
         The file cannot be written.
     """
     path = Path(path)
-    given: ArrayLike = normals.normals if isinstance(normals, NormalField) else normals
-    vectors = plain("normals", without_mask(given, math.nan), np.float32)
-    if vectors.ndim != NORMALS_NDIM or vectors.shape[2] != NORMALS_NDIM:
-        msg = f"normals: must have shape (H, W, 3), got {vectors.shape}"
-        raise InputError(msg)
+    vectors = vectors_to_write(normals)
     if path.suffix.lower() != ".png":
         msg = f"{path}: a normal map file must end in .png"
         raise InputError(msg)
@@ -74,6 +70,31 @@ def write_normal_map(normals: NormalField | FloatArray, path: str | PathLike[str
     with atomic_file(path) as temporary:
         _bgars.write_png16(temporary, rgb)
         sign(temporary)
+
+
+def vectors_to_write(normals: NormalField | ArrayLike) -> FloatArray:
+    """Return plain (H, W, 3) unit vectors, NaN in all three where a pixel has none: not finite, masked, or 0.
+
+    Raises
+    ------
+    InputError
+        Another shape, no pixel, or lengths that no reader takes for unit vectors.
+    """
+    given: ArrayLike = normals.normals if isinstance(normals, NormalField) else normals
+    vectors = plain("normals", without_mask(given, math.nan), np.float32)
+    if vectors.ndim != NORMALS_NDIM or vectors.shape[2] != NORMALS_NDIM or not vectors.size:
+        msg = f"normals: must have shape (H, W, 3), none of them 0, got {vectors.shape}"
+        raise InputError(msg)
+    length = np.sqrt(np.einsum("...i,...i", vectors, vectors))
+    is_none = ~(np.isfinite(length) & (length > 0.0))
+    is_wrong = ~is_none & (np.abs(length - 1.0) > UNIT_WITHIN)
+    if is_wrong.any():
+        row, col = map(int, np.argwhere(is_wrong)[0])
+        msg = f"normals: at row {row}, column {col}: must have length 1 within {UNIT_WITHIN}, got {length[row, col]:g}"
+        raise InputError(msg)
+    if not is_none.any():
+        return vectors
+    return np.where(is_none[..., np.newaxis], np.float32(np.nan), vectors)
 
 
 def read_normal_map(

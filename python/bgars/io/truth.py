@@ -10,6 +10,7 @@ import numpy as np
 from bgars.errors import FileFormatError
 from bgars.files.mat_files import read_arrays
 from bgars.files.safe_files import read_bounded, read_text
+from bgars.io.given_paths import need_folder
 from bgars.io.images import decode_stack
 from bgars.io.masks import read_mask
 from bgars.records.truth import Truth
@@ -46,7 +47,7 @@ def read_truth(folder: str | PathLike[str]) -> Truth:
     >>> bgars.read_truth(bgars.sample_capture()).normals.shape
     (240, 256, 3)
     """
-    folder = Path(folder)
+    folder = need_folder(folder)
     for place in (folder, folder.resolve().parent):
         if (place / SCENE_TRUTH).is_file():
             return _read_scene(place / SCENE_TRUTH)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from bgars.errors import FileFormatError, InputError
 from bgars.io.recipe import RECIPE_NAME
+from bgars.store.data_set import is_store
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -23,7 +24,7 @@ IMAGES = {".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".pgm", ".ppm", ".pn
 def capture_folders(given: Iterable[str | PathLike[str]]) -> list[Path]:
     """Return the capture folders that are meant, each once, in the order of what was given.
 
-    A pattern stands for the folders that match, a folder of folders for those in it.
+    A pattern stands for the folders that match, a folder of folders for those in it; stores are left out of both.
 
     Raises
     ------
@@ -38,7 +39,8 @@ def capture_folders(given: Iterable[str | PathLike[str]]) -> list[Path]:
         if path.is_dir():
             places = _captures_in(path)
         elif WILD & set(str(path)):
-            places = [Path(name) for name in sorted(glob.glob(str(path))) if Path(name).is_dir()]  # noqa: PTH207
+            matches = map(Path, sorted(glob.glob(str(path))))  # noqa: PTH207
+            places = [match for match in matches if match.is_dir() and not is_store(match)]
             if not places:
                 msg = f"{path}: no folder matches this pattern"
                 raise InputError(msg)
@@ -54,9 +56,11 @@ def capture_folders(given: Iterable[str | PathLike[str]]) -> list[Path]:
 
 
 def _captures_in(folder: Path) -> list[Path]:
-    """The folder itself, or, where it holds no images and no description, the folders in it."""
+    """The folder itself, or, where it holds no images and no description, the folders in it but stores."""
     entries = sorted(folder.iterdir())
     if any(entry.name == RECIPE_NAME or entry.suffix.lower() in IMAGES for entry in entries):
         return [folder]
-    places = [entry for entry in entries if entry.is_dir() and not entry.name.startswith(NO_CAPTURE)]
+    places = [
+        entry for entry in entries if entry.is_dir() and not entry.name.startswith(NO_CAPTURE) and not is_store(entry)
+    ]
     return places or [folder]

@@ -68,7 +68,7 @@ def page_name(serial: str, round_: int | None = None) -> str:
     >>> page_name("SN_1"), page_name("SN1", 2)
     ('SN_1.html', 'SN1.round2.html')
     >>> page_name("SN/1")
-    'SN_1-fc16d0dd.html'
+    'SN_1-417b55fa.html'
     """
     name = re.sub(r"[^\w.+-]", "_", serial)[:LONGEST] or "_"
     if name != serial or RESERVED.search(name):

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from bgars.records.part_result import PartResult
     from bgars.store import Store
 
-__all__ = ["Watch", "watched"]
+__all__ = ["Watch", "need_outside", "watched"]
 
 LOCK = ".bgars-watch.lock"
 DONE, FAILED = "done", "failed"
@@ -257,6 +257,21 @@ class Watch:
                 f"clock: it is {behind_s:.0f} s before the last part of {self.store.folder}; times of inspection "
                 "follow the clock, the order of parts does not"
             )
+
+
+def need_outside(inbox: Path, *places: Path) -> None:
+    """Raise InputError where a folder of the watch lies in the inbox: there it would be taken for a part, and moved.
+
+    Folders whose names begin with a dot or underscore are no parts.
+    """
+    root = inbox.resolve()
+    for place in places:
+        path = place.resolve()
+        if path == root or (root in path.parents and not path.relative_to(root).parts[0].startswith(HIDDEN)):
+            msg = (
+                f"{place}: lies in {inbox}, where every folder is a part; name one elsewhere, or such as {inbox}/_name"
+            )
+            raise InputError(msg)
 
 
 @contextmanager

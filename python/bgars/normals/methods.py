@@ -160,6 +160,9 @@ def added_method(name: object) -> Callable[..., Any]:
         except (ImportError, AttributeError) as error:
             msg = f"method: {name} ({entry.value}) cannot be loaded ({error})"
             raise InputError(msg) from error
+        if not callable(function):
+            msg = f"method: {name} ({entry.value}) must be callable, got {type(function).__name__}"
+            raise InputError(msg)
     parameters = signature(function).parameters.values()
     taken = {parameter.name for parameter in parameters}
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters):

@@ -13,6 +13,7 @@ from bgars.normals.given import GIVEN, given_field
 from bgars.normals.methods import DEFAULT_METHOD, Method
 from bgars.pipelines.normals import estimate_normals
 from bgars.records.normal_field import NormalField
+from bgars.records.plain_arrays import plain, without_mask
 from bgars.records.renamed import renamed
 from bgars.records.whole_capture import need_whole
 from bgars.surface.integrate import integrate_normals
@@ -176,9 +177,15 @@ def evaluate(
 
 
 def angular_error_deg(estimate: FloatArray, truth: FloatArray) -> NDArray[np.float64]:
-    """Angle between two arrays of unit vectors (..., 3), degrees, accurate for small angles too.
+    """Angle between two arrays of vectors (..., 3), degrees, accurate for small angles too.
 
-    NaN in `estimate` counts as (0, 0, 1).
+    Where `estimate` has no normal (NaN, masked, or a vector of 0) it counts as (0, 0, 1); where `truth` has none, the
+    error is NaN.
+
+    Raises
+    ------
+    InputError
+        Arrays that are not numbers, or whose shapes do not fit each other or do not end in 3.
 
     Examples
     --------
@@ -186,12 +193,27 @@ def angular_error_deg(estimate: FloatArray, truth: FloatArray) -> NDArray[np.flo
     >>> angular_error_deg(np.float32([[0, 0.6, 0.8]]), np.float32([[0, 0, 1]])).round(2).tolist()
     [36.87]
     """
-    filled = np.where(np.isfinite(estimate).all(axis=-1, keepdims=True), estimate, [0.0, 0.0, 1.0]).astype(np.float64)
-    known = truth.astype(np.float64)
+    given, is_given = _vectors("estimate", estimate)
+    known, is_known = _vectors("truth", truth)
+    try:
+        np.broadcast_shapes(given.shape, known.shape)
+    except ValueError:
+        msg = f"estimate and truth: must have shapes that fit, got {given.shape} and {known.shape}"
+        raise InputError(msg) from None
+    filled = np.where(is_given[..., np.newaxis], given, [0.0, 0.0, 1.0])
     sine = np.linalg.norm(np.cross(filled, known), axis=-1)
     cosine = (filled * known).sum(axis=-1)
-    degrees: NDArray[np.float64] = np.degrees(np.arctan2(sine, cosine))
+    degrees: NDArray[np.float64] = np.where(is_known, np.degrees(np.arctan2(sine, cosine)), np.nan)
     return degrees
+
+
+def _vectors(name: str, values: ArrayLike) -> tuple[NDArray[np.float64], BoolArray]:
+    """Plain vectors (..., 3), and which of them are normals."""
+    vectors = plain(name, without_mask(values, np.nan), np.float64)
+    if vectors.shape[-1:] != (3,):
+        msg = f"{name}: must have shape (..., 3), got {vectors.shape}"
+        raise InputError(msg)
+    return vectors, np.isfinite(vectors).all(axis=-1) & (vectors != 0.0).any(axis=-1)
 
 
 def _errors(field: NormalField, truth: FloatArray, judged: BoolArray) -> AngularErrors | None:
@@ -219,6 +241,7 @@ def _ball_height_rmse_um(field: NormalField, truth: Truth, judged: BoolArray) ->
     pitch = field.pixel_pitch_um
     if truth.height_um is None or truth.ball_ids is None or pitch is None:
         return None
+    judged = judged & (field.normals[..., 2] > 0.0)  # of an estimator that lets some face away
     if not (field.mask & judged).any():
         return None
     try:

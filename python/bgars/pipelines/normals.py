@@ -12,7 +12,7 @@ import numpy as np
 from bgars import _bgars
 from bgars.balls import find_balls
 from bgars.errors import InputError
-from bgars.normals.given import given_field
+from bgars.normals.given import given_field, within
 from bgars.normals.methods import DEFAULT_METHOD, TABLE, Method, added_method
 from bgars.normals.pixelwise import PIXELWISE_METHODS, PixelwiseMethod, capture_of, combined_mask, pixelwise_normals
 from bgars.normals.reflectance import add_reflectance
@@ -142,7 +142,7 @@ def estimate_normals(
         **{"keep_sets": keep_sets or None, "out": out, "threads": threads, "progress": progress},
     }
     found = run(capture, **{name: value for name, value in options.items() if value is not None})
-    return found if is_own else _within(replace(given_field(found, capture, method), method=method), use)
+    return found if is_own else within(replace(given_field(found, capture, method), method=method), use)
 
 
 def ball_normals(
@@ -170,21 +170,6 @@ def _refuse_idle(method: Method, given: dict[str, object]) -> None:
             users = [name for name, entry in TABLE.items() if option in entry.options]
             msg = f"{option}: only the method {' or '.join(users)} uses it, got method {method!r}"
             raise InputError(msg)
-
-
-def _within(field: NormalField, use: NDArray[np.bool_] | None) -> NormalField:
-    """The field without what lies outside the mask, where a method did not see to it itself."""
-    if use is None or not (field.mask & ~use).any():
-        return field
-    return replace(
-        field,
-        normals=np.where(use[..., None], field.normals, np.float32(np.nan)),
-        albedo=np.where(use, field.albedo, np.float32(np.nan)),
-        mask=field.mask & use,
-        confidence=np.where(use, field.confidence, np.float32(0)),
-        is_measured=field.is_measured & use,
-        lights_kept=np.where(use, field.lights_kept, np.uint16(0)),
-    )
 
 
 def _by_reflectance(

@@ -8,18 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bgars.errors import InputError
+from bgars.io.part_recipe import read_part_recipe
 from bgars.normals.methods import DEFAULT_METHOD, Method
 from bgars.pipelines.inspect import inspect
 from bgars.records.part_identity import PartIdentity
-from bgars.records.part_recipe import layout_places
+from bgars.records.part_recipe import PartRecipe, layout_places
 from bgars.records.whole_capture import need_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from os import PathLike
 
     from bgars.pipelines.inspect import InspectionStage
     from bgars.records.capture import Capture
-    from bgars.records.part_recipe import PartRecipe
     from bgars.records.part_result import PartResult
     from bgars.records.strip_layout import StripLayout, StripPlace
 
@@ -81,7 +82,7 @@ def part_of_strip(capture: Capture, strip: StripLayout, place: StripPlace) -> Ca
 
 def inspect_place(
     capture: Capture,
-    recipe: PartRecipe,
+    recipe: PartRecipe | str | PathLike[str],
     place: str,
     *,
     method: Method = DEFAULT_METHOD,
@@ -96,7 +97,7 @@ def inspect_place(
     ----------
     capture : Capture
         Of the whole strip, with a pixel pitch.
-    recipe : PartRecipe
+    recipe : PartRecipe or path
         With a strip.
     place : str
         Such as ``"R1C2"``: row from the top of the image, column from its left.
@@ -110,12 +111,15 @@ def inspect_place(
 
     Raises
     ------
+    FileFormatError
+        The recipe file cannot be read.
     InputError
         As :func:`places_of_strip` and :func:`bgars.inspect`; no part at this place.
     CalibrationError
         As :func:`bgars.inspect`.
     """
     need_whole(capture)
+    recipe = recipe if isinstance(recipe, PartRecipe) else read_part_recipe(recipe)
     places_of_strip(capture, recipe)
     strip = _strip_of(recipe)
     alone = part_of_strip(capture, strip, strip.place(place))

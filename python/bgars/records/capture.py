@@ -16,12 +16,11 @@ from bgars.records.plain_arrays import (
     plain,
     plain_bool,
 )
+from bgars.records.rig import LightRig
 from bgars.records.shown import ShownCapture
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    from bgars.records.rig import LightRig
 
 __all__ = ["Capture"]
 
@@ -73,6 +72,13 @@ class Capture(ShownCapture):
 
     def __post_init__(self) -> None:
         """Bring the arrays into the layout of the kernels; what a numpy masked stack hides is not used."""
+        rig: object = self.rig
+        if not isinstance(rig, LightRig):
+            msg = (
+                "rig: must be a LightRig, as bgars.LightRig.from_directions(directions) makes it, "
+                f"got {type(rig).__name__}"
+            )
+            raise InputError(msg)
         hidden = masked_pixels(self.images)
         mask = plain_bool("mask", self.mask)
         if hidden is not None and hidden.shape != mask.shape:

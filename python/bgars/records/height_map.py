@@ -24,7 +24,7 @@ from bgars.records.shown import ShownHeight
 if TYPE_CHECKING:
     from bgars.records.bilateral_fit import BilateralFit
 
-__all__ = ["HeightMap"]
+__all__ = ["HeightMap", "need_height"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -124,13 +124,28 @@ class HeightMap(ShownHeight):
         return self.height_px if height_um is None else height_um
 
     def summary(self) -> dict[str, Any]:
-        """Return the record's scalars as plain Python values."""
+        """Return the record's scalars as plain Python values; without a valid pixel the range is NaN."""
         height = self.height[self.mask]
+        span = [float(height.min()), float(height.max())] if height.size else [math.nan, math.nan]
         return {
             "unit": self.unit,
-            f"height_range_{self.unit}": [float(height.min()), float(height.max())],
+            f"height_range_{self.unit}": span,
             "pixels": int(self.mask.sum()),
             "components": len(self.components),
             "iterations": self.iterations,
             "residual": self.residual,
         }
+
+
+def need_height(height: object, field: object = None) -> None:
+    """Raise InputError unless this is a height map, and a field, where there is one, is one of its size."""
+    if not isinstance(height, HeightMap):
+        msg = (
+            "height: must be a HeightMap, as bgars.integrate_normals or bgars.HeightMap.from_array(heights) makes it, "
+            f"got {type(height).__name__}"
+        )
+        raise InputError(msg)
+    if field is not None and not isinstance(field, NormalField):
+        msg = f"field: must be a NormalField, as bgars.estimate_normals makes it, got {type(field).__name__}"
+        raise InputError(msg)
+    height.check_field(field)

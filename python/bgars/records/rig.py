@@ -319,7 +319,7 @@ def _uncertainties(u_deg: ArrayLike | None, count: int) -> NDArray[np.float64] |
     """One standard uncertainty a light; None when unknown."""
     if u_deg is None:
         return None
-    values = np.array(u_deg, dtype=np.float64)
+    values = plain("u_deg", u_deg, np.float64).copy()
     if values.ndim == 0:
         values = np.repeat(values, count)
     if values.shape != (count,):

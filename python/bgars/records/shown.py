@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bgars.errors import InputError
+from bgars.records.plain_arrays import plain
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -85,8 +86,12 @@ class ShownCapture(Shown):
         return _grey(_thinned(capture.images[0]))
 
     def plot(self, light: int = 0, *, axes: Axes | None = None) -> Axes:
-        """Draw the image of a light; returns matplotlib's axes."""
+        """Draw the image of a light (from 0; -1 is the last); returns matplotlib's axes."""
         capture: Any = self
+        lights = len(capture.images)
+        if isinstance(light, bool) or not isinstance(light, (int, np.integer)) or not -lights <= light < lights:
+            msg = f"light: must be a whole number from 0 to {lights - 1}, got {light!r}"
+            raise InputError(msg)
         return _plot(axes, capture.images[light], f"{capture.name}, light {light}", cmap="gray")
 
 
@@ -143,7 +148,7 @@ class ShownField(Shown):
         True
         """
         field: Any = self
-        to_light = np.asarray(direction, dtype=np.float64)
+        to_light = plain("direction", direction, np.float64)
         length = float(np.linalg.norm(to_light)) if to_light.shape == (3,) else 0.0
         if not (math.isfinite(length) and length > 0):
             msg = f"direction: must be three finite numbers, not all 0; got {direction!r}"

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.errors import InputError
+from bgars.records.station import Station
 from bgars.records.station_lens import straightened
 
 if TYPE_CHECKING:
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from bgars.records.flat_field import FlatField
     from bgars.records.response_curve import ResponseCurve
     from bgars.records.rig import LightRig
-    from bgars.records.station import Station
 
 __all__ = ["flat_maps", "legendre_terms", "with_station"]
 
@@ -38,6 +38,10 @@ def with_station(capture: Capture, station: Station) -> Capture:
     InputError
         Another number or order of images than the station has lights, or another image size than its flat field has.
     """
+    given: object = station
+    if not isinstance(given, Station):
+        msg = f"station: must be a Station, as bgars.read_station(FILE) returns it, got {type(given).__name__}"
+        raise InputError(msg)
     if station.lights is not None:
         expected = len(station.lights.rig)
         if len(capture.images) != expected:

@@ -7,10 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bgars.errors import InputError
 from bgars.records.capture import Capture
+from bgars.records.rig import LightRig
 from bgars.simulate.array import truncated_normal
+from bgars.simulate.camera import Camera
 from bgars.simulate.checks import require, whole
+from bgars.simulate.material import Material
 from bgars.simulate.render import Studio, render
+from bgars.simulate.scene import Scene
 from bgars.simulate.sensor import Sensor, stream_key
 from bgars.simulate.shading import Finish
 from bgars.simulate.shadows import check_lights
@@ -20,11 +25,8 @@ from bgars.simulate.truth import SimulatedTruth, SimulationSetup, ball_table, co
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bgars.records.rig import LightRig
     from bgars.simulate.board import Board
-    from bgars.simulate.camera import Camera
-    from bgars.simulate.material import Material, Variation
-    from bgars.simulate.scene import Scene
+    from bgars.simulate.material import Variation
     from bgars.simulate.solids import Array, Solid
 
 __all__ = ["simulate"]
@@ -105,6 +107,15 @@ def simulate(
     >>> capture.images.shape, capture.images.dtype.name, float(truth.height_px.max()).__round__()
     ((8, 270, 270), 'uint8', 90)
     """
+    for name, given, wanted in (
+        ("scene", scene, Scene),
+        ("rig", rig, LightRig),
+        ("material", material, Material),
+        ("camera", camera, Camera),
+    ):
+        if not isinstance(given, wanted):
+            msg = f"{name}: must be a bgars.{wanted.__name__}, got {type(given).__name__}"
+            raise InputError(msg)
     whole("seed", seed, 0, MAX_SEED)
     for name, count in (("threads", threads), ("tile_rows", tile_rows)):
         if count is not None:

@@ -69,6 +69,12 @@ def calibrate_flat(capture: Capture) -> tuple[FlatField, tuple[Remark, ...]]:
     height, width = capture.mask.shape
     step = max(1, math.ceil(max(height, width) / BLOCKS))
     means, weights, x, y = _blocks(levels.images, capture.mask, step)
+    if not len(weights):
+        msg = f"{capture.name}: the mask has {np.count_nonzero(capture.mask)} pixels, too few for a flat field"
+        raise CalibrationError(msg)
+    if not np.isfinite(means).all():
+        msg = f"{capture.name}: images: must be finite inside the mask"
+        raise CalibrationError(msg)
     for index, image in enumerate(levels.images):
         name = light_name(index, capture.files)
         inside = image[capture.mask]

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bgars.errors import FileFormatError, InputError
+from bgars.files.safe_files import need_readable
 from bgars.records.ball_result import BallResult
 from bgars.records.keys import old_names
 from bgars.studies.characteristics import CHARACTERISTICS
@@ -38,6 +39,7 @@ def read_references(path: str | PathLike[str]) -> References:
         An unknown characteristic, a value that is no number, a line that comes twice; file and line are named.
     """
     path = Path(path)
+    need_readable(path)
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             rows = list(csv.reader(file))

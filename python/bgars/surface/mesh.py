@@ -8,6 +8,7 @@ import numpy as np
 
 from bgars import _bgars
 from bgars.errors import InputError
+from bgars.records.height_map import need_height
 from bgars.records.scalar_checks import thread_count
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ def mesh_from_height(
     import trimesh  # noqa: PLC0415 - half a second, only for those who want its record
 
     threads = thread_count(threads)
-    height.check_field(field)
+    need_height(height, field)
     pitch = 1.0 if height.pixel_pitch_um is None else height.pixel_pitch_um
     vertices, faces, pixels = _bgars.triangulate(height.height_px, height.mask, pitch, threads=threads)
     check_faces(len(vertices), len(faces))

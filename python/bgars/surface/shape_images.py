@@ -10,6 +10,8 @@ import numpy as np
 import scipy  # loads its modules when they are used
 
 from bgars.errors import InputError
+from bgars.records.height_map import need_height
+from bgars.records.scalar_checks import number
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,7 +23,11 @@ if TYPE_CHECKING:
 __all__ = ["ShapeImages", "shape_images"]
 
 LEAST_WEIGHT = 0.5
-"""Share of a smoothing window that must be valid."""
+"""Share of a smoothing window, as far as it lies in the image, that must be valid."""
+REACH = 4.0
+"""Radius of the window, in standard deviations."""
+LEAST_SPREAD = 1e-9
+"""Determinant of the weights' moments, in scales, above which pixels fix a plane."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +58,11 @@ class ShapeImages:
 def shape_images(height: HeightMap, *, scale_px: float = 2.0) -> ShapeImages:
     """Return slope, curvatures and fine relief of a height map.
 
-    Heights are smoothed by a Gaussian over the valid pixels; slope and curvatures are those of the smoothed surface,
-    by central differences (do Carmo, Differential Geometry of Curves and Surfaces, 1976, section 3-3).
+    Each height is smoothed by the plane that fits the valid pixels around it best, weighted by a Gaussian (local linear
+    regression; Fan and Gijbels, Local Polynomial Modelling and Its Applications, 1996, section 3.1): inside the surface
+    this is the Gaussian's mean, and at its edges a tilted plane stays one. Slope and curvatures are those of the
+    smoothed surface, by central differences (do Carmo, Differential Geometry of Curves and Surfaces, 1976, section
+    3-3). Nearer than `scale_px` to an edge, curvatures may be wrong by half, in corners by more.
 
     Parameters
     ----------
@@ -78,18 +87,16 @@ def shape_images(height: HeightMap, *, scale_px: float = 2.0) -> ShapeImages:
     >>> round(float(shape.mean_curvature[20, 20]), 3), round(float(shape.slope_deg[20, 30]), 0)
     (-0.02, 12.0)
     """
+    need_height(height)
+    scale_px = number("scale_px", scale_px)
     if not (math.isfinite(scale_px) and scale_px > 0):
-        msg = f"scale_px: must be finite and above 0, got {scale_px}"
+        msg = f"scale_px: must be finite and above 0, got {scale_px:g}"
         raise InputError(msg)
     if min(height.mask.shape) < len(("one", "two")):
         msg = f"height: must have 2 x 2 pixels at least, got {height.mask.shape}"
         raise InputError(msg)
     spacing = 1.0 if height.pixel_pitch_um is None else height.pixel_pitch_um
-    weight = scipy.ndimage.gaussian_filter(height.mask.astype(np.float64), scale_px)
-    filled = np.where(height.mask, height.height.astype(np.float64), 0.0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        smooth = scipy.ndimage.gaussian_filter(filled, scale_px) / weight
-    smooth[(weight < LEAST_WEIGHT) | ~height.mask] = np.nan
+    smooth = _smoothed(height, scale_px)
     z_down, z_x = np.gradient(smooth, spacing)
     z_y = -z_down
     z_x_down, z_xx = np.gradient(z_x, spacing)
@@ -104,3 +111,33 @@ def shape_images(height: HeightMap, *, scale_px: float = 2.0) -> ShapeImages:
         (height.height - smooth).astype(np.float32),
         height.unit,
     )
+
+
+def _smoothed(height: HeightMap, scale_px: float) -> NDArray[np.float64]:
+    """(H, W) value at each pixel of the plane that fits around it, by its normal equations; NaN where too little is."""
+    reach = min(int(REACH * scale_px + 0.5), max(height.mask.shape))
+    offset = np.arange(-reach, reach + 1) / scale_px
+    gaussian = np.exp(-0.5 * offset**2)
+    gaussian /= gaussian.sum()
+    kernels = [gaussian * offset**power for power in range(3)]
+
+    def moments(values: NDArray[np.float64], *powers: tuple[int, int]) -> list[NDArray[np.float64]]:
+        along = [scipy.ndimage.correlate1d(values, kernel, axis=0, mode="constant") for kernel in kernels]
+        return [scipy.ndimage.correlate1d(along[row], kernels[col], axis=1, mode="constant") for row, col in powers]
+
+    weight, row, col, row_row, row_col, col_col = moments(
+        height.mask.astype(np.float64), (0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)
+    )
+    mean, by_row, by_col = moments(np.where(height.mask, height.height.astype(np.float64), 0.0), (0, 0), (1, 0), (0, 1))
+    minors = row_row * col_col - row_col**2, row_col * col - row * col_col, row * row_col - row_row * col
+    determinant = weight * minors[0] + row * minors[1] + col * minors[2]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        smooth: NDArray[np.float64] = (minors[0] * mean + minors[1] * by_row + minors[2] * by_col) / determinant
+        # Pixels in one line fix no plane: their mean it is.
+        is_flat = determinant > LEAST_SPREAD
+        smooth = np.where(is_flat, smooth, mean / weight)
+    in_image = np.multiply.outer(
+        *(scipy.ndimage.correlate1d(np.ones(side), gaussian, mode="constant") for side in weight.shape)
+    )
+    smooth[(weight < LEAST_WEIGHT * in_image) | ~height.mask] = np.nan
+    return smooth

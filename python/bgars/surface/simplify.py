@@ -15,7 +15,8 @@ import numpy as np
 from bgars import _bgars
 from bgars.errors import InputError
 from bgars.extras import how_to_install, missing
-from bgars.records.scalar_checks import thread_count
+from bgars.records.height_map import need_height
+from bgars.records.scalar_checks import number, thread_count
 from bgars.surface.mesh import check_faces
 
 if TYPE_CHECKING:
@@ -106,7 +107,7 @@ def simplified_mesh(
     expected = np.where(used.reshape(height.mask.shape), height.height_px.astype(np.float64), np.nan)
     best, best_error_px = (vertices, faces.astype(np.int64)), 0.0
     good_log2, bad_log2 = 0.0, LEAST_KEPT_LOG2
-    for number in range(TRIES):
+    for tried_before in range(TRIES):
         kept_log2 = (good_log2 + bad_log2) / 2.0
         target = max(1, int(len(faces) * 2.0**kept_log2))
         tried = fast_simplification.simplify(vertices, faces, target_count=target, preserve_border=True)
@@ -118,7 +119,7 @@ def simplified_mesh(
         else:
             bad_log2 = kept_log2
         if progress is not None:
-            progress((number + 1) / TRIES)
+            progress((tried_before + 1) / TRIES)
     wide_vertices, wide_faces = (
         np.ascontiguousarray(best[0], np.float64) * pitch_um,
         np.ascontiguousarray(best[1], np.int64),
@@ -230,6 +231,8 @@ def _parts(sizes: NDArray[np.float64]) -> list[slice]:
 
 
 def _check(height: HeightMap, max_error_um: float) -> None:
+    need_height(height)
+    max_error_um = number("max_error_um", max_error_um)
     if not (math.isfinite(max_error_um) and max_error_um > 0):
         msg = f"max_error_um: must be finite and above 0, got {max_error_um:g}"
         raise InputError(msg)
