@@ -285,7 +285,7 @@ def test_a_second_watch_is_refused(inbox: Path) -> None:
 def test_no_folder_of_the_watch_lies_among_the_parts(inbox: Path, option: str, place: str) -> None:
     options = {"-o": inbox.parent / "store"} | {option: inbox / place}
     run = CliRunner().invoke(app, ["watch", str(inbox), *(str(word) for pair in options.items() for word in pair)])
-    assert "where every folder is a part" in str(run.exception)
+    assert "would be taken for a part, as every folder in" in str(run.exception)
     assert list(inbox.iterdir()) == []
 
 

@@ -80,8 +80,8 @@ class Watch:
             self._name = read_part_recipe(self.recipe).name
         if self.rig is not None:
             read_recipe(self.rig / RECIPE_NAME if self.rig.is_dir() else self.rig)
+        need_outside(self.inbox.folder, self.done, self.failed)
         for place in (self.done, self.failed):
-            self._need_outside(place)
             try:
                 place.mkdir(parents=True, exist_ok=True)
             except OSError as error:
@@ -91,16 +91,6 @@ class Watch:
                 msg = f"{place}: must be on the drive of {self.inbox.folder}: parts are renamed into it, never copied"
                 raise InputError(msg)
         self._warn_of_clock()
-
-    def _need_outside(self, place: Path) -> None:
-        """Refuse a folder for parts that would itself be taken for a part that arrives."""
-        inbox, whole = self.inbox.folder.resolve(), place.resolve()
-        if not whole.is_relative_to(inbox):
-            return
-        below = whole.relative_to(inbox).parts
-        if not below or not below[0].startswith(HIDDEN):
-            msg = f"{place}: would be taken for a part: name a folder outside {inbox}, or one of it as _NAME"
-            raise InputError(msg)
 
     def run(self, *, most: int | None = None) -> None:
         """Watch until :attr:`is_stopping`, or so many parts were taken; the part at hand is always finished."""
@@ -268,9 +258,7 @@ def need_outside(inbox: Path, *places: Path) -> None:
     for place in places:
         path = place.resolve()
         if path == root or (root in path.parents and not path.relative_to(root).parts[0].startswith(HIDDEN)):
-            msg = (
-                f"{place}: lies in {inbox}, where every folder is a part; name one elsewhere, or such as {inbox}/_name"
-            )
+            msg = f"{place}: would be taken for a part, as every folder in {inbox}; name another, such as {inbox}/_name"
             raise InputError(msg)
 
 
