@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import bgars
 import numpy as np
 import pytest
+from bgars.inspection import measure_balls, own_shape
 from bgars.inspection.bundle import Solution, solve_bundle
 from bgars.inspection.bundle_normal import Priors
 from bgars.inspection.common_terms import COMMON_TERMS, EDGE_TERMS, ELEVATION, ROUNDNESS
 from bgars.inspection.own_shape import free_shapes
+from bgars.inspection.results import OWN_SHAPE
 from numpy.typing import NDArray
 from test_budget import points
+from test_measure_balls import array, photograph
 
 Array = NDArray[np.float64]
 NOISE_PX = 0.03
@@ -115,3 +119,16 @@ def test_balls_that_are_alike_stay_as_they_are() -> None:
     for seed in range(6):
         spheroids, free, _ = fitted(None, 50 + seed)
         assert free is spheroids
+
+
+def test_a_round_ball_with_a_shape_of_its_own_is_measured_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    capture, truth, found = photograph(array(3, 3, 1), bgars.LightRig.ring(8), pitch_um=20.0)
+    plain = measure_balls(capture, found).balls[ODD]
+    monkeypatch.setattr(own_shape, "_unlike", lambda solution, *_: np.arange(len(solution.balls)) == ODD)
+    measured = measure_balls(capture, found)
+    odd, true = measured.balls[ODD], truth.balls[ODD]
+    assert [text for text in measured.warnings if "its shape is fitted" in text] == [f"{odd.name}: {OWN_SHAPE}"]
+    for name in ("x_um", "y_um", "diameter_um", "top_um"):
+        value, u, known = getattr(odd, name), getattr(odd, f"u_{name}"), getattr(true, name)
+        assert abs(value - known) < 3.0 * u
+        assert u > getattr(plain, f"u_{name}")

@@ -47,7 +47,7 @@ class Fit:
     """Everything the shadows gave, in pixels.
 
     `index` (n,) balls whose shadows were looked at (no bridges); `solution` only of those that `usability` calls
-    usable.
+    usable; `own_shapes` balls that are no spheroids.
     """
 
     problem: Problem
@@ -60,6 +60,7 @@ class Fit:
     doubts: tuple[str, ...] = ()
     priors: Priors | None = None
     settled: Settled | None = None
+    own_shapes: NDArray[np.intp] | None = None
 
 
 def fit_shadows(
@@ -101,7 +102,8 @@ def fit_shadows(
         warnings = _warnings(problem, complaints, edges, None, enough)
         return Fit(problem, index, usability, None, edges, spread, warnings)
     mixtures = common_mixtures(problem, passes.priors, refine_lights)
-    settled = settle(_free_shapes(passes, passes.solution), passes.priors, mixtures)
+    solution, own_shapes = _free_shapes(passes, passes.solution)
+    settled = settle(solution, passes.priors, mixtures)
     moved = abs(float(settled.solution.common[ROUNDNESS] - passes.solution.common[ROUNDNESS]))
     if ROUNDNESS in mixtures and moved > LINEAR_ROUNDNESS:
         u_common = passes.priors.u_common.copy()
@@ -109,7 +111,8 @@ def fit_shadows(
         passes.from_elsewhere(settled.solution.state, u_common)
         edges, usability = passes.edges, passes.usability
         if passes.solution is not None:
-            settled = settle(_free_shapes(passes, passes.solution), passes.priors, mixtures)
+            solution, own_shapes = _free_shapes(passes, passes.solution)
+            settled = settle(solution, passes.priors, mixtures)
     # First heights may be wrong, and what lies in the image with them.
     in_view &= lights_in_view(problem, passes.state.balls)
     warnings = _warnings(problem, complaints, passes.used, passes.solution, in_view)
@@ -117,16 +120,18 @@ def fit_shadows(
     if passes.shifts is not None and passes.outlines is not None:
         warnings += check_shifts(passes.shifts, files)
         doubts = displaced_images(passes.outlines, files)
-    return Fit(problem, index, usability, settled.solution, edges, spread, warnings, doubts, passes.priors, settled)
+    return Fit(
+        problem, index, usability, settled.solution, edges, spread, warnings, doubts, passes.priors, settled, own_shapes
+    )
 
 
-def _free_shapes(passes: ShadowPasses, solution: Solution) -> Solution:
-    """Balls that are unlike the others get shapes of their own, and priors to match."""
+def _free_shapes(passes: ShadowPasses, solution: Solution) -> tuple[Solution, NDArray[np.intp]]:
+    """Balls that are unlike the others get shapes of their own, and priors to match; returns which balls these are."""
     chosen, u_q = passes.index[passes.usability.usable], passes.priors.u_q.copy()
     solution, odd = free_shapes(solution, passes.used, passes.priors.of_balls(chosen), passes.problem.near, REDESCEND)
     u_q[chosen[odd]] = FREE
     passes.priors = passes.priors._replace(u_q=u_q)
-    return solution
+    return solution, chosen[odd]
 
 
 def _warnings(
