@@ -48,16 +48,17 @@ def points(elevation_deg: float, seed: int, noise_px: float) -> tuple[Edges, Sta
     return edges, state, table[:, [0, 1, 3]] + 0.05 * random.standard_normal((len(table), 3))
 
 
-def fitted(elevation_deg: float, seed: int, noise_px: float = 0.03) -> tuple[Solution, State]:
-    edges, state, outlines = points(elevation_deg, seed, noise_px)
-    count = len(outlines)
-    u_common = np.full(COMMON_TERMS, 0.01)
+def point_priors(
+    state: State, outlines: Array, *, u_outline_px: float, u_q: float, u_elevation_deg: float, u_roundness: float
+) -> Priors:
+    """Priors around the truth, of lights that hardly move on a flat board."""
+    count, u_common = len(outlines), np.full(COMMON_TERMS, 0.01)
     u_common[list(EDGE_TERMS)] = 0.003
-    u_common[ELEVATION], u_common[ROUNDNESS] = np.radians(1.5), 1e-4
-    priors = Priors(
+    u_common[ELEVATION], u_common[ROUNDNESS] = np.radians(u_elevation_deg), u_roundness
+    return Priors(
         outlines,
-        np.full((count, 3), 0.05),
-        np.full(count, 1e-4),
+        np.full((count, 3), u_outline_px),
+        np.full(count, u_q),
         state.vectors,
         np.full(8, np.radians(0.01)),
         np.zeros((8, 2)),
@@ -67,6 +68,11 @@ def fitted(elevation_deg: float, seed: int, noise_px: float = 0.03) -> tuple[Sol
         np.zeros(COMMON_TERMS),
         u_common,
     )
+
+
+def fitted(elevation_deg: float, seed: int, noise_px: float = 0.03) -> tuple[Solution, State]:
+    edges, state, outlines = points(elevation_deg, seed, noise_px)
+    priors = point_priors(state, outlines, u_outline_px=0.05, u_q=1e-4, u_elevation_deg=1.5, u_roundness=1e-4)
     return solve_bundle(edges, state, False, priors, redescend=3.5), state
 
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from bgars.inspection import measure_balls, own_shape
 from bgars.inspection.bundle import Solution, solve_bundle
-from bgars.inspection.bundle_normal import Priors
-from bgars.inspection.common_terms import COMMON_TERMS, EDGE_TERMS, ELEVATION, ROUNDNESS
+from bgars.inspection.bundle_model import linearise_edges
+from bgars.inspection.bundle_normal import normal_equations
 from bgars.inspection.own_shape import free_shapes
-from bgars.inspection.results import OWN_SHAPE
+from bgars.inspection.results import NO_SPHEROID
 from numpy.typing import NDArray
-from test_budget import points
+from test_budget import point_priors, points
 from test_measure_balls import array, photograph
 
 Array = NDArray[np.float64]
@@ -63,23 +63,7 @@ def fitted(shape: str | None, seed: int) -> tuple[Solution, Solution, Array]:
         edges = replace(edges, x=x, y=y)
         # What a circle makes of an outline that is none.
         outlines[ODD] += [0.5, -0.3, 0.3]
-    count = len(outlines)
-    u_common = np.full(COMMON_TERMS, 0.01)
-    u_common[list(EDGE_TERMS)] = 0.003
-    u_common[ELEVATION], u_common[ROUNDNESS] = np.radians(0.05), 1e-3
-    priors = Priors(
-        outlines,
-        np.full((count, 3), 0.1),
-        np.full(count, 3e-4),
-        state.vectors,
-        np.full(8, np.radians(0.01)),
-        np.zeros((8, 2)),
-        np.full((8, 2), 1e-3),
-        np.zeros(5),
-        np.full(5, 1e-9),
-        np.zeros(COMMON_TERMS),
-        u_common,
-    )
+    priors = point_priors(state, outlines, u_outline_px=0.1, u_q=3e-4, u_elevation_deg=0.05, u_roundness=1e-3)
     spheroids = solve_bundle(edges, state, False, priors, redescend=3.5)
     free, odd = free_shapes(spheroids, edges, priors, False, 3.5)
     assert np.flatnonzero(odd).tolist() == ([] if shape is None else [ODD])
@@ -127,8 +111,21 @@ def test_a_round_ball_with_a_shape_of_its_own_is_measured_and_named(monkeypatch:
     monkeypatch.setattr(own_shape, "_unlike", lambda solution, *_: np.arange(len(solution.balls)) == ODD)
     measured = measure_balls(capture, found)
     odd, true = measured.balls[ODD], truth.balls[ODD]
-    assert [text for text in measured.warnings if "its shape is fitted" in text] == [f"{odd.name}: {OWN_SHAPE}"]
+    assert [text for text in measured.warnings if "its shape is fitted" in text] == [f"{odd.name}: {NO_SPHEROID}"]
     for name in ("x_um", "y_um", "diameter_um", "top_um"):
         value, u, known = getattr(odd, name), getattr(odd, f"u_{name}"), getattr(true, name)
         assert abs(value - known) < 3.0 * u
         assert u > getattr(plain, f"u_{name}")
+
+
+def test_normal_equations_without_more_terms_are_those_of_the_kernel() -> None:
+    edges, state, outlines = points(45.0, 3, NOISE_PX)
+    priors = point_priors(state, outlines, u_outline_px=0.1, u_q=3e-4, u_elevation_deg=0.05, u_roundness=1e-3)
+    model = linearise_edges(edges, state, False)
+    weight = np.random.default_rng(3).uniform(0.0, 1e3, model.residual.shape)
+    weight[0, 0, :4] = 0.0
+    model.rows[0, 0, :4] = np.nan
+    by_kernel = normal_equations(model, weight, state, priors)
+    by_numpy = normal_equations(model, weight, state, priors, np.zeros((*weight.shape, 0)))
+    for kernel, numpy in zip(by_kernel, by_numpy, strict=True):
+        np.testing.assert_allclose(numpy, kernel, rtol=1e-9, atol=1e-9 * np.abs(kernel).max())

@@ -31,7 +31,8 @@ __all__ = ["free_shapes"]
 
 Array = NDArray[np.float64]
 
-SHAPE_TERMS = 4
+OWN_TERMS = 4
+"""Two tilts and two ovalities."""
 Z, RADIUS, Q = 2, 3, 4
 """Places of a ball's terms."""
 UNLIKE = 20.0
@@ -45,12 +46,12 @@ LARGEST_STEP = 0.1
 
 
 class _Fitted(NamedTuple):
-    """Balls with shapes of their own (n, SHAPE_TERMS) in px, the priors and standard deviations they were fitted by."""
+    """Balls with shapes of their own (n, OWN_TERMS), the priors they were fitted by, the shapes' deviations (n, 1)."""
 
     state: State
-    shape: Array
+    shape_px: Array
     priors: Priors
-    u_shape: Array
+    u_shape_px: Array
 
 
 def free_shapes(
@@ -84,8 +85,8 @@ def free_shapes(
     own = _fitted(solution.state, edges, priors, odd, variance, near, redescend)
     if not np.isfinite(own.state.balls).all():
         return solution, np.zeros_like(odd)
-    balls, shape = solution.balls.copy(), np.zeros((len(odd), SHAPE_TERMS))
-    balls[odd], shape[odd] = own.state.balls, own.shape
+    balls, shape = solution.balls.copy(), np.zeros((len(odd), OWN_TERMS))
+    balls[odd], shape[odd] = own.state.balls, own.shape_px
     solution = replace(solution, balls=balls)
     model, by_shape = _with_shape(linearise_edges(edges, solution.state, near), balls[:, Q], shape)
     honest = honest_weights(model.residual, variance, known, redescend)
@@ -94,7 +95,7 @@ def free_shapes(
     normal = _normal(EdgeModel(*(part[odd] for part in model)), weight, own, by_shape[odd])
     inverse = np.linalg.inv(normal.balls)
     relief = relief_variances(model.residual, edges.u_px, solution.vectors)[odd]
-    left_out = np.square(NO_ELLIPSOID) * np.square(own.shape).sum(axis=1)
+    left_out = np.square(NO_ELLIPSOID) * np.square(own.shape_px).sum(axis=1)
     own_variance = relief + left_out[:, None] * (np.arange(BALL_TERMS) != Q)
     alone = inverse[:, :BALL_TERMS, :BALL_TERMS] + own_variance[:, :, None] * np.eye(BALL_TERMS)
     robust = robust_weights(model.residual, variance, known, redescend) * variance
@@ -122,7 +123,7 @@ def _unlike(solution: Solution, edges: Edges, priors: Priors, near: bool, weight
     count = len(solution.balls)
     if count < MIN_POPULATION:
         return np.zeros(count, dtype=np.bool_)
-    none = np.zeros((count, SHAPE_TERMS))
+    none = np.zeros((count, OWN_TERMS))
     model, by_shape = _with_shape(linearise_edges(edges, solution.state, near), solution.balls[:, Q], none)
     usual = max(float(np.median(solution.factor)), 1.0)
     at_rest = _Fitted(solution.state, none, priors, FREE * priors.outlines[:, 2:])
@@ -135,7 +136,7 @@ def _unlike(solution: Solution, edges: Edges, priors: Priors, near: bool, weight
     off = shape - np.median(shape, axis=0)
     single = np.einsum("nii->ni", covariance)
     excess = float(np.median(np.square(off) - MEDIAN_CHI_SQUARE * single)) / MEDIAN_CHI_SQUARE
-    total = covariance + max(excess, 0.0) * np.eye(SHAPE_TERMS)
+    total = covariance + max(excess, 0.0) * np.eye(OWN_TERMS)
     unlike: NDArray[np.bool_] = np.einsum("ni,ni->n", off, np.linalg.solve(total, off[..., None])[..., 0]) > UNLIKE
     return unlike
 
@@ -154,25 +155,25 @@ def _fitted(
     state, edges, variance, priors = state.take(index), edges.take(odd), variance[odd], priors.of_balls(index)
     priors = priors._replace(u_q=np.full(len(index), FREE))
     radius, u_outlines = priors.outlines[:, 2:], priors.u_outlines
-    limit = LARGEST_STEP * np.where(np.arange(BALL_TERMS + SHAPE_TERMS) == Q, 1.0, radius)
-    own = _Fitted(state, np.zeros((len(index), SHAPE_TERMS)), priors, FREE * radius)
+    limit = LARGEST_STEP * np.where(np.arange(BALL_TERMS + OWN_TERMS) == Q, 1.0, radius)
+    own = _Fitted(state, np.zeros((len(index), OWN_TERMS)), priors, FREE * radius)
     for turn in range(ROUNDS):
         # A circle that was fitted to what is none is off by about as much.
-        aside = np.linalg.norm(own.shape, axis=1)[:, None]
+        aside = np.linalg.norm(own.shape_px, axis=1)[:, None]
         own = own._replace(priors=priors._replace(u_outlines=np.hypot(u_outlines, aside)))
-        model, by_shape = _with_shape(linearise_edges(edges, own.state, near), own.state.balls[:, Q], own.shape)
+        model, by_shape = _with_shape(linearise_edges(edges, own.state, near), own.state.balls[:, Q], own.shape_px)
         # At first with weights that find the way from farther off.
         scale = redescend if turn >= ROUNDS // 2 else None
         weight = robust_weights(model.residual, variance, np.isfinite(edges.u_px), scale)
         normal = _normal(model, weight, own, by_shape)
         step = np.clip(np.linalg.solve(normal.balls, normal.right[..., None])[..., 0], -limit, limit)
         moved = own.state._replace(balls=own.state.balls + step[:, :BALL_TERMS])
-        own = own._replace(state=moved, shape=own.shape + step[:, BALL_TERMS:])
+        own = own._replace(state=moved, shape_px=own.shape_px + step[:, BALL_TERMS:])
     return own
 
 
 def _with_shape(model: EdgeModel, q: Array, shape: Array) -> tuple[EdgeModel, Array]:
-    """Distances to the edges of shaped balls; derivatives (N, L, S, SHAPE_TERMS) by tilts and ovalities, px.
+    """Distances to the edges of shaped balls; derivatives (N, L, S, OWN_TERMS) by tilts and ovalities, px.
 
     The derivatives by place and radius show the normal of the ball where it throws the edge.
     """
@@ -187,7 +188,7 @@ def _with_shape(model: EdgeModel, q: Array, shape: Array) -> tuple[EdgeModel, Ar
 def _normal(model: EdgeModel, weight: Array, own: _Fitted, by_shape: Array) -> NormalEquations:
     """Normal equations of balls and their shapes, with the shapes' prior."""
     normal = normal_equations(model, weight, own.state, own.priors, by_shape)
-    at = range(BALL_TERMS, BALL_TERMS + SHAPE_TERMS)
-    normal.balls[:, at, at] += own.u_shape**-2.0
-    normal.right[:, BALL_TERMS:] -= own.shape / own.u_shape**2
+    at = range(BALL_TERMS, BALL_TERMS + OWN_TERMS)
+    normal.balls[:, at, at] += own.u_shape_px**-2.0
+    normal.right[:, BALL_TERMS:] -= own.shape_px / own.u_shape_px**2
     return normal

@@ -55,7 +55,7 @@ CLIPPED_SHARE = 0.5
 """Share of board around a ball, saturated or masked, that explains why nothing was measured."""
 LIGHT_WARNING_DEG = 5.0
 """Move of a light in the fit that is told."""
-OWN_SHAPE = "its shadows show a tilted, oval or dented ball; its shape is fitted, and its uncertainties are larger"
+NO_SPHEROID = "its shadows show a tilted, oval or dented ball; its shape is fitted, and its uncertainties are larger"
 WORTH_TELLING = 0.05
 """Causes of less than this share of an uncertainty are not listed: together they are a few thousandths of it."""
 
@@ -126,7 +126,7 @@ def measurement(found: FoundBalls, problem: Problem, fit: Fit | None, flats: Fla
     if fit.settled is not None:
         warnings += what_is_odd(fit.settled, problem.pitch_um)
     if fit.own_shapes is not None:
-        warnings += tuple(f"{found.balls[ball].name}: {OWN_SHAPE}" for ball in fit.own_shapes)
+        warnings += tuple(f"{found.balls[ball].name}: {NO_SPHEROID}" for ball in fit.own_shapes)
     warnings += tuple(
         f"{light_name(light, files)}: its shadows place it {moved[light]:.1f} degrees off its direction in the rig"
         for light in map(int, np.flatnonzero(moved > LIGHT_WARNING_DEG))

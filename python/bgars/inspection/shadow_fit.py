@@ -47,7 +47,8 @@ class Fit:
     """Everything the shadows gave, in pixels.
 
     `index` (n,) balls whose shadows were looked at (no bridges); `solution` only of those that `usability` calls
-    usable; `own_shapes` balls that are no spheroids.
+    usable; `own_shapes` (m,) balls that are no
+    spheroids.
     """
 
     problem: Problem
