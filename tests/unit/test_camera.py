@@ -74,3 +74,20 @@ def test_what_a_driver_raises_is_one_line_that_names_the_light(tmp_path: Path) -
     with pytest.raises(bgars.BgarsError, match=r"camera: grab\(1\) gave no image \(IndexError: tuple index"):
         take_capture(Broken(np.zeros((4, 4), np.uint8)), tmp_path / "part", lights=2)
     assert not (tmp_path / "part").exists()
+
+
+def test_what_the_rig_names_comes_along_or_is_missed_before_the_first_image(tmp_path: Path) -> None:
+    camera = FolderCamera(bgars.sample_capture())
+    rig = tmp_path / "rig.toml"
+    rig.write_text('[lights]\nangles_deg = "lights/ring.csv"\n')
+    with pytest.raises(bgars.InputError, match=r"rig.toml: lights.angles_deg: the file 'lights/ring.csv' must stand"):
+        take_capture(camera, tmp_path / "part", lights=8, rig=rig)
+    assert not (tmp_path / "part").exists()
+    (tmp_path / "lights").mkdir()
+    (tmp_path / "lights" / "ring.csv").write_text("".join(f"{45 * light},45\n" for light in range(8)))
+    assert take_capture(camera, tmp_path / "part", lights=8, rig=rig)[-1] == "lights/ring.csv"
+    elevations = np.degrees(np.arcsin(bgars.read_capture(tmp_path / "part").rig.directions[:, 2]))
+    assert np.allclose(elevations, 45)
+    rig.write_text('station = "station.toml"\n')
+    with pytest.raises(bgars.InputError, match=r"station: 'station\.toml' is not found from"):
+        take_capture(camera, tmp_path / "other", lights=8, rig=rig)

@@ -268,6 +268,13 @@ def test_wrong_use_is_exit_code_2(tmp_path: Path, arguments: list[str], words: s
     assert list(tmp_path.iterdir()) == [], "nothing is left behind"
 
 
+@pytest.mark.parametrize("arguments", [[], ["--threads", 4]])
+def test_no_command_is_answered_with_the_help(tmp_path: Path, arguments: list[Any]) -> None:
+    run = bgars_command(*arguments, cwd=tmp_path)
+    assert run.returncode == 2
+    assert "bgars demo" in run.stdout
+
+
 def test_a_process_ends_in_the_same_code_and_words(tmp_path: Path) -> None:
     run = bgars_process("reconstruct", "nowhere", "-o", "out", cwd=tmp_path)
     assert (run.returncode, run.stdout, run.stderr) == (2, "", "error: nowhere: no such folder\n")

@@ -95,5 +95,9 @@ def test_any_question_is_charted(tmp_path: Path) -> None:
         query_charts(store, "select serial from parts")
     with pytest.raises(bgars.InputError, match="at least 3 rows"):
         query_charts(store, "select 1.0 as x")
+    with pytest.raises(
+        bgars.InputError, match=r"query: x: must be within -1e\+100 and 1e\+100 to be charted, got 1e\+308"
+    ):
+        query_charts(store, "select 1e308 as x from range(4)")
     with pytest.raises(bgars.InputError, match="values: must be finite"):
         individuals_chart(np.array([1.0, np.nan, 2.0]))

@@ -192,6 +192,7 @@ def test_verify_prints_json_of_a_single_capture(tmp_path: Path) -> None:
     [
         (["--ring", "nan,45"], "--ring: must be COUNT,ELEVATION"),
         (["--ring", "8,45,inf"], "--ring: must be COUNT,ELEVATION"),
+        (["--ring", "8,0.785"], "got 0.785, which looks like radians (45 degrees)"),
         (["--ring", "8,95"], "error: lights.ring.elevation_deg: Input should be less than 90"),
         (["--ring", "8,45", "--dark", "none.png"], "none.png: no such file"),
         (["--station", "none.toml"], "none.toml: cannot be read"),

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 import bgars
-from bgars.cli.console import activation, print_json, say, shown_path, stage_progress
+from bgars.cli.console import EXIT_BAD_INPUT, activation, print_json, say, shown_path, stage_progress
 from bgars.cli.drawing import OVERVIEW, picture_process
 from bgars.cli.evaluation import choice_in_words, evaluation_table
 from bgars.cli.lazy import LazyGroup
@@ -50,6 +50,7 @@ app = typer.Typer(
 
 @app.callback(invoke_without_command=True)
 def top(
+    context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False,
     threads: Annotated[
         int | None,
@@ -65,6 +66,9 @@ def top(
     if version:
         say(f"bgars {bgars.__version__}")
         raise typer.Exit
+    if context.invoked_subcommand is None:
+        say(context.get_help())
+        raise typer.Exit(EXIT_BAD_INPUT)
 
 
 @app.command()

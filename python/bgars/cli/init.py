@@ -96,6 +96,10 @@ def _ring(text: str) -> str:
     if not 1 < len(values) <= len(names) or not all(map(math.isfinite, values)) or values[0] != int(values[0]):
         msg = f"--ring: must be COUNT,ELEVATION or COUNT,ELEVATION,AZIMUTH0, got {text!r}"
         raise InputError(msg)
+    if 0 < values[1] <= math.pi / 2:  # no ring stands so low, and every one does in radians
+        elevation_deg = f"{math.degrees(values[1]):.0f} degrees"
+        msg = f"--ring: ELEVATION must be in degrees, got {values[1]:g}, which looks like radians ({elevation_deg})"
+        raise InputError(msg)
     pairs = [
         f"{name} = {int(value) if name == 'count' else value!r}" for name, value in zip(names, values, strict=False)
     ]

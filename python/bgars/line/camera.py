@@ -13,7 +13,7 @@ import imageio.v3 as iio
 import numpy as np
 
 from bgars.errors import BgarsError, FileFormatError, InputError
-from bgars.io.recipe import RECIPE_NAME, read_recipe
+from bgars.io.recipe import RECIPE_NAME, CaptureRecipe, read_recipe
 from bgars.line.folders import IMAGES
 
 if TYPE_CHECKING:
@@ -120,7 +120,8 @@ def take_capture(
         New. It appears when all is in it: an inbox may hold it.
     lights : int
     rig : path, optional
-        capture.toml that is copied into it; with ``images`` it names the files, else they are ``light_00.png``, ...
+        capture.toml that is copied into it, with the files of lights, dark frame, mask and response that it names; with
+        ``images`` it names the images, else they are ``light_00.png``, ...
     progress : callable
         Called with the fraction done.
 
@@ -132,7 +133,8 @@ def take_capture(
     Raises
     ------
     InputError
-        The folder is there, no lights, or the camera returned no image or one of another shape.
+        The folder is there, no lights, a file that the rig names is missing, or the camera returned no image or one of
+        another shape.
     BgarsError
         The camera failed.
     FileFormatError
@@ -146,6 +148,7 @@ def take_capture(
         msg = f"lights: must be 1 or more, got {lights}"
         raise InputError(msg)
     names = [f"light_{light:02d}.png" for light in range(lights)]
+    beside: list[str] = []
     if rig is not None:
         recipe = read_recipe(Path(rig))
         if recipe.exposures_ms is not None or isinstance(recipe.images, str):
@@ -156,6 +159,7 @@ def take_capture(
             msg = f"{rig}: images: must name {lights} files, one per light, got {len(described)}"
             raise InputError(msg)
         names = described or names
+        beside = _named_files(Path(rig), recipe, folder)
     try:
         folder.absolute().parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".bgars-partial-", dir=folder.absolute().parent) as place:
@@ -169,7 +173,10 @@ def take_capture(
                 progress((light + 1) / lights)
             if rig is not None:
                 shutil.copyfile(rig, made / RECIPE_NAME)
-                names = [*names, RECIPE_NAME]
+                for name in beside:
+                    (made / name).parent.mkdir(parents=True, exist_ok=True)
+                    shutil.copyfile(Path(rig).parent / name, made / name)
+                names = [*names, RECIPE_NAME, *beside]
             made.rename(folder)
     except BgarsError:
         raise
@@ -177,6 +184,23 @@ def take_capture(
         msg = f"{folder}: cannot be written ({error.strerror or error})"
         raise FileFormatError(msg) from error
     return names
+
+
+def _named_files(rig: Path, recipe: CaptureRecipe, folder: Path) -> list[str]:
+    """The files that a description of a rig names; all are there, and its station is found from the new folder, too."""
+    lights = recipe.lights
+    given = {"dark": recipe.dark, "mask": recipe.mask, "response.table": getattr(recipe.response, "table", None)}
+    for name in () if lights is None else ("directions", "angles_deg", "positions_mm", "lp", "intensities"):
+        given[f"lights.{name}"] = getattr(lights, name)
+    named = {key: name for key, name in given.items() if isinstance(name, str) and not Path(name).is_absolute()}
+    for key, name in named.items():
+        if ".." in Path(name).parts or not (rig.parent / name).is_file():
+            msg = f"{rig}: {key}: the file {name!r} must stand beside it, to be copied into the capture"
+            raise InputError(msg)
+    if recipe.station is not None and not (folder / recipe.station).is_file():
+        msg = f"{rig}: station: {recipe.station!r} is not found from {folder}; write its whole path, as bgars init does"
+        raise InputError(msg)
+    return list(dict.fromkeys(named.values()))
 
 
 def _grabbed(camera: Camera, light: int, first: NDArray[Any] | None) -> NDArray[Any]:

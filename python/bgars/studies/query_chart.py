@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 __all__ = ["QueryChart", "query_charts"]
 
+LARGEST = 1e100  # the squares of larger numbers overflow
+
 
 @dataclass(frozen=True, eq=False)
 class QueryChart:
@@ -78,6 +80,10 @@ def query_charts(
         if len(known) < MIN_VALUES:
             continue
         values = np.array([float(row[name]) for row in known])
+        worst = values[np.abs(values).argmax()]
+        if abs(worst) > LARGEST:
+            msg = f"query: {name}: must be within -{LARGEST:g} and {LARGEST:g} to be charted, got {worst:g}"
+            raise InputError(msg)
         chart = individuals_chart(values, zone_rules=zone_rules, nelson=nelson)
         labels = tuple("\n".join(str(row[word])[:19] for word in words[:2]) for row in known)
         unit = "µm" if name.endswith("_um") else ""

@@ -7,6 +7,7 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::matrix_free::conjugate_gradient::{CgParams, conjugate_gradient as solve, conjugate_gradient_scratch};
 use faer::matrix_free::{InitialGuessStatus, LinOp, Precond};
 use faer::{MatMut, MatRef, Par};
+use rayon::prelude::*;
 
 use super::norm::norm;
 use super::vectors::{slice, slice_mut, symmetric_operator};
@@ -14,6 +15,10 @@ use crate::{Error, Result};
 
 /// What the true residual may lie above the target by, relative to it.
 const ROUNDING: f64 = 1e-6;
+
+/// What both sides are multiplied by. faer 0.24 takes the norm of every residual, and for that squares values times 1e-154, too:
+/// of values below one that is subnormal, and takes a third of an iteration. A power of two changes no digit.
+const LIFT: f64 = (1_u64 << 40) as f64;
 
 /// When to stop.
 #[derive(Clone, Copy, Debug)]
@@ -53,6 +58,8 @@ pub(super) fn conjugate_gradient<P: Precond<f64>>(
         return Ok(outcome);
     }
     let preconditioner = preconditioner();
+    let lifted: Vec<f64> = right.par_iter().map(|value| value * LIFT).collect();
+    x.par_iter_mut().for_each(|value| *value *= LIFT);
     let watch = Watch { stopped: AtomicBool::new(false), norm: AtomicU64::new(0) };
     let (watched, preconditioner) = (Stoppable(operator, &watch), Noting(&preconditioner, &watch));
     let request = conjugate_gradient_scratch(&preconditioner, &watched, 1, Par::Seq);
@@ -63,7 +70,7 @@ pub(super) fn conjugate_gradient<P: Precond<f64>>(
         let params = CgParams {
             // faer 0.24 leaves its residual unset for a guess of zero.
             initial_guess: InitialGuessStatus::MaybeNonZero,
-            abs_tolerance: limits.target,
+            abs_tolerance: limits.target * LIFT,
             rel_tolerance: 0.0,
             max_iters: limits.max_iters - start,
             ..CgParams::default()
@@ -71,23 +78,24 @@ pub(super) fn conjugate_gradient<P: Precond<f64>>(
         let done = &mut outcome.iterations;
         let each = |_: MatRef<'_, f64>| {
             // The residual of this iteration is known in the next one.
-            if *done > start && report(*done, f64::from_bits(watch.norm.load(Ordering::Relaxed))).is_break() {
+            if *done > start && report(*done, f64::from_bits(watch.norm.load(Ordering::Relaxed)) / LIFT).is_break() {
                 watch.stopped.store(true, Ordering::Relaxed);
             }
             *done += 1;
         };
-        let (solution, right) = (MatMut::from_column_major_slice_mut(x, right.len(), 1), column(right));
+        let (solution, right) = (MatMut::from_column_major_slice_mut(x, right.len(), 1), column(&lifted));
         // It ends converged, out of iterations, or where rounding leaves nothing of a product: the true residual tells.
         let _ = solve(solution, &preconditioner, &watched, right, params, each, Par::Seq, MemStack::new(&mut memory));
         if watch.stopped.load(Ordering::Relaxed) {
             return Err(Error::Cancelled);
         }
-        outcome.norm = true_norm(operator, slice(right), x);
+        outcome.norm = true_norm(operator, &lifted, x) / LIFT;
         outcome.solved = outcome.norm <= limits.target * (1.0 + ROUNDING);
         if outcome.iterations > start && report(outcome.iterations, outcome.norm).is_break() {
             return Err(Error::Cancelled);
         }
         if outcome.solved || outcome.iterations >= limits.max_iters || !(outcome.norm < before) {
+            x.par_iter_mut().for_each(|value| *value /= LIFT);
             return Ok(outcome);
         }
     }
@@ -99,6 +107,9 @@ fn column(values: &[f64]) -> MatRef<'_, f64> {
 
 /// Norm of `right - operator x`.
 fn true_norm(operator: &impl LinOp<f64>, right: &[f64], x: &[f64]) -> f64 {
+    if x.par_iter().all(|&value| value == 0.0) {
+        return norm(right);
+    }
     let mut left = vec![0.0; right.len()];
     let product = MatMut::from_column_major_slice_mut(&mut left, right.len(), 1);
     operator.apply(product, column(x), Par::Seq, MemStack::new(&mut []));
