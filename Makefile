@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 export PIP_NO_COMPILE := 1
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: demo docs wheel api test test-rust test-python data lint lint-rust lint-python format accuracy inspection reality reality-scenes bilateral station station-balls simulator experiments method check-faults kills line watch-station schema constants studies performance bench fuzz clean
+.PHONY: demo docs wheel api test test-rust test-python data lint lint-rust lint-python format accuracy inspection reality reality-scenes bilateral station station-balls simulator experiments method shape-page check-faults kills line watch-station schema constants studies performance bench fuzz clean
 
 demo: $(VENV)/.run-time ## Reconstruct the solder ball that ships with bgars
 	$(BIN)/bgars demo -o demo-output
@@ -76,6 +76,9 @@ experiments: $(VENV)/.installed ## Run the paper's experiments again and rewrite
 
 method: $(VENV)/.installed ## Draw the pictures of docs/reflectance.md and one of docs/inspection.md again
 	PYTHONPATH=. $(BIN)/python docs/make_method_pictures.py
+
+shape-page: $(VENV)/.installed ## Draw the pictures of docs/shape.md and write its table again
+	$(BIN)/python docs/make_shape.py
 
 studies: $(VENV)/.installed ## Run the gauge studies of docs/studies.md again (15 minutes)
 	$(BIN)/python docs/make_studies.py

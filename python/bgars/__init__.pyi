@@ -78,6 +78,7 @@ from .records.surface_material import SurfaceMaterial as SurfaceMaterial
 from .records.truth import Truth as Truth
 from .report.figures.overview import write_overview as write_overview
 from .report.figures.part import write_part_pictures as write_part_pictures
+from .report.figures.shape import write_shape_images as write_shape_images
 from .report.html.page import write_report as write_report
 from .samples import sample_capture as sample_capture
 from .samples import sample_part_recipe as sample_part_recipe

@@ -76,6 +76,7 @@ SETUPS: dict[str, Callable[[Path], None]] = {
     "inspection.md": lambda folder: part(folder, "FOLDER"),
     "line.md": lambda folder: part(folder, "lots/L7/SN0041", "lots/L7/SN0042"),
     "result.md": lambda folder: part(folder, "part"),
+    "shape.md": lambda folder: part(folder, "FOLDER"),
     "station.md": station,
     "studies.md": studies,
 }

@@ -20,6 +20,7 @@ LAZY_COMMANDS = {
         "Check whether images and lights belong together, and find other faults of a capture.",
     ),
     "mesh": ("bgars.cli.mesh", "Turn a normal map or a height map into a mesh."),
+    "shape": ("bgars.cli.shape", "Write images of a surface's shape: slope, curvatures, dents and scratches."),
     "inspect": ("bgars.cli.inspect", "Find, measure and judge the solder balls of a part."),
     "capture": ("bgars.cli.capture", "Take an image under each light with a camera, write a capture folder."),
     "batch": ("bgars.cli.batch", "Inspect many captures into one store: all cores, failures kept with their reason."),

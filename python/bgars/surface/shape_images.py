@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     FloatArray = NDArray[np.float32]
 
-__all__ = ["ShapeImages", "shape_images"]
+__all__ = ["ShapeImages", "need_scale", "shape_images"]
 
 LEAST_WEIGHT = 0.5
 """Share of a smoothing window, as far as it lies in the image, that must be valid."""
@@ -46,6 +46,10 @@ class ShapeImages:
         Heights minus their smoothed version, in the unit: what is finer than the scale, such as scratches.
     unit : str
         "um" or "px".
+    scale_px : float
+        Standard deviation of the Gaussian that smoothed, in pixels.
+    pixel_pitch_um : float or None
+        That of the heights.
     """
 
     slope_deg: FloatArray
@@ -53,6 +57,8 @@ class ShapeImages:
     gaussian_curvature: FloatArray
     flattened: FloatArray
     unit: str
+    scale_px: float
+    pixel_pitch_um: float | None = None
 
 
 def shape_images(height: HeightMap, *, scale_px: float = 2.0) -> ShapeImages:
@@ -88,10 +94,7 @@ def shape_images(height: HeightMap, *, scale_px: float = 2.0) -> ShapeImages:
     (-0.02, 12.0)
     """
     need_height(height)
-    scale_px = number("scale_px", scale_px)
-    if not (math.isfinite(scale_px) and scale_px > 0):
-        msg = f"scale_px: must be finite and above 0, got {scale_px:g}"
-        raise InputError(msg)
+    scale_px = need_scale(scale_px, "scale_px")
     if min(height.mask.shape) < len(("one", "two")):
         msg = f"height: must have 2 x 2 pixels at least, got {height.mask.shape}"
         raise InputError(msg)
@@ -110,7 +113,18 @@ def shape_images(height: HeightMap, *, scale_px: float = 2.0) -> ShapeImages:
         ((z_xx * z_yy - z_xy**2) / steep**2).astype(np.float32),
         (height.height - smooth).astype(np.float32),
         height.unit,
+        scale_px,
+        height.pixel_pitch_um,
     )
+
+
+def need_scale(scale_px: float, name: str) -> float:
+    """Return a scale, or raise InputError with the name that it was given by."""
+    scale_px = number(name, scale_px)
+    if not (math.isfinite(scale_px) and scale_px > 0):
+        msg = f"{name}: must be finite and above 0, got {scale_px:g}"
+        raise InputError(msg)
+    return scale_px
 
 
 def _smoothed(height: HeightMap, scale_px: float) -> NDArray[np.float64]:

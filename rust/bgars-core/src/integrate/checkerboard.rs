@@ -9,6 +9,8 @@ use multiversion::multiversion;
 
 /// Rows of pixels that one task works on; even, so that tasks own whole rows of the coarse grid.
 pub(super) const BAND_ROWS: usize = 32;
+/// Values that are worth waking a thread for: some microseconds.
+pub(super) const TASK: usize = 1 << 14;
 
 /// One of the two colours of pixels, which are also the two parts of a vector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

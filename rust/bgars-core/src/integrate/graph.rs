@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::checkerboard::{Colour, Grid};
+use super::checkerboard::{Colour, Grid, TASK};
 use super::real::Real;
 
-/// Unknowns that one task works on.
-const TASK: usize = 1 << 12;
+/// Unknowns that one task works on: each has its own number of edges.
+const PART: usize = TASK / 4;
 
 /// The unknowns of one colour, in the order of their pixels, and their edges to those of the other colour.
 #[derive(Debug, Default)]
@@ -71,11 +71,11 @@ impl Graph {
 /// Sets every value by its place, on all threads where that is worth waking them: a W-cycle visits small graphs often.
 pub(super) fn each<T: Send>(values: &mut [T], set: impl Fn(usize, &mut T) + Sync) {
     let set_all = |(task, values): (usize, &mut [T])| {
-        values.iter_mut().enumerate().for_each(|(k, value)| set(task * TASK + k, value));
+        values.iter_mut().enumerate().for_each(|(k, value)| set(task * PART + k, value));
     };
-    if values.len() <= TASK {
+    if values.len() <= PART {
         set_all((0, values));
     } else {
-        values.par_chunks_mut(TASK).enumerate().for_each(set_all);
+        values.par_chunks_mut(PART).enumerate().for_each(set_all);
     }
 }

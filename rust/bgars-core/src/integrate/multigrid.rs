@@ -10,14 +10,11 @@ use rayon::prelude::*;
 
 use super::adjacency::Adjacency;
 use super::aggregation::{Aggregates, aggregate};
-use super::checkerboard::{Colour, Grid, join_row, split_row};
+use super::checkerboard::{Colour, Grid, TASK, join_row, split_row};
 use super::graph::{Graph, each};
 use super::real::Real;
 use super::stencil::Stencil;
 use super::vectors::{slice, slice_mut, symmetric_operator};
-
-/// Rows of blocks that are worth a task.
-const TASK_ROWS: usize = 16;
 
 /// How much of a second cycle counts. By less than one, the whole stays positive where a cycle overshoots, up to threefold.
 const SECOND_CYCLE: f32 = 0.5;
@@ -172,7 +169,7 @@ impl Transfer {
             Self::Blocks(fine) => {
                 let (half, coarse_half) = (fine.half(), fine.coarse().half());
                 let rows = coarse_reds.par_chunks_mut(coarse_half).zip(coarse_blacks.par_chunks_mut(coarse_half));
-                rows.enumerate().with_min_len(TASK_ROWS).for_each_init(
+                rows.enumerate().with_min_len(TASK.div_ceil(half)).for_each_init(
                     || vec![0.0; half],
                     |sums, (row, (coarse_reds, coarse_blacks))| {
                         sums.fill(0.0);
@@ -198,12 +195,14 @@ impl Transfer {
         match self {
             Self::Blocks(fine) => {
                 let (half, coarse_half) = (fine.half(), fine.coarse().half());
-                blacks.par_chunks_mut(2 * half).with_min_len(TASK_ROWS).enumerate().for_each(|(row, blacks)| {
-                    let span = row * coarse_half..(row + 1) * coarse_half;
-                    let (first, second) = blacks.split_at_mut(half);
-                    join_row(row, [&coarse_reds[span.clone()], &coarse_blacks[span]], first);
-                    second.copy_from_slice(&first[..second.len()]);
-                });
+                blacks.par_chunks_mut(2 * half).with_min_len(TASK.div_ceil(2 * half)).enumerate().for_each(
+                    |(row, blacks)| {
+                        let span = row * coarse_half..(row + 1) * coarse_half;
+                        let (first, second) = blacks.split_at_mut(half);
+                        join_row(row, [&coarse_reds[span.clone()], &coarse_blacks[span]], first);
+                        second.copy_from_slice(&first[..second.len()]);
+                    },
+                );
             }
             Self::Components(Aggregates { parents, .. }) => {
                 let coarse = [coarse_reds, coarse_blacks];
@@ -221,9 +220,11 @@ impl LinOp<f64> for Multigrid<'_> {
 
     fn apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, _par: Par, _stack: &mut MemStack) {
         let mut vectors = self.vectors.lock().unwrap_or_else(PoisonError::into_inner);
-        vectors[0].right[0].par_iter_mut().zip(slice(rhs)).for_each(|(rounded, &number)| *rounded = number as f32);
+        let rounded = vectors[0].right[0].par_iter_mut().zip(slice(rhs)).with_min_len(TASK);
+        rounded.for_each(|(rounded, &number)| *rounded = number as f32);
         v_cycle(&self.levels, &mut vectors);
-        slice_mut(out).par_iter_mut().zip(&vectors[0].solution[0]).for_each(|(out, &number)| *out = f64::from(number));
+        let out = slice_mut(out).par_iter_mut().zip(&vectors[0].solution[0]).with_min_len(TASK);
+        out.for_each(|(out, &number)| *out = f64::from(number));
     }
 }
 

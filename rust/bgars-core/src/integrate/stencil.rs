@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::checkerboard::{BAND_ROWS, Colour, Grid, split_row};
+use super::checkerboard::{BAND_ROWS, Colour, Grid, TASK, split_row};
 use super::real::Real;
 
 pub(super) const LEFT: usize = 0;
@@ -128,7 +128,8 @@ impl<W: Real> Stencil<W> {
         set: impl Fn(&mut T, T, T, T) + Sync,
     ) {
         let half = self.grid.half();
-        values.par_chunks_mut(BAND_ROWS * half).enumerate().for_each(|(band, values)| {
+        let bands = values.par_chunks_mut(BAND_ROWS * half).with_min_len(TASK.div_ceil(BAND_ROWS * half));
+        bands.enumerate().for_each(|(band, values)| {
             for (row, values) in (band * BAND_ROWS..).zip(values.chunks_mut(half)) {
                 let of_row = |row: usize| &neighbours[row * half..(row + 1) * half];
                 let vertical = [of_row(row.saturating_sub(1)), of_row((row + 1).min(self.grid.height - 1))];
