@@ -11,6 +11,7 @@ from bgars.errors import FileFormatError, InputError, UnsupportedImageError
 from bgars.io.image_formats import format_of, read_pixels
 from bgars.io.image_stacks import read_stack
 from bgars.io.image_tags import read_tags
+from bgars.records.given_pixels import LUMINANCE, one_value
 from bgars.records.plain_arrays import integer_full_scale
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ MAX_MEGAPIXELS = 256.0
 """Largest image a header may claim, in megapixels, unless the caller allows more."""
 
 WEIGHTS: dict[str, tuple[float, float, float]] = {
-    "luminance": (0.2126, 0.7152, 0.0722),
+    "luminance": LUMINANCE,
     "mean": (1 / 3, 1 / 3, 1 / 3),
     "red": (1.0, 0.0, 0.0),
     "green": (0.0, 1.0, 0.0),
@@ -209,8 +210,5 @@ def _combine(
         weights = weights * gains
     rgb = image[..., :3]
     values = rgb.astype(np.float32) if response is None or rgb.dtype.kind != "u" else response[rgb]
-    combined: FloatArray = values @ weights
-    if response is not None or gains is not None or image.dtype.kind == "f":
-        return combined
-    rounded = np.rint(combined)
-    return rounded.astype(np.uint8) if image.dtype == np.uint8 else rounded.astype(np.uint16)
+    is_linear = response is not None or gains is not None
+    return one_value(values, weights, np.dtype(np.float32) if is_linear else image.dtype)

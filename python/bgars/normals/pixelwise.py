@@ -12,10 +12,11 @@ from bgars import _bgars
 from bgars.errors import InputError
 from bgars.normals.kernel_outputs import fresh_outputs, measured_by, outputs_of
 from bgars.records.capture import Capture
+from bgars.records.given_pixels import grey_pixels
 from bgars.records.kernel_capture import kernel_capture
 from bgars.records.normal_field import NormalField
 from bgars.records.pixels import float_full_scale
-from bgars.records.plain_arrays import every_pixel, integer_full_scale, masked_pixels, pixel_array, plain_bool
+from bgars.records.plain_arrays import every_pixel, integer_full_scale, masked_pixels, plain_bool
 from bgars.records.rig import LightRig
 from bgars.records.whole_capture import need_whole
 
@@ -140,9 +141,9 @@ def capture_of(
 
 def pixel_stack(images: ArrayLike) -> PixelArray:
     """Return a C-contiguous (L, H, W) stack of a supported dtype, without a copy where possible."""
-    stack = pixel_array("images", images)
+    stack = grey_pixels("images", images)
     if stack.ndim != STACK_NDIM:
-        msg = f"images: must have shape (L, H, W), got {stack.shape}"
+        msg = f"images: must have shape (L, H, W) or (L, H, W, 3), got {stack.shape}"
         raise InputError(msg)
     return stack
 

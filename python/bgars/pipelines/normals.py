@@ -59,7 +59,8 @@ def estimate_normals(
     ----------
     images : Capture or (L, H, W) array_like of uint8, uint16 or float32
         A capture, or one image per light. A C-contiguous array, read-only or not, is used where it lies; strided and
-        Fortran-ordered ones (a crop, a transposed stack) and float64 are copied once.
+        Fortran-ordered ones (a crop, a transposed stack) and other types are copied once: (L, H, W, 3) as its
+        luminance, whole numbers from 0 to 65535 as uint8 where none is above 255, else as uint16.
     light_directions : (L, 3) array_like
         Unit vectors from the surface to the light; only with plain arrays.
     method : {"reflectance", "robust-filter", "specular-filter", "lambertian", "blind"} or str

@@ -8,19 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bgars.errors import InputError
+from bgars.records.given_pixels import grey_pixels
 from bgars.records.pixels import BoolArray, FloatArray, PixelArray
-from bgars.records.plain_arrays import (
-    keep,
-    masked_pixels,
-    pixel_array,
-    plain,
-    plain_bool,
-)
+from bgars.records.plain_arrays import keep, masked_pixels, plain, plain_bool
 from bgars.records.rig import LightRig
 from bgars.records.shown import ShownCapture
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from numpy.typing import NDArray
 
 __all__ = ["Capture"]
 
@@ -32,7 +29,8 @@ class Capture(ShownCapture):
     Attributes
     ----------
     images : (L, H, W) uint8, uint16 or float32
-        One image per light, grey levels as the camera gave them.
+        One image per light, grey levels as the camera gave them. The constructor also takes (L, H, W, 3), of which it
+        keeps the luminance, floats of other sizes, and whole numbers from 0 to 65535: as uint8 where none is above 255.
     rig : LightRig
         The L lights, in the order of the images.
     mask : (H, W) bool
@@ -85,11 +83,11 @@ class Capture(ShownCapture):
             msg = f"mask: must have shape {hidden.shape}, that of the images, got {mask.shape}"
             raise InputError(msg)
         arrays: dict[str, Any] = {
-            "images": pixel_array("images", self.images),
+            "images": grey_pixels("images", self.images),
             "mask": mask if hidden is None else mask & ~hidden,
         }
         if self.dark is not None:
-            arrays["dark"] = plain("dark", self.dark)
+            arrays["dark"] = _like(arrays["images"], plain("dark", self.dark))
         if self.response is not None:
             arrays["response"] = plain("response", self.response, np.float32)
         keep(self, arrays)
@@ -98,3 +96,11 @@ class Capture(ShownCapture):
     def name(self) -> str:
         """Name of the capture's folder, or "capture"."""
         return "capture" if self.folder is None else self.folder.resolve().name
+
+
+def _like(images: PixelArray, dark: NDArray[Any]) -> NDArray[Any]:
+    """A dark frame brought to the images' type by what was done to them; where that would lose digits, as it is."""
+    if dark.dtype in (np.uint8, np.uint16, np.float32) and dark.ndim < images.ndim:
+        return dark
+    grey = grey_pixels("dark", dark[None])[0]
+    return np.asarray(grey, images.dtype) if np.can_cast(grey.dtype, images.dtype) else grey

@@ -16,7 +16,6 @@ __all__ = [
     "integer_full_scale",
     "keep",
     "masked_pixels",
-    "pixel_array",
     "plain",
     "plain_bool",
     "plain_fields",
@@ -87,21 +86,10 @@ def without_mask(values: ArrayLike, fill: float | bool) -> ArrayLike:
 
 
 def masked_pixels(stack: ArrayLike) -> NDArray[np.bool_] | None:
-    """(H, W) True where any image of a numpy masked stack (L, H, W) is masked; None of another array."""
+    """(H, W) True where any value of a numpy masked stack (L, H, W[, channels]) is masked; None of another array."""
     if not isinstance(stack, np.ma.MaskedArray):
         return None
-    return np.asarray(np.ma.getmaskarray(stack).any(axis=0))
-
-
-def pixel_array(name: str, pixels: ArrayLike) -> NDArray[Any]:
-    """Return pixels as the kernels read them, copied only where they are not so; float64 becomes float32."""
-    array = plain(name, without_mask(pixels, 0))
-    if array.dtype.kind == "f" and array.dtype != np.float32:
-        array = array.astype(np.float32)
-    if array.dtype not in (np.uint8, np.uint16, np.float32):
-        msg = f"{name}: must be uint8, uint16 or float32, got {array.dtype}"
-        raise InputError(msg)
-    return array
+    return np.asarray(np.ma.getmaskarray(stack).any(axis=(0, *range(3, stack.ndim))))
 
 
 def keep(record: object, arrays: dict[str, Any]) -> None:

@@ -1,0 +1,56 @@
+"""Images as arrays of any common kind give the normals of the same images as the kernels read them."""
+
+from __future__ import annotations
+
+import bgars
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+RIG = bgars.LightRig.ring(6)
+LEVELS = np.random.default_rng(0).integers(20, 250, (6, 5, 7)).astype(np.uint8)
+
+
+def normals(images: ArrayLike) -> NDArray[np.float32]:
+    return bgars.estimate_normals(images, RIG.directions, method="lambertian").normals
+
+
+@pytest.mark.parametrize("dtype", [np.int64, np.int32, np.uint32, np.int16, ">u2", np.float16, np.float64])
+def test_types(dtype: DTypeLike) -> None:
+    np.testing.assert_allclose(normals(LEVELS.astype(dtype)), normals(LEVELS), atol=1e-6)
+    assert bgars.Capture(LEVELS.astype(np.int64), RIG, np.ones((5, 7), bool)).images.dtype == np.uint8
+    wide = 200 * LEVELS.astype(np.int64)
+    capture = bgars.Capture(wide, RIG, np.ones((5, 7), bool), dark=np.ones((5, 7), np.int64))
+    assert (capture.images.dtype, capture.dark.dtype) == (np.uint16, np.uint16)
+    np.testing.assert_array_equal(capture.images, wide)
+
+
+def test_lists() -> None:
+    np.testing.assert_array_equal(normals(LEVELS.tolist()), normals(LEVELS))
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32, np.int64])
+@pytest.mark.parametrize("channels", [3, 4])
+def test_colour_is_taken_as_its_luminance(dtype: DTypeLike, channels: int) -> None:
+    rgb = np.random.default_rng(1).integers(20, 250, (6, 5, 7, channels)).astype(dtype)
+    grey = rgb[..., :3] @ np.array([0.2126, 0.7152, 0.0722])
+    np.testing.assert_allclose(normals(rgb), normals(grey.astype(np.float32)), atol=0.02)
+    dark = np.full((5, 7, channels), 3, dtype)
+    capture = bgars.Capture(rgb, RIG, np.ones((5, 7), bool), dark=dark)
+    assert capture.images.shape == (6, 5, 7)
+    np.testing.assert_allclose(capture.images, grey, atol=0.5 if capture.images.dtype.kind == "u" else 1e-4)
+    assert capture.dark is not None
+    np.testing.assert_array_equal(np.rint(capture.dark), np.full((5, 7), 3))
+    assert capture.dark.dtype == capture.images.dtype
+
+
+def test_what_is_hidden_in_one_channel_is_not_used() -> None:
+    rgb = np.ma.array(np.repeat(LEVELS[..., None], 3, axis=3))
+    rgb[2, 1, 4, 0] = np.ma.masked
+    assert np.argwhere(np.isnan(normals(rgb)[..., 2])).tolist() == [[1, 4]]
+
+
+def test_a_dark_frame_that_does_not_fit_is_told_not_cut() -> None:
+    capture = bgars.Capture(LEVELS, RIG, np.ones((5, 7), bool), dark=np.full((5, 7), 300, np.int64))
+    with pytest.raises(bgars.InputError, match="dark: must have the dtype of the images, uint8, got uint16"):
+        bgars.estimate_normals(capture)
