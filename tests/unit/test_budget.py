@@ -16,8 +16,8 @@ from bgars.inspection.common_terms import COMMON_TERMS, EDGE_TERMS, ELEVATION, R
 from bgars.inspection.misfit import relief_px, scatter_factors
 from bgars.inspection.shadow_edges import Edges
 from bgars.inspection.shadow_model import Balls, Lights, edge_at, rays
+from measured_captures import array, circles
 from numpy.typing import NDArray
-from test_measure_balls import array, circles
 
 Array = NDArray[np.float64]
 STRETCHES = 15

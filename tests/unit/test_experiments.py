@@ -17,6 +17,7 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 from bgars.normals.methods import METHODS
+from shared_work import shared
 
 from experiments import EXPERIMENTS, write_experiments
 from experiments.kept import solved
@@ -33,8 +34,11 @@ ERROR_COLUMNS = (
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
-    folder = tmp_path_factory.mktemp("experiments") / "out"
-    return folder, write_experiments("all", folder, radius_px=RADIUS_PX)
+    def made() -> tuple[Path, dict[str, Any]]:
+        folder = tmp_path_factory.mktemp("experiments") / "out"
+        return folder, write_experiments("all", folder, radius_px=RADIUS_PX)
+
+    return shared(tmp_path_factory, "experiments", made)
 
 
 def rows_of(folder: Path, name: str) -> list[dict[str, str]]:

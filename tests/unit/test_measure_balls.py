@@ -8,94 +8,15 @@ import bgars
 import numpy as np
 import pytest
 from bgars.inspection import check_shadows, measure_balls
-from bgars.records.found_balls import FoundBall, FoundBalls
-from bgars.records.measured_balls import BallMeasurement
+from bgars.records.found_balls import FoundBalls
+from measured_captures import array, errors, photograph, rms, sixteen_balls, wrong_rig
 from numpy.typing import NDArray
-
-PITCH_UM = 11.0
-MATTE = bgars.Material(i_d=0.5, i_s=1.0, hardness=40)
-
-
-def board(bow_um: float = 0.0, i_d: float = 0.12) -> bgars.Board:
-    tilt_deg = 0.15 if bow_um else 0.0
-    return bgars.Board(
-        bgars.Material.matte(i_d), tilt_x_deg=tilt_deg, bow_um=bow_um, bow_radius_um=3000.0, texture=bgars.Texture(0.25)
-    )
-
-
-def array(rows: int, cols: int, seed: int, *, bow_um: float = 0.0, **options: object) -> bgars.Scene:
-    jitter = bgars.Jitter(height_um=8.0, radius_um=3.0, position_um=5.0)
-    return bgars.Scene.ball_array(
-        rows,
-        cols,
-        rotation_deg=0.3,
-        jitter=jitter,
-        seed=seed,
-        board=board(bow_um),
-        **options,  # type: ignore[arg-type]
-    )
-
-
-def circles(truth: bgars.SimulatedTruth, pitch_um: float, seed: int) -> FoundBalls:
-    """What a rough finder would say: half a pixel off in the centre, 1 % in the radius."""
-    random = np.random.default_rng(seed)
-    balls = []
-    for ball in truth.balls:
-        if ball.x_um is None or ball.y_um is None or ball.diameter_um is None:
-            continue
-        off = random.standard_normal(3)
-        radius_px = ball.diameter_um / 2.0 / pitch_um
-        balls.append(
-            FoundBall(
-                ball.name,
-                ball.row - 1,
-                ball.col - 1,
-                ball.x_um / pitch_um + 0.5 * off[0],
-                ball.y_um / pitch_um + 0.5 * off[1],
-                radius_px * (1.0 + 0.01 * off[2]),
-                u_centre_px=0.5,
-                u_radius_px=0.01 * radius_px,
-            )
-        )
-    return FoundBalls(tuple(balls), (), (), 1, 1, None, 0.0, (0.0, 0.0))
-
-
-def photograph(
-    scene: bgars.Scene, rig: bgars.LightRig, seed: int = 1, *, pitch_um: float = PITCH_UM, **camera: object
-) -> tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]:
-    options = {"supersample": 4, "full_well_e": 15000.0, "read_noise_levels": 0.15} | camera
-    capture, truth = bgars.simulate(
-        scene,
-        rig,
-        MATTE,
-        bgars.Camera(pixel_pitch_um=pitch_um, **options),
-        seed=seed,  # type: ignore[arg-type]
-    )
-    return capture, truth, circles(truth, pitch_um, seed)
-
-
-def errors(measured: BallMeasurement, truth: bgars.SimulatedTruth, name: str) -> NDArray[np.float64]:
-    by_name = {ball.name: getattr(ball, name) for ball in truth.balls}
-    return np.array([getattr(ball, name) - by_name[ball.name] for ball in measured.balls])
-
-
-def rms(values: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
-def wrong_rig(rig: bgars.LightRig, off_deg: float, seed: int) -> bgars.LightRig:
-    """The same rig as somebody measured it, each light `off_deg` away."""
-    turn = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, len(rig))
-    level = np.cos(np.radians(rig.elevations_deg))
-    angles = np.column_stack(
-        [rig.azimuths_deg + off_deg * np.cos(turn) / level, rig.elevations_deg + off_deg * np.sin(turn)]
-    )
-    return bgars.LightRig.from_angles(angles)
+from shared_work import shared
 
 
 @pytest.fixture(scope="module")
 def part() -> tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]:
-    return photograph(array(4, 4, 1), bgars.LightRig.ring(8))
+    return sixteen_balls()
 
 
 def test_balls_are_measured_to_a_fraction_of_a_micrometre(
@@ -136,7 +57,11 @@ MOST_STATED_PX = {"x_um": 0.02, "y_um": 0.02, "diameter_um": 0.04, "centre_z_um"
 
 
 @pytest.fixture(scope="module")
-def six_parts() -> tuple[dict[str, float], dict[str, float]]:
+def six_parts(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, float], dict[str, float]]:
+    return shared(tmp_path_factory, "six_parts", measured_six)
+
+
+def measured_six() -> tuple[dict[str, float], dict[str, float]]:
     """Shares of readings within their standard uncertainty, and medians of these, px."""
     settings = [
         {"elevation_deg": 45.0, "pitch_um": 11.0, "off_deg": 0.0},
@@ -187,7 +112,11 @@ def test_uncertainties_are_not_too_large(six_parts: tuple[dict[str, float], dict
 
 
 @pytest.fixture(scope="module")
-def diameters_within_u() -> list[NDArray[np.bool_]]:
+def diameters_within_u(tmp_path_factory: pytest.TempPathFactory) -> list[NDArray[np.bool_]]:
+    return shared(tmp_path_factory, "diameters_within_u", diameters_of_all_kinds)
+
+
+def diameters_of_all_kinds() -> list[NDArray[np.bool_]]:
     """Whether diameters of found balls lie within u, for each kind of capture."""
     kinds = [
         {"supersample": 1},
@@ -327,85 +256,6 @@ def test_no_balls_no_numbers(part: tuple[bgars.Capture, bgars.SimulatedTruth, Fo
     assert np.isnan(measured.shadow_residual_rms)
 
 
-def swapped(images: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    return images[[0, 1, 5, 3, 4, 2, 6, 7]]
-
-
-def doubled(images: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    return images[[0, 1, 2, 2, 4, 5, 6, 7]]
-
-
-def noisily_doubled(images: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    again = doubled(images)
-    again[3] = np.clip(again[3].astype(int) + np.random.default_rng(0).integers(-1, 2, again[3].shape), 0, 255)
-    return again
-
-
-def far_shifted(images: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    moved = images.copy()
-    moved[4] = np.roll(images[4], 12, axis=1)
-    return moved
-
-
-def shifted(images: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    moved = images.copy()
-    moved[4] = np.roll(images[4], 2, axis=1)
-    return moved
-
-
-@pytest.mark.parametrize(
-    ("change", "error", "text"),
-    [
-        (swapped, bgars.CalibrationError, r"images 2 \(counted from 0\) and 5 \(counted from 0\) are swapped"),
-        (doubled, bgars.InputError, "same picture"),
-        (
-            noisily_doubled,
-            bgars.CalibrationError,
-            r"image 3 \(counted from 0\) has the shadows of light 2 \(counted from 0\)",
-        ),
-        (far_shifted, bgars.CalibrationError, r"image 4 \(counted from 0\) is shifted"),
-    ],
-)
-def test_images_that_do_not_belong_are_refused(
-    part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls],
-    change: object,
-    error: type[Exception],
-    text: str,
-) -> None:
-    capture, _, found = part
-    wrong = replace(capture, images=change(capture.images))  # type: ignore[operator]
-    with pytest.raises(error, match=text):
-        check_shadows(wrong, found)
-    with pytest.raises(error, match=text):
-        measure_balls(wrong, found)
-
-
-def test_a_shift_of_two_pixels_is_refused(part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]) -> None:
-    capture, _, found = part
-    with pytest.raises(bgars.CalibrationError, match=r"image 4 \(counted from 0\) is shifted by"):
-        measure_balls(replace(capture, images=shifted(capture.images)), found)
-
-
-def test_a_light_six_degrees_off_is_named_and_measured(
-    part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls],
-) -> None:
-    capture, truth, found = part
-    angles = np.column_stack([capture.rig.azimuths_deg, capture.rig.elevations_deg])
-    angles[1, 1] += 6.0
-    measured = measure_balls(replace(capture, rig=bgars.LightRig.from_angles(angles)), found)
-    assert any("light 1 (counted from 0)" in warning for warning in measured.warnings)
-    assert measured.light_change_deg[1] == pytest.approx(6.0, abs=0.1)
-    assert rms(errors(measured, truth, "top_um")) < 0.8
-
-
-def test_a_light_twenty_degrees_off_is_refused(part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]) -> None:
-    capture, _, found = part
-    angles = np.column_stack([capture.rig.azimuths_deg, capture.rig.elevations_deg])
-    angles[1, 0] += 25.0
-    with pytest.raises(bgars.CalibrationError, match=r"light 1 \(counted from 0\) stands about"):
-        check_shadows(replace(capture, rig=bgars.LightRig.from_angles(angles)), found)
-
-
 def test_a_sound_capture_has_no_warnings(part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]) -> None:
     assert check_shadows(part[0], part[2]) == ()
     assert measure_balls(part[0], part[2]).warnings == ()
@@ -424,19 +274,3 @@ def test_small_balls_and_blurred_images() -> None:
     assert rms(errors(measure_balls(capture, found), truth, "top_um")) < 1.0
     capture, truth, found = photograph(array(3, 3, 12), bgars.LightRig.ring(8), pitch_um=10.0, blur_px=2.0)
     assert rms(errors(measure_balls(capture, found), truth, "top_um")) < 1.0
-
-
-def test_bad_arguments_are_named(part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]) -> None:
-    capture, _, found = part
-    with pytest.raises(bgars.InputError, match="pixel_pitch_um"):
-        measure_balls(replace(capture, pixel_pitch_um=None), found)
-    with pytest.raises(bgars.InputError, match="threads"):
-        measure_balls(capture, found, threads=0)
-    outside = replace(found, balls=(replace(found.balls[0], x_px=1e4),))
-    with pytest.raises(bgars.InputError, match=found.balls[0].name):
-        measure_balls(capture, outside)
-    with pytest.raises(bgars.InputError, match="u_centre_px"):
-        measure_balls(capture, replace(found, balls=(replace(found.balls[0], u_centre_px=0.0),)))
-    field = bgars.estimate_normals(capture.images[:, :50, :50], capture.rig.directions)
-    with pytest.raises(bgars.InputError, match="field"):
-        measure_balls(capture, found, field=field)

@@ -13,9 +13,9 @@ from bgars.inspection.bundle_model import linearise_edges
 from bgars.inspection.bundle_normal import normal_equations
 from bgars.inspection.own_shape import free_shapes
 from bgars.inspection.results import NO_SPHEROID
+from measured_captures import array, photograph
 from numpy.typing import NDArray
 from test_budget import point_priors, points
-from test_measure_balls import array, photograph
 
 Array = NDArray[np.float64]
 NOISE_PX = 0.03

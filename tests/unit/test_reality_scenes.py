@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "benches" / "reality"))
 from figures import summarise
 from judge_scene import judge_scene
 from records import SceneRecord
+from shared_work import shared
 
 pytestmark = pytest.mark.data
 
@@ -26,8 +27,9 @@ WITHIN_2U = {"x": 88.0, "y": 88.0, "diameter": 88.0, "top": 86.0}
 
 
 @pytest.fixture(scope="module")
-def dozen(data_folder: Path) -> list[SceneRecord]:
-    return [judge_scene(data_folder / "reality" / str(seed), normals=False) for seed in DOZEN]
+def dozen(data_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> list[SceneRecord]:
+    folders = [data_folder / "reality" / str(seed) for seed in DOZEN]
+    return shared(tmp_path_factory, "dozen", lambda: [judge_scene(folder, normals=False) for folder in folders])
 
 
 @pytest.mark.timeout(900)

@@ -10,50 +10,23 @@ import numpy as np
 import pytest
 from bgars.pipelines.normals import ball_normals
 from bgars.records.circle_pixels import inside_circles
+from hemispheres import (
+    GAINS,
+    RADIUS_PX,
+    RING,
+    SOLDER,
+    anchored,
+    circles_px,
+    hemisphere,
+    judged,
+    mean_deg,
+)
+from shared_work import shared
 
 from experiments.measure import filled_normals
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-RING = bgars.LightRig.ring(8)
-SOLDER = bgars.Material(i_d=0.5, i_s=1.0, hardness=40)
-GAINS = (1.04, 0.97, 1.01, 0.95, 1.05, 0.99, 1.02, 0.96)
-RADIUS_PX = 30
-MIN_N_Z = 0.3
-
-Pair = tuple[bgars.Capture, bgars.SimulatedTruth]
-
-
-def hemisphere(
-    material: bgars.Material = SOLDER, rig: bgars.LightRig = RING, *, radius_px: int = RADIUS_PX, **camera: object
-) -> Pair:
-    """A hemisphere at the image centre; `seed` goes to the simulator, the rest to the camera."""
-    seed = camera.pop("seed", 0)
-    scene = bgars.Scene.hemisphere(10.0 * radius_px)
-    return bgars.simulate(scene, rig, material, bgars.Camera(pixel_pitch_um=10.0, **camera), seed=seed, threads=1)
-
-
-def anchored(capture: bgars.Capture, radius_px: float = RADIUS_PX, **options: object) -> bgars.NormalField:
-    return bgars.estimate_normals(capture, anchors=[[0.0, 0.0, radius_px]], **options)
-
-
-def judged(truth: bgars.SimulatedTruth) -> NDArray[np.bool_]:
-    return truth.mask & (truth.normals[..., 2] > MIN_N_Z)
-
-
-def mean_deg(field: bgars.NormalField, truth: bgars.SimulatedTruth, where: NDArray[np.bool_] | None = None) -> float:
-    where = judged(truth) if where is None else where
-    return float(bgars.angular_error_deg(field.normals[where], truth.normals[where]).mean())
-
-
-def circles_px(capture: bgars.Capture, truth: bgars.SimulatedTruth) -> list[list[float]]:
-    """True silhouettes of the balls of a simulated array."""
-    balls = [ball for ball in truth.balls if ball.present]
-    return [[v / capture.pixel_pitch_um for v in (ball.x_um, ball.y_um, ball.diameter_um / 2)] for ball in balls]
-
+    pass
 
 LIMITS = [
     # the requirement: I_s = 1, h = 40 unless said, 8 bit, no noise unless said
@@ -103,14 +76,20 @@ def test_the_height_of_a_hemisphere_is_right_to_hundredths_of_a_pixel() -> None:
     assert (height - truth.height_px)[truth.mask].std() <= 0.05
 
 
-@pytest.fixture(scope="module")
-def odd_array() -> tuple[bgars.Capture, bgars.SimulatedTruth, bgars.NormalField]:
+def odd_balls() -> tuple[bgars.Capture, bgars.SimulatedTruth, bgars.NormalField]:
     """Nine balls: B2 pressed flat, C1 with its top cut off."""
     scene = bgars.Scene.ball_array(
         3, 3, pitch_um=900.0, defects={"B2": bgars.Defect.flattened(), "C1": bgars.Defect.clipped(15.0)}
     )
     capture, truth = bgars.simulate(scene, RING, SOLDER, bgars.Camera(pixel_pitch_um=10.0))
     return capture, truth, bgars.estimate_normals(capture, anchors=circles_px(capture, truth))
+
+
+@pytest.fixture(scope="module")
+def odd_array(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> tuple[bgars.Capture, bgars.SimulatedTruth, bgars.NormalField]:
+    return shared(tmp_path_factory, "odd_balls", odd_balls)
 
 
 @pytest.mark.parametrize(("name", "limit_deg"), [("B2", 0.3), ("C1", 0.7), ("A1", 0.15)])
@@ -338,49 +317,6 @@ def test_progress_rises_and_ctrl_c_in_it_stops_the_work() -> None:
 
     with pytest.raises(KeyboardInterrupt):
         bgars.estimate_normals(capture, anchors=circles_px(capture, truth), progress=interrupt)
-
-
-def solder_for(lights: int) -> bgars.SurfaceMaterial:
-    return bgars.SurfaceMaterial(100.0, 0.0, 0.0, (bgars.SurfaceLobe(255.0, 0.2, 0.0),), "smith", (1.0,) * lights)
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"anchors": [[0.0, 0.0, 2.0]]}, "radius at least 3 pixels.*2"),
-        ({"anchors": [[0.0, 0.0, -1.0]]}, "radii above 0 px"),
-        ({"anchors": [[0.0, np.nan, 9.0]]}, "must be finite"),
-        ({"anchors": [[0.0, 0.0]]}, r"circles of shape \(N, 3\).*\(1, 2\)"),
-        ({"anchors": np.zeros((4, 4), np.bool_)}, r"anchors: a mask of one ball.*\(4, 4\)"),
-        ({"anchors": [[0.0, 0.0, 30.0]], "material": solder_for(5)}, "material.gains.*8.*5"),
-        ({"anchors": [[0.0, 0.0, 30.0]], "method": "lambertian"}, "anchors: only the method reflectance"),
-        ({"material": solder_for(8), "method": "robust-filter"}, "material: only the method reflectance"),
-        ({"threshold": 40.0}, "threshold: only the method specular-filter uses it, got method 'reflectance'"),
-        ({"threshold": 40.0, "method": "robust-filter"}, "threshold: only the method specular-filter"),
-    ],
-)
-def test_bad_input_is_one_clear_line(options: dict[str, Any], words: str) -> None:
-    capture, _ = hemisphere()
-    with pytest.raises(bgars.InputError, match=words):
-        bgars.estimate_normals(capture, **options)
-
-
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: bgars.SurfaceLobe(-1.0, 0.2, 0.0), r"lobe\.strength_level.*got -1"),
-        (lambda: bgars.SurfaceLobe(1.0, 0.0, 0.0), r"lobe\.roughness.*got 0"),
-        (lambda: bgars.SurfaceLobe(1.0, 0.2, 1.5), r"lobe\.tail.*got 1\.5"),
-        (lambda: replace(solder_for(8), diffuse_level=-1.0), "diffuse_level.*got -1"),
-        (lambda: replace(solder_for(8), grazing=np.inf), "grazing.*got inf"),
-        (lambda: replace(solder_for(8), lobes=()), "lobes: must be one or two, got 0"),
-        (lambda: replace(solder_for(8), masking="none"), "masking: must be smith or cook-torrance, got 'none'"),
-        (lambda: replace(solder_for(8), gains=(1.0, 0.0)), r"gains\[1\]: must be finite and above 0, got 0"),
-    ],
-)
-def test_impossible_materials_are_refused(make: Callable[[], object], words: str) -> None:
-    with pytest.raises(bgars.InputError, match=words):
-        make()
 
 
 def test_pixels_that_are_not_wanted_change_nothing_of_the_others() -> None:
