@@ -114,11 +114,12 @@ def _render_tile(studio: Studio, frames: Frames, first: int, last: int) -> None:
     frames.labels[inside] = studio.world.labels[centre.owner]
     direct = camera.supersample == 1 and camera.halo_px == 0
     signals = [] if direct else _box_filtered(studio, first, last)
+    albedo = _board_albedo(studio, centre, (first, 0)) if direct else 1.0
     for light in range(lights):
         beam = beam_at(studio.rig, light, centre)
         lit = is_lit(studio.world, studio.rig, light, centre, beam, studio.floor_um)
         frames.lit[light, inside] = lit
-        signal = _signal(studio, centre, beam, lit, (first, 0)) if direct else signals[light]
+        signal = _signal(studio, centre, beam, lit, albedo) if direct else signals[light]
         frames.images[light, inside] = studio.sensor.expose(signal, light, first)
 
 
@@ -136,15 +137,16 @@ def _box_filtered(studio: Studio, first: int, last: int) -> list[Array]:
     for down_um in shifts_um:
         for right_um in shifts_um:
             patch = studio.world.look(x_um + right_um, y_um - down_um)
+            albedo = _board_albedo(studio, patch, (first - halo, -halo))
             for light in range(lights):
                 beam = beam_at(studio.rig, light, patch)
                 lit = is_lit(studio.world, studio.rig, light, patch, beam, studio.floor_um)
-                sums[light] += _signal(studio, patch, beam, lit, (first - halo, -halo))
+                sums[light] += _signal(studio, patch, beam, lit, albedo)
     return [blur(total / count**2, camera.blur_px, halo) for total in sums]
 
 
-def _signal(studio: Studio, patch: Patch, beam: Beam, lit: NDArray[np.bool_], corner: tuple[int, int]) -> Array:
-    """Light of the lit samples, as a fraction of full scale; `corner` is the image place of the first sample."""
+def _signal(studio: Studio, patch: Patch, beam: Beam, lit: NDArray[np.bool_], albedo: Array | float) -> Array:
+    """Light of the lit samples, as a fraction of full scale; `albedo` is the board's factor at every sample."""
     signal = np.zeros(patch.z_um.shape)
     on_board = patch.owner < 0
     board = studio.world.board
@@ -154,16 +156,14 @@ def _signal(studio: Studio, patch: Patch, beam: Beam, lit: NDArray[np.bool_], co
         if not where.size:
             continue
         if is_board:
-            finish = Finish(i_d=_board_albedo(studio, patch, corner, chosen))
+            finish = Finish(i_d=albedo.take(where) if isinstance(albedo, np.ndarray) else albedo)
         else:
-            owner = patch.owner.ravel()[where]
+            owner = patch.owner.take(where)
             finish = Finish(*(np.asarray(factor)[owner] for factor in _factors(studio.finishes)))
-        normal = Points(*(component.ravel()[where] for component in patch.normal))
+        normal = Points(*(component.take(where) for component in patch.normal))
         toward = Points(*(_pick(component, where) for component in beam.toward))
-        values = reflected(board.material if is_board else studio.material, finish, normal, toward) * _pick(
-            beam.irradiance, where
-        )
-        signal.ravel()[where] = values
+        material = board.material if is_board else studio.material
+        signal.put(where, reflected(material, finish, normal, toward) * _pick(beam.irradiance, where))
     return signal
 
 
@@ -172,16 +172,17 @@ def _factors(finish: Finish) -> tuple[Array | float, Array | float, Array | floa
 
 
 def _pick(values: Array, where: NDArray[np.intp]) -> Array:
-    return values.ravel() if values.size == 1 else values.ravel()[where]
+    return values.ravel() if values.size == 1 else values.take(where)
 
 
-def _board_albedo(studio: Studio, patch: Patch, corner: tuple[int, int], chosen: NDArray[np.bool_]) -> Array | float:
+def _board_albedo(studio: Studio, patch: Patch, corner: tuple[int, int]) -> Array | float:
+    """The board's factor at every sample; `corner` is the image place of the first."""
     board = studio.world.board
     if board.texture is not None:
-        return board.texture.factor(patch.x_um, patch.y_um)[chosen]
+        return board.texture.factor(patch.x_um, patch.y_um)
     if board.albedo_map is not None:
         rows, cols = studio.shape
         row = np.clip(np.arange(corner[0], corner[0] + len(patch.y_um)), 0, rows - 1)
         col = np.clip(np.arange(corner[1], corner[1] + len(patch.x_um)), 0, cols - 1)
-        return board.albedo_map[row][:, col][chosen]
+        return board.albedo_map[row][:, col]
     return 1.0

@@ -69,6 +69,6 @@ class World:
 
 def window(x_um: Array, y_um: Array, x0: float, x1: float, y0: float, y1: float) -> tuple[slice, slice]:
     """Rows and columns of the grid inside a box; x grows, y falls."""
-    cols = slice(int(np.searchsorted(x_um, x0)), int(np.searchsorted(x_um, x1, side="right")))
-    rows = slice(int(np.searchsorted(-y_um, -y1)), int(np.searchsorted(-y_um, -y0, side="right")))
-    return rows, cols
+    down_um = -y_um
+    rows = slice(int(down_um.searchsorted(-y1)), int(down_um.searchsorted(-y0, side="right")))
+    return rows, slice(int(x_um.searchsorted(x0)), int(x_um.searchsorted(x1, side="right")))
