@@ -54,3 +54,35 @@ def test_a_dark_frame_that_does_not_fit_is_told_not_cut() -> None:
     capture = bgars.Capture(LEVELS, RIG, np.ones((5, 7), bool), dark=np.full((5, 7), 300, np.int64))
     with pytest.raises(bgars.InputError, match="dark: must have the dtype of the images, uint8, got uint16"):
         bgars.estimate_normals(capture)
+
+
+@pytest.mark.parametrize(
+    ("images", "saturation", "full_scale"),
+    [
+        (LEVELS, 255.0, 255.0),
+        (257 * LEVELS.astype(np.uint16), 65535.0, 65535.0),
+        (LEVELS.astype(np.float32) / 255.0, np.inf, float(LEVELS.max() / np.float32(255.0))),
+    ],
+)
+def test_a_capture_made_by_hand_has_the_scale_of_its_pixels(
+    images: NDArray[np.generic], saturation: float, full_scale: float
+) -> None:
+    capture = bgars.Capture(images, RIG, np.ones((5, 7), bool))
+    assert (capture.saturation, capture.full_scale) == (saturation, pytest.approx(full_scale))
+    told = bgars.Capture(images, RIG, np.ones((5, 7), bool), saturation=200.0)
+    assert told.saturation == 200.0
+    assert told.full_scale == (200.0 if images.dtype.kind == "f" else full_scale)
+
+
+@pytest.mark.parametrize("method", ["robust-filter", "specular-filter", "reflectance"])
+@pytest.mark.parametrize("scale", [np.uint16(257), np.float32(1 / 255)])
+def test_normals_of_a_capture_made_by_hand_are_those_of_its_arrays(method: str, scale: np.generic) -> None:
+    sample = bgars.read_capture(bgars.sample_capture())
+    images = sample.images * scale
+    by_hand = bgars.estimate_normals(bgars.Capture(images, sample.rig, sample.mask), method=method)
+    plain = bgars.estimate_normals(images, sample.rig.directions, method=method)
+    np.testing.assert_array_equal(by_hand.normals, plain.normals)
+    eight_bits = bgars.estimate_normals(sample, method=method)
+    # The largest of floats is not quite full scale: single pixels choose other lights.
+    angles_deg = bgars.angular_error_deg(by_hand.normals, eight_bits.normals)
+    assert np.nanmean(angles_deg) < 0.1

@@ -15,8 +15,7 @@ from bgars.records.capture import Capture
 from bgars.records.given_pixels import grey_pixels
 from bgars.records.kernel_capture import kernel_capture
 from bgars.records.normal_field import NormalField
-from bgars.records.pixels import float_full_scale
-from bgars.records.plain_arrays import every_pixel, integer_full_scale, masked_pixels, plain_bool
+from bgars.records.plain_arrays import every_pixel, masked_pixels, plain_bool
 from bgars.records.rig import LightRig
 from bgars.records.whole_capture import need_whole
 
@@ -94,15 +93,8 @@ def capture_of(
     light_directions: ArrayLike | None,
     light_intensities: ArrayLike | None,
     saturation: float | None,
-    threads: int | None,
-    *,
-    needs_full_scale: bool,
 ) -> Capture:
-    """Return the capture, or one made of plain arrays; arguments as of :func:`bgars.estimate_normals`.
-
-    Full scale of plain floats is their largest value. Where only kernels need it, these look for it: they read the
-    images anyway.
-    """
+    """Return the capture, or one made of plain arrays; arguments as of :func:`bgars.estimate_normals`."""
     if isinstance(images, Capture):
         for name, value in (
             ("light_directions", light_directions),
@@ -123,19 +115,11 @@ def capture_of(
     if len(rig) != len(stack):
         msg = f"images and light_directions: {len(stack)} images but {len(rig)} lights; they must be equal in number"
         raise InputError(msg)
-    full_scale = integer_full_scale(stack)
-    if full_scale is not None:
-        clip = full_scale if saturation is None else saturation
-    else:
-        # Not for a saturation of 0, which is refused later.
-        full_scale = saturation or (float_full_scale(stack, threads) if needs_full_scale else math.nan)
-        clip = float("inf") if saturation is None else saturation
     return Capture(
         images=stack,
         rig=rig,
         mask=every_pixel(stack.shape[1:]) if hidden is None else ~hidden,
-        saturation=clip,
-        full_scale=full_scale,
+        saturation=math.nan if saturation is None else saturation,
     )
 
 

@@ -132,10 +132,7 @@ def estimate_normals(
         _refuse_idle(method, {"threshold": threshold, "anchors": anchors, "material": material})
     threshold = None if threshold is None else number("threshold", threshold)
     saturation = None if saturation is None else number("saturation", saturation)
-    needs_full_scale = not is_own or method == "reflectance"
-    capture = capture_of(
-        images, light_directions, light_intensities, saturation, threads, needs_full_scale=needs_full_scale
-    )
+    capture = capture_of(images, light_directions, light_intensities, saturation)
     need_whole(capture)
     use = combined_mask(capture, mask)
     options = {
@@ -159,7 +156,6 @@ def ball_normals(
     """Normals of balls by a method; of ``reflectance``, which learns from all pixels of `mask`, only those wanted."""
     if method != "reflectance":
         return estimate_normals(capture, method=method, mask=mask, threads=threads)
-    capture = capture_of(capture, None, None, None, threads, needs_full_scale=True)
     use = combined_mask(capture, mask)
     return _by_reflectance(capture, mask=use, wanted=wanted, anchors=found, material=material, threads=threads)
 

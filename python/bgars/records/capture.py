@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -9,8 +10,8 @@ import numpy as np
 
 from bgars.errors import InputError
 from bgars.records.given_pixels import grey_pixels
-from bgars.records.pixels import BoolArray, FloatArray, PixelArray
-from bgars.records.plain_arrays import keep, masked_pixels, plain, plain_bool
+from bgars.records.pixels import BoolArray, FloatArray, PixelArray, float_full_scale
+from bgars.records.plain_arrays import integer_full_scale, keep, masked_pixels, plain, plain_bool
 from bgars.records.rig import LightRig
 from bgars.records.shown import ShownCapture
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 __all__ = ["Capture"]
+
+STACK_NDIM = 3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -44,9 +47,11 @@ class Capture(ShownCapture):
     response : (256,) or (65536,) float32, or None
         Linear grey level of every code (the camera's inverse response); None for a linear camera.
     black_level, saturation : float
-        Grey level of no light, used where there is no dark frame; that at and above which a pixel counts as clipped.
+        Grey level of no light, used where there is no dark frame; that at and above which a pixel counts as clipped:
+        by default the largest of an integer type, infinite for floats.
     full_scale : float
-        Grey level of full scale; thresholds "of 255" scale with it and albedo 1 means it. NaN: the kernels find it.
+        Grey level of full scale; thresholds "of 255" scale with it and albedo 1 means it. By default the largest of an
+        integer type; for floats `saturation`, or where that is infinite their largest value.
     files, folder : tuple of Path, Path or None
         The image files, for messages and reports; where the capture was read from.
     assumed : tuple of str
@@ -60,8 +65,8 @@ class Capture(ShownCapture):
     dark: PixelArray | None = None
     response: FloatArray | None = None
     black_level: float = 0.0
-    saturation: float = float("inf")
-    full_scale: float = 255.0
+    saturation: float = math.nan
+    full_scale: float = math.nan
     files: tuple[Path, ...] = ()
     folder: Path | None = None
     pixel_pitch_u_um: float | None = None
@@ -91,11 +96,31 @@ class Capture(ShownCapture):
         if self.response is not None:
             arrays["response"] = plain("response", self.response, np.float32)
         keep(self, arrays)
+        keep(self, self._levels())
+
+    def _levels(self) -> dict[str, float]:
+        """Saturation and full scale, where they were not given."""
+        top = integer_full_scale(self.images)
+        saturation = self.saturation
+        if saturation != saturation:  # noqa: PLR0124 - NaN; it may be anything that somebody gave
+            saturation = math.inf if top is None else top
+        if self.full_scale == self.full_scale:
+            return {"saturation": saturation}
+        if top is None:
+            # Not a saturation of 0, which is refused later.
+            is_told = isinstance(saturation, int | float) and 0.0 < saturation < math.inf
+            top = saturation if is_told else _largest(self.images)
+        return {"saturation": saturation, "full_scale": top}
 
     @property
     def name(self) -> str:
         """Name of the capture's folder, or "capture"."""
         return "capture" if self.folder is None else self.folder.resolve().name
+
+
+def _largest(images: PixelArray) -> float:
+    """The largest value of a stack of floats, above 0; what is no stack is refused later."""
+    return float_full_scale(images, None) if images.ndim == STACK_NDIM and images.size else 1.0
 
 
 def _like(images: PixelArray, dark: NDArray[Any]) -> NDArray[Any]:
