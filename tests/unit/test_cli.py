@@ -146,6 +146,13 @@ def test_info(tmp_path: Path) -> None:
     assert bgars_command("info", tmp_path).returncode == 2
 
 
+def test_info_tells_of_lights_below_the_surface(capture_folder: Path) -> None:
+    recipe = "[lights]\ndirections = [[1, 0, -1], [0, 1, -1], [-1, 0, -1], [0, -1, -1]]\n"
+    (capture_folder / "capture.toml").write_text(recipe, encoding="utf-8")
+    run = bgars_command("info", capture_folder)
+    assert (run.returncode, run.stderr.startswith("error: below-surface: every light stands below")) == (0, True)
+
+
 def test_evaluate_on_the_sample() -> None:
     run = bgars_command("evaluate", bgars.sample_capture(), "--json")
     assert run.returncode == 0, run.stderr
