@@ -147,7 +147,7 @@ def test_info(tmp_path: Path) -> None:
 
 
 def test_info_tells_of_lights_below_the_surface(capture_folder: Path) -> None:
-    recipe = "[lights]\ndirections = [[1, 0, -1], [0, 1, -1], [-1, 0, -1], [0, -1, -1]]\n"
+    recipe = "[lights]\ndirections = [[0.6, 0, -0.8], [0, 0.6, -0.8], [-0.6, 0, -0.8], [0, -0.6, -0.8]]\n"
     (capture_folder / "capture.toml").write_text(recipe, encoding="utf-8")
     run = bgars_command("info", capture_folder)
     assert (run.returncode, run.stderr.startswith("error: below-surface: every light stands below")) == (0, True)
