@@ -1,4 +1,7 @@
-"""Pass, fail or undecided: the decision rule of ISO 14253-1."""
+"""Pass, fail or undecided: the decision rule of ISO 14253-1.
+
+Doubts of a ball or a part may lower a verdict afterwards: ``judge_ball.py``, ``judge_part.py``, ``judge.py``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-r"""Where the edges of the shadows really are: short stretches of edge, each measured across.
+r"""Where the edges of the shadows really are, sub-pixel: short stretches of edge, each measured across.
 
 Near the predicted edge of a shadow, at signed distance d, the board reads
 

@@ -1,4 +1,5 @@
-//! The robust filter: the window of sorted values that a Lambertian facet explains best.
+//! The robust filter: the window of sorted values that a Lambertian facet explains best. Most pixels take the same rule in `f32`,
+//! many at once, in `windows.rs`; this is the careful kernel that near ties are left to.
 
 use nalgebra::{Matrix3, Vector3};
 
