@@ -153,10 +153,12 @@ def read_stored_normals(
     path = Path(path)
     pixels = read_pixels(path)
     shape = pixels.values.shape
-    use = None if mask is None else read_mask(Path(mask), (shape[0], shape[1]))
+    said: list[str] = []
+    use = None if mask is None else read_mask(Path(mask), (shape[0], shape[1]), said)
     if use is None and path.suffix.lower() == ".png" and is_own(path):
         use = np.ones(shape[:2], np.bool_)  # black says where there is nothing: a board of one colour is a board
-    return normals_of(path, pixels, use, directx)
+    found = normals_of(path, pixels, use, directx)
+    return Normals(found.vectors, (*said, *found.notes))
 
 
 def holds_normals(path: Path) -> bool:
