@@ -76,7 +76,10 @@ def test_a_mask_that_is_not_used_is_named(tmp_path: Path) -> None:
     assert not reads_right(tmp_path, "mask_left.png, mask_right.png").mask.all()
     write_directions(tmp_path, "l.txt")
     recipe(tmp_path, '[lights]\ndirections = "l.txt"\n')
-    assert reads_right(tmp_path).mask.all(), "a recipe says everything"
+    told = 'mask_right.png are not used: capture.toml names no mask; add mask = "mask.png"'
+    assert reads_right(tmp_path, told).mask.all(), "a recipe says everything"
+    recipe(tmp_path, 'mask = "mask.png"\n[lights]\ndirections = "l.txt"\n')
+    assert not reads_right(tmp_path).mask.all()
 
 
 def test_a_mask_of_ones(tmp_path: Path) -> None:

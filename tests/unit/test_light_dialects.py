@@ -15,6 +15,7 @@ from case_captures import (
     PLAIN,
     levels,
     lp_lines,
+    names_of,
     reads_right,
     refused,
     with_names,
@@ -170,3 +171,20 @@ def test_columns_in_another_order_are_refused(tmp_path: Path, header: str) -> No
     lines = path.read_text(encoding="utf-8").split("\n")
     path.write_text("\n".join([good, *lines[1:]]), encoding="utf-8")
     np.testing.assert_allclose(read_light_file(path).vectors, LIGHTS, atol=1e-4)
+
+
+@pytest.mark.parametrize("header", ["file x y z", "filename,x,y,z", "image\tLx\tLy\tLz"])
+def test_a_header_below_the_count_is_not_counted(header: str, tmp_path: Path) -> None:
+    between = "," if "," in header else "\t" if "\t" in header else " "
+    rows = [line.replace(" ", between) for line in lp_lines(write_images(tmp_path))]
+    (tmp_path / "lights.lp").write_text("\n".join([str(COUNT), header, *rows]), encoding="utf-8")
+    reads_right(tmp_path)
+    (tmp_path / "lights.lp").write_text("\n".join([str(COUNT), header, *rows[:-1]]), encoding="utf-8")
+    refused(tmp_path, f"announces {COUNT} lights, but {COUNT - 1} follow")
+
+
+def test_names_that_look_like_numbers_of_fortran_stay_names(tmp_path: Path) -> None:
+    names = names_of("{}D2.png")
+    write_images(tmp_path, names)
+    write_lp(tmp_path, lp_lines([name.removesuffix(".png") for name in names]))
+    reads_right(tmp_path, "by stem")

@@ -14,6 +14,8 @@ import pytest
 import tifffile
 from bgars.cli.app import app
 from bgars.io.normal_map import read_stored_normals
+from PIL import Image
+from scipy.io import savemat
 from typer.testing import CliRunner
 
 SHAPE = (90, 110)
@@ -57,6 +59,7 @@ def error_deg(found: np.ndarray, use: np.ndarray) -> float:
 
 
 TURNED = truth() * [1, -1, 1]
+BLUE_FROM_0 = np.dstack([codes(truth())[..., :2], np.rint(255 * truth()[..., 2]).astype(np.uint8)])
 SWIZZLED = with_alpha(codes(truth())[..., 0], np.dstack([np.full(SHAPE, 255, np.uint8), *[codes(truth())[..., 1]] * 2]))
 
 
@@ -86,6 +89,15 @@ def exr(path: Path) -> None:
         file.write(str(path))
 
 
+def radiance(path: Path) -> None:
+    """A flat file of four bytes a pixel: red, green and blue of one exponent."""
+    shares = truth() / 2 + 0.5
+    _, exponent = np.frexp(shares.max(axis=2))
+    mantissa = np.floor(shares * 256.0 / np.exp2(exponent)[..., None]).astype(np.uint8)
+    pixels = np.dstack([mantissa, (exponent + 128).astype(np.uint8)])
+    path.write_bytes(f"#?RADIANCE\n\n-Y {SHAPE[0]} +X {SHAPE[1]}\n".encode() + pixels.tobytes())
+
+
 # name: (file, where normals are expected, words of the note or "")
 READ: dict[str, tuple[Callable[[Path], Path], np.ndarray, str]] = {
     "8 bits": (png(codes(truth())), MASK | True, ""),
@@ -104,6 +116,11 @@ READ: dict[str, tuple[Callable[[Path], Path], np.ndarray, str]] = {
     "green down, white": (png(np.where(MASK[..., None], codes(TURNED), np.uint8(255))), MASK, "DirectX"),
     "blue first": (png(codes(truth())[..., ::-1].copy()), MASK | True, "B, G, R"),
     "blue first, green down": (png(codes(TURNED)[..., ::-1].copy()), MASK | True, "B, G, R"),
+    "red and green exchanged": (png(codes(truth())[..., [1, 0, 2]]), MASK | True, "exchanged"),
+    "exchanged, 16 bits": (png(codes(truth()[..., [1, 0, 2]], 16).copy()), MASK | True, "exchanged"),
+    "exchanged, y down": (png(codes(TURNED)[..., [1, 0, 2]]), MASK | True, "exchanged, and y as down"),
+    "blue from 0 to 1": (png(BLUE_FROM_0), MASK | True, "from 0 to 1"),
+    "blue from 0 to 1, white": (png(np.where(MASK[..., None], BLUE_FROM_0, np.uint8(255))), MASK, "from 0 to 1"),
     "z away": (png(codes(truth() * [1, 1, -1])), MASK | True, "away"),
     "sRGB curve": (png(srgb(truth())), MASK | True, "sRGB"),
     "two channels, blue 0": (png(codes(truth()) * np.uint8([1, 1, 0])), MASK | True, "third channel"),
@@ -146,6 +163,10 @@ READ: dict[str, tuple[Callable[[Path], Path], np.ndarray, str]] = {
     "npy, codes": (saved("n.npy", lambda path: np.save(path, codes(truth()))), MASK | True, ""),
     "npz": (saved("n.npz", lambda path: np.savez(path, normals=truth(), depth=truth())), MASK | True, ""),
     "npz, one array": (saved("n.npz", lambda path: np.savez(path, truth())), MASK | True, ""),
+    "MATLAB": (saved("N.mat", lambda path: savemat(path, {"Normal_gt": truth()})), MASK | True, ""),
+    "TGA": (saved("n.tga", lambda path: Image.fromarray(codes(truth())).save(path)), MASK | True, ""),
+    "WebP": (saved("n.webp", lambda path: Image.fromarray(codes(truth())).save(path, lossless=True)), MASK | True, ""),
+    "Radiance HDR": (saved("n.hdr", radiance), MASK | True, "from 0 to 1"),
     "EXR": (saved("n.exr", exr), MASK | True, ""),
 }
 

@@ -114,6 +114,51 @@ def test_positions_have_the_unit_of_their_header(header: str, per_mm: float, tmp
     np.testing.assert_allclose(capture.rig.positions_um, places_mm * 1000.0, atol=1.0)
 
 
+def test_positions_on_a_dome_are_near_lights_where_the_scale_is_known(tmp_path: Path) -> None:
+    write_images(tmp_path)
+    rows = "".join(",".join(f"{value:.6f}" for value in place) + "\n" for place in LIGHTS * 300.0)
+    (tmp_path / "lights.csv").write_text(f"x_mm,y_mm,z_mm\n{rows}", encoding="utf-8")
+    reads_right(tmp_path, "positions at 300 mm taken as directions; with pixel_pitch_um in capture.toml they are near")
+    recipe(tmp_path, 'pixel_pitch_um = 10\n[lights]\ndirections = "lights.csv"\n')
+    capture = reads_right(tmp_path, "lights.csv: positions in the unit of its header, so near lights")
+    assert capture.rig.positions_um is not None
+    np.testing.assert_allclose(capture.rig.positions_um, LIGHTS * 300_000.0, atol=1.0)
+    (tmp_path / "lights.csv").write_text(f"x,y,z\n{rows}", encoding="utf-8")
+    assert reads_right(tmp_path, "vectors of length 300 taken as directions").rig.positions_um is None
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "sep=;\nx;y;z\n" + "".join(";".join(f"{v:.6f}" for v in light) + "\n" for light in LIGHTS),
+        "sep=;\r\n" + "".join(";".join(f"{v:.6f}".replace(".", ",") for v in light) + "\r\n" for light in LIGHTS),
+        '"sep=,"\nx,y,z\n' + "".join(",".join(f"{v:.6f}" for v in light) + "\n" for light in LIGHTS),
+        "".join(" ".join(f"{v:.6f}" for v in light).replace("-", "\N{MINUS SIGN}") + "\n" for light in LIGHTS),
+        "".join(",".join(f"{v:.6e}" for v in light).replace("-", "\N{MINUS SIGN}") + "\n" for light in LIGHTS),
+        "".join(" ".join(f"{v:.6e}".replace("e", "D") for v in light) + "\n" for light in LIGHTS),
+        "".join(" ".join(f"{v / 10:.6f}".replace("0.", ".") + "d+1" for v in light) + "\n" for light in LIGHTS),
+        "azimuth_deg,elevation_deg\n"
+        + "".join(
+            f"{a},{e}\n".replace("-", "\N{MINUS SIGN}") for a, e in zip(AZIMUTHS_DEG - 360, ELEVATIONS_DEG, strict=True)
+        ),
+    ],
+    ids=[
+        "sep",
+        "sep and decimal commas",
+        "quoted sep",
+        "minus",
+        "minus in exponents",
+        "Fortran",
+        "bare point",
+        "angles",
+    ],
+)
+def test_numbers_as_excel_and_fortran_write_them(text: str, tmp_path: Path) -> None:
+    write_images(tmp_path)
+    (tmp_path / "lights.csv").write_text(text, encoding="utf-8")
+    reads_right(tmp_path, "lights.csv")
+
+
 def test_rows_of_an_lp_file_that_look_like_numbers(tmp_path: Path) -> None:
     write_images(tmp_path, names_of("{}.png"))
     write_lp(tmp_path, lp_lines(names_of("{}")))

@@ -22,11 +22,13 @@ from bgars.io.capture_radiometry import (
     response_table,
     subtract_offset,
 )
+from bgars.io.capture_values import note_light_below_zero, refuse_nan
 from bgars.io.given_paths import need_folder
 from bgars.io.image_listing import Listing, list_folder
 from bgars.io.image_tags import upright
 from bgars.io.images import MAX_MEGAPIXELS, WEIGHTS
 from bgars.io.light_discovery import choose_mask, default_recipe
+from bgars.io.mask_hints import tell_unused_masks
 from bgars.io.masks import opaque_everywhere, read_mask
 from bgars.io.recipe import RECIPE_NAME, CaptureRecipe, read_recipe
 from bgars.io.station_file import read_station
@@ -195,6 +197,8 @@ def _load_chosen(
     lights, names = match(folder, lights, chosen, images)
     if recipe.mask is None and chosen.mask is not None:
         recipe = recipe.model_copy(update={"mask": chosen.mask})
+    if recipe.mask is None:
+        tell_unused_masks(folder, listing, names, notes)
     return _load(folder, recipe, lights, names, channel or recipe.channel, max_megapixels, threads, notes)
 
 
@@ -257,7 +261,7 @@ def _load(
     images, linear, code_scale = decoding.decode(table, gains)
     images = _turn(images, headers, notes)
     mask = _mask(folder, recipe, images, headers, notes)
-    _refuse_nan(images, mask, paths)
+    refuse_nan(images, mask, paths)
 
     levels = levels_of(folder, recipe, images, code_scale, threads, notes)
     dark_path = None if recipe.dark is None else folder / recipe.dark
@@ -272,6 +276,7 @@ def _load(
             dark = read_dark(dark_path, images, channel, table)
         if linear or images.dtype.kind == "f":
             images, dark, levels = linearise_floats(folder, recipe, images, dark, levels, linear)
+    note_light_below_zero(images, levels.black_level if dark is None else dark, mask, paths, notes)
     files = tuple(f"{names[0]}[{index}]" for index in range(len(paths))) if stack else tuple(names)
     rig = lights.rig.with_intensities(
         np.ones(len(paths)) if in_values else _one_intensity(lights.intensities, channel), files=files
@@ -309,7 +314,7 @@ def _mask(folder: Path, recipe: CaptureRecipe, images: PixelArray, headers: Head
     """The mask of the recipe, else what no image declares transparent."""
     shape = (images.shape[1], images.shape[2])
     if recipe.mask is not None:
-        return read_mask(folder / recipe.mask, shape)
+        return read_mask(folder / recipe.mask, shape, notes)
     opaque = opaque_everywhere(headers.with_alpha, headers.orientation)
     if opaque is None or opaque.shape != shape:
         return every_pixel(shape)
@@ -334,17 +339,3 @@ def _one_intensity(intensities: NDArray[np.float64], channel: ChannelName) -> ND
     weights = np.array(WEIGHTS[channel])
     combined: NDArray[np.float64] = intensities @ weights / weights.sum()
     return combined
-
-
-def _refuse_nan(images: PixelArray, mask: BoolArray, paths: list[Path]) -> None:
-    if images.dtype.kind != "f":
-        return
-    for image, path in zip(images, paths, strict=True):
-        bad = ~np.isfinite(image) & mask
-        if bad.any():
-            row, col = np.argwhere(bad)[0]
-            msg = (
-                f"{path}: {int(bad.sum())} pixels inside the mask are not finite (first at row {row}, column {col}); "
-                "mask them out"
-            )
-            raise InputError(msg)

@@ -115,7 +115,12 @@ def _rig(
         notes.extend(f"{path.name}: {note}" for note in table.notes)
         if table.kind == "camera_mm":
             return _near_rig(table, path, recipe, notes)
-    if lights.positions_mm is not None:
+    by_header = lights.positions_mm is None and path is not None and _are_positions(table, recipe)
+    if by_header and path is not None:
+        notes.append(
+            f"{path.name}: positions in the unit of its header, so near lights (origin: image centre on the board)"
+        )
+    if lights.positions_mm is not None or by_header:
         _refuse_unit_lengths(table)
         distance_um = None if lights.intensity_distance_mm is None else lights.intensity_distance_mm * 1000.0
         rig = LightRig.from_positions(table.vectors * 1000.0, intensity_distance_um=distance_um)
@@ -124,9 +129,19 @@ def _rig(
     return LightRig.from_directions(vectors, files=table.files), strength, None
 
 
-def _refuse_unit_lengths(table: LightTable) -> None:
+def _are_positions(table: LightTable, recipe: CaptureRecipe) -> bool:
+    """Whether a header gives the unit of positions, and the scale is known that near lights need."""
+    is_stated = table.kind == "positions_mm" and not table.free_length and recipe.pixel_pitch_um is not None
+    return is_stated and not _are_unit(table)
+
+
+def _are_unit(table: LightTable) -> bool:
     lengths = np.linalg.norm(table.vectors, axis=1)
-    if len(lengths) > 1 and (np.abs(lengths - 1.0) < UNIT_WITHIN).all():
+    return len(lengths) > 1 and bool((np.abs(lengths - 1.0) < UNIT_WITHIN).all())
+
+
+def _refuse_unit_lengths(table: LightTable) -> None:
+    if _are_unit(table):
         msg = "positions_mm: all are 1 mm from the image centre, so they are directions: write directions = ..."
         raise InputError(msg)
 
@@ -162,7 +177,10 @@ def _unit(table: LightTable, path: Path, notes: list[str]) -> tuple[NDArray[np.f
     if table.free_length or (alike and (np.abs(lengths - 1.0) < UNIT_WITHIN).all()):
         return units, table.intensities
     if alike:
-        notes.append(f"{path.name}: vectors of length {np.median(lengths):.4g} taken as directions")
+        is_dome = table.kind == "positions_mm"
+        what = "positions at {:.4g} mm" if is_dome else "vectors of length {:.4g}"
+        near = f"; with pixel_pitch_um in {RECIPE_NAME} they are near lights" if is_dome else ""
+        notes.append(f"{path.name}: {what.format(np.median(lengths))} taken as directions{near}")
         return units, table.intensities
     if lengths.max() > STRONGEST or table.kind == "positions_mm":
         msg = (

@@ -20,6 +20,8 @@ __all__ = ["ImageTags", "read_tags", "upright"]
 
 UPRIGHT = 1
 ORIENTATION, SUBFILE, EXTRA_SAMPLES, PROFILE = 274, 254, 338, 34675
+BITS, PHOTOMETRIC = 258, 262
+WHITE_IS_ZERO = 0
 REDUCED = 1
 SHORT, LONG = 3, 4
 MAX_PAGES = 10_000
@@ -46,6 +48,8 @@ class ImageTags(NamedTuple):
         The first page is a reduced copy.
     profile : bool
         The file declares sRGB or another profile for the display of its colours.
+    white_bits : bool
+        A pixel is one bit, and 0 means white (TIFF).
     """
 
     orientation: int = UPRIGHT
@@ -53,6 +57,7 @@ class ImageTags(NamedTuple):
     alpha: bool = False
     preview_first: bool = False
     profile: bool = False
+    white_bits: bool = False
 
 
 def read_tags(path: Path, kind: ImageFormat) -> ImageTags:
@@ -91,7 +96,8 @@ def _tiff_tags(file: BinaryIO) -> ImageTags:
     first = full[0] if full else {}
     orientation, count = _valid(first.get(ORIENTATION, UPRIGHT)), max(len(full), 1)
     preview_first = bool(pages) and first is not pages[0]
-    return ImageTags(orientation, count, EXTRA_SAMPLES in first, preview_first, PROFILE in first)
+    white_bits = first.get(PHOTOMETRIC) == WHITE_IS_ZERO and first.get(BITS, 1) == 1
+    return ImageTags(orientation, count, EXTRA_SAMPLES in first, preview_first, PROFILE in first, white_bits)
 
 
 def _directories(file: BinaryIO, only_first: bool = False) -> Iterator[dict[int, int]]:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import tifffile
 
 from bgars.errors import FileFormatError, InputError
+from bgars.io.decoders.tiff import quiet
 from bgars.io.image_formats import format_of, read_pixels
 from bgars.io.image_tags import read_tags, upright
 from bgars.io.images import MAX_MEGAPIXELS, decode_stack
@@ -25,8 +27,10 @@ __all__ = ["opaque_everywhere", "read_mask"]
 WITH_ALPHA = (2, 4)
 
 
-def read_mask(path: Path, shape: tuple[int, int]) -> BoolArray:
+def read_mask(path: Path, shape: tuple[int, int], notes: list[str] | None = None) -> BoolArray:
     """Read a mask image: white = use, and where the file has an opacity that varies, opaque = use.
+
+    A boolean array that tifffile wrote counts as an array: True = use. `notes` gets what is assumed.
 
     Raises
     ------
@@ -39,7 +43,9 @@ def read_mask(path: Path, shape: tuple[int, int]) -> BoolArray:
     if tags.pages > 1:
         msg = f"{path}: holds {tags.pages} images; a mask is one"
         raise FileFormatError(msg)
-    grey = upright(decode_stack([path], channel="mean").images[0], tags.orientation)
+    bits = _bits(path, [] if notes is None else notes) if tags.white_bits else None
+    grey = decode_stack([path], channel="mean").images[0] if bits is None else bits
+    grey = upright(grey, tags.orientation)
     if grey.shape != shape:
         msg = (
             f"{path}: the mask is {grey.shape[1]} x {grey.shape[0]} pixels, but the images are {shape[1]} x {shape[0]}"
@@ -58,6 +64,25 @@ def read_mask(path: Path, shape: tuple[int, int]) -> BoolArray:
             msg += f"; its largest value is {top:g}: multiply the mask so that what to use has {white:g}"
         raise InputError(msg)
     return use
+
+
+def _bits(path: Path, notes: list[str]) -> NDArray[Any] | None:
+    """Bits of a boolean array as white where they are set; None for any other file whose bits of 0 mean white.
+
+    tifffile writes True as 1 into a file that says that 1 is black (TIFF 6.0, section 3), and reads it as True again:
+    whoever writes an array means the array. Other programs mean the picture.
+    """
+    with quiet(), tifffile.TiffFile(path) as tiff:
+        page = tiff.pages.first
+        is_array = page.is_shaped or page.software.startswith("tifffile")
+    if not is_array:
+        notes.append(f"{path.name}: its bits of 0 are used, since 0 is white in this TIFF")
+        return None
+    notes.append(
+        f"{path.name}: its bits of 1 are used, as True of the array that tifffile wrote (viewers show it inverted)"
+    )
+    bits: NDArray[Any] = read_pixels(path, MAX_MEGAPIXELS)
+    return bits
 
 
 def opaque_everywhere(paths: Sequence[Path], orientation: int) -> BoolArray | None:

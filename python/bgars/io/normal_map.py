@@ -105,15 +105,16 @@ def read_normal_map(
     8 and 16 bits a channel encode ``round((n + 1) / 2 * 255)`` (65535); of 8 bits, 127 and 128 both are 0, which has no
     code of its own: a plain map of (128, 128, 255) is flat. Alpha is a mask. The one colour around an object is left
     out where it is no unit vector, or where the object ends steeply at it. Maps of two channels get their z computed.
-    sRGB curves, blue and red exchanged, z away from the camera and green down are recognised, and a warning says so.
+    sRGB curves, channels in another order, blue from 0 to 1, z away from the camera and green down are recognised, and
+    a warning says so. In lossy files, pixels that their blocks have mixed with the surround are left out.
 
     Parameters
     ----------
     path : path
-        PNG, JPEG, BMP, PPM, TIFF (8 and 16 bits, float), EXR (``pip install 'bgars[exr]'``), .npy or .npz (of several
-        arrays the one whose name has "normal"); R = x, G = y up (OpenGL), B = z.
+        PNG, JPEG, WebP, BMP, PPM, TGA, TIFF (8 and 16 bits, float), HDR, EXR (``pip install 'bgars[exr]'``), .npy, .npz
+        or .mat (of several arrays the one whose name has "normal"); R = x, G = y up (OpenGL), B = z.
     directx : bool, optional
-        The file has G = y down; by default the curl of its field says.
+        The file has G = y down; by default the curl of its field says, also whether red and green are exchanged.
     mask : path, optional
         Image, white = use; background is then not looked for.
 
@@ -152,10 +153,12 @@ def read_stored_normals(
     path = Path(path)
     pixels = read_pixels(path)
     shape = pixels.values.shape
-    use = None if mask is None else read_mask(Path(mask), (shape[0], shape[1]))
+    said: list[str] = []
+    use = None if mask is None else read_mask(Path(mask), (shape[0], shape[1]), said)
     if use is None and path.suffix.lower() == ".png" and is_own(path):
         use = np.ones(shape[:2], np.bool_)  # black says where there is nothing: a board of one colour is a board
-    return normals_of(path, pixels, use, directx)
+    found = normals_of(path, pixels, use, directx)
+    return Normals(found.vectors, (*said, *found.notes))
 
 
 def holds_normals(path: Path) -> bool:

@@ -12,11 +12,14 @@ import numpy as np
 
 from bgars.errors import FileFormatError
 from bgars.io.normal_map_background import border_color, is_cut_out
-from bgars.io.normal_map_green import curl_agreement
+from bgars.io.normal_map_blocks import mixed_with
+from bgars.io.normal_map_green import curl_of
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
+    from bgars.io.normal_map_blocks import Blocks
     from bgars.io.normal_map_pixels import Pixels
     from bgars.records.pixels import BoolArray, FloatArray
 
@@ -35,6 +38,8 @@ NEARLY_ALL = 0.95
 FEW = 0.05
 ALPHA_VALUES = 16
 """An alpha of more values than this is no mask."""
+LEAST_TELLING = 64
+"""Pixels tilted so far that the length of their vectors tells how blue is coded."""
 MOST_GREY = 1.02
 """Two channels of unit normals: x^2 + y^2 at most 1, and rounding."""
 
@@ -67,19 +72,26 @@ def normals_of(path: Path, pixels: Pixels, use: BoolArray | None, directx: bool 
     """
     notes: list[str] = []
     swizzled = _swizzled(pixels)
-    usable = _usable(pixels, use, swizzled)
-    surround = border_color(pixels.values, usable, pixels.alike) if use is None else np.zeros_like(usable)
-    if not (usable & ~surround).any():
-        surround = np.zeros_like(usable)
+    there = _usable(pixels, swizzled)
+    usable = there if use is None else there & use
+    around = np.zeros_like(there)
+    if use is None or pixels.blocks is not None:
+        around = border_color(pixels.values, there, pixels.alike)
+    surround = around if use is None and (usable & ~around).any() else np.zeros_like(there)
     vectors = _decoded(path, pixels, usable, surround, swizzled, notes)
     vectors = _toward_the_camera(path, vectors, usable & ~surround, notes)
-    usable &= _are_normals(vectors)
+    are_normals = _are_normals(vectors)
+    usable = usable & are_normals
     vectors /= np.maximum(_lengths(vectors), 1e-6)[..., np.newaxis]
+    outside = ~there | (around & ~are_normals)
     if use is None and (surround & usable).any() and is_cut_out(vectors, surround, usable):
         share = 100 * surround.mean()
         notes.append(f"the flat surround ({share:.1f} % of the pixels) is taken as background; --mask overrides this")
         usable &= ~surround
-    _set_green(vectors, usable, directx, notes)
+        outside |= surround
+    if pixels.blocks is not None and outside.any():
+        usable = _unmixed(usable, mixed_with(outside, ~are_normals, pixels.blocks), pixels.blocks, notes)
+    _set_red_and_green(vectors, usable, directx, notes)
     vectors[~usable] = np.nan
     return Normals(vectors, tuple(notes))
 
@@ -92,16 +104,14 @@ def _swizzled(pixels: Pixels) -> bool:
     return bool(np.all(red == red.flat[0]))
 
 
-def _usable(pixels: Pixels, use: BoolArray | None, swizzled: bool) -> BoolArray:
-    """Where there is something: not black (zero in floats), finite, not hidden by alpha or mask."""
+def _usable(pixels: Pixels, swizzled: bool) -> BoolArray:
+    """Where there is something: not black (zero in floats), finite, not hidden by alpha."""
     channels = [pixels.values[..., index] for index in range(pixels.values.shape[2])]
     usable = reduce(np.logical_and, map(np.isfinite, channels)) & reduce(
         np.logical_or, (each != 0 for each in channels)
     )
     if pixels.alpha is not None and not swizzled:
         usable &= pixels.alpha >= 0.5  # noqa: PLR2004 - half
-    if use is not None:
-        usable &= use
     return np.asarray(usable)
 
 
@@ -127,21 +137,40 @@ def _decoded(
         # A flat surround counts with the rest, one of a colour that is no vector does not.
         return max(_unit_share(vectors, inner), _unit_share(vectors, usable)) >= 1.0 - MOST_OTHERS
 
-    if fits(plain):
-        return plain
-    others = (
-        [("its codes are sRGB and were made linear", _linear(values, pixels.bits))]
-        if pixels.bits
-        else [
-            ("its floats run from 0 to 1", values * 2.0 - 1.0),
-            ("its floats run from 0 to 255", values * (2.0 / 255.0) - 1.0),
-        ]
-    )
-    for note, vectors in others:
+    for note, vectors in _readings(plain, values, pixels.bits, inner):
         if fits(vectors):
-            notes.append(note)
+            notes.extend([note] if note else [])
             return vectors
     return _refuse(path, plain, inner)
+
+
+def _readings(plain: FloatArray, values: FloatArray, bits: int, inner: BoolArray) -> Iterator[tuple[str, FloatArray]]:
+    """What three channels can mean, the likeliest first, each with its note."""
+    half = _with_half_blue(plain, inner) if bits else None
+    if half is not None:
+        yield "blue is taken as running from 0 to 1 (z = code / full scale), as the vectors' lengths show", half
+    yield "", plain
+    if bits:
+        yield "its codes are sRGB and were made linear", _linear(values, bits)
+        return
+    yield "its floats run from 0 to 1", values * 2.0 - 1.0
+    yield "its floats run from 0 to 255", values * (2.0 / 255.0) - 1.0
+
+
+def _with_half_blue(vectors: FloatArray, inner: BoolArray) -> FloatArray | None:
+    """The same with z from 0 to 1 in place of -1 to 1, where that and not the usual code gives unit vectors.
+
+    Judged where the two lengths differ by more than rounding can make them: on the mean of normals over a crease,
+    which is too short, z from 0 to 1 halves the error at some tilts, but not nearly everywhere.
+    """
+    half = vectors.copy()
+    half[..., 2] = (half[..., 2] + 1.0) / 2.0
+    whole_length, half_length = _lengths(vectors), _lengths(half)
+    telling = inner & (np.abs(whole_length - half_length) > 2.0 * TIGHT)
+    if np.count_nonzero(telling) < LEAST_TELLING:
+        return None
+    fits_better = np.abs(half_length - 1.0) < np.abs(whole_length - 1.0) / 2.0
+    return half if _share(fits_better, telling) >= NEARLY_ALL else None
 
 
 def _lacks_z(values: FloatArray, inner: BoolArray) -> bool:
@@ -229,13 +258,47 @@ def _toward_the_camera(path: Path, vectors: FloatArray, inner: BoolArray, notes:
     raise FileFormatError(msg)
 
 
-def _set_green(vectors: FloatArray, usable: BoolArray, directx: bool | None, notes: list[str]) -> None:
-    """Turn y up, in place."""
-    agreement = curl_agreement(vectors, usable)
-    if directx if directx is not None else agreement < 0:
+def _unmixed(usable: BoolArray, mixed: BoolArray, blocks: Blocks, notes: list[str]) -> BoolArray:
+    """Usable pixels that share no block of a lossy file with the surround; all of them where none would be left."""
+    kept: BoolArray = usable & ~mixed
+    count = int(np.count_nonzero(usable))
+    share = 100.0 * (1.0 - np.count_nonzero(kept) / max(count, 1))
+    size = f"blocks of {blocks.cols} x {blocks.rows} pixels"
+    if not kept.any():
+        notes.append(f"lossy compression has mixed all pixels with the surround, in {size}: save the map as PNG")
+        return usable
+    if share:
+        notes.append(
+            f"{share:.1f} % of the pixels are left out: lossy compression has mixed them with the surround, in {size}; "
+            "a PNG keeps them"
+        )
+    return kept
+
+
+def _set_red_and_green(vectors: FloatArray, usable: BoolArray, directx: bool | None, notes: list[str]) -> None:
+    """Turn x right and y up, in place."""
+    curl = curl_of(vectors, usable)
+    if directx is not None:
+        if directx:
+            vectors[..., 1] *= -1.0
+        if curl.exchanged:
+            notes.append("red and green are taken as stated, but the curl of the field shows them exchanged")
+        elif curl.agreement and (curl.agreement < 0) != directx:
+            seen = "down" if curl.agreement < 0 else "up"
+            notes.append(f"green is taken as stated, but the curl of the field shows y {seen}")
+        return
+    if curl.exchanged:
+        vectors[..., :2] = vectors[..., 1::-1]
+    if curl.agreement < 0:
         vectors[..., 1] *= -1.0
-    if directx is None and agreement < 0:
-        notes.append("green is taken as y down (DirectX), as the curl of the field shows; --opengl overrides this")
-    elif directx is not None and agreement and (agreement < 0) != directx:
-        seen = "down" if agreement < 0 else "up"
-        notes.append(f"green is taken as stated, but the curl of the field shows y {seen}")
+    if curl.exchanged:
+        down = ", and y as down" if curl.agreement < 0 else ""
+        notes.append(
+            f"red and green are taken as exchanged{down}, as the curl of the field shows; --opengl overrides this; "
+            "if bumps come out as dents, both are reversed"
+        )
+    elif curl.agreement < 0:
+        notes.append(
+            "green is taken as y down (DirectX), as the curl of the field shows; --opengl overrides this; "
+            "if bumps come out as dents, red is reversed instead: the curl cannot tell"
+        )

@@ -8,9 +8,13 @@ import numpy as np
 
 from bgars import _bgars
 from bgars.errors import FileFormatError, InputError, UnsupportedImageError
+from bgars.files.mat_files import read_arrays
+from bgars.files.safe_files import read_bounded
+from bgars.io import image_formats
 from bgars.io.decoders.exr import exr_channels
 from bgars.io.guarded import decoding, load_npy, load_npz, load_tiff
 from bgars.io.images import MAX_MEGAPIXELS
+from bgars.io.normal_map_blocks import Blocks, blocks_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -18,12 +22,15 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bgars.records.pixels import BoolArray, FloatArray
+    from bgars.records.pixels import FloatArray
 
 __all__ = ["NORMAL_MAP_SUFFIXES", "Pixels", "is_normal_array", "read_pixels"]
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".ppm")
-NORMAL_MAP_SUFFIXES = (*IMAGE_SUFFIXES, ".tif", ".tiff", ".exr", ".npy", ".npz")
+OTHER_IMAGE_SUFFIXES = (".webp", ".tga", ".hdr")
+"""Of images that the compiled decoder does not read."""
+ARRAY_SUFFIXES = (".exr", ".npy", ".npz", ".mat")
+NORMAL_MAP_SUFFIXES = (*IMAGE_SUFFIXES, *OTHER_IMAGE_SUFFIXES, ".tif", ".tiff", *ARRAY_SUFFIXES)
 WHAT = "a normal map"
 CHANNELS = (2, 3, 4)
 RGB, RGBA, NDIM = 3, 4, 3
@@ -31,7 +38,9 @@ FIRST_ROWS = 8
 EIGHT_BIT_STEP = 257.0
 """Of 16-bit codes that 8-bit ones were widened to."""
 MAX_ALIKE = 6.0
-"""Levels by which a JPEG may show one colour as others."""
+"""Levels by which a lossy file may show one colour as others."""
+MAX_MAT_BYTES = int(MAX_MEGAPIXELS * 1e6) * 3 * 8
+"""Doubles of the largest image."""
 
 
 class Pixels(NamedTuple):
@@ -46,13 +55,16 @@ class Pixels(NamedTuple):
     alpha : (H, W) float32 or None
         From 0 to 1.
     alike : float
-        By how many levels one colour may differ from itself (JPEG).
+        By how many levels one colour may differ from itself (JPEG, WebP).
+    blocks : Blocks or None
+        Pixels that were rounded together (JPEG, WebP).
     """
 
     values: FloatArray
     bits: int
     alpha: FloatArray | None
     alike: float = 0.0
+    blocks: Blocks | None = None
 
 
 def read_pixels(path: Path) -> Pixels:
@@ -69,12 +81,10 @@ def read_pixels(path: Path) -> Pixels:
     if suffix not in NORMAL_MAP_SUFFIXES:
         msg = f"{path}: a normal map file must end in {', '.join(NORMAL_MAP_SUFFIXES)}; got {suffix!r}"
         raise InputError(msg)
-    if suffix == ".npy":
-        return of_array(path, load_npy(path, WHAT))
-    if suffix == ".npz":
-        return of_array(path, _of_many(path, load_npz(path, WHAT)))
-    if suffix == ".exr":
-        return of_array(path, _read_exr(path))
+    if suffix in ARRAY_SUFFIXES:
+        return of_array(path, _read_array(path, suffix))
+    if suffix in OTHER_IMAGE_SUFFIXES:
+        return _with_blocks(path, of_array(path, image_formats.read_pixels(path, MAX_MEGAPIXELS)))
     try:
         with decoding(path, WHAT):
             values, bits = _bgars.read_color(path, MAX_MEGAPIXELS)
@@ -89,7 +99,24 @@ def read_pixels(path: Path) -> Pixels:
     # Most files of 16 bits show at their first rows that they are no copies of 8.
     if bits == 2 * 8 and not any((part % EIGHT_BIT_STEP).any() for part in (values[:FIRST_ROWS], values)):
         values, bits = values / np.float32(EIGHT_BIT_STEP), 8
-    return _split(values, bits if bits <= 2 * 8 else 0, MAX_ALIKE if suffix in {".jpg", ".jpeg"} else 0.0)
+    return _with_blocks(path, _split(values, bits if bits <= 2 * 8 else 0))
+
+
+def _read_array(path: Path, suffix: str) -> NDArray[Any]:
+    if suffix == ".npy":
+        return load_npy(path, WHAT)
+    if suffix == ".npz":
+        return _of_many(path, load_npz(path, WHAT))
+    if suffix == ".mat":
+        with decoding(path, WHAT):
+            return _of_many(path, read_arrays(read_bounded(path, MAX_MAT_BYTES), MAX_MAT_BYTES))
+    return _read_exr(path)
+
+
+def _with_blocks(path: Path, pixels: Pixels) -> Pixels:
+    """The same and what a lossy file did to them."""
+    blocks = blocks_of(path)
+    return pixels if blocks is None else pixels._replace(alike=MAX_ALIKE, blocks=blocks)
 
 
 def of_array(path: Path, array: NDArray[Any]) -> Pixels:
@@ -101,7 +128,7 @@ def of_array(path: Path, array: NDArray[Any]) -> Pixels:
         array = np.moveaxis(array, 0, 2)
     whole = {"u": 8 * array.dtype.itemsize}.get(array.dtype.kind, 0)
     if array.dtype.kind == "f" or whole in {8, 16}:
-        return _split(np.ascontiguousarray(array, dtype=np.float32), whole, 0.0)
+        return _split(np.ascontiguousarray(array, dtype=np.float32), whole)
     msg = f"{path}: must hold uint8, uint16 or floats, got {array.dtype}"
     raise FileFormatError(msg)
 
@@ -111,11 +138,11 @@ def is_normal_array(shape: tuple[int, ...]) -> bool:
     return len(shape) == NDIM and (shape[2] in CHANNELS or shape[0] == RGB)
 
 
-def _split(values: FloatArray, bits: int, alike: float) -> Pixels:
+def _split(values: FloatArray, bits: int) -> Pixels:
     if values.shape[2] != RGBA:
-        return Pixels(values, bits, None, alike)
+        return Pixels(values, bits, None)
     alpha = values[..., RGB] / np.float32(2**bits - 1 if bits else 1)
-    return Pixels(np.ascontiguousarray(values[..., :RGB]), bits, alpha, alike)
+    return Pixels(np.ascontiguousarray(values[..., :RGB]), bits, alpha)
 
 
 def _of_many(path: Path, arrays: dict[str, NDArray[Any]]) -> NDArray[Any]:
@@ -151,8 +178,3 @@ def _channel(path: Path, names: Iterable[str], letters: str) -> str:
         msg = f"{path}: must have one channel X or R, one Y or G, one Z or B; it has {', '.join(sorted(names))}"
         raise FileFormatError(msg)
     return found[0]
-
-
-def outside_alpha(alpha: FloatArray | None, shape: tuple[int, ...]) -> BoolArray:
-    """True where alpha hides a pixel."""
-    return np.zeros(shape, np.bool_) if alpha is None else alpha < 0.5  # noqa: PLR2004 - half

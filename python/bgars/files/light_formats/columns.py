@@ -23,6 +23,10 @@ SUFFIX_AND_NUMBER = re.compile(rf"(?P<name>{NAME_WITH_SUFFIX.pattern})\s+(?P<num
 QUOTED = re.compile(r"(?P<quote>[\"'])(?P<name>.*?)(?P=quote)\s*[,;\t ]?(?P<rest>.*)")
 QUOTED_DECIMAL_COMMA = re.compile(r"\"[-+]?\d+,\d+\"", re.ASCII)
 BRACKETED = re.compile(r"(?P<name>.*?)[\s,;]*[\[({](?P<vector>[^\[\](){}]*)[\])}]")
+MINUS = re.compile(r"(?<![^\s,;=\[({eEdD\"'])\N{MINUS SIGN}(?=[\d.])")
+FORTRAN = re.compile(r"(?<![\w.])([-+]?(?:\d+\.\d*|\.\d+))[dD]([-+]?\d{1,3})(?![\w.])", re.ASCII)
+"""Double precision has the exponent D there, and always a point (ISO/IEC 1539-1, 13.7.2.3.3)."""
+SEPARATOR_OF_EXCEL = re.compile(r"\s*\"?sep=.\"?\s*", re.IGNORECASE)
 BRACKETS = str.maketrans("[](){}", "      ")
 LONGEST_NUMBER = 64
 AXES = 3
@@ -52,9 +56,15 @@ class Style:
 
 
 def data_lines(text: str) -> list[Line]:
-    """Return the lines that are neither empty nor comments, without a separator at their ends; or rows of a matrix."""
+    """Return the lines that are neither empty nor comments, without a separator at their ends; or rows of a matrix.
+
+    Numbers with the minus sign of Unicode or the exponent of Fortran (1.0D-01) become plain ones.
+    """
+    text = FORTRAN.sub(r"\1e\2", MINUS.sub("-", text))
     lines = []
     for number, line in enumerate(text.splitlines(), start=1):
+        if number == 1 and SEPARATOR_OF_EXCEL.fullmatch(line):
+            continue
         content = re.split(r"(?:^|\s)#", line, maxsplit=1)[0].strip().strip("\x1a")
         if content and not content.startswith(COMMENTS):
             lines.append(Line(number, content))

@@ -62,10 +62,11 @@ def read_rows(path: Path, *, named: bool = False) -> Rows:
     first, counted = lines[0], _is_count(lines[0].text)
     if counted:
         lines = lines[1:]
-        if int(first.text) != len(lines):
+        follow = len(lines) - int(bool(lines) and _is_header(lines[0], find_style(lines)))
+        if int(first.text) != follow:
             commented = text.content.count("\n#")
             hidden = f" (lines that begin with # are comments: {commented})" if commented else ""
-            msg = f"{path}: line {first.number} announces {first.text} lights, but {len(lines)} follow{hidden}"
+            msg = f"{path}: line {first.number} announces {first.text} lights, but {follow} follow{hidden}"
             raise FileFormatError(msg)
     style = find_style(lines)
     if style.decimal_comma:
