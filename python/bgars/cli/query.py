@@ -52,8 +52,8 @@ def query(
 ) -> None:
     """Query a store of results, in SQL: which lot, which ball, since when, how often.
 
-    Tables: parts, balls, checks, budgets, failures, results; docs/queries.md has examples. A query reads only the store
-    and changes nothing.
+    Tables: parts, balls, checks, budgets, failures, inspections, results; docs/queries.md has examples. A query reads
+    only the store and changes nothing.
 
     Exit code 0: answered. 2: no store, or a query that DuckDB refuses.
     """

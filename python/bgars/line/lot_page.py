@@ -74,7 +74,7 @@ def lot_facts(store: Store, lot: str | None = None) -> dict[str, Any]:
     # A part that came again after rework counts once, as it was found last.
     last_round = (
         f"select * from parts {chosen} qualify serial = '' "
-        "or row_number() over (partition by serial, recipe order by round desc) = 1"
+        "or row_number() over (partition by serial, recipe order by round desc, sequence desc) = 1"
     )
     counts = _rows(store, f"select verdict, count(*) n from ({last_round}) group by verdict")
     by_verdict = {"pass": 0, "fail": 0, "undecided": 0} | {row["verdict"]: row["n"] for row in counts}

@@ -15,7 +15,7 @@ from bgars.io.parquet import need_pyarrow
 from bgars.store.append import PARTIAL, append_rows, partition, write_durably
 from bgars.store.compact import compact
 from bgars.store.export import export
-from bgars.store.keys import failure_key, part_key
+from bgars.store.keys import failure_key, images_key, part_key
 from bgars.store.known_parts import KnownParts
 from bgars.store.query import query
 from bgars.store.rows import TIME_FORM, result_rows
@@ -88,14 +88,16 @@ class Store:
         """Return a result with its round, unless it states one or has no serial number.
 
         The first inspection of a serial number under a recipe is round 1; that of other images, such as after rework,
-        the next. What any process appended meanwhile counts.
+        the next. The same images, such as with a station that was calibrated anew, are the round that they were. What
+        any process appended meanwhile counts.
         """
         if result.identity.round is not None or not result.serial:
             return result
         known = self._parts()
         known.look()
         place = partition("", result.name if result.recipe is not None else "").name
-        number = known.round_of(part_key(result), result.serial, place)
+        images = images_key(result.files, len(result.light_directions))
+        number = known.round_of(part_key(result), result.serial, place, images)
         return replace(result, identity=replace(result.identity, round=number))
 
     def append_failure(

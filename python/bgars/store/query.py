@@ -15,26 +15,36 @@ TRIES = 5
 """A compaction may take files away between the listing and the reading; the next listing has what replaced them."""
 LOST = ("No files found", "Cannot open file", "No such file")
 VIEWS = {
-    "parts": "one row per part; round = 1, 2, ... counts the inspections of a serial number",
+    "parts": "the latest inspection of each part and round; round = 1, 2, ... counts new images of a serial number",
     "balls": "one row per ball, with serial, lot, part and time of its part",
     "checks": "one row per judged quantity of a part",
     "budgets": "standard uncertainty by cause, of each reading",
     "failures": "captures that could not be inspected, and why; removed once inspected",
-    "results": "part_key, serial, result_json: everything else of a result",
+    "inspections": "one row per inspection: parts, and those that a later one of the same images replaced",
+    "results": "part_key, serial, result_json: everything else of an inspection",
 }
 # A part is taken from the first of its files, and its balls from the file of the same name: while a compaction runs,
 # there are two copies of both.
 PARTS = """
 CREATE TABLE parts_taken AS
-SELECT * REPLACE (CASE WHEN serial = '' THEN 1 ELSE coalesce(round, row_number() OVER (
+-- The same images inspected again, such as with a station that was calibrated anew, replace what was found before.
+-- Files of an earlier bgars do not say which images: a later row has their round only if it has their images.
+SELECT *, serial = '' OR (
+    row_number() OVER (PARTITION BY serial, recipe, round, coalesce(nullif(images_sha256, ''), part_key)
+                       ORDER BY sequence DESC) = 1
+    AND NOT (images_sha256 IS NULL AND sequence < coalesce(
+        max(sequence) FILTER (images_sha256 IS NOT NULL) OVER (PARTITION BY serial, recipe, round), 0))) AS is_latest
+FROM (SELECT * REPLACE (CASE WHEN serial = '' THEN 1 ELSE coalesce(round, row_number() OVER (
     PARTITION BY serial, recipe ORDER BY inspected_utc, sequence)) END AS round)
 FROM (SELECT * EXCLUDE (filename, copy) FROM (
     SELECT *, parse_filename(filename, true) AS stem,
            row_number() OVER (PARTITION BY part_key ORDER BY filename) AS copy
-    -- Files of an earlier bgars have no rounds.
-    FROM (SELECT * EXCLUDE (result_json) FROM {parts} UNION ALL BY NAME SELECT NULL::BIGINT AS round WHERE false))
-    WHERE copy = 1);
-CREATE VIEW parts AS SELECT * EXCLUDE (stem) FROM parts_taken;
+    -- Files of an earlier bgars have no rounds, or no checksum of the images.
+    FROM (SELECT * EXCLUDE (result_json) FROM {parts} UNION ALL BY NAME
+          SELECT NULL::BIGINT AS round, NULL::VARCHAR AS images_sha256 WHERE false))
+    WHERE copy = 1));
+CREATE VIEW parts AS SELECT * EXCLUDE (stem, is_latest) FROM parts_taken WHERE is_latest;
+CREATE VIEW inspections AS SELECT * EXCLUDE (stem) FROM parts_taken;
 CREATE VIEW results AS SELECT part_key, serial, result_json FROM (
     SELECT *, row_number() OVER (PARTITION BY part_key ORDER BY filename) AS copy FROM {parts}) WHERE copy = 1;
 """
@@ -42,7 +52,8 @@ SIDES = """
 CREATE VIEW {name} AS
 SELECT p.serial, p.lot, p.part, p.inspected_utc, p.sequence, p.round,
        s.* EXCLUDE (filename, day, recipe), p.day, p.recipe
-FROM {files} s JOIN parts_taken p ON s.part_key = p.part_key AND parse_filename(s.filename, true) = p.stem;
+FROM {files} s JOIN parts_taken p ON s.part_key = p.part_key AND parse_filename(s.filename, true) = p.stem
+WHERE p.is_latest;
 """
 FAILURES = """
 CREATE VIEW failures AS SELECT * EXCLUDE (filename, copy) FROM (
