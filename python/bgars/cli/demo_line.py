@@ -9,10 +9,11 @@ from bgars.cli.console import activation, print_json, say, shown_path, stage_pro
 from bgars.errors import InputError
 from bgars.line.demo import LIGHTS, PARTS, RECIPE, RIG, defects_of, drop_part, serial_of
 from bgars.line.inbox import Inbox
+from bgars.line.inbox_lock import watched
 from bgars.line.lot_page import write_lot_page
 from bgars.line.naming import Naming
 from bgars.line.pages import page_name, write_part_page
-from bgars.line.watch import Watch, watched
+from bgars.line.watch import Watch
 from bgars.records.part_identity import PartIdentity
 from bgars.store import open_store
 

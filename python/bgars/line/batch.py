@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from bgars.records.part_result import PartResult
     from bgars.records.strip_layout import StripLayout
 
-__all__ = ["Batch", "Progress", "inspect_many", "store_outcome"]
+__all__ = ["Batch", "Progress", "inspect_many", "now_utc", "store_outcome"]
 
 COMPACT_FROM = 200
 """Parts of a run that are worth a compaction."""
@@ -212,14 +212,18 @@ def store_outcome(
         if store is not None:
             store.append_failure(folder, outcome.reason, serial=outcome.serial, recipe=recipe, lot=lot)
         return None
-    now = datetime.now(timezone.utc).strftime(TIME_FORM)
-    result = replace(outcome.result, inspected_utc=now)
+    result = replace(outcome.result, inspected_utc=now_utc())
     if store is None:
         return result
     result = store.numbered(result)
     if not store.append(result, capture_folder=folder, seconds=outcome.seconds):
         return None
     return result
+
+
+def now_utc() -> str:
+    """The time as the stamps of results have it."""
+    return datetime.now(timezone.utc).strftime(TIME_FORM)
 
 
 def _jobs(
