@@ -66,55 +66,6 @@ def test_rounds_count_the_inspections_of_a_serial(tmp_path: Path) -> None:
     assert [(row["serial"], row["round"]) for row in got] == [("SN0000", 1), ("SN0000", 2), ("SN0001", 1)]
 
 
-def recalibrated(result: bgars.PartResult, station: str, day: int) -> bgars.PartResult:
-    """The same images, inspected with another station file; each finds another verdict."""
-    files = (("a.png", "a" * 64), ("capture.toml", "c" * 64), ("station.toml", station * 64))
-    return replace(result, files=files, serial="SN7", inspected_utc=f"2026-03-{day:02d}T00:00:00Z")
-
-
-def test_the_same_images_with_another_station_are_no_rework(tmp_path: Path) -> None:
-    """The yield before and after rework counts parts, not calibrations; the latest result of a round counts."""
-    store = bgars.open_store(tmp_path / "store", create=True)
-    first, again = recalibrated(part(3), "1", 2), recalibrated(part(4), "2", 1)  # the clock was set back
-    assert part_key(first) != part_key(again)
-    assert store.append(first)
-    assert store.append(again)
-    assert store.append(replace(part(4), serial="SN7", inspected_utc="2026-03-09T00:00:00Z")), "after rework"
-    assert bgars.open_store(store.folder).numbered(recalibrated(part(3), "3", 3)).identity.round == 1
-    for _ in range(2):
-        rows = store.query("select round, verdict from parts order by round").to_pylist()
-        assert rows == [{"round": 1, "verdict": "pass"}, {"round": 2, "verdict": "pass"}]
-        every = store.query("select round, verdict, is_latest from inspections order by sequence").to_pylist()
-        assert [tuple(row.values()) for row in every] == [(1, "fail", False), (1, "pass", True), (2, "pass", True)]
-        assert store.query("select count(*) n from balls")["n"].to_pylist() == [12]
-        assert store.query("select count(*) n from results")["n"].to_pylist() == [3]
-        store.compact()
-
-
-def test_images_of_a_store_without_their_checksum_are_known_from_the_results(tmp_path: Path) -> None:
-    store = bgars.open_store(tmp_path / "store", create=True)
-    store.append(recalibrated(part(3), "1", 1))
-    for path in (store.folder / "parts").rglob("*.parquet"):
-        parquet.write_table(parquet.ParquetFile(path).read().drop_columns(["images_sha256"]), path)
-    store = bgars.open_store(store.folder)
-    assert store.numbered(replace(part(4), serial="SN7")).identity.round == 2
-    assert store.append(recalibrated(part(4), "2", 2))
-    assert store.query("select round, verdict from parts").to_pylist() == [{"round": 1, "verdict": "pass"}]
-
-
-def test_a_database_loses_what_was_replaced_and_gets_new_columns(tmp_path: Path) -> None:
-    store, url = bgars.open_store(tmp_path / "store", create=True), f"sqlite:///{tmp_path / 'parts.db'}"
-    store.append(recalibrated(part(3), "1", 1))
-    store.export(url)
-    with closing(sqlite3.connect(tmp_path / "parts.db")) as base, base:
-        base.execute("alter table bgars_parts drop column images_sha256")
-    store.append(recalibrated(part(4), "2", 2))
-    assert store.export(url)["bgars_parts"] == 1
-    with closing(sqlite3.connect(tmp_path / "parts.db")) as base:
-        assert base.execute("select verdict, length(images_sha256) from bgars_parts").fetchall() == [("pass", 64)]
-        assert base.execute("select count(*) from bgars_balls").fetchone() == (6,)
-
-
 def test_the_order_of_parts_does_not_follow_a_clock_that_is_set_back(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

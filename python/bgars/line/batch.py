@@ -76,6 +76,8 @@ class Batch:
         Parts that were in the store.
     failures : list of (str, str)
         Folder and reason of each capture that could not be inspected.
+    notes : list of str
+        What to look at: serial numbers that came in another lot before.
     results : list of PartResult
         Without a store only, in the order of the folders.
     seconds : float
@@ -87,6 +89,7 @@ class Batch:
     verdicts: dict[str, int] = field(default_factory=lambda: {"pass": 0, "fail": 0, "undecided": 0})
     known: int = 0
     failures: list[tuple[str, str]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
     results: list[PartResult] = field(default_factory=list)
     seconds: float = 0.0
     processes: int = 0
@@ -178,9 +181,8 @@ def inspect_many(
     results: dict[str, list[PartResult]] = {}
     for done, outcomes in enumerate(_run(jobs, used, scheduler), 1):
         for outcome in outcomes:
-            stamped = store_outcome(
-                outcome, opened, recipe="" if part is None else part.name, lot=template.naming.common.lot
-            )
+            name, lot = "" if part is None else part.name, template.naming.common.lot
+            stamped = store_outcome(outcome, opened, recipe=name, lot=lot, say=batch.notes.append)
             _count(batch, outcome, is_new=stamped is not None)
             if opened is None and stamped is not None:
                 results.setdefault(outcome.folder, []).append(stamped)
@@ -194,11 +196,17 @@ def inspect_many(
 
 
 def store_outcome(
-    outcome: Outcome, store: Store | None, *, recipe: str = "", lot: str = "", moved_to: Path | None = None
+    outcome: Outcome,
+    store: Store | None,
+    *,
+    recipe: str = "",
+    lot: str = "",
+    moved_to: Path | None = None,
+    say: Callable[[str], object] = lambda _note: None,
 ) -> PartResult | None:
     """Stamp a result with the time and keep it, or keep why there is none; return it where it is new.
 
-    `moved_to` is where the capture will lie, if elsewhere.
+    `moved_to` is where the capture will lie, if elsewhere; `say` gets a note where a serial number changes its lot.
 
     Raises
     ------
@@ -216,8 +224,11 @@ def store_outcome(
     if store is None:
         return result
     result = store.numbered(result)
+    note = store.lot_note(result)
     if not store.append(result, capture_folder=folder, seconds=outcome.seconds):
         return None
+    if note:
+        say(note)
     return result
 
 

@@ -124,6 +124,12 @@ def lot_facts(store: Store, lot: str | None = None) -> dict[str, Any]:
         "drifts": [chart for name, title in DRIFTS.items() if (chart := _drift(drift, name, title)) is not None],
         "last": last,
         "failures": _rows(store, f"select serial, capture_folder, reason from failures {chosen} limit {LAST_PARTS}"),
+        "two_lots": _rows(
+            store,
+            "select serial, list_sort(list(distinct lot)) lots from parts where serial <> '' and lot <> '' "
+            f"and serial in (select serial from parts {chosen}) group by serial, recipe "
+            f"having count(distinct lot) > 1 order by serial limit {LAST_PARTS}",
+        ),
         **span,
     }
 

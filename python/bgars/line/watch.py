@@ -206,7 +206,8 @@ class Watch:
         lot = self.naming.common.lot
         try:
             kept = [
-                store_outcome(outcome, self.store, recipe=self._name, lot=lot, moved_to=place) for outcome in outcomes
+                store_outcome(outcome, self.store, recipe=self._name, lot=lot, moved_to=place, say=self.say)
+                for outcome in outcomes
             ]
         except BgarsError as error:
             self._problem_once(f"{error}; {part.folder.name} stays in the inbox, tried again")

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bgars.errors import FileFormatError
 from bgars.io.parquet import need_pyarrow
 from bgars.store.keys import images_key
+from bgars.store.repair import damage
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 __all__ = ["KnownParts"]
 
-READ = ("part_key", "serial", "sequence", "inspected_utc", "round", "images_sha256")
+READ = ("part_key", "serial", "sequence", "inspected_utc", "round", "images_sha256", "lot")
 SETTLED_NS = 10_000_000_000
 """Age of a folder's time from which it tells changes: file systems count it in steps, and clocks differ."""
 
@@ -39,6 +40,7 @@ class KnownParts:
         self._folder = folder
         # There may be millions of parts: numbers stand for names, and only rounds that are not the first are kept.
         self._last_round: dict[int, int] = {}
+        self._last_lot: dict[int, str] = {}
         self._later: dict[str, int] = {}
         self._round_of_images: dict[int, int] = {}
         self._without_images: list[tuple[str, str]] = []
@@ -88,6 +90,10 @@ class KnownParts:
             return self._round_of_images.get(hash((serial, recipe, images)), last + 1)
         return last + 1
 
+    def last_lot(self, serial: str, recipe: str) -> str:
+        """Return the lot that a serial number came in last; "" where it is not known."""
+        return self._last_lot.get(hash((serial, recipe)), "")
+
     def _read_images(self) -> None:
         """Take from the whole results, when it is needed first, what files of an earlier bgars have no column for."""
         while self._without_images:
@@ -112,6 +118,8 @@ class KnownParts:
             return
         place = hash((serial, row["recipe"]))
         self._last_round[place] = max(self._last_round.get(place, 0), number)
+        if row["lot"]:
+            self._last_lot[place] = sys.intern(row["lot"])
         if images:
             self._round_of_images.setdefault(hash((serial, row["recipe"], images)), number)
         if number > 1:
@@ -156,6 +164,5 @@ def _rows(path: str, recipe: str, columns: tuple[str, ...] = READ) -> list[dict[
     except FileNotFoundError:  # gone into a compacted file, which is read, or a second copy of it
         return []
     except (OSError, ValueError) as error:
-        msg = f"{path}: is not a readable file of a store ({error})"
-        raise FileFormatError(msg) from error
+        raise damage(Path(path), error) from error
     return [{"round": None, "images_sha256": None, **row, "recipe": recipe} for row in rows]

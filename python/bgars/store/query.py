@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from bgars.errors import FileFormatError, InputError
+from bgars.store.repair import raise_damage
 from bgars.store.schema import OLD_NAMES, TABLES, arrow_schema
 
 __all__ = ["VIEWS", "connect", "need_duckdb", "query"]
@@ -87,11 +88,16 @@ def query(folder: Path, sql: str) -> Any:  # noqa: ANN401 - pyarrow has no types
                 if answer is None:
                     break
                 return answer.to_arrow_table()
-        except duckdb.IOException as error:
-            if attempt + 1 == TRIES or not any(word in str(error) for word in LOST):
+        except duckdb.Error as error:
+            is_file = isinstance(error, duckdb.IOException)
+            if is_file and attempt + 1 < TRIES and any(word in str(error) for word in LOST):
+                continue
+            # What a damaged file says has no class of its own, and not always the name of the file.
+            if is_file or type(error) is duckdb.Error or ".parquet" in str(error):
+                raise_damage(folder)
+            if is_file:
                 msg = f"{folder}: a file of the store cannot be read ({_one_line(error)})"
                 raise FileFormatError(msg) from error
-        except duckdb.Error as error:
             msg = f"query: {_one_line(error)}"
             raise InputError(msg) from error
     msg = f"query: must be a query that returns rows, such as 'select count(*) from parts', got {sql!r}"
