@@ -16,6 +16,7 @@ from bgars.line.job import Job, Outcome, place_serial, with_content
 from bgars.line.local_pool import run_local, share_cores, thread_environment
 from bgars.line.naming import Naming
 from bgars.normals.methods import DEFAULT_METHOD, Method
+from bgars.records.scalar_checks import check_progress
 from bgars.store import Store, open_store
 from bgars.store.rows import TIME_FORM
 
@@ -163,6 +164,7 @@ def inspect_many(
     >>> done.verdicts, done.results[0].serial
     ({'pass': 0, 'fail': 0, 'undecided': 1}, 'one_ball')
     """
+    check_progress(progress)
     for name, count in (("processes", processes), ("threads", threads)):
         if count is not None and count < 1:
             msg = f"{name}: must be 1 or more, got {count}"

@@ -15,6 +15,7 @@ import numpy as np
 from bgars.errors import BgarsError, FileFormatError, InputError
 from bgars.io.recipe import RECIPE_NAME, CaptureRecipe, read_recipe
 from bgars.line.folders import IMAGES
+from bgars.records.scalar_checks import check_progress
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -140,6 +141,7 @@ def take_capture(
     FileFormatError
         It cannot be written.
     """
+    check_progress(progress)
     folder = Path(folder)
     if folder.exists():
         msg = f"{folder}: must be a new folder; captures are never overwritten"

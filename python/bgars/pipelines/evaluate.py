@@ -15,6 +15,7 @@ from bgars.pipelines.normals import estimate_normals
 from bgars.records.normal_field import NormalField
 from bgars.records.plain_arrays import plain, without_mask
 from bgars.records.renamed import renamed
+from bgars.records.scalar_checks import check_progress
 from bgars.records.whole_capture import need_whole
 from bgars.surface.integrate import integrate_normals
 
@@ -139,6 +140,7 @@ def evaluate(
     >>> round(errors.mean_deg, 1), errors.invalid
     (9.3, 0)
     """
+    check_progress(progress)
     need_whole(capture)
     if truth is None:
         if capture.folder is None:
