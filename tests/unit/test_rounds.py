@@ -8,7 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import bgars
-from bgars.line.batch import store_outcome
+import pytest
+from bgars.cli import batch
+from bgars.line.batch import Batch, store_outcome
 from bgars.line.job import Outcome
 from bgars.line.lot_page import write_lot_page
 from bgars.store import part_key
@@ -65,7 +67,7 @@ def test_a_database_loses_what_was_replaced_and_gets_new_columns(tmp_path: Path)
         assert base.execute("select count(*) from bgars_balls").fetchone() == (6,)
 
 
-def test_a_serial_number_in_two_lots_is_spoken_of(tmp_path: Path) -> None:
+def test_a_serial_number_in_two_lots_is_spoken_of(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Serial numbers are unique among parts of a recipe; the second of two parts would count as its rework."""
     store, notes = bgars.open_store(tmp_path / "store", create=True), []
     for number, lot in ((0, "A"), (1, "A"), (2, "B"), (4, "B")):
@@ -73,5 +75,7 @@ def test_a_serial_number_in_two_lots_is_spoken_of(tmp_path: Path) -> None:
         store_outcome(Outcome("f", "S1", result), store, say=notes.append)
     (note,) = notes
     assert note.startswith("S1: was in lot A, is in lot B now, and counts as round 3 of one part; if these are two")
+    batch._tell(Batch(4, notes=notes), store.folder)
+    assert f"note: {note}\n" in capsys.readouterr().out
     write_lot_page(store, tmp_path / "lot.html", lot="A")
     assert "S1 (A, B)" in (tmp_path / "lot.html").read_text(encoding="utf-8")
