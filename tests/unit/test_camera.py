@@ -32,6 +32,17 @@ def test_a_capture_through_a_camera_is_what_the_camera_showed(tmp_path: Path) ->
     assert [path.name for path in out.parent.iterdir()] == ["SN1"], "nothing half-written"
 
 
+def test_a_rig_is_named_by_its_folder_too_and_a_clean_check_says_so(tmp_path: Path) -> None:
+    (tmp_path / "rig").mkdir()
+    (tmp_path / "rig" / "capture.toml").write_text(RIG)
+    line = ["capture", f"folder:{bgars.sample_capture()}", "-o", str(tmp_path / "SN1"), "--rig", str(tmp_path / "rig")]
+    run = CliRunner().invoke(app, line)
+    assert run.exit_code == 0, run.output
+    assert (tmp_path / "SN1" / "capture.toml").read_text() == RIG
+    findings = bgars.check(bgars.read_capture(tmp_path / "SN1"))
+    assert ("no faults found" in run.output.splitlines()) == (not findings.told)
+
+
 def test_a_driver_of_ones_own_is_found_beside_the_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "my_station.py").write_text(
         "import numpy as np\nclass Mine:\n"

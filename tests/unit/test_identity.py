@@ -7,8 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import bgars
+import numpy as np
 import pytest
 from bgars.cli.app import app
+from bgars.line.job import Job, run_job
+from bgars.line.naming import identity_of
 from bgars.report.figure_file import Drawn
 from bgars.report.identity import identity_facts, identity_line
 from line_captures import copy_capture
@@ -133,6 +136,28 @@ def test_one_inspection_takes_its_identity_from_side_file_and_options(tmp_path: 
         assert words in header
     parquet = pytest.importorskip("pyarrow.parquet")
     assert parquet.read_table(out / "balls.parquet")["part_lot"][0].as_py() == "L2"
+
+
+def test_the_station_is_named_by_its_file_where_nothing_else_names_it(tmp_path: Path) -> None:
+    capture = bgars.read_capture(bgars.sample_capture())
+    response = bgars.ResponseCurve(np.array([0.0, 1.0]), np.array([0.0, 1.0]), 0.0)
+    for file, name in (("st8.toml", "line 8"), ("none.toml", "station")):
+        bgars.write_station(bgars.Station(name, response=response), tmp_path / file)
+    folder = copy_capture(tmp_path / "SN1")
+    described = (folder / "capture.toml").read_text(encoding="utf-8")
+    for file, stated, common, expected in (
+        ("st8.toml", "", "", "line 8"),
+        ("st8.toml", "", "option", "option"),
+        ("st8.toml", '[part]\nstation = "stated"\n', "option", "stated"),
+        ("none.toml", "", "", ""),  # the name of a station that nobody named
+    ):
+        (folder / "capture.toml").write_text(f'station = "../{file}"\n{described}\n{stated}', encoding="utf-8")
+        naming = bgars.Naming(common=bgars.PartIdentity(station=common))
+        (outcome,) = run_job(Job(str(folder), naming=naming))
+        assert outcome.result is not None, outcome.reason
+        assert outcome.result.identity.station == expected
+    _, identity = identity_of(capture, bgars.PartIdentity(), tmp_path / "st8.toml")
+    assert identity.station == "line 8"
 
 
 def test_pictures_say_which_part_they_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

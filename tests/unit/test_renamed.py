@@ -43,6 +43,14 @@ def test_readings_of_balls_have_their_old_names() -> None:
         assert bgars.Limits(flat_um=3.0) == bgars.Limits(flat_top_depth_um=3.0)  # type: ignore[call-arg]
 
 
+def test_old_names_are_not_completed(field: bgars.NormalField) -> None:
+    ball = bgars.BallResult("A1", 0, 0, True, "pass", ())
+    assert not {"measured", "choice"} & set(dir(field))
+    assert not {"q", "u_q", "flat_um", "u_flat_um"} & set(dir(ball))
+    assert {"is_measured", "method_reason", "normals", "plot"} <= set(dir(field))
+    assert "aspect_ratio" in dir(ball)
+
+
 def test_summaries_hold_both_names() -> None:
     result = bgars.evaluate(bgars.read_capture(bgars.sample_capture()), method="lambertian").to_dict()
     assert result["choice"] == result["method_reason"] == "lambertian, as asked"

@@ -47,6 +47,30 @@ def test_a_record_is_one_short_line_a_picture_and_a_plot(records: dict[str, obje
     mpl.pyplot.close("all")
 
 
+def test_records_of_arrays_are_one_line_without_their_numbers() -> None:
+    capture = bgars.read_capture(bgars.sample_capture())
+    result = bgars.inspect(capture, surface=True)
+    field = bgars.estimate_normals(capture)
+    response = bgars.ResponseCurve(np.linspace(0, 1, 99), np.linspace(0, 1, 99))
+    _, truth = bgars.simulate(
+        bgars.Scene.hemisphere(300.0), capture.rig, bgars.Material(), bgars.Camera(pixel_pitch_um=10.0)
+    )
+    for record, words in (
+        (bgars.shape_images(bgars.integrate_normals(field)), "slope_deg=(240, 256) float32, "),
+        (bgars.read_truth(bgars.sample_capture()), "normals=(240, 256, 3) float32, "),
+        (truth, "balls=1 entry, setup=SimulationSetup(...)"),
+        (result.material, "PartMaterial(parameters="),
+        (result.surface, "ball_step_px=1, "),
+        (field.reflectance, "ReflectanceFit(balls=1, shape='sphere', loss=0.00"),
+        (bgars.evaluate(capture, method="lambertian"), "region='balls, n_z > 0.3', normals=9."),
+        (capture.rig, "LightRig(directions=(8, 3) float64, intensities=(8,) float64, "),
+        (response, "ResponseCurve(levels=(99,) float64, radiances=(99,) float64, u_radiance=0, source='')"),
+    ):
+        assert words in repr(record)
+        assert len(repr(record)) < 230
+        assert "\n" not in repr(record)
+
+
 def test_normals_of_others_are_evaluated_as_one_s_own_are() -> None:
     capture = bgars.read_capture(bgars.sample_capture())
     field = bgars.estimate_normals(capture, method="lambertian")

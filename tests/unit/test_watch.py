@@ -19,8 +19,9 @@ import pytest
 from bgars.cli.app import app
 from bgars.line import job
 from bgars.line.inbox import Inbox
+from bgars.line.inbox_lock import watched
 from bgars.line.notify import Notifier
-from bgars.line.watch import Watch, watched
+from bgars.line.watch import Watch
 from bgars.store import append
 from killed_watch import RIG, command, drop, instant, kill_often
 from line_captures import copy_capture

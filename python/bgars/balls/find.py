@@ -16,7 +16,7 @@ from bgars.balls.registration import register
 from bgars.errors import InputError
 from bgars.records.ball_names import ball_name
 from bgars.records.found_balls import FoundBall, FoundBalls
-from bgars.records.scalar_checks import thread_count
+from bgars.records.scalar_checks import check_progress, thread_count
 from bgars.records.whole_capture import need_whole
 
 if TYPE_CHECKING:
@@ -101,6 +101,7 @@ def find_balls(
     >>> found.balls[0].name, len(found.balls), len(found.missing)
     ('A1', 1, 0)
     """
+    check_progress(progress)
     threads = thread_count(threads)
     if layout is not None and capture.pixel_pitch_um is None:
         msg = "layout: needs capture.pixel_pitch_um, which is None, to convert micrometres to pixels"

@@ -83,17 +83,18 @@ def demo(
     parts: Annotated[
         int | None, typer.Option(min=4, help="Number of parts of the line; 50 by default.", show_default=False)
     ] = None,
+    no_open: Annotated[bool, typer.Option("--no-open", help="Do not open the page of the lot.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Reconstruct the sample solder ball that comes with bgars, or simulate a station on a line.
 
     'bgars demo line' simulates 50 parts, three of them with a defect, puts them into an inbox, inspects them as they
-    arrive (minutes), and writes the page of their lot.
+    arrive (minutes), writes the page of their lot and, on a desktop, opens it.
     """
     if what == "line":
         from bgars.cli.demo_line import demo_line  # noqa: PLC0415 - loaded when it runs
 
-        demo_line(output, parts=parts, as_json=as_json)
+        demo_line(output, parts=parts, opens=not no_open, as_json=as_json)
         return
     folder = bgars.sample_capture()
     _need_places(folder, output)

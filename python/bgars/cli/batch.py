@@ -123,6 +123,10 @@ def _tell(done: Batch, output: Path) -> None:
     say(f"{done.inspected} parts inspected: {verdicts} ({done.seconds:.1f} s{rate})")
     if done.known:
         say(f"{done.known} were in the store already and were skipped")
+    for note in done.notes[:MOST_FAILURES]:
+        say(f"note: {note}")
+    if len(done.notes) > MOST_FAILURES:
+        say(f"note: so are {len(done.notes) - MOST_FAILURES} more serial numbers")
     if done.failures:
         say(f"{len(done.failures)} could not be inspected; the next run tries again:")
         for folder, reason in done.failures[:MOST_FAILURES]:

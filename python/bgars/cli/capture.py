@@ -13,6 +13,7 @@ from bgars.cli.describe import describe, describe_in_words
 from bgars.cli.first_check import warn
 from bgars.cli.options import JsonOption
 from bgars.io.given_paths import need_file
+from bgars.io.recipe import RECIPE_NAME
 from bgars.line.camera import camera_of, take_capture
 
 __all__ = ["register"]
@@ -40,8 +41,8 @@ def capture(
     rig: Annotated[
         Path | None,
         typer.Option(
-            metavar="capture.toml",
-            help="capture.toml that describes the rig, copied into the folder.",
+            metavar="PATH",
+            help="capture.toml that describes the rig, or its folder; copied into the capture.",
             show_default=False,
         ),
     ] = None,
@@ -52,6 +53,7 @@ def capture(
     The folder appears when it is complete, so that it may be in the inbox of bgars watch. The capture is then checked
     as by 'bgars check'.
     """
+    rig = rig / RECIPE_NAME if rig is not None and rig.is_dir() else rig
     need_file(rig)
     with stage_progress() as report:
         files = take_capture(
@@ -71,3 +73,5 @@ def capture(
         say("no --rig was given: put a capture.toml into the folder (bgars init)")
     for finding in () if findings is None else findings.told:
         warn(finding)
+    if findings is not None and not findings.told:
+        say("no faults found")

@@ -28,6 +28,7 @@ __all__ = [
     "is_command",
     "may_start_processes",
     "notes_to_stderr",
+    "open_page",
     "print_json",
     "say",
     "say_files",
@@ -82,6 +83,18 @@ def shown_path(path: Path) -> str:
         return str(path.resolve().relative_to(Path.cwd()))
     except ValueError:
         return str(path)
+
+
+def open_page(page: Path) -> bool:
+    """Open a page in the browser where somebody sits before it: a terminal and a display, and no CI."""
+    has_display = sys.platform in {"darwin", "win32"} or bool(
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    )
+    if os.environ.get("CI") or not (sys.stdout.isatty() and has_display):
+        return False
+    import webbrowser  # noqa: PLC0415 - loaded where it opens something
+
+    return webbrowser.open(page.resolve().as_uri())
 
 
 def activation() -> str:

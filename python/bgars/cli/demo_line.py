@@ -5,14 +5,15 @@ from __future__ import annotations
 import threading
 from pathlib import Path
 
-from bgars.cli.console import activation, print_json, say, shown_path, stage_progress
+from bgars.cli.console import activation, open_page, print_json, say, shown_path, stage_progress
 from bgars.errors import InputError
 from bgars.line.demo import LIGHTS, PARTS, RECIPE, RIG, defects_of, drop_part, serial_of
 from bgars.line.inbox import Inbox
+from bgars.line.inbox_lock import watched
 from bgars.line.lot_page import write_lot_page
 from bgars.line.naming import Naming
 from bgars.line.pages import page_name, write_part_page
-from bgars.line.watch import Watch, watched
+from bgars.line.watch import Watch
 from bgars.records.part_identity import PartIdentity
 from bgars.store import open_store
 
@@ -21,7 +22,7 @@ __all__ = ["demo_line"]
 LOT = "DEMO"
 
 
-def demo_line(output: Path, *, parts: int | None = None, as_json: bool = False) -> None:
+def demo_line(output: Path, *, parts: int | None = None, opens: bool = True, as_json: bool = False) -> None:
     """Simulate a station, inspect what it drops, and write the page of the lot, and of parts that do not pass."""
     parts = PARTS if parts is None else parts
     if output.exists() and any(output.iterdir()):
@@ -64,7 +65,9 @@ def demo_line(output: Path, *, parts: int | None = None, as_json: bool = False) 
     told = ", ".join(f"{count} {verdict}" for verdict, count in facts["verdicts"].items())
     say(f"Verdicts: {told}; failed: {', '.join(found) or 'none'}.")
     say()
-    say(f"Open {shown_path(page)}: yield, defects and where they are, drift; rows of failed parts link to their pages.")
+    verb = "Opened" if opens and open_page(page) else "Open"
+    facts_of_page = "yield, defects and where they are, drift; rows of failed parts link to their pages"
+    say(f"{verb} {shown_path(page)}: {facts_of_page}.")
     shown = shown_path(store_folder)
     say(
         f"Next: {activation()}bgars query {shown} \"select serial, verdict, reason from parts where verdict <> 'pass'\""

@@ -142,7 +142,7 @@ def inspect(
         painter = beside.enter_context(picture_process(PART_PICTURES, wanted=is_drawn))
         capture = bgars.read_capture(folder, station=station)
         named, identity = identity_of(
-            capture, PartIdentity(lot=lot, station=station_name, operator=operator, round=round_)
+            capture, PartIdentity(lot=lot, station=station_name, operator=operator, round=round_), station
         )
         serial = serial or named
         if part is not None and part.strip is not None:

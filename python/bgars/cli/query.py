@@ -34,6 +34,7 @@ def register(app: typer.Typer) -> None:
     stores.command("compact")(compact)
     stores.command("export")(export)
     stores.command("add")(add)
+    stores.command("repair")(repair)
     app.add_typer(stores, name="store")
 
 
@@ -52,8 +53,8 @@ def query(
 ) -> None:
     """Query a store of results, in SQL: which lot, which ball, since when, how often.
 
-    Tables: parts, balls, checks, budgets, failures, results; docs/queries.md has examples. A query reads only the store
-    and changes nothing.
+    Tables: parts, balls, checks, budgets, failures, inspections, results; docs/queries.md has examples. A query reads
+    only the store and changes nothing.
 
     Exit code 0: answered. 2: no store, or a query that DuckDB refuses.
     """
@@ -128,6 +129,26 @@ def add(
         print_json({"added": count, "known": len(read) - count})
     else:
         say(f"{store}: {count} results added, {len(read) - count} were there")
+
+
+def repair(store: StoreArgument, as_json: JsonOption = False) -> None:
+    """Read every file of a store; make damaged ones again from the results, or move them to STORE/damaged.
+
+    Files of balls, checks and budgets are made again. Parts whose own file is damaged are not in the store any more:
+    inspect their captures again. What is readable stays as it is.
+    """
+    done = open_store(store).repair()
+    if as_json:
+        print_json(dict(done))
+        return
+    for name in done["remade"]:
+        say(f"{store / name}: made again from the results")
+    for name in done["set_aside"]:
+        say(f"{store / name}: moved to {store / 'damaged'}")
+    if any(name.startswith("parts/") for name in done["set_aside"]):
+        say("parts are missing: inspect their captures again, with bgars batch")
+    if not any(done.values()):
+        say(f"{store}: every file is readable")
 
 
 def _say_tables(opened: Any, *, as_json: bool) -> None:  # noqa: ANN401 - a Store

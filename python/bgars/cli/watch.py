@@ -20,10 +20,11 @@ from bgars.cli.options import (
 from bgars.cli.stopping import ended_by_signals
 from bgars.io.given_paths import need_path
 from bgars.line.inbox import Inbox
+from bgars.line.inbox_lock import watched
 from bgars.line.naming import Naming
 from bgars.line.notify import Notifier
 from bgars.line.warm import warm_up
-from bgars.line.watch import Watch, need_outside, watched
+from bgars.line.watch import Watch, need_outside
 from bgars.normals.methods import DEFAULT_METHOD
 from bgars.records.part_identity import PartIdentity
 from bgars.store import open_store

@@ -10,6 +10,7 @@ from bgars.inspection.flat_top import flat_tops
 from bgars.inspection.problem import make_problem, thread_count
 from bgars.inspection.results import measurement
 from bgars.inspection.shadow_fit import fit_shadows
+from bgars.records.scalar_checks import check_progress
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -95,6 +96,7 @@ def measure_balls(
     if field is not None and field.mask.shape != capture.images.shape[1:]:
         msg = f"field: must have the shape of the images {capture.images.shape[1:]}, got {field.mask.shape}"
         raise InputError(msg)
+    check_progress(progress)
     workers = thread_count(threads)
     report = progress or _quiet
     refuse_repeated(capture)

@@ -16,6 +16,7 @@ from bgars.line.job import Job, Outcome, place_serial, with_content
 from bgars.line.local_pool import run_local, share_cores, thread_environment
 from bgars.line.naming import Naming
 from bgars.normals.methods import DEFAULT_METHOD, Method
+from bgars.records.scalar_checks import check_progress
 from bgars.store import Store, open_store
 from bgars.store.rows import TIME_FORM
 
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from bgars.records.part_result import PartResult
     from bgars.records.strip_layout import StripLayout
 
-__all__ = ["Batch", "Progress", "inspect_many", "store_outcome"]
+__all__ = ["Batch", "Progress", "inspect_many", "now_utc", "store_outcome"]
 
 COMPACT_FROM = 200
 """Parts of a run that are worth a compaction."""
@@ -76,6 +77,8 @@ class Batch:
         Parts that were in the store.
     failures : list of (str, str)
         Folder and reason of each capture that could not be inspected.
+    notes : list of str
+        What to look at: serial numbers that came in another lot before.
     results : list of PartResult
         Without a store only, in the order of the folders.
     seconds : float
@@ -87,6 +90,7 @@ class Batch:
     verdicts: dict[str, int] = field(default_factory=lambda: {"pass": 0, "fail": 0, "undecided": 0})
     known: int = 0
     failures: list[tuple[str, str]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
     results: list[PartResult] = field(default_factory=list)
     seconds: float = 0.0
     processes: int = 0
@@ -160,6 +164,7 @@ def inspect_many(
     >>> done.verdicts, done.results[0].serial
     ({'pass': 0, 'fail': 0, 'undecided': 1}, 'one_ball')
     """
+    check_progress(progress)
     for name, count in (("processes", processes), ("threads", threads)):
         if count is not None and count < 1:
             msg = f"{name}: must be 1 or more, got {count}"
@@ -178,9 +183,8 @@ def inspect_many(
     results: dict[str, list[PartResult]] = {}
     for done, outcomes in enumerate(_run(jobs, used, scheduler), 1):
         for outcome in outcomes:
-            stamped = store_outcome(
-                outcome, opened, recipe="" if part is None else part.name, lot=template.naming.common.lot
-            )
+            name, lot = "" if part is None else part.name, template.naming.common.lot
+            stamped = store_outcome(outcome, opened, recipe=name, lot=lot, say=batch.notes.append)
             _count(batch, outcome, is_new=stamped is not None)
             if opened is None and stamped is not None:
                 results.setdefault(outcome.folder, []).append(stamped)
@@ -194,11 +198,17 @@ def inspect_many(
 
 
 def store_outcome(
-    outcome: Outcome, store: Store | None, *, recipe: str = "", lot: str = "", moved_to: Path | None = None
+    outcome: Outcome,
+    store: Store | None,
+    *,
+    recipe: str = "",
+    lot: str = "",
+    moved_to: Path | None = None,
+    say: Callable[[str], object] = lambda _note: None,
 ) -> PartResult | None:
     """Stamp a result with the time and keep it, or keep why there is none; return it where it is new.
 
-    `moved_to` is where the capture will lie, if elsewhere.
+    `moved_to` is where the capture will lie, if elsewhere; `say` gets a note where a serial number changes its lot.
 
     Raises
     ------
@@ -212,14 +222,21 @@ def store_outcome(
         if store is not None:
             store.append_failure(folder, outcome.reason, serial=outcome.serial, recipe=recipe, lot=lot)
         return None
-    now = datetime.now(timezone.utc).strftime(TIME_FORM)
-    result = replace(outcome.result, inspected_utc=now)
+    result = replace(outcome.result, inspected_utc=now_utc())
     if store is None:
         return result
     result = store.numbered(result)
+    note = store.lot_note(result)
     if not store.append(result, capture_folder=folder, seconds=outcome.seconds):
         return None
+    if note:
+        say(note)
     return result
+
+
+def now_utc() -> str:
+    """The time as the stamps of results have it."""
+    return datetime.now(timezone.utc).strftime(TIME_FORM)
 
 
 def _jobs(

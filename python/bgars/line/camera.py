@@ -15,6 +15,7 @@ import numpy as np
 from bgars.errors import BgarsError, FileFormatError, InputError
 from bgars.io.recipe import RECIPE_NAME, CaptureRecipe, read_recipe
 from bgars.line.folders import IMAGES
+from bgars.records.scalar_checks import check_progress
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -120,8 +121,8 @@ def take_capture(
         New. It appears when all is in it: an inbox may hold it.
     lights : int
     rig : path, optional
-        capture.toml that is copied into it, with the files of lights, dark frame, mask and response that it names; with
-        ``images`` it names the images, else they are ``light_00.png``, ...
+        capture.toml that is copied into it, or its folder, with the files of lights, dark frame, mask and response that
+        it names; with ``images`` it names the images, else they are ``light_00.png``, ...
     progress : callable
         Called with the fraction done.
 
@@ -140,6 +141,7 @@ def take_capture(
     FileFormatError
         It cannot be written.
     """
+    check_progress(progress)
     folder = Path(folder)
     if folder.exists():
         msg = f"{folder}: must be a new folder; captures are never overwritten"
@@ -150,7 +152,8 @@ def take_capture(
     names = [f"light_{light:02d}.png" for light in range(lights)]
     beside: list[str] = []
     if rig is not None:
-        recipe = read_recipe(Path(rig))
+        rig = Path(rig) / RECIPE_NAME if Path(rig).is_dir() else Path(rig)
+        recipe = read_recipe(rig)
         if recipe.exposures_ms is not None or isinstance(recipe.images, str):
             msg = f"{rig}: exposures_ms: a camera is asked for one image per light; take the bracket's files yourself"
             raise InputError(msg)
@@ -159,7 +162,7 @@ def take_capture(
             msg = f"{rig}: images: must name {lights} files, one per light, got {len(described)}"
             raise InputError(msg)
         names = described or names
-        beside = _named_files(Path(rig), recipe, folder)
+        beside = _named_files(rig, recipe, folder)
     try:
         folder.absolute().parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".bgars-partial-", dir=folder.absolute().parent) as place:
@@ -175,7 +178,7 @@ def take_capture(
                 shutil.copyfile(rig, made / RECIPE_NAME)
                 for name in beside:
                     (made / name).parent.mkdir(parents=True, exist_ok=True)
-                    shutil.copyfile(Path(rig).parent / name, made / name)
+                    shutil.copyfile(rig.parent / name, made / name)
                 names = [*names, RECIPE_NAME, *beside]
             made.rename(folder)
     except BgarsError:

@@ -16,6 +16,8 @@ __all__ = ["HIDDEN", "Inbox", "Waiting"]
 Signature = tuple[tuple[str, int, int], ...]
 HIDDEN = (".", "_")
 """How the names of folders begin that are no parts."""
+LOOSE_S = 2.0
+"""How long images may lie beside the folders: software that makes a folder and moves them into it takes less."""
 
 
 @dataclass
@@ -78,6 +80,7 @@ class Inbox:
             raise InputError(msg)
         self.flat = FlatFiles(folder, files, count=count, settle_s=settle_s) if files and count else None
         self._waiting: dict[str, Waiting] = {}
+        self._loose_s: dict[str, float] = {}
 
     def look(self) -> list[Waiting]:
         """Return the parts that lie there, oldest first by when they were seen; entries that vanish are skipped.
@@ -92,7 +95,11 @@ class Inbox:
         now = time.monotonic()
         found: dict[str, Waiting] = {}
         with os.scandir(self.folder) as entries:
-            folders = [entry for entry in entries if not entry.name.startswith(HIDDEN) and _is_folder(entry)]
+            shown = [entry for entry in entries if not entry.name.startswith(HIDDEN)]
+        folders = [entry for entry in shown if _is_folder(entry)]
+        images = {entry.name for entry in shown if Path(entry.name).suffix.lower() in IMAGES}
+        images -= {entry.name for entry in folders}
+        self._loose_s = {name: self._loose_s.get(name, now) for name in images}
         for entry in sorted(folders, key=lambda entry: entry.name):
             signature = _signature(Path(entry.path))
             if signature is None:
@@ -105,6 +112,22 @@ class Inbox:
                 found[entry.name] = Waiting(Path(entry.path), signature, now, first)
         self._waiting = found
         return sorted(found.values(), key=lambda part: part.first_s)
+
+    def loose(self, patience_s: float) -> str:
+        """What images wait for that have lain in the inbox itself for a while, in words; "" = there are none.
+
+        With a pattern of files they may be waiting for others of their part, as long as `patience_s`.
+        """
+        least_s = max(self.settle_s, LOOSE_S) if self.flat is None else patience_s
+        now = time.monotonic()
+        names = sorted(name for name, since_s in self._loose_s.items() if now - since_s >= least_s)
+        if not names:
+            return ""
+        images = f"{len(names)} images" if len(names) > 1 else "1 image"
+        told = f"{images} not in the folder of a part, such as {names[0]}"
+        if self.flat is None:
+            return f"{told}: waiting for a folder, or give --files '{{serial}}_{{image}}.png' and --count"
+        return f"{told}: waiting for --count {self.count} images of one serial number whose names follow --files"
 
     def is_complete(self, part: Waiting) -> bool:
         """Whether a part can be taken."""

@@ -14,7 +14,7 @@ from bgars.errors import BgarsError
 from bgars.io.capture import read_capture
 from bgars.io.part_recipe import read_part_recipe
 from bgars.io.provenance import capture_files, checksums
-from bgars.line.naming import Naming, last_written_utc
+from bgars.line.naming import Naming, with_capture
 from bgars.normals.methods import DEFAULT_METHOD, Method
 from bgars.pipelines.check import check, refuse_wrong_geometry, told_by
 from bgars.pipelines.inspect import inspected
@@ -148,7 +148,7 @@ def _inspected(job: Job, folder: Path, recipe_file: str, started: float) -> tupl
     capture = read_capture(folder, threads=job.threads)
     serial = job.naming.of_capture(folder, capture, serial)
     digests = [digest for _, digest in checksums((*capture_files(capture), *([Path(recipe_file)] if recipe else [])))]
-    identity = replace(identity, captured_utc=last_written_utc(capture))
+    identity = with_capture(identity, capture)
     told = cache(lambda: _tell(capture, check(capture)))  # at most once, and not where the store has all
     if recipe is None or recipe.strip is None:
         return (_part(job, capture, recipe, "", serial, identity, digests, told, started),)

@@ -74,7 +74,7 @@ def lot_facts(store: Store, lot: str | None = None) -> dict[str, Any]:
     # A part that came again after rework counts once, as it was found last.
     last_round = (
         f"select * from parts {chosen} qualify serial = '' "
-        "or row_number() over (partition by serial, recipe order by round desc) = 1"
+        "or row_number() over (partition by serial, recipe order by round desc, sequence desc) = 1"
     )
     counts = _rows(store, f"select verdict, count(*) n from ({last_round}) group by verdict")
     by_verdict = {"pass": 0, "fail": 0, "undecided": 0} | {row["verdict"]: row["n"] for row in counts}
@@ -124,6 +124,12 @@ def lot_facts(store: Store, lot: str | None = None) -> dict[str, Any]:
         "drifts": [chart for name, title in DRIFTS.items() if (chart := _drift(drift, name, title)) is not None],
         "last": last,
         "failures": _rows(store, f"select serial, capture_folder, reason from failures {chosen} limit {LAST_PARTS}"),
+        "two_lots": _rows(
+            store,
+            "select serial, list_sort(list(distinct lot)) lots from parts where serial <> '' and lot <> '' "
+            f"and serial in (select serial from parts {chosen}) group by serial, recipe "
+            f"having count(distinct lot) > 1 order by serial limit {LAST_PARTS}",
+        ),
         **span,
     }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import re
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,13 +12,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bgars.errors import InputError
-from bgars.io.recipe import RECIPE_NAME, read_recipe
+from bgars.io.recipe import RECIPE_NAME, CaptureRecipe, read_recipe
+from bgars.io.strict_toml import read_values
 from bgars.records.part_identity import PartIdentity
+from bgars.records.station import Station
 
 if TYPE_CHECKING:
     from bgars.records.capture import Capture
 
-__all__ = ["CODE", "Naming", "identity_of", "last_written_utc"]
+__all__ = ["CODE", "Naming", "identity_of", "with_capture"]
 
 CODE = "code"
 """A pattern that asks for the code in the images."""
@@ -130,24 +132,47 @@ class Naming:
         return re.compile(told)
 
 
-def identity_of(capture: Capture, common: PartIdentity) -> tuple[str, PartIdentity]:
-    """Return serial number ("" = not named) and identity of a single capture: its side file, else what is common."""
+def identity_of(capture: Capture, common: PartIdentity, station: Path | None = None) -> tuple[str, PartIdentity]:
+    """Return serial number ("" = not named) and identity of a single capture: its side file, else what is common.
+
+    `station` is its station file, if it is not the one that its side file names.
+    """
     known = {} if capture.folder is None else _side_file(capture.folder)
     values = common.known() | known
     serial = values.pop("serial", "")
-    return serial, PartIdentity(**(values | {"captured_utc": last_written_utc(capture)}))
+    return serial, with_capture(PartIdentity(**values), capture, station)
 
 
-def last_written_utc(capture: Capture) -> str:
+def with_capture(identity: PartIdentity, capture: Capture, station: Path | None = None) -> PartIdentity:
+    """Return an identity with the time of the last image, and the name in the station file where no other is stated."""
+    name = identity.station or _station_name(capture, station)
+    return replace(identity, captured_utc=_last_written_utc(capture), station=name)
+
+
+def _station_name(capture: Capture, file: Path | None) -> str:
+    """What a station file calls its station; "" without one, and for the name of those that nobody named."""
+    if file is None and capture.folder is not None:
+        recipe = _recipe(capture.folder)
+        file = None if recipe is None or recipe.station is None else capture.folder / recipe.station
+    name = "" if file is None else str(read_values(file).get("name", ""))
+    return "" if name == Station().name else name
+
+
+def _last_written_utc(capture: Capture) -> str:
     """When the youngest image was written, as ISO 8601, UTC; "" without files."""
     times = [path.stat().st_mtime for path in capture.files]
     return datetime.fromtimestamp(max(times), timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ") if times else ""
 
 
 def _side_file(folder: Path) -> dict[str, Any]:
-    path = folder / RECIPE_NAME
-    part = read_recipe(path).part if path.is_file() else None
+    recipe = _recipe(folder)
+    part = None if recipe is None else recipe.part
     return {} if part is None else {name: value for name, value in vars(part).items() if value}
+
+
+def _recipe(folder: Path) -> CaptureRecipe | None:
+    path = folder / RECIPE_NAME
+    return read_recipe(path) if path.is_file() else None
 
 
 def _read_code(capture: Capture) -> str:

@@ -17,13 +17,15 @@ from urllib.parse import urlsplit
 from bgars.errors import BgarsError, InputError
 from bgars.line.credentials import split_address
 from bgars.store.append import write_durably
+from bgars.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from bgars.records.part_identity import PartIdentity
     from bgars.records.part_result import PartResult
 
-__all__ = ["Notifier"]
+__all__ = ["Notifier", "failure_message", "message"]
 
 TIMEOUT_S = 5.0
 COMMAND_S = 30.0
@@ -68,18 +70,8 @@ class Notifier:
                 msg = f"--on-result: is no command ({error}), got {self.command!r}"
                 raise InputError(msg) from None
 
-    def tell(self, result: PartResult, folder: Path) -> list[str]:
-        """Tell a result; return what went wrong, one line each: the line goes on."""
-        return self.send(message(result, folder), result.summary_line())
-
-    def tell_failure(self, serial: str, folder: Path, reason: str) -> list[str]:
-        """Tell that a part could not be inspected: its verdict is "error"."""
-        values = {"serial": serial, "verdict": "error", "reason": reason, "folder": str(folder)}
-        line = f"serial={json.dumps(serial)} verdict=error reason={json.dumps(reason)}"
-        return self.send(values, line)
-
     def send(self, values: dict[str, Any], line: str) -> list[str]:
-        """Send a message, and its line."""
+        """Send a message, and its line; return what went wrong, one line each: the line goes on."""
         problems = []
         for name, action in self._actions(values, line):
             try:
@@ -112,6 +104,25 @@ def message(result: PartResult, folder: Path) -> dict[str, Any]:
         "failed_balls": [ball.name for ball in result.balls if ball.verdict == "fail"],
         "folder": str(folder),
         "version": result.version,
+    }
+
+
+def failure_message(
+    serial: str, folder: Path, reason: str, *, part: str, identity: PartIdentity, inspected_utc: str
+) -> dict[str, Any]:
+    """What a line needs of a part that could not be inspected: its verdict is "error"."""
+    return {
+        "serial": serial,
+        **identity.known(),
+        "part": part,
+        "verdict": "error",
+        "reasons": [reason],
+        "inspected_utc": inspected_utc,
+        "balls": None,
+        "failed_balls": [],
+        "folder": str(folder),
+        "version": __version__,
+        "reason": reason,
     }
 
 

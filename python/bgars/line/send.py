@@ -186,7 +186,7 @@ class Sender:
         since = max(self._state.values(), default=0) - LATE_NS
         rows = self.store.query(
             "select p.sequence, p.part_key, p.capture_folder, r.result_json "
-            f"from parts p join results r using (part_key) where p.sequence > {since} order by p.sequence"
+            f"from inspections p join results r using (part_key) where p.sequence > {since} order by p.sequence"
         ).to_pylist()
         for row in [row for row in rows if row["part_key"] not in self._state][:BLOCK_PARTS]:
             if self.is_stopping:

@@ -3,33 +3,34 @@
 from __future__ import annotations
 
 import shutil
-import sys
 import time
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from bgars.errors import BgarsError, FileFormatError, InputError
 from bgars.io.part_recipe import read_part_recipe
 from bgars.io.recipe import RECIPE_NAME, read_recipe
-from bgars.line.batch import store_outcome
+from bgars.io.station_file import read_station
+from bgars.line.batch import now_utc, store_outcome
 from bgars.line.inbox import HIDDEN, Inbox, Waiting
 from bgars.line.job import Job, Outcome, run_job
 from bgars.line.naming import Naming
-from bgars.line.notify import Notifier
+from bgars.line.notify import Notifier, failure_message, message
 from bgars.normals.methods import DEFAULT_METHOD, Method
+from bgars.records.result_text import error_line
+from bgars.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from bgars.records.part_result import PartResult
     from bgars.store import Store
 
-__all__ = ["Watch", "need_outside", "watched"]
+__all__ = ["Watch", "need_outside"]
 
-LOCK = ".bgars-watch.lock"
 DONE, FAILED = "done", "failed"
 LONGEST_PAUSE_S = 30.0
 """Between two tries to write a result where the disk is full or away."""
@@ -72,6 +73,9 @@ class Watch:
     _tries: int = 0
     _name: str = ""
     _problem: str = ""
+    _rig_file: Path = field(default_factory=Path)
+    _stations: set[str] = field(default_factory=set)
+    _loose_told: bool = False
     _refused: dict[str, tuple[object, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -79,7 +83,8 @@ class Watch:
         if self.recipe is not None:
             self._name = read_part_recipe(self.recipe).name
         if self.rig is not None:
-            read_recipe(self.rig / RECIPE_NAME if self.rig.is_dir() else self.rig)
+            self._rig_file = self.rig / RECIPE_NAME if self.rig.is_dir() else self.rig
+            self._stations = _station(self._rig_file)
         need_outside(self.inbox.folder, self.done, self.failed)
         for place in (self.done, self.failed):
             try:
@@ -107,6 +112,7 @@ class Watch:
         except OSError as error:
             self._problem_once(f"{self.inbox.folder}: cannot be read ({error.strerror or error}); tried again")
             return False
+        self._tell_loose()
         taken, self._pause_s = 0, 0.0
         for part in waiting:
             if self.is_stopping or self._pause_s:
@@ -118,6 +124,13 @@ class Watch:
                 reason = f"incomplete: {self.inbox.missing(part)}, and nothing new for {self.patience_s:g} s"
                 taken += self._reject(part, (Outcome(str(part.folder), self._serial(part.folder), reason=reason),))
         return taken > 0
+
+    def _tell_loose(self) -> None:
+        """Say once what images wait for that lie in the inbox beside the folders of the parts."""
+        stuck = self.inbox.loose(self.patience_s)
+        if stuck and not self._loose_told:
+            self.say(f"{self.inbox.folder}: {stuck}")
+        self._loose_told = bool(stuck)
 
     def _take(self, part: Waiting) -> bool:
         """Inspect a part where it lies, keep its result, tell it, and only then move the part."""
@@ -132,6 +145,10 @@ class Watch:
         )
         outcomes = run_job(job)
         if all(outcome.result is None for outcome in outcomes):
+            if (away := self._away(part.folder)) is not None:
+                self._problem_once(f"{away}; {part.folder.name} stays in the inbox, tried again")
+                self._back_off()
+                return False
             now = time.monotonic()
             seen, since = self._refused.setdefault(part.folder.name, (part.signature, now))
             if seen != part.signature:  # it goes on changing: half-written before
@@ -139,6 +156,8 @@ class Watch:
             elif now - since >= self.patience_s or (self.inbox.trigger and all(each.is_input for each in outcomes)):
                 return self._reject(part, outcomes)
             return False
+        with suppress(BgarsError, OSError):
+            self._stations |= _station(part.folder / RECIPE_NAME)
         place = self._free(self.done, part.folder.name)
         kept = self._keep(part, outcomes, place)
         if kept is None:
@@ -147,13 +166,31 @@ class Watch:
             if outcome.result is None:
                 self._tell_failure(outcome, place)
                 continue
-            result = new or self.store.numbered(outcome.result)
-            for problem in self.notifier.tell(result, place):
-                self.say(f"{result.serial}: {problem}")
+            result = new or replace(self.store.numbered(outcome.result), inspected_utc=now_utc())
             if new is None:
                 self.say(f"{part.folder.name}: the store had it; reported and moved again")
-            self.say(f"{result.summary_line()} seconds={outcome.seconds:.2f}")
+            self._tell(outcome, message(result, place), result.summary_line())
         return self._move(part, place)
+
+    def _away(self, folder: Path) -> str | None:
+        """Which file of the line, not of the part, cannot be read now: recipe, rig, or a station that could be read."""
+        try:
+            if self.recipe is not None:
+                read_part_recipe(self.recipe)
+            if self.rig is not None and not (folder / RECIPE_NAME).exists():
+                read_recipe(self._rig_file)
+        except (BgarsError, OSError) as error:
+            return " ".join(str(error).split())
+        try:
+            stations = _station(folder / RECIPE_NAME) & self._stations
+        except (BgarsError, OSError):  # the part's own
+            return None
+        try:
+            for station in stations:
+                read_station(folder / station)
+        except (BgarsError, OSError) as error:
+            return " ".join(str(error).split())
+        return None
 
     def _reject(self, part: Waiting, outcomes: tuple[Outcome, ...]) -> bool:
         """Keep why a part could not be inspected, and move it to the failed ones."""
@@ -169,7 +206,8 @@ class Watch:
         lot = self.naming.common.lot
         try:
             kept = [
-                store_outcome(outcome, self.store, recipe=self._name, lot=lot, moved_to=place) for outcome in outcomes
+                store_outcome(outcome, self.store, recipe=self._name, lot=lot, moved_to=place, say=self.say)
+                for outcome in outcomes
             ]
         except BgarsError as error:
             self._problem_once(f"{error}; {part.folder.name} stays in the inbox, tried again")
@@ -178,10 +216,16 @@ class Watch:
         self._tries, self._problem = 0, ""
         return kept
 
+    def _tell(self, outcome: Outcome, values: dict[str, Any], line: str) -> None:
+        for problem in self.notifier.send(values, line):
+            self.say(f"{outcome.serial or Path(outcome.folder).name}: {problem}")
+        self.say(f"{line} seconds={outcome.seconds:.2f}")
+
     def _tell_failure(self, outcome: Outcome, place: Path) -> None:
-        for problem in self.notifier.tell_failure(outcome.serial, place, outcome.reason):
-            self.say(f"{outcome.serial}: {problem}")
-        self.say(f"{outcome.serial or Path(outcome.folder).name}: not inspected: {outcome.reason}")
+        capture, now = Path(outcome.folder).name, now_utc()
+        told = {"serial": outcome.serial, "reason": outcome.reason, "part": self._name or capture}
+        values = failure_message(folder=place, identity=self.naming.common, inspected_utc=now, **told)
+        self._tell(outcome, values, error_line(time=now, capture=capture, version=__version__, **told))
 
     def _move(self, part: Waiting, place: Path) -> bool:
         """Rename a part out of the inbox; where that fails it stays, and the store knows it when it is met again."""
@@ -249,6 +293,12 @@ class Watch:
             )
 
 
+def _station(description: Path) -> set[str]:
+    """The station that a capture.toml names, as it is written there."""
+    named = read_recipe(description).station
+    return set() if named is None else {named}
+
+
 def need_outside(inbox: Path, *places: Path) -> None:
     """Raise InputError where a folder of the watch lies in the inbox: there it would be taken for a part, and moved.
 
@@ -260,48 +310,3 @@ def need_outside(inbox: Path, *places: Path) -> None:
         if path == root or (root in path.parents and not path.relative_to(root).parts[0].startswith(HIDDEN)):
             msg = f"{place}: would be taken for a part, as every folder in {inbox}; name another, such as {inbox}/_name"
             raise InputError(msg)
-
-
-@contextmanager
-def watched(folder: Path) -> Iterator[None]:
-    """Hold an inbox for this process alone.
-
-    Raises
-    ------
-    InputError
-        Another process watches it.
-    FileFormatError
-        It is no folder that can be written.
-    """
-    if not folder.is_dir():
-        msg = f"{folder}: no such folder"
-        raise FileFormatError(msg)
-    try:
-        lock = (folder / LOCK).open("a+b")
-    except OSError as error:
-        msg = f"{folder}: cannot be written ({error.strerror}); parts are moved out of it"
-        raise FileFormatError(msg) from error
-    with lock:
-        if not _lock(lock):
-            msg = f"{folder}: another bgars watch works on it"
-            raise InputError(msg)
-        yield
-
-
-def _lock(file: IO[bytes]) -> bool:
-    """Take the lock, which the system gives back however the process ends."""
-    if sys.platform == "win32":
-        import msvcrt  # noqa: PLC0415 - only there
-
-        try:
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-        except OSError:
-            return False
-        return True
-    import fcntl  # noqa: PLC0415 - not there
-
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True

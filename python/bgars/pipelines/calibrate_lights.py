@@ -17,6 +17,7 @@ from bgars.records.light_calibration import BallView, LightCalibration
 from bgars.records.part_recipe import PartRecipe
 from bgars.records.remark import Remark
 from bgars.records.rig import LightRig
+from bgars.records.scalar_checks import check_progress
 from bgars.station.lights import calibrate_lights as lights_of_spheres
 
 if TYPE_CHECKING:
@@ -104,6 +105,7 @@ def calibrate_lights(
     >>> float(abs(found.rig.elevations_deg - 45.0).max()) < 1.0
     True
     """
+    check_progress(progress)
     if sphere != "balls":
         if recipe is not None:
             msg = f"recipe: goes with sphere 'balls' only, got sphere {sphere!r}"

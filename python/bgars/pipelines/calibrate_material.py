@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from bgars import _bgars
 from bgars.errors import CalibrationError
 from bgars.pipelines.normals import estimate_normals
-from bgars.records.scalar_checks import thread_count
+from bgars.records.scalar_checks import check_progress, thread_count
 from bgars.records.whole_capture import need_whole
 
 if TYPE_CHECKING:
@@ -59,6 +59,7 @@ def calibrate_material(
     >>> len(fit.circles_px), len(fit.material.gains), fit.loss < 0.1
     (1, 8, True)
     """
+    check_progress(progress)
     threads = thread_count(threads)
     need_whole(capture)
     if len(capture.rig) < _bgars.REFLECTANCE_MIN_LIGHTS:

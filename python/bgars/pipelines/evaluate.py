@@ -15,6 +15,8 @@ from bgars.pipelines.normals import estimate_normals
 from bgars.records.normal_field import NormalField
 from bgars.records.plain_arrays import plain, without_mask
 from bgars.records.renamed import renamed
+from bgars.records.scalar_checks import check_progress
+from bgars.records.short import Short
 from bgars.records.whole_capture import need_whole
 from bgars.surface.integrate import integrate_normals
 
@@ -56,8 +58,8 @@ class AngularErrors:
 
 
 @renamed(choice="method_reason")
-@dataclass(frozen=True)
-class Evaluation:
+@dataclass(frozen=True, repr=False)
+class Evaluation(Short):
     """Result of :func:`evaluate`.
 
     Attributes
@@ -90,6 +92,13 @@ class Evaluation:
     coverage: float | None
     board: AngularErrors | None
     ball_height_rmse_um: float | None
+
+    def _facts(self) -> dict[str, object]:
+        facts: dict[str, object] = {"name": repr(self.name), "method": repr(self.method), "region": repr(self.region)}
+        errors = {"normals": self.normals, "measured": self.measured, "board": self.board}
+        facts |= {name: f"{each.mean_deg:.4g} deg mean" for name, each in errors.items() if each is not None}
+        height = self.ball_height_rmse_um
+        return facts if height is None else facts | {"ball_height_rmse_um": f"{height:.4g}"}
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain Python values, for JSON."""
@@ -139,6 +148,7 @@ def evaluate(
     >>> round(errors.mean_deg, 1), errors.invalid
     (9.3, 0)
     """
+    check_progress(progress)
     need_whole(capture)
     if truth is None:
         if capture.folder is None:

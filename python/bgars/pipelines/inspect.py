@@ -23,7 +23,7 @@ from bgars.pipelines.part_surface import part_surface
 from bgars.records.circle_pixels import inside_circles
 from bgars.records.part_material import part_material
 from bgars.records.part_recipe import PartRecipe
-from bgars.records.scalar_checks import thread_count
+from bgars.records.scalar_checks import check_progress, thread_count
 from bgars.records.whole_capture import need_whole
 from bgars.version import __version__
 
@@ -123,6 +123,7 @@ def inspected(
 
     `judged` is called with the result before its surface is made.
     """
+    check_progress(progress)
     threads = thread_count(threads)
     if recipe is not None and not isinstance(recipe, PartRecipe):
         recipe = read_part_recipe(recipe)

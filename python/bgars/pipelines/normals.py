@@ -20,7 +20,7 @@ from bgars.records.circle_pixels import inside_circles
 from bgars.records.found_balls import FoundBalls
 from bgars.records.normal_field import NormalField
 from bgars.records.plain_arrays import plain, plain_bool
-from bgars.records.scalar_checks import number, thread_count
+from bgars.records.scalar_checks import check_progress, number, thread_count
 from bgars.records.whole_capture import need_whole
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def estimate_normals(
         Largest number of threads; by default the environment variable ``RAYON_NUM_THREADS``, else one per core.
         The result does not depend on it.
     progress : callable, optional
-        Called with the fraction done, at most ten times a second; not at all where the work is done before that.
+        Called with the fraction done, at most ten times a second, and with 1 at the end.
 
     Returns
     -------
@@ -125,6 +125,7 @@ def estimate_normals(
     >>> float(bgars.estimate_normals(images, rig.directions).normals[0, 0, 2])
     1.0
     """
+    check_progress(progress)
     threads = thread_count(threads)
     is_own = isinstance(method, str) and method in RUNNERS
     run = RUNNERS[method] if is_own else added_method(method)
@@ -140,6 +141,8 @@ def estimate_normals(
         **{"keep_sets": keep_sets or None, "out": out, "threads": threads, "progress": progress},
     }
     found = run(capture, **{name: value for name, value in options.items() if value is not None})
+    if progress is not None:
+        progress(1.0)
     return found if is_own else within(replace(given_field(found, capture, method), method=method), use)
 
 

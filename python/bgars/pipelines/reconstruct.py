@@ -12,7 +12,7 @@ from bgars.normals.methods import DEFAULT_METHOD, Method
 from bgars.normals.noise_floor import without_background
 from bgars.pipelines.check import checked_beside, tell_before
 from bgars.pipelines.normals import estimate_normals
-from bgars.records.scalar_checks import thread_count
+from bgars.records.scalar_checks import check_progress, thread_count
 from bgars.records.whole_capture import need_whole
 from bgars.surface.flatten import Bow, Flatten, find_bow, flattened
 from bgars.surface.integrate import Difference, integrate_normals
@@ -177,6 +177,7 @@ def reconstructed(
     progress: Callable[[Stage, float], object] | None = None,
 ) -> Reconstruction:
     """Reconstruct a surface; its capture is checked while its normals are estimated, and `tell` says what was found."""
+    check_progress(progress)
     threads = thread_count(threads)
 
     def report(stage: Stage, fraction: float) -> None:

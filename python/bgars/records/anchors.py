@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.errors import InputError
+from bgars.records.short import Short
 
 __all__ = ["Anchors"]
 
 MAX_REGION = 2**31 - 1
 
 
-@dataclass(frozen=True, eq=False)
-class Anchors:
+@dataclass(frozen=True, eq=False, repr=False)
+class Anchors(Short):
     """Heights that are known from elsewhere, for parts of a surface whose absolute height normals do not give.
 
     Anchors move a whole component up or down; only in regions with a reach do they bend it.

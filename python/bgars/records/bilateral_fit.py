@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars.records.short import Short
+
 __all__ = ["BilateralFit"]
 
 
-@dataclass(frozen=True, eq=False)
-class BilateralFit:
+@dataclass(frozen=True, eq=False, repr=False)
+class BilateralFit(Short):
     """Where a bilateral integration saw jumps, and how it came to rest.
 
     Attributes

@@ -11,12 +11,13 @@ from bgars.records.bilateral_fit import BilateralFit
 from bgars.records.component import Component
 from bgars.records.pinhole import Pinhole
 from bgars.records.plain_arrays import plain_fields
+from bgars.records.short import Short
 
 __all__ = ["DepthMap"]
 
 
-@dataclass(frozen=True, eq=False)
-class DepthMap:
+@dataclass(frozen=True, eq=False, repr=False)
+class DepthMap(Short):
     """Depths under a pinhole camera, up to one factor per connected component.
 
     Attributes

@@ -7,13 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars.records.short import Short
+
 __all__ = ["FlatField"]
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class FlatField:
+@dataclass(frozen=True, eq=False, repr=False)
+class FlatField(Short):
     """How even each light is on a flat board: smooth maps, one polynomial per light.
 
     Attributes

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.records.remark import Remark
+from bgars.records.short import Short
 
 if TYPE_CHECKING:
     from bgars.records.rig import LightRig
@@ -43,8 +44,8 @@ class BallView:
     residuals_px: Array
 
 
-@dataclass(frozen=True, eq=False)
-class LightCalibration:
+@dataclass(frozen=True, eq=False, repr=False)
+class LightCalibration(Short):
     """Lights as reference balls show them.
 
     Attributes

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 if TYPE_CHECKING:
     from bgars.records.reflectance_fit import ReflectanceFit
 from bgars.records.keys import Key
+from bgars.records.short import Short
 
 __all__ = ["GREY_LEVELS", "MaterialParameter", "PartMaterial", "part_material"]
 
@@ -38,8 +39,8 @@ class MaterialParameter:
     unit: Annotated[Unit, Key("unit of value and standard error")]
 
 
-@dataclass(frozen=True)
-class PartMaterial:
+@dataclass(frozen=True, repr=False)
+class PartMaterial(Short):
     """What the balls do with light, and how well one material explains them.
 
     Attributes

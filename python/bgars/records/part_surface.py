@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from bgars.records.short import Short
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -12,8 +14,8 @@ if TYPE_CHECKING:
 __all__ = ["PartSurface"]
 
 
-@dataclass(frozen=True, eq=False)
-class PartSurface:
+@dataclass(frozen=True, eq=False, repr=False)
+class PartSurface(Short):
     """Heights above the board at the centre of the image, from integrated normals held by known heights.
 
     Sample [i, j] of either map is pixel [step i, step j] of the images: x = (step j + 0.5 - W/2) p, y = (H/2 - step i

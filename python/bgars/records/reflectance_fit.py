@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from bgars.records.short import Short
 from bgars.records.surface_material import SurfaceMaterial
 
 __all__ = ["ReflectanceFit", "loss_in_words"]
@@ -14,8 +15,8 @@ WELL = 0.5
 """Losses below which a material explains its balls very well, and well."""
 
 
-@dataclass(frozen=True)
-class ReflectanceFit:
+@dataclass(frozen=True, repr=False)
+class ReflectanceFit(Short):
     """What the reflectance estimator fitted.
 
     Attributes
@@ -59,6 +60,10 @@ class ReflectanceFit:
     shape_ratio: float = 1.0
     u_shape_ratio: float = 0.0
     refusal: str = ""
+
+    def _facts(self) -> dict[str, object]:
+        facts = {"balls": len(self.circles_px), "shape": repr(self.shape), "loss": f"{self.loss:.4g}"}
+        return facts | ({"accepted": True} if self.accepted else {"refusal": repr(self.refusal)})
 
     @property
     def shape_in_words(self) -> str:

@@ -15,7 +15,7 @@ Record = TypeVar("Record")
 
 
 def renamed(**names: str) -> Callable[[type[Record]], type[Record]]:
-    """Let a record's fields be read, and given, by their old names: ``@renamed(old="new")``."""
+    """Let a record's fields be read, and given, by their old names, ``@renamed(old="new")``; dir() leaves these out."""
 
     def decorate(record: type[Record]) -> type[Record]:
         made: Any = record.__init__
@@ -29,6 +29,8 @@ def renamed(**names: str) -> Callable[[type[Record]], type[Record]]:
         setattr(record, "__init__", init)  # noqa: B010 - a plain assignment mypy takes for a mistake
         for old, new in names.items():
             setattr(record, old, property(functools.partial(_read, record=record, old=old, new=new)))
+        listed: Any = record.__dir__
+        setattr(record, "__dir__", lambda self: [name for name in listed(self) if name not in names])  # noqa: B010 - same
         return record
 
     return decorate

@@ -7,13 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars.records.short import Short
+
 __all__ = ["ResponseCurve"]
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class ResponseCurve:
+@dataclass(frozen=True, eq=False, repr=False)
+class ResponseCurve(Short):
     """Inverse response of the camera.
 
     Attributes

@@ -15,7 +15,7 @@ from bgars.records.keys import DIGITS, keys_of, plain_value
 if TYPE_CHECKING:
     from bgars.records.part_result import PartResult
 
-__all__ = ["csv_text", "log_line", "table_text"]
+__all__ = ["csv_text", "error_line", "log_line", "table_text"]
 
 CSV_DIGITS = 3
 CSV_PART = ("part_serial", "part_lot", "part_capture", "part_inspected_utc", "part_round")
@@ -38,6 +38,12 @@ LINE_READINGS = (
     "regression_coplanarity_um",
     "u_regression_coplanarity_um",
     "warpage_um",
+)
+
+LINE_KEYS = (
+    *("time", "part", "serial", "capture", "verdict", "balls"),
+    *(f"balls_{verdict}" for verdict in get_args(Verdict)),
+    *("balls_missing", "bridges", *LINE_READINGS, "reason", "warnings", "version", "round"),
 )
 
 
@@ -71,6 +77,18 @@ def table_text(result: PartResult) -> str:
     return "\n".join(lines)
 
 
+def error_line(*, time: str, part: str, serial: str, capture: str, reason: str, version: str) -> str:
+    """A part that could not be inspected, with the keys of :func:`log_line`; what is not known is null.
+
+    Examples
+    --------
+    >>> error_line(time="", part="BGA 9", serial="SN1", capture="SN1", reason="no images", version="1")[:70]
+    'time=null part="BGA 9" serial=SN1 capture=SN1 verdict=error balls=null'
+    """
+    told = {"part": part, "serial": serial, "capture": capture, "reason": reason, "version": version}
+    return _line({"time": time or None, **told, "verdict": "error"})
+
+
 def log_line(result: PartResult) -> str:
     """The part, as key=value pairs."""
     balls = {verdict: sum(ball.verdict == verdict for ball in result.balls) for verdict in get_args(Verdict)}
@@ -90,7 +108,12 @@ def log_line(result: PartResult) -> str:
         "version": result.version,
         "round": result.identity.round,
     }
-    return " ".join(f"{key}={_log_value(value)}" for key, value in pairs.items())
+    return _line(pairs)
+
+
+def _line(pairs: dict[str, Any]) -> str:
+    """Pairs as a line that always has the same keys in the same order."""
+    return " ".join(f"{key}={_log_value(pairs.get(key))}" for key in LINE_KEYS)
 
 
 def _csv_cell(name: str, value: Any) -> Any:  # noqa: ANN401 - a field of a record

@@ -15,6 +15,7 @@ from bgars.files.light_formats import MAX_LIGHTS
 from bgars.files.light_names import light_name
 from bgars.records.plain_arrays import plain
 from bgars.records.scalar_checks import number
+from bgars.records.short import Short
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -26,8 +27,8 @@ MOST_SHOWN = 10**20
 """Numbers from here on have too many digits for a message."""
 
 
-@dataclass(frozen=True, eq=False)
-class LightRig:
+@dataclass(frozen=True, eq=False, repr=False)
+class LightRig(Short):
     """The lights of a capture, one per image.
 
     Make one with :meth:`ring`, :meth:`from_directions`, :meth:`from_angles`, :meth:`from_positions` or :meth:`from_lp`.

@@ -1,4 +1,4 @@
-"""Checks of single numbers that a caller gives."""
+"""Checks of single numbers that a caller gives, and of what is to be called."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from bgars.errors import InputError
 
-__all__ = ["check_pitch", "number", "thread_count"]
+__all__ = ["check_pitch", "check_progress", "number", "thread_count"]
 
 MAX_THREADS = 1024
 MOST_A_CORE = 4
@@ -32,6 +32,13 @@ def check_pitch(pixel_pitch_um: object, name: str = "pixel_pitch_um") -> None:
     pitch = number(name, pixel_pitch_um)
     if not (math.isfinite(pitch) and pitch > 0):
         msg = f"{name}: must be finite and above 0, got {pitch:g}"
+        raise InputError(msg)
+
+
+def check_progress(progress: object) -> None:
+    """Raise InputError unless progress can be called, or is None."""
+    if progress is not None and not callable(progress):
+        msg = f"progress: must be callable, got {progress!r}"
         raise InputError(msg)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from bgars.errors import InputError
 from bgars.records.plain_arrays import plain
+from bgars.records.short import Short
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,17 +39,11 @@ def counted(balls: Sequence[BallResult]) -> list[str]:
     return [f"{count} {name if count == 1 else name.replace('place', 'places')}" for name, count in known]
 
 
-class Shown:
+class Shown(Short):
     """A record that is shown by a few facts and a picture."""
-
-    def _facts(self) -> dict[str, object]:
-        raise NotImplementedError
 
     def _picture(self) -> Image.Image:
         raise NotImplementedError
-
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({', '.join(f'{name}={fact}' for name, fact in self._facts().items())})"
 
     def _repr_html_(self) -> str:
         """A table of the facts beside a thumbnail, for notebooks."""

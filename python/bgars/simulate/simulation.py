@@ -10,6 +10,7 @@ import numpy as np
 from bgars.errors import InputError
 from bgars.records.capture import Capture
 from bgars.records.rig import LightRig
+from bgars.records.scalar_checks import check_progress
 from bgars.simulate.array import truncated_normal
 from bgars.simulate.camera import Camera
 from bgars.simulate.checks import require, whole
@@ -107,6 +108,7 @@ def simulate(
     >>> capture.images.shape, capture.images.dtype.name, float(truth.height_px.max()).__round__()
     ((8, 270, 270), 'uint8', 90)
     """
+    check_progress(progress)
     for name, given, wanted in (
         ("scene", scene, Scene),
         ("rig", rig, LightRig),

@@ -99,7 +99,7 @@ class BallTruth:
     roughness: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SimulatedTruth(Truth):
     """Truth of a simulated capture, at pixel centres and without blur.
 

@@ -7,9 +7,9 @@ import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from bgars.errors import FileFormatError
 from bgars.io.parquet import need_pyarrow
 from bgars.store.append import COMMIT, PARTIAL, write_table
+from bgars.store.repair import damage
 from bgars.store.schema import TABLES
 
 if TYPE_CHECKING:
@@ -113,8 +113,7 @@ def _read(path: Path) -> Any:  # noqa: ANN401 - pyarrow has no types
     except FileNotFoundError:
         raise
     except (OSError, ValueError) as error:
-        msg = f"{path}: is not a readable file of a store ({error})"
-        raise FileFormatError(msg) from error
+        raise damage(path, error) from error
 
 
 def _only(piece: Any, keys: list[str]) -> Any:  # noqa: ANN401 - pyarrow has no types

@@ -15,9 +15,10 @@ from bgars.io.parquet import need_pyarrow
 from bgars.store.append import PARTIAL, append_rows, partition, write_durably
 from bgars.store.compact import compact
 from bgars.store.export import export
-from bgars.store.keys import failure_key, part_key
+from bgars.store.keys import failure_key, images_key, part_key
 from bgars.store.known_parts import KnownParts
 from bgars.store.query import query
+from bgars.store.repair import repair
 from bgars.store.rows import TIME_FORM, result_rows
 from bgars.store.schema import FORMAT, FORMAT_VERSION, TABLES
 
@@ -88,15 +89,28 @@ class Store:
         """Return a result with its round, unless it states one or has no serial number.
 
         The first inspection of a serial number under a recipe is round 1; that of other images, such as after rework,
-        the next. What any process appended meanwhile counts.
+        the next. The same images, such as with a station that was calibrated anew, are the round that they were. What
+        any process appended meanwhile counts.
         """
         if result.identity.round is not None or not result.serial:
             return result
         known = self._parts()
         known.look()
         place = partition("", result.name if result.recipe is not None else "").name
-        number = known.round_of(part_key(result), result.serial, place)
+        images = images_key(result.files, len(result.light_directions))
+        number = known.round_of(part_key(result), result.serial, place, images)
         return replace(result, identity=replace(result.identity, round=number))
+
+    def lot_note(self, result: PartResult) -> str:
+        """Say that the serial number of a numbered result came in another lot before; "" = it did not."""
+        place = partition("", result.name if result.recipe is not None else "").name
+        before, lot = self._parts().last_lot(result.serial, place), result.identity.lot
+        if not (result.serial and before and lot) or before == lot or (result.identity.round or 1) == 1:
+            return ""
+        return (
+            f"{result.serial}: was in lot {before}, is in lot {lot} now, and counts as round {result.identity.round} "
+            "of one part; if these are two parts, make serial numbers unique among parts of a recipe"
+        )
 
     def append_failure(
         self, capture_folder: str, reason: str, *, serial: str = "", recipe: str = "", version: str = "", lot: str = ""
@@ -148,6 +162,16 @@ class Store:
     def compact(self) -> dict[str, int]:
         """Join the many small files of each day and recipe; others may append meanwhile."""
         return compact(self.folder)
+
+    def repair(self) -> dict[str, list[str]]:
+        """Make damaged files again from the whole results, or set them aside; return their names.
+
+        The keys are ``remade`` and ``set_aside``. Parts whose own file was set aside are not in the store any more, and
+        can be inspected again.
+        """
+        done = repair(self.folder)
+        self.refresh()
+        return done
 
     def export(self, url: str) -> dict[str, int]:
         """Copy what is new to a database that SQLAlchemy knows; return how many rows each table got."""

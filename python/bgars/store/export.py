@@ -67,8 +67,11 @@ def _copy(alchemy: Any, engine: Any, folder: Path) -> dict[str, int]:  # noqa: A
     tables = {name: _table(alchemy, metadata, name) for name in TABLES}
     _rename_columns(alchemy, engine)
     metadata.create_all(engine)
+    _add_columns(alchemy, engine, tables)
     with engine.connect() as connection:
         there = set(connection.execute(alchemy.select(tables["parts"].c.part_key)).scalars())
+    replaced = query(folder, "select part_key from inspections where not is_latest")["part_key"].to_pylist()
+    _remove(engine, tables, [key for key in replaced if key in there])
     keys = query(folder, "select part_key from parts order by sequence")["part_key"].to_pylist()
     fresh = [key for key in keys if key not in there]
     added = dict.fromkeys((f"{PREFIX}{name}" for name in TABLES), 0)
@@ -85,6 +88,27 @@ def _copy(alchemy: Any, engine: Any, folder: Path) -> dict[str, int]:  # noqa: A
         rows = query(folder, f"select {every} from failures")
         added[f"{PREFIX}failures"] += _insert(connection, tables["failures"], rows)
     return added
+
+
+def _remove(engine: Any, tables: dict[str, Any], keys: list[str]) -> None:  # noqa: ANN401 - as above
+    """Remove inspections that later ones of the same images replaced."""
+    for start in range(0, len(keys), BLOCK_PARTS):
+        with engine.begin() as connection:
+            for name in ("budgets", "checks", "balls", "parts"):
+                gone = tables[name].c.part_key.in_(keys[start : start + BLOCK_PARTS])
+                connection.execute(tables[name].delete().where(gone))
+
+
+def _add_columns(alchemy: Any, engine: Any, tables: dict[str, Any]) -> None:  # noqa: ANN401 - as above
+    """Give a database that an earlier version made the columns that came since, empty in its rows."""
+    looked = alchemy.inspect(engine)
+    with engine.begin() as connection:
+        for table in tables.values():
+            there = {each["name"] for each in looked.get_columns(table.name)}
+            for column in table.columns:
+                if column.name not in there:
+                    kind = column.type.compile(dialect=engine.dialect)
+                    connection.execute(alchemy.text(f"ALTER TABLE {table.name} ADD COLUMN {column.name} {kind}"))
 
 
 def _rename_columns(alchemy: Any, engine: Any) -> None:  # noqa: ANN401 - as above

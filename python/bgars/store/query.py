@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from bgars.errors import FileFormatError, InputError
+from bgars.store.repair import raise_damage
 from bgars.store.schema import OLD_NAMES, TABLES, arrow_schema
 
 __all__ = ["VIEWS", "connect", "need_duckdb", "query"]
@@ -15,26 +16,36 @@ TRIES = 5
 """A compaction may take files away between the listing and the reading; the next listing has what replaced them."""
 LOST = ("No files found", "Cannot open file", "No such file")
 VIEWS = {
-    "parts": "one row per part; round = 1, 2, ... counts the inspections of a serial number",
+    "parts": "the latest inspection of each part and round; round = 1, 2, ... counts new images of a serial number",
     "balls": "one row per ball, with serial, lot, part and time of its part",
     "checks": "one row per judged quantity of a part",
     "budgets": "standard uncertainty by cause, of each reading",
     "failures": "captures that could not be inspected, and why; removed once inspected",
-    "results": "part_key, serial, result_json: everything else of a result",
+    "inspections": "one row per inspection: parts, and those that a later one of the same images replaced",
+    "results": "part_key, serial, result_json: everything else of an inspection",
 }
 # A part is taken from the first of its files, and its balls from the file of the same name: while a compaction runs,
 # there are two copies of both.
 PARTS = """
 CREATE TABLE parts_taken AS
-SELECT * REPLACE (CASE WHEN serial = '' THEN 1 ELSE coalesce(round, row_number() OVER (
+-- The same images inspected again, such as with a station that was calibrated anew, replace what was found before.
+-- Files of an earlier bgars do not say which images: a later row has their round only if it has their images.
+SELECT *, serial = '' OR (
+    row_number() OVER (PARTITION BY serial, recipe, round, coalesce(nullif(images_sha256, ''), part_key)
+                       ORDER BY sequence DESC) = 1
+    AND NOT (images_sha256 IS NULL AND sequence < coalesce(
+        max(sequence) FILTER (images_sha256 IS NOT NULL) OVER (PARTITION BY serial, recipe, round), 0))) AS is_latest
+FROM (SELECT * REPLACE (CASE WHEN serial = '' THEN 1 ELSE coalesce(round, row_number() OVER (
     PARTITION BY serial, recipe ORDER BY inspected_utc, sequence)) END AS round)
 FROM (SELECT * EXCLUDE (filename, copy) FROM (
     SELECT *, parse_filename(filename, true) AS stem,
            row_number() OVER (PARTITION BY part_key ORDER BY filename) AS copy
-    -- Files of an earlier bgars have no rounds.
-    FROM (SELECT * EXCLUDE (result_json) FROM {parts} UNION ALL BY NAME SELECT NULL::BIGINT AS round WHERE false))
-    WHERE copy = 1);
-CREATE VIEW parts AS SELECT * EXCLUDE (stem) FROM parts_taken;
+    -- Files of an earlier bgars have no rounds, or no checksum of the images.
+    FROM (SELECT * EXCLUDE (result_json) FROM {parts} UNION ALL BY NAME
+          SELECT NULL::BIGINT AS round, NULL::VARCHAR AS images_sha256 WHERE false))
+    WHERE copy = 1));
+CREATE VIEW parts AS SELECT * EXCLUDE (stem, is_latest) FROM parts_taken WHERE is_latest;
+CREATE VIEW inspections AS SELECT * EXCLUDE (stem) FROM parts_taken;
 CREATE VIEW results AS SELECT part_key, serial, result_json FROM (
     SELECT *, row_number() OVER (PARTITION BY part_key ORDER BY filename) AS copy FROM {parts}) WHERE copy = 1;
 """
@@ -42,7 +53,8 @@ SIDES = """
 CREATE VIEW {name} AS
 SELECT p.serial, p.lot, p.part, p.inspected_utc, p.sequence, p.round,
        s.* EXCLUDE (filename, day, recipe), p.day, p.recipe
-FROM {files} s JOIN parts_taken p ON s.part_key = p.part_key AND parse_filename(s.filename, true) = p.stem;
+FROM {files} s JOIN parts_taken p ON s.part_key = p.part_key AND parse_filename(s.filename, true) = p.stem
+WHERE p.is_latest;
 """
 FAILURES = """
 CREATE VIEW failures AS SELECT * EXCLUDE (filename, copy) FROM (
@@ -76,11 +88,16 @@ def query(folder: Path, sql: str) -> Any:  # noqa: ANN401 - pyarrow has no types
                 if answer is None:
                     break
                 return answer.to_arrow_table()
-        except duckdb.IOException as error:
-            if attempt + 1 == TRIES or not any(word in str(error) for word in LOST):
+        except duckdb.Error as error:
+            is_file = isinstance(error, duckdb.IOException)
+            if is_file and attempt + 1 < TRIES and any(word in str(error) for word in LOST):
+                continue
+            # What a damaged file says has no class of its own, and not always the name of the file.
+            if is_file or type(error) is duckdb.Error or ".parquet" in str(error):
+                raise_damage(folder)
+            if is_file:
                 msg = f"{folder}: a file of the store cannot be read ({_one_line(error)})"
                 raise FileFormatError(msg) from error
-        except duckdb.Error as error:
             msg = f"query: {_one_line(error)}"
             raise InputError(msg) from error
     msg = f"query: must be a query that returns rows, such as 'select count(*) from parts', got {sql!r}"

@@ -11,7 +11,7 @@ from bgars.errors import InputError
 from bgars.inspection.decision import decide
 from bgars.records.ball_result import BallResult
 from bgars.records.part_check import PartCheck
-from bgars.store.keys import part_key
+from bgars.store.keys import images_key, part_key
 from bgars.store.schema import READINGS
 
 if TYPE_CHECKING:
@@ -111,6 +111,7 @@ def _part(
         "mean_diameter_um": _mean([ball.diameter_um for ball in result.balls]),
         "mean_top_um": _mean([ball.top_um for ball in result.balls]),
         "warnings": list(result.warnings),
+        "images_sha256": images_key(result.files, len(result.light_directions)),
         "recipe_sha256": "" if recipe is None or recipe.file is None else dict(result.files).get(recipe.file.name, ""),
         "method": result.method,
         "version": result.version,

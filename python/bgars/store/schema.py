@@ -86,6 +86,9 @@ PARTS = (
     Column("mean_diameter_um", "real", "mean over the balls with a reading, in um"),
     Column("mean_top_um", "real", "mean height over the balls with a reading, in um"),
     Column("warnings", "texts", "what to look at although the numbers are right"),
+    Column(
+        "images_sha256", "text", "SHA-256 of the images' checksums: the same for every inspection of the same images"
+    ),
     Column("recipe_sha256", "text", "SHA-256 of the recipe file"),
     Column("method", "text", "estimator of the normals"),
     Column("version", "text", "version of bgars"),

@@ -15,6 +15,7 @@ from bgars.io.result_file import RESULT_NAME, read_result
 from bgars.normals.methods import DEFAULT_METHOD, Method
 from bgars.pipelines.inspect import inspect
 from bgars.records.part_recipe import PartRecipe
+from bgars.records.scalar_checks import check_progress
 from bgars.studies.alike import check_alike
 
 if TYPE_CHECKING:
@@ -118,6 +119,7 @@ def read_study(
     CalibrationError
         A capture that cannot be measured: the study fails, no run is left out silently.
     """
+    check_progress(progress)
     folder = Path(folder)
     places = _places(folder)
     finished = [path for _, path in places if (path / RESULT_NAME).is_file()]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from bgars.errors import InputError
 from bgars.io.given_paths import need_path
 from bgars.io.result_file import RESULT_NAME, parse_result, read_result
+from bgars.records.scalar_checks import check_progress
 from bgars.store import is_store, open_store
 from bgars.studies.alike import check_alike
 from bgars.studies.study_folder import natural, subfolders
@@ -49,6 +50,7 @@ def read_results(
     FileFormatError
         A file that is no result.
     """
+    check_progress(progress)
     given = [place for path in paths for place in expanded(Path(path))]
     stored = [each for path in given if is_store(path) for each in _of_store(path, where)]
     files = [file for path in given if not is_store(path) for file in _files(path)]

@@ -13,7 +13,7 @@ from bgars.records.component import Component
 from bgars.records.depth_map import DepthMap
 from bgars.records.height_map import HeightMap
 from bgars.records.normal_field import NormalField
-from bgars.records.scalar_checks import check_pitch, number, thread_count
+from bgars.records.scalar_checks import check_pitch, check_progress, number, thread_count
 from bgars.surface.anchoring import anchored
 from bgars.surface.integration_inputs import (
     anchor_regions,
@@ -175,6 +175,7 @@ def integrate_normals(
     >>> np.diff(bgars.integrate_normals(normals, method="bilateral").height_px[0]).round(2).tolist()
     [0.75, 0.75]
     """
+    check_progress(progress)
     threads = thread_count(threads)
     for name, value, allowed in (
         ("method", method, get_args(IntegrationMethod)),

@@ -12,6 +12,7 @@ import scipy  # loads its modules when they are used
 from bgars.errors import InputError
 from bgars.records.height_map import need_height
 from bgars.records.scalar_checks import number
+from bgars.records.short import Short
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -30,8 +31,8 @@ LEAST_SPREAD = 1e-9
 """Determinant of the weights' moments, in scales, above which pixels fix a plane."""
 
 
-@dataclass(frozen=True, eq=False)
-class ShapeImages:
+@dataclass(frozen=True, eq=False, repr=False)
+class ShapeImages(Short):
     """Shape of a surface, smoothed to a scale; NaN where invalid. The unit is that of the heights, um or px.
 
     Attributes

@@ -16,7 +16,7 @@ from bgars import _bgars
 from bgars.errors import InputError
 from bgars.extras import how_to_install, missing
 from bgars.records.height_map import need_height
-from bgars.records.scalar_checks import number, thread_count
+from bgars.records.scalar_checks import check_progress, number, thread_count
 from bgars.surface.mesh import check_faces
 
 if TYPE_CHECKING:
@@ -98,6 +98,7 @@ def simplified_mesh(
     import fast_simplification  # noqa: PLC0415 - optional
     import trimesh  # noqa: PLC0415 - half a second
 
+    check_progress(progress)
     threads = thread_count(threads)
     pitch_um = height.pixel_pitch_um or 1.0
     vertices, faces, pixels = _bgars.triangulate(height.height_px, height.mask, 1.0, threads=threads)
