@@ -148,7 +148,8 @@ def refuse_wrong_geometry(findings: Findings, name: str, *, way_out: str) -> Non
     Raises
     ------
     InputError
-        Lights in wrong order, mirrored or below the surface, an image twice or turned, a dead lamp.
+        Lights in wrong order, mirrored or below the surface, an image twice or turned, a dead lamp, black images,
+        noise and nothing else.
     """
     wrong = findings.geometry_errors
     if wrong:
