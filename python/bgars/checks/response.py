@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from bgars.checks.view import View
     from bgars.records.capture import Capture
 
-__all__ = ["check_format", "check_noise_of_levels", "check_response", "curvature"]
+__all__ = ["DOUBT", "check_format", "check_noise_of_levels", "check_response", "curvature"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -64,8 +64,9 @@ def curvature(view: View, lights: Array) -> tuple[float, float, float]:
     if int(told.sum()) < MIN_PIXELS:
         return 0.0, np.inf, 0.0
     keep &= told
-    bent = _varying(fit_normals(square, keep, lights).left * mean, keep)
-    left = _varying(fit.left, keep)
+    ones = fit_normals(np.ones_like(square), keep, lights).left
+    bent = _own(fit_normals(square, keep, lights).left * mean, ones, keep)
+    left = _own(fit.left, ones, keep)
     tiles = view.tiles.ravel()[use]
     top, bottom = tile_sums(tiles, (left * bent).sum(axis=0), told), tile_sums(tiles, (bent**2).sum(axis=0), told)
     if bottom.sum() <= 0.0:
@@ -75,10 +76,11 @@ def curvature(view: View, lights: Array) -> tuple[float, float, float]:
     return bend, error, float(bottom.sum() ** 2 / (bottom**2).sum())
 
 
-def _varying(left: Array, keep: Mask) -> Array:
-    """(L, N) without the mean of each light."""
-    varying: Array = (left - (left * keep).sum(axis=1, keepdims=True) / np.maximum(keep.sum(axis=1), 1)[:, None]) * keep
-    return varying
+def _own(left: Array, ones: Array, keep: Mask) -> Array:
+    """(L, N) without what goes with that of ones, and without the mean of each light."""
+    left = (left - ones * float((left * ones).sum() / max((ones * ones).sum(), 1e-12))) * keep
+    own: Array = (left - left.sum(axis=1, keepdims=True) / np.maximum(keep.sum(axis=1), 1)[:, None]) * keep
+    return own
 
 
 def check_noise_of_levels(capture: Capture, curve: NoiseCurve | None) -> list[Finding]:

@@ -94,6 +94,8 @@ def check_capture(capture: Capture) -> Findings:
         drowned = check_noise_of_levels(capture, curve)
     gone = [each.image for each in found if each.kind == "lamp-dead" and each.image is not None]
     found += _between(capture, view, gone, drowned)
+    if any(each.kind == "response" and each.severity != "note" for each in found):
+        found = [each for each in found if each.kind != "response" or each.severity != "note"]
     return Findings.of([_with_file(each, capture) for each in found])
 
 

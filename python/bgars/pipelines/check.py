@@ -41,7 +41,8 @@ def check(capture: Capture | str | PathLike[str]) -> Findings:
     -------
     Findings
         ``findings`` with the worst first; each has kind, severity ("note", "warning", "error"), image, message and
-        advice. A flat field is no evidence: nothing is said of what a capture cannot show.
+        advice. A flat field is no evidence: nothing is said of what a capture cannot show. Images that are all the
+        same, black, or noise, are errors.
 
     Raises
     ------
