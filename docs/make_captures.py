@@ -60,9 +60,9 @@ def _figures(rows: list[dict[str, Any]]) -> list[str]:
         f"Of {len(faulty)} captures with one fault each, {found} are found ({100 * found / len(faulty):.0f} %), and "
         f"for {named} ({100 * named / len(faulty):.0f} %) the right cause",
         f"is named first; {alarms} of {len(good)} good captures get a warning or an error.",
-        "The captures are simulated arrays and reliefs (seeds from 70000: none was used when the thresholds were chosen) "
-        "and rendered",
-        f"parts (seeds {_seeds(rows)}), each also turned (`make check-faults`). Three faults need",
+        "The captures are simulated arrays and reliefs (seeds from 70000: none was used when the thresholds were",
+        f"chosen) and rendered parts (seeds {_seeds(rows)}), each also turned",
+        "(`make check-faults`). Three faults need",
         "cast shadows to show, and are only put there: ambient light, a veil, and a half turn of the table.",
         "The rates hold for surfaces like these, under 6 to 16 lights: matt reliefs with texture, and shiny balls on a",
         "board. A smooth part without texture, or a single ball, tells less, such as of an image that is shifted.",

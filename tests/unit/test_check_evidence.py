@@ -113,6 +113,11 @@ def test_a_direction_that_stands_twice_in_the_table(bumps: bgars.Capture) -> Non
     assert "the table says azimuth 0, elevation 50 degrees" in finding.message
 
 
+@pytest.mark.parametrize("factor", [0.7, 1.3])
+def test_a_lamp_of_another_strength_stands_where_it_should(bumps: bgars.Capture, factor: float) -> None:
+    assert told(changed(bumps, lambda image: factor * image, 3)) == [("warning", "lamp-uneven", 3)]
+
+
 def test_lights_of_uneven_elevation_hide_no_curve(bumps: bgars.Capture) -> None:
     assert told(bumps) == []
     (finding,) = bgars.check(changed(bumps, lambda levels: 255.0 * (levels / 255.0) ** (1.0 / 2.2))).told

@@ -81,7 +81,10 @@ def check_odd_image(view: View) -> list[Finding]:
     turns = TURNS + (QUARTERS if image.shape[0] == image.shape[1] else ())
     turned = [name for name, turn in turns if _explains(view, surface, (image, light), (turn(image), light))]
     seen = _seen_light(image, light, surface)
-    if seen is not None and not _explains(view, surface, (image, light), (image, seen)):
+    # A lamp that is only dimmer stands where it should.
+    if seen is not None and not _explains(
+        view, surface, (image, light * _strength(image, light, surface)), (image, seen)
+    ):
         seen = None
     return _told(view, index, turned, seen)
 
@@ -128,6 +131,13 @@ def _explains(view: View, surface: _Surface, given: tuple[Floats, Array], other:
     there = weight > 0.0
     t, tiles = paired_t((one - two)[there] / weight[there], weight[there])
     return t > critical_t(min(tiles, TILES * TILES), len(view.lights) * (len(TURNS) + len(QUARTERS) + 1))
+
+
+def _strength(image: Floats, light: Array, surface: _Surface) -> float:
+    """Usual light over the promised one."""
+    promise = np.einsum("k,khw->hw", light, surface.normal)
+    known = surface.known & _matt(image, surface.middle) & (promise > SHADOWED * surface.middle)
+    return float(np.median(image[known] / promise[known])) if known.any() else 1.0
 
 
 def _seen_light(image: Floats, light: Array, surface: _Surface) -> Array | None:

@@ -148,15 +148,17 @@ def _single(capture: Capture, view: View, lights: NDArray[np.float64], kept: NDA
     found = check_ambient(capture, lights) + check_vignetting(view, lit)
     blurred = check_focus(capture, kept, view.names)
     veiled = any(each.kind == "ambient" for each in found)
-    curved = [] if veiled else check_response(view, lights)
+    few = int(lit.sum()) < FEW_LIT
+    by_moments = None if few else gains_by_moments(moments_by(view, lit, view.tiles, TILES * TILES))
+    uneven, factors = check_gains(view, by_moments or gains_by_promise(view), lights)
+    stated, lights = lights, lights * factors[:, None]
+    # A dim lamp bends what its light leaves of the others; a curve stays once the lamps are as they are.
+    curved = [] if veiled or not check_response(view, stated) else check_response(view, lights)
     if curved:
         return found + curved
-    if int(lit.sum()) < FEW_LIT:
-        return found + check_gains(view, gains_by_promise(view), lights)[0] + blurred
-    moments = gains_by_moments(moments_by(view, lit, view.tiles, TILES * TILES))
-    uneven, factors = check_gains(view, moments, lights)
-    lights = lights * factors[:, None]
     found += uneven
+    if few:
+        return found + blurred
     # A blurred image looks shifted, and less noisy; a shifted one is as sharp as the others.
     moved = blurred or check_motion(capture, kept, lights, view.names)
     windows = None if moved or len(kept) != len(capture.rig) else cut_windows(capture, view)
