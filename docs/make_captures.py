@@ -47,7 +47,6 @@ def main() -> None:
 
 def _figures(rows: list[dict[str, Any]]) -> list[str]:
     faulty = [row for row in rows if row["fault"] in faults.FAULTS]
-    own = [row for row in rows if row["fault"] and row["fault"] not in faults.FAULTS]
     good = [row for row in rows if not row["fault"]]
     found, named = sum(bool(row["kinds"]) for row in faulty), sum(row["right"] for row in faulty)
     alarms = sum(bool(row["kinds"]) for row in good)
@@ -61,11 +60,12 @@ def _figures(rows: list[dict[str, Any]]) -> list[str]:
         f"Of {len(faulty)} captures with one fault each, {found} are found ({100 * found / len(faulty):.0f} %), and "
         f"for {named} ({100 * named / len(faulty):.0f} %) the right cause",
         f"is named first; {alarms} of {len(good)} good captures get a warning or an error.",
-        "The captures are simulated arrays and reliefs (seeds from 70000) and rendered parts (`BGARS_RENDERED`: seeds",
-        f"{_seeds(rows)}), each also turned; none was used when the",
-        "thresholds were chosen (`make check-faults`). Two faults need",
-        "cast shadows to show, and are only put there: ambient light and a half turn of the table.",
-        *_own(own),
+        "The captures are simulated arrays and reliefs (seeds from 70000: none was used when the thresholds were",
+        f"chosen) and rendered parts (seeds {_seeds(rows)}), each also turned",
+        "(`make check-faults`). Three faults need",
+        "cast shadows to show, and are only put there: ambient light, a veil, and a half turn of the table.",
+        "The rates hold for surfaces like these, under 6 to 16 lights: matt reliefs with texture, and shiny balls on a",
+        "board. A smooth part without texture, or a single ball, tells less, such as of an image that is shifted.",
     ]
 
 
@@ -75,18 +75,6 @@ def _seeds(rows: list[dict[str, Any]]) -> str:
         row["capture"].split(",")[0].removeprefix("rendered part ") for row in rows if "rendered" in row["capture"]
     }
     return ", ".join(sorted(names, key=lambda name: (len(name), name)))
-
-
-def _own(rows: list[dict[str, Any]]) -> list[str]:
-    """Rendered parts whose camera was wrong as drawn, by any amount, also a negligible one."""
-    if not rows:
-        return []
-    found, right = sum(bool(row["kinds"]) for row in rows), sum(row["right"] for row in rows)
-    return [
-        f"Of {len(rows)} part{'' if len(rows) == 1 else 's'} rendered with a faulty camera (faults of any size, also "
-        f"negligible ones), {found} are found and",
-        f"{right} given the right cause.",
-    ]
 
 
 def _table(rows: list[dict[str, Any]]) -> list[str]:

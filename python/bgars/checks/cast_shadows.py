@@ -50,6 +50,8 @@ class ShadowVerdict(NamedTuple):
     turned: bool
     t: float
     tiles: float
+    told: bool = False
+    """Whether they tell at all: for the half turn or against it."""
 
 
 class _Ground(NamedTuple):
@@ -118,7 +120,8 @@ def judge_shadows(view: View) -> ShadowVerdict:
         return silent
     t, tiles = paired_t(votes[there] / voters[there], voters[there])
     balance = float(votes[there].sum() / voters[there].sum())
-    return ShadowVerdict(turned=balance > PLAIN and t > critical_t(tiles), t=t, tiles=tiles)
+    plain = abs(balance) > PLAIN and abs(t) > critical_t(tiles)
+    return ShadowVerdict(turned=plain and balance > 0.0, t=t, tiles=tiles, told=plain)
 
 
 def _near(upright: Mask, direction: Array) -> Mask:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from bgars.checks.view import View
     from bgars.records.capture import Capture
 
-__all__ = ["alike_images", "check_duplicates"]
+__all__ = ["alike_images", "check_all_alike", "check_duplicates"]
 
 SAME_LIGHT = 0.02
 """Share of the usual difference between two lights (variance) that is left between two images under one light."""
@@ -52,6 +52,22 @@ def alike_images(view: View) -> list[tuple[int, int]]:
     typical = float(np.median(list(apart.values())))
     limit = {pair: usual * min(SAME_LIGHT, OF_EXPECTED * apart[pair] / typical) for pair in far}
     return [pair for pair in far if differs[pair] < limit[pair]]
+
+
+def check_all_alike(capture: Capture) -> list[Finding]:
+    """Find images that are all the same, also where they are blank."""
+    images = capture.images
+    if len(images) < 2 or not all(np.array_equal(images[0], each) for each in images[1:]):  # noqa: PLR2004
+        return []
+    return [
+        Finding(
+            "duplicate",
+            "error",
+            f"all {len(images)} images are the same picture",
+            "they hold no shading, so that nothing can be measured: look for one file under several names, lamps that "
+            "do not switch, or a camera that sends one frame again and again",
+        )
+    ]
 
 
 def check_duplicates(capture: Capture, view: View) -> list[Finding]:

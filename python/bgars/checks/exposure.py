@@ -22,6 +22,8 @@ BRIGHT_PERCENT = 99.0
 DARK = 20.0 / 255.0
 """Brightest level, of full scale: below, 8 bits quantise slopes to 1 / 20 / sqrt(12) = 0.014 rad a light, 1 degree.
 In files of 16 bits cameras that expose so little are noisy, or have fewer bits: both need a word."""
+BLACK = 2.0
+"""Grey levels of the file below which the brightest parts are black: with one level no light differs from another."""
 MOST_LIGHTS = 0.75
 """A highlight clips a pixel under the lights of one side only; clipped under so many of them, it is overexposed."""
 OVEREXPOSED, MUCH_OVEREXPOSED = 0.02, 0.1
@@ -59,12 +61,25 @@ def dead_lamps(view: View, inside: NDArray[np.bool_]) -> list[Finding]:
     return found
 
 
-def check_dark(view: View, inside: NDArray[np.bool_]) -> list[Finding]:
-    """Find underexposure of the whole capture."""
+def check_dark(view: View, inside: NDArray[np.bool_], levels: float) -> list[Finding]:
+    """Find underexposure of the whole capture; `levels` is the number of grey levels of the files."""
     brightest = float(np.percentile(view.values.max(axis=0)[inside], BRIGHT_PERCENT)) if inside.any() else 0.0
     brightest *= view.used_scale
     if brightest >= DARK:
         return []
+    if brightest * levels < BLACK:
+        return [
+            Finding(
+                "dark",
+                "error",
+                "all images are black: their brightest parts are less than two grey levels above the black level",
+                "look for a closed lens cap, lamps without power, the exposure time, and a black level or dark frame "
+                "that takes all light away",
+                value=brightest,
+                limit=BLACK / levels,
+                unit="of full scale",
+            )
+        ]
     fewer = "" if view.used_scale > 0.5 else " (or, if the camera has fewer than 16 bits, state 'saturation')"  # noqa: PLR2004
     return [
         Finding(

@@ -13,13 +13,16 @@ if TYPE_CHECKING:
 
     from bgars.records.findings import Kind
 
-__all__ = ["Hypothesis", "alternatives", "reordered"]
+__all__ = ["HALF_TURN", "Hypothesis", "alternatives", "either", "half_turned", "reordered"]
 
 Array = NDArray[np.float64]
 
 SAME = 0.1
 """Largest distance of unit vectors of tables that are the same: 6 degrees, see `geometry.LINEAR`."""
+HALF_TURN = np.array([-1.0, -1.0, 1.0])
 NAMED = 12
+SHORT = 3
+"""Words up to which two causes that differ by no more are told in one sentence."""
 ONE_TURNED = (
     ("x", "mirrored left to right", (-1.0, 1.0, 1.0)),
     ("y", "mirrored top to bottom", (1.0, -1.0, 1.0)),
@@ -54,6 +57,37 @@ def alternatives(lights: Array, names: Sequence[str], suspects: Sequence[int]) -
     The half turn (x and y both the wrong way round) is none of them: shading shows a bump so lit as a hollow lit from
     the other side, and only cast shadows tell (`cast_shadows.py`).
     """
+    return _distinct(lights, _usual(lights, names, suspects))
+
+
+def half_turned(lights: Array, names: Sequence[str], found: Hypothesis) -> Hypothesis | None:
+    """Return the usual mistake that differs from another by half a turn; None where it is none."""
+    table = found.lights * HALF_TURN
+    return next((each for each in _usual(lights, names, ()) if np.abs(each.lights - table).max() < SAME), None)
+
+
+def either(one: Hypothesis, two: Hypothesis) -> Hypothesis:
+    """Both, where the images do not tell which."""
+    first, second = one.told.split(), two.told.split()
+    same = _alike(first, second)
+    rest = min(_alike(first[::-1], second[::-1]), min(len(first), len(second)) - same)
+    own, others = first[same : len(first) - rest], second[same : len(second) - rest]
+    if own and max(len(own), len(others)) <= SHORT:
+        words = [*first[: same + len(own)], "or", *others, *first[len(first) - rest :]]
+    else:
+        words = [*first[:-1], first[-1] + ";", "or", *(second[same:] if same > SHORT else second)]
+    advice = one.advice if one.advice == two.advice else f"{one.advice}; or {two.advice}"
+    return Hypothesis(one.kind, " ".join(words) + " (no cast shadow tells which)", advice, one.lights)
+
+
+def _alike(first: list[str], second: list[str]) -> int:
+    """Words with which both begin."""
+    pairs = zip(first, second, strict=False)
+    return next((at for at, (one, two) in enumerate(pairs) if one != two), min(len(first), len(second)))
+
+
+def _usual(lights: Array, names: Sequence[str], suspects: Sequence[int]) -> list[Hypothesis]:
+    """All of them, also those that shading cannot tell from each other."""
     flip = np.array([1.0, -1.0, 1.0])
     count = len(lights)
     found = [
@@ -91,7 +125,7 @@ def alternatives(lights: Array, names: Sequence[str], suspects: Sequence[int]) -
         ),
         Hypothesis(
             "handedness",
-            "x and y are exchanged in the table of lights, with opposite sign",
+            "x and y are exchanged in the table of lights with opposite sign",
             "give x (right) first, then y (up)",
             -lights[:, [1, 0, 2]] * np.array([1.0, 1.0, -1.0]),
         ),
@@ -128,7 +162,7 @@ def alternatives(lights: Array, names: Sequence[str], suspects: Sequence[int]) -
         )
         for turn in TURNS_DEG
     ]
-    return _distinct(lights, found)
+    return found
 
 
 def _one_turned(lights: Array, names: Sequence[str], suspects: Sequence[int]) -> list[Hypothesis]:
@@ -171,10 +205,9 @@ def _distinct(lights: Array, found: list[Hypothesis]) -> list[Hypothesis]:
     """Leave out tables that shading cannot tell from an earlier one: the same, or the same after a half turn."""
     kept: list[Hypothesis] = []
     known = [lights]
-    half_turn = np.array([-1.0, -1.0, 1.0])
     for each in found:
         tables = np.stack(known)
-        for candidate in (each.lights, each.lights * half_turn):
+        for candidate in (each.lights, each.lights * HALF_TURN):
             if (np.abs(tables - candidate).max(axis=(1, 2)) < SAME).any():
                 break
         else:

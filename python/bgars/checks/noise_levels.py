@@ -5,7 +5,9 @@ A curve ``s^(1/g)`` stretches the dark: there the variance is multiplied by ``s^
 shadows to the lit surface is none of a linear camera.
 
 Noise is what differs between neighbouring pixels of one image over the mean of all: texture goes with the mean, and so
-it does under any power law.
+it does under any power law. Relief and edges of shadows do not. Over pixels twice as far apart, noise differs as much
+as before, a straight edge has twice the variance (it touches twice as many pixels), and a curved surface more: so what
+the wider filter finds beyond the narrow one is at least what is no noise in the narrow one.
 
 References
 ----------
@@ -20,12 +22,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars.checks.evidence import FALSE_ALARMS
 from bgars.checks.patches import cut_patches
 
 if TYPE_CHECKING:
     from bgars.records.capture import Capture
 
-__all__ = ["NoiseCurve", "noise_curve", "noise_falls"]
+__all__ = ["FALLS", "NoiseCurve", "noise_curve", "noise_falls", "noise_share"]
 
 Floats = NDArray[np.float32]
 
@@ -37,9 +40,12 @@ FAINT = 0.01
 QUANTILE = 0.4
 """Of the absolute differences: edges and highlights are in the upper ones."""
 MIN_SAMPLES = 500
-"""Of a bin: its variance is then known to 10 percent."""
+"""Of a bin: the variance is then known to a quarter."""
+U_VARIANCE = 5.2
+"""Relative standard error of a variance, times the root of the samples: 2.7 for that quantile of independent normal
+values, and 1.9 as the filters overlap (the sum of their squared correlations is 3.8)."""
 FALLS = 1.2
-"""Ratio of variances from which on noise falls: two standard errors of the smallest bin; the least of all is taken."""
+"""Ratio of variances, of every bin, from which on noise falls at all: rounding and blur change it by as much."""
 QUANTISED = 2.4 / 12.0
 """Variance in grey levels of the file, squared, below which rounding hides the noise."""
 
@@ -50,24 +56,41 @@ class NoiseCurve(NamedTuple):
     level: NDArray[np.float64]
     variance: NDArray[np.float64]
     samples: NDArray[np.int64]
+    noise: NDArray[np.float64]
+    """Variance that is noise for certain: without what relief and edges may add; negative where these rule."""
+    error: NDArray[np.float64]
+    """Standard error of `noise`."""
+
+    @property
+    def lit(self) -> int:
+        """The fullest bin."""
+        return int(np.argmax(self.samples))
 
 
 def noise_curve(capture: Capture) -> NoiseCurve | None:
     """Measure noise in bins of grey level; None where nothing is bright enough."""
-    steps, levels = [], []
+    near, far, levels = [], [], []
     for patch in cut_patches(capture):
         mean = patch.levels.mean(axis=0)
-        if min(mean.shape) < 3:  # noqa: PLR2004 - the filter is 3 x 3
+        if min(mean.shape) < 5:  # noqa: PLR2004 - the wider filter is 5 x 5
             continue
         ratio = patch.levels / np.maximum(mean, np.float32(1e-6))
-        local = _summed(patch.levels, 1.0) / np.float32(9.0)
-        usable = patch.inside[1:-1, 1:-1] & (mean[1:-1, 1:-1] > FAINT) & ~_touched(patch.clipped)
-        step = _summed(ratio, -2.0) / np.float32(6.0) * mean[1:-1, 1:-1]
-        steps.append(np.abs(step[usable]))
+        mean = mean[2:-2, 2:-2]
+        local = _summed(patch.levels, 1.0)[..., 1:-1, 1:-1] / np.float32(9.0)
+        usable = patch.inside[2:-2, 2:-2] & (mean > FAINT) & ~_touched(_touched(patch.clipped))
+        scale = mean / np.float32(6.0)
+        near.append(np.abs(_summed(ratio, -2.0)[..., 1:-1, 1:-1] * scale)[usable])
+        far.append(np.abs(_summed(ratio, -2.0, 2) * scale)[usable])
         levels.append(local[usable])
-    if not steps or sum(each.size for each in steps) < MIN_SAMPLES:
+    if not near or sum(each.size for each in near) < MIN_SAMPLES:
         return None
-    return _binned(np.concatenate(steps), np.concatenate(levels))
+    return _binned(np.concatenate(near), np.concatenate(far), np.concatenate(levels))
+
+
+def noise_share(curve: NoiseCurve) -> float:
+    """Noise over signal of the fullest bin, 0 where relief and edges hide it."""
+    lit = curve.lit
+    return float(max(curve.noise[lit], 0.0) ** 0.5 / max(curve.level[lit], 1e-9))
 
 
 def noise_falls(curve: NoiseCurve, level_step: float) -> float:
@@ -82,39 +105,48 @@ def noise_falls(curve: NoiseCurve, level_step: float) -> float:
     Returns
     -------
     float
-        The smallest ratio of all bins at most half as bright as the fullest one, or else of the next darker one.
+        Of the bin that says it most clearly, of those at most half as bright as the fullest one, or else of the next
+        darker one. All of them must show it, and one beyond chance and relief: a linear camera may have equal noise
+        everywhere.
     """
-    lit = int(np.argmax(curve.samples))
+    lit = curve.lit
     darker = [index for index in range(lit) if curve.samples[index] >= MIN_SAMPLES]
     darker = [index for index in darker if index < lit - 1] or darker
-    if not darker or not curve.variance[lit] > 0.0:
+    usual = float(curve.variance[lit])
+    if not darker or not usual > 0.0:
         return 0.0
-    least = float(curve.variance[darker].min())
-    if least < QUANTISED * level_step**2:
+    if float(curve.variance[darker].min()) < max(QUANTISED * level_step**2, FALLS * usual):
         return 0.0
-    return least / float(curve.variance[lit])
+    error = np.hypot(curve.error[darker], usual * U_VARIANCE / float(curve.samples[lit]) ** 0.5)
+    certain = (curve.noise[darker] - usual) / error
+    best = int(np.argmax(certain))
+    critical = NormalDist().inv_cdf(1.0 - FALSE_ALARMS / len(darker))
+    return float(curve.noise[darker[best]]) / usual if certain[best] > critical else 0.0
 
 
-def _binned(steps: Floats, levels: Floats) -> NoiseCurve:
+def _binned(near: Floats, far: Floats, levels: Floats) -> NoiseCurve:
     top = float(np.percentile(levels, BRIGHTEST_PERCENT))
     edges = max(top, 1e-6) * 2.0 ** -np.arange(OCTAVES - 1, 0, -1.0)
     number = np.searchsorted(edges, levels)
-    sigma_of_quantile = NormalDist().inv_cdf(0.5 + QUANTILE / 2.0)
-    level, variance, count = np.zeros(OCTAVES), np.zeros(OCTAVES), np.zeros(OCTAVES, dtype=np.int64)
-    for index in range(OCTAVES):
+    level, variance, wide = np.zeros(OCTAVES), np.zeros(OCTAVES), np.zeros(OCTAVES)
+    count = np.bincount(number, minlength=OCTAVES).astype(np.int64)
+    for index in np.flatnonzero(count):
         chosen = number == index
-        count[index] = int(chosen.sum())
-        if count[index]:
-            level[index] = float(levels[chosen].mean())
-            variance[index] = (float(np.quantile(steps[chosen], QUANTILE)) / sigma_of_quantile) ** 2
-    return NoiseCurve(level, variance, count)
+        level[index] = float(levels[chosen].mean())
+        variance[index], wide[index] = _variance(near[chosen]), _variance(far[chosen])
+    error = U_VARIANCE / np.sqrt(np.maximum(count, 1)) * np.hypot(2.0 * variance, wide)
+    return NoiseCurve(level, variance, count, variance - np.maximum(wide - variance, 0.0), error)
 
 
-def _summed(stack: Floats, middle: float) -> Floats:
-    """(L, h - 2, w - 2) sums over 3 x 3 pixels with weights 1, middle, 1 along each axis."""
-    weight = np.float32(middle)
-    rows = stack[..., :-2, :] + weight * stack[..., 1:-1, :] + stack[..., 2:, :]
-    sums: Floats = rows[..., :-2] + weight * rows[..., 1:-1] + rows[..., 2:]
+def _variance(steps: Floats) -> float:
+    return (float(np.quantile(steps, QUANTILE)) / NormalDist().inv_cdf(0.5 + QUANTILE / 2.0)) ** 2
+
+
+def _summed(stack: Floats, middle: float, step: int = 1) -> Floats:
+    """(L, h - 2 step, w - 2 step) sums over 3 x 3 pixels, `step` apart, with weights 1, middle, 1 along each axis."""
+    weight, twice = np.float32(middle), 2 * step
+    rows = stack[..., :-twice, :] + weight * stack[..., step:-step, :] + stack[..., twice:, :]
+    sums: Floats = rows[..., :-twice] + weight * rows[..., step:-step] + rows[..., twice:]
     return sums
 
 

@@ -13,15 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.checks.evidence import critical_t
-from bgars.checks.noise_levels import FALLS, noise_curve, noise_falls
+from bgars.checks.matt_fit import MIN_LIGHTS, fit_normals, matt_lights
+from bgars.checks.noise_levels import FALLS, noise_falls
 from bgars.checks.view import tile_sums, used_scale
 from bgars.records.findings import Finding
 
 if TYPE_CHECKING:
+    from bgars.checks.noise_levels import NoiseCurve
     from bgars.checks.view import View
     from bgars.records.capture import Capture
 
-__all__ = ["check_noise_of_levels", "check_response", "curvature"]
+__all__ = ["DOUBT", "check_format", "check_noise_of_levels", "check_response", "curvature"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -39,36 +41,52 @@ ADVICE = (
     "switch gamma (sRGB, tone curves) off in the camera, or state the response in capture.toml: 'srgb', a gamma, or a "
     "measured table"
 )
-JPEG = (".jpg", ".jpeg")
+DOUBT = " is hardly ever linear in light"
+"""What the reader assumed of JPEG, GIF, WebP and of images with a colour profile (`bgars.io.capture_headers`)."""
 
 
-def curvature(view: View, lit: Mask, lights: Array) -> tuple[float, float, float]:
-    """Curvature of the response, its standard error over tiles, and the number of tiles."""
-    values = view.values.astype(np.float64)
-    project = lights @ np.linalg.pinv(lights)
-    relative = values / np.maximum(values.mean(axis=0), 1e-9)
-    linear = np.einsum("kl,lhw->khw", project, relative)
-    left = relative - linear
-    square = (linear - 1.0) ** 2
-    lit = lit & (square.sum(axis=0) > SHADED**2)
-    if int(lit.sum()) < MIN_PIXELS:
+def curvature(view: View, lights: Array) -> tuple[float, float, float]:
+    """Curvature of the response, its standard error over tiles, and the number of tiles.
+
+    Each pixel counts under the lights that show it matt. What all pixels have in common says nothing: a lamp's strength
+    is off, or the lights' elevations differ, so that ones are not linear in them.
+    """
+    count = len(lights)
+    use = view.use.ravel()
+    keep = matt_lights(view).reshape(count, -1)[:, use]
+    values = view.values.reshape(count, -1)[:, use].astype(np.float64)
+    number = np.maximum(keep.sum(axis=0), 1)
+    relative = values / np.maximum((keep * values).sum(axis=0) / number, 1e-9)
+    fit = fit_normals(relative, keep, lights)
+    square = (np.einsum("lk,kn->ln", lights, fit.normal) - 1.0) ** 2
+    mean = np.maximum((keep * square).sum(axis=0) / number, 1e-9)
+    told = fit.solved & (number > MIN_LIGHTS) & (mean * number > SHADED**2)
+    if int(told.sum()) < MIN_PIXELS:
         return 0.0, np.inf, 0.0
-    square -= np.einsum("kl,lhw->khw", project, square)
-    top = tile_sums(view.tiles, (left * square).sum(axis=0), lit)
-    bottom = tile_sums(view.tiles, (square**2).sum(axis=0), lit)
+    keep &= told
+    ones = fit_normals(np.ones_like(square), keep, lights).left
+    bent = _own(fit_normals(square, keep, lights).left * mean, ones, keep)
+    left = _own(fit.left, ones, keep)
+    tiles = view.tiles.ravel()[use]
+    top, bottom = tile_sums(tiles, (left * bent).sum(axis=0), told), tile_sums(tiles, (bent**2).sum(axis=0), told)
     if bottom.sum() <= 0.0:
         return 0.0, np.inf, 0.0
     bend = float(top.sum() / bottom.sum())
     error = float(np.sqrt(((top - bend * bottom) ** 2).sum()) / bottom.sum())
-    tiles = float(bottom.sum() ** 2 / (bottom**2).sum())
-    return bend, error, tiles
+    return bend, error, float(bottom.sum() ** 2 / (bottom**2).sum())
 
 
-def check_noise_of_levels(capture: Capture) -> list[Finding]:
+def _own(left: Array, ones: Array, keep: Mask) -> Array:
+    """(L, N) without what goes with that of ones, and without the mean of each light."""
+    left = (left - ones * float((left * ones).sum() / max((ones * ones).sum(), 1e-12))) * keep
+    own: Array = (left - left.sum(axis=1, keepdims=True) / np.maximum(keep.sum(axis=1), 1)[:, None]) * keep
+    return own
+
+
+def check_noise_of_levels(capture: Capture, curve: NoiseCurve | None) -> list[Finding]:
     """Find a camera curve by its noise, which falls from the shadows to the lit surface."""
     if capture.images.dtype.kind != "u":
         return []
-    curve = noise_curve(capture)
     ratio = 0.0 if curve is None else noise_falls(curve, 1.0 / used_scale(capture, capture.images))
     if ratio < FALLS:
         return []
@@ -86,12 +104,9 @@ def check_noise_of_levels(capture: Capture) -> list[Finding]:
     ]
 
 
-def check_response(capture: Capture, view: View, lit: Mask, lights: Array) -> list[Finding]:
+def check_response(view: View, lights: Array) -> list[Finding]:
     """Find a camera curve that was not undone."""
-    if len(lights) < 5 or not lit.any():  # noqa: PLR2004 - one degree of freedom does not tell
-        return []
-    bend, error, tiles = curvature(view, lit, lights)
-    jpeg = any(path.suffix.lower() in JPEG for path in capture.files) and capture.response is None
+    bend, error, tiles = curvature(view, lights)
     if bend < BENT and error < U_MOST and -bend > critical_t(tiles) * error:
         gamma = 1.0 - 2.0 * bend
         told = f"gamma {gamma:.1f}" if gamma < STRONGEST else f"gamma {STRONGEST:g} or more"
@@ -106,13 +121,19 @@ def check_response(capture: Capture, view: View, lit: Mask, lights: Array) -> li
                 unit="gamma",
             )
         ]
-    if jpeg:
-        return [
-            Finding(
-                "response",
-                "note",
-                "JPEG files are hardly ever linear in light, but are taken as linear",
-                "use the camera's raw or linear TIFF or PNG files, or state the response in capture.toml",
-            )
-        ]
     return []
+
+
+def check_format(capture: Capture) -> list[Finding]:
+    """Tell of files that are made for the eye, as the reader saw."""
+    told = [each.partition(DOUBT)[0] for each in capture.assumed if DOUBT in each]
+    return [
+        Finding(
+            "response",
+            "note",
+            f"{each}{DOUBT}, but is taken as linear",
+            "use the camera's raw or linear TIFF or PNG files, or state the response in capture.toml ('linear' to "
+            "confirm it)",
+        )
+        for each in told[:1]
+    ]

@@ -9,17 +9,19 @@ import numpy as np
 
 from bgars.checks.ambient import check_ambient
 from bgars.checks.below_surface import check_below, raised
-from bgars.checks.bit_depth import check_bit_depth
-from bgars.checks.duplicates import check_duplicates
+from bgars.checks.bit_depth import check_bit_depth, check_few_levels
+from bgars.checks.duplicates import check_all_alike, check_duplicates
 from bgars.checks.exposure import check_clipped, check_dark, dead_lamps
 from bgars.checks.focus import check_focus
-from bgars.checks.gains import check_gains
+from bgars.checks.gains import check_gains, gains_by_moments, gains_by_promise
 from bgars.checks.half_lit import check_half_lit
 from bgars.checks.moments import lit_everywhere, moments_by
 from bgars.checks.motion import check_motion
-from bgars.checks.noise import check_noise
+from bgars.checks.noise import check_drowned, check_noise
+from bgars.checks.noise_levels import noise_curve
+from bgars.checks.odd_image import check_odd_image
 from bgars.checks.orientation import check_orientation
-from bgars.checks.response import check_noise_of_levels, check_response
+from bgars.checks.response import check_format, check_noise_of_levels, check_response
 from bgars.checks.table import check_table
 from bgars.checks.view import TILES, make_view
 from bgars.checks.vignetting import check_vignetting
@@ -42,7 +44,7 @@ LEAST_CONDITIONING = 1e-6
 """27 det(L^T L) / tr(L^T L)^3 of the lights below which no method estimates normals (`MIN_CONDITIONING` of the core);
 1 for three at right angles."""
 FEW_LIT = 200
-"""Pixels of the small copy, lit and matt, below which single images are not judged."""
+"""Pixels of the small copy, lit by all lights and matt, below which noise and motion of one image are not judged."""
 
 
 def check_capture(capture: Capture) -> Findings:
@@ -70,14 +72,30 @@ def check_capture(capture: Capture) -> Findings:
     inside = view.values.max(axis=0) > 0.0
     below = check_below(view)
     view = view.with_lights(raised(view.lights))
-    if not inside.any():
-        return Findings.of(below + check_dark(view, inside))
+    kind = capture.images.dtype
+    dark = check_dark(view, inside, float(2 ** (8 * kind.itemsize) - 1) if kind.kind == "u" else np.inf)
+    if not inside.any() or any(each.severity == "error" for each in dark):
+        return Findings.of(below + dark)
+    alike = check_all_alike(capture)
+    if alike:
+        return Findings.of(below + alike)
     found = below + dead_lamps(view, inside) + check_bit_depth(capture)
-    found += check_dark(view, inside) + check_clipped(view, inside)
+    few = check_few_levels(capture)
+    found += check_format(capture) + dark + check_clipped(view, inside)
     if any(each.kind == "clipped" and (each.value or 0.0) > MOST_CLIPPED for each in found):
-        return Findings.of(found)  # what is clipped cannot be compared
+        # What is clipped cannot be compared; a threshold clips what it does not blacken.
+        return Findings.of([each for each in few if each.value == 1.0] + found)
+    found += few
+    curve = noise_curve(capture)
+    drowned = check_drowned(curve)
+    if any(each.severity == "error" for each in drowned):
+        return Findings.of(found + drowned)  # nor what is noise
+    if not drowned:
+        drowned = check_noise_of_levels(capture, curve)
     gone = [each.image for each in found if each.kind == "lamp-dead" and each.image is not None]
-    found += _between(capture, view, gone)
+    found += _between(capture, view, gone, drowned)
+    if any(each.kind == "response" and each.severity != "note" for each in found):
+        found = [each for each in found if each.kind != "response" or each.severity != "note"]
     return Findings.of([_with_file(each, capture) for each in found])
 
 
@@ -100,45 +118,47 @@ def _with_file(finding: Finding, capture: Capture) -> Finding:
     return replace(finding, file=capture.files[finding.image].name)
 
 
-def _between(capture: Capture, view: View, gone: list[int]) -> list[Finding]:
-    """Checks of images against each other; images without light are left out."""
+def _between(capture: Capture, view: View, gone: list[int], levels: list[Finding]) -> list[Finding]:
+    """Checks of images against each other, of those with light. `levels`: what is wrong with all grey levels."""
     alike = check_duplicates(capture, view)
     turned = check_orientation(view)
     if alike or turned:
-        return alike + turned
+        return alike + turned + levels
     kept = np.setdiff1d(np.arange(len(view.lights)), gone)
     for index in sorted(gone, reverse=True):
         view = view.without(index)
     if len(kept) < 4:  # noqa: PLR2004 - three images fit any surface
-        return []
+        return levels
     found, lights = check_table(capture, view)
     # A frame that is lit in part upsets all that follows, as it does the comparison of tables.
     halves = check_half_lit(view.with_lights(lights))
     if halves:
-        return _renumbered(halves + [each for each in found if each.kind != "order"], kept)
-    found += _single(capture, view, lights, kept)
-    return _renumbered(found, kept)
+        return _renumbered(halves + [each for each in found if each.kind != "order"], kept) + levels
+    if not found:
+        found = check_odd_image(view)
+        if found:
+            return _renumbered(found, kept) + levels
+    # All that follows compares grey levels as if they were light.
+    return _renumbered(found, kept) + (levels or _renumbered(_single(capture, view, lights, kept), kept))
 
 
 def _single(capture: Capture, view: View, lights: NDArray[np.float64], kept: NDArray[np.intp]) -> list[Finding]:
     """Checks of single images under the right table."""
     lit = lit_everywhere(view, lights)
-    bent = check_noise_of_levels(capture)
-    if bent:
-        # All that follows compares grey levels as if they were light.
-        return bent
     found = check_ambient(capture, lights) + check_vignetting(view, lit)
     blurred = check_focus(capture, kept, view.names)
-    if int(lit.sum()) < FEW_LIT:
-        return found + blurred
     veiled = any(each.kind == "ambient" for each in found)
-    curved = [] if veiled else check_response(capture, view, lit_everywhere(view, lights, matt=False), lights)
-    found += curved
-    if any(each.severity != "note" for each in curved):
-        return found
-    uneven, factors = check_gains(view, moments_by(view, lit, view.tiles, TILES * TILES), lights)
-    lights = lights * factors[:, None]
+    few = int(lit.sum()) < FEW_LIT
+    by_moments = None if few else gains_by_moments(moments_by(view, lit, view.tiles, TILES * TILES))
+    uneven, factors = check_gains(view, by_moments or gains_by_promise(view), lights)
+    stated, lights = lights, lights * factors[:, None]
+    # A dim lamp bends what its light leaves of the others; a curve stays once the lamps are as they are.
+    curved = [] if veiled or not check_response(view, stated) else check_response(view, lights)
+    if curved:
+        return found + curved
     found += uneven
+    if few:
+        return found + blurred
     # A blurred image looks shifted, and less noisy; a shifted one is as sharp as the others.
     moved = blurred or check_motion(capture, kept, lights, view.names)
     windows = None if moved or len(kept) != len(capture.rig) else cut_windows(capture, view)

@@ -10,21 +10,24 @@ import numpy as np
 from bgars.checks.ambient import LIT_QUANTILE, shadow_floor
 from bgars.checks.cast_shadows import judge_shadows
 from bgars.checks.geometry import judge_table
+from bgars.checks.hypotheses import HALF_TURN, either, half_turned
 from bgars.records.findings import Finding
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from bgars.checks.cast_shadows import ShadowVerdict
+    from bgars.checks.hypotheses import Hypothesis
     from bgars.checks.view import View
     from bgars.records.capture import Capture
 
 __all__ = ["check_table"]
 
-HALF_TURN = (
+TURNED = (
     "cast shadows fall towards the lights: every light stands on the other side (x and y have the wrong sign, the "
     "directions point from the light to the surface, the images are shifted by half the ring, or upside down)"
 )
-HALF_TURN_ADVICE = "change the sign of x and y in the table of lights, or turn the images by 180 degrees"
+TURNED_ADVICE = "change the sign of x and y in the table of lights, or turn the images by 180 degrees"
 
 
 def check_table(capture: Capture, view: View) -> tuple[list[Finding], NDArray[np.float64]]:
@@ -49,22 +52,33 @@ def check_table(capture: Capture, view: View) -> tuple[list[Finding], NDArray[np
         shadows = judge_shadows(_without_veil(capture, view.with_lights(lights)))
     findings = []
     if verdict.better is not None:
-        text = verdict.better.told + (", and all by half a turn besides" if shadows.turned else "")
+        cause = _cause(view, verdict.better, shadows)
         findings.append(
             Finding(
-                verdict.better.kind,
+                cause.kind,
                 "error",
-                f"{text} (t = {min(verdict.t, 999.0):.0f} over {verdict.tiles:.0f} parts of the image)",
-                verdict.better.advice,
+                f"{cause.told} (t = {min(verdict.t, 999.0):.0f} over {verdict.tiles:.0f} parts of the image)",
+                cause.advice,
                 value=min(verdict.t, 999.0),
                 unit="t",
             )
         )
     elif shadows.turned:
-        findings.append(Finding("order", "error", HALF_TURN, HALF_TURN_ADVICE, value=min(shadows.t, 999.0), unit="t"))
+        findings.append(Finding("order", "error", TURNED, TURNED_ADVICE, value=min(shadows.t, 999.0), unit="t"))
     if shadows.turned:
-        lights = lights * np.array([-1.0, -1.0, 1.0])
+        lights = lights * HALF_TURN
     return findings, lights
+
+
+def _cause(view: View, found: Hypothesis, shadows: ShadowVerdict) -> Hypothesis:
+    """What is told: with the half turn where cast shadows say so, both where they say nothing."""
+    other = half_turned(view.lights, view.names, found)
+    if not shadows.turned:
+        return found if shadows.told or other is None else either(found, other)
+    if other is not None:
+        return other
+    told = f"{found.told}, and all by half a turn besides"
+    return replace(found, told=told, advice=f"{found.advice}; then change the sign of x and y of all lights")
 
 
 def _without_veil(capture: Capture, view: View) -> View:

@@ -16,12 +16,17 @@ if TYPE_CHECKING:
 
 __all__ = ["check_vignetting", "corner_loss"]
 
+Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 LOSS, MUCH = 0.20, 0.35
 """Light lost in the corners that is noted, and that costs signal; a factor common to all images bends no normal."""
 ROUND = 2.0
 """How much more the loss goes with the distance from the middle than with any other second-order shape."""
+INNER = 0.5
+LASTS = 0.5
+"""Of half a diagonal, and of the loss: beyond, a lens goes on losing light as before, a bright part in the middle of a
+darker board does not. It is none if less is left, and two standard errors."""
 COVERED = 0.7
 """Share of the tiles that must hold level, lit surface: a dark background is no vignetting."""
 
@@ -43,19 +48,32 @@ def corner_loss(view: View, lit: Mask) -> tuple[float, float, bool]:
     down, across = np.divmod(np.arange(TILES * TILES), TILES)
     x = ((across + 0.5) / TILES - 0.5) * cols / half
     y = ((down + 0.5) / TILES - 0.5) * rows / half
-    design = np.column_stack([np.ones_like(x), x, y, x**2 + y**2, x**2 - y**2, 2.0 * x * y])[known]
-    target = level[known]
-    weight = np.ones(len(target))
+    design = np.column_stack([np.ones_like(x), x, y, x**2 + y**2, x**2 - y**2, 2.0 * x * y])
+    outside = known & (np.hypot(x, y) > INNER)
+    if outside.sum() < 2 * design.shape[1]:
+        return 0.0, 0.0, False
+    loss, error, is_round = _round_loss(design[known], level[known])
+    beyond, error_beyond, _ = _round_loss(design[outside], level[outside])
+    if beyond + 2.0 * error_beyond < LASTS * loss:
+        return 0.0, 0.0, False
+    return 1.0 - float(np.exp(-max(loss, 0.0))), loss / max(error, 1e-9), is_round
+
+
+def _round_loss(design: Array, level: Array) -> tuple[float, float, bool]:
+    """Loss towards the corners, natural logarithm, its standard error, and whether it is round."""
+    weight: Array = np.ones(len(level))
+    left: Array = np.zeros(len(level))
+    normal: Array = np.eye(design.shape[1])
+    solution: Array = np.zeros(design.shape[1])
     for _ in range(5):
         normal = design.T @ (weight[:, None] * design)
-        solution = np.linalg.solve(normal, design.T @ (weight * target))
-        left = target - design @ solution
+        solution = np.asarray(np.linalg.solve(normal, design.T @ (weight * level)), np.float64)
+        left = np.asarray(level - design @ solution, np.float64)
         scale = 1.4826 * float(np.median(np.abs(left))) + 1e-6
         weight = 1.0 / (1.0 + (left / (2.0 * scale)) ** 2)
     error = float(np.sqrt(np.linalg.inv(normal)[3, 3] * (weight * left**2).sum() / max(weight.sum() - 6.0, 1.0)))
-    round_loss = -float(solution[3])
-    is_round = round_loss > ROUND * float(np.hypot(solution[4], solution[5]))
-    return 1.0 - float(np.exp(-max(round_loss, 0.0))), round_loss / max(error, 1e-9), bool(is_round)
+    loss = -float(solution[3])
+    return loss, error, bool(loss > ROUND * float(np.hypot(solution[4], solution[5])))
 
 
 def check_vignetting(view: View, lit: Mask) -> list[Finding]:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 import bgars
+from bgars.checks.response import DOUBT
 from bgars.cli.calibrate_station import drift
 from bgars.cli.console import print_json, say
-from bgars.errors import InputError
+from bgars.errors import CaptureWarning, InputError
 from bgars.io.atomic import FolderNames, atomic_file, atomic_folder
 from bgars.io.given_paths import need_folder, need_output
 from bgars.io.own_files import need_new_or_own
@@ -75,7 +77,10 @@ def check(
         return
     if output is not None and not _is_page(output):
         need_output(output, folder)
-    capture = bgars.read_capture(folder)
+    with warnings.catch_warnings():
+        # What the check says of such files need not be said twice.
+        warnings.filterwarnings("ignore", message=f".*{DOUBT}", category=CaptureWarning)
+        capture = bgars.read_capture(folder)
     findings = bgars.check(capture)
     page = None if output is None else _write_page(output, check_page(capture, findings))
     if as_json:

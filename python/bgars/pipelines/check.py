@@ -41,7 +41,8 @@ def check(capture: Capture | str | PathLike[str]) -> Findings:
     -------
     Findings
         ``findings`` with the worst first; each has kind, severity ("note", "warning", "error"), image, message and
-        advice. A flat field is no evidence: nothing is said of what a capture cannot show.
+        advice. A flat field is no evidence: nothing is said of what a capture cannot show. Images that are all the
+        same, black, or noise, are errors.
 
     Raises
     ------
@@ -148,7 +149,8 @@ def refuse_wrong_geometry(findings: Findings, name: str, *, way_out: str) -> Non
     Raises
     ------
     InputError
-        Lights in wrong order, mirrored or below the surface, an image twice or turned, a dead lamp.
+        Lights in wrong order, mirrored or below the surface, an image twice or turned, a dead lamp, black images,
+        noise and nothing else.
     """
     wrong = findings.geometry_errors
     if wrong:

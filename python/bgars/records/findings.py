@@ -33,7 +33,7 @@ Severity = Literal["note", "warning", "error"]
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
 GEOMETRY_KINDS: frozenset[Kind] = frozenset(
-    {"order", "handedness", "below-surface", "duplicate", "lamp-dead", "orientation"}
+    {"order", "handedness", "below-surface", "duplicate", "dark", "noise", "lamp-dead", "orientation"}
 )
 """Errors of these kinds mean that every normal is wrong, not only less certain."""
 RANK: dict[Severity, int] = {"error": 0, "warning": 1, "note": 2}

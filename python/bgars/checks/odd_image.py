@@ -1,0 +1,197 @@
+"""One image that shows another light than its line of the table, or that is turned: against what the others promise.
+
+The other images fix normal and albedo of every pixel, and so the light that each must show. An image turned back that
+fits as well as the others do was turned; a direction of light under which it does is the one that it was taken under.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bgars.checks.evidence import critical_t, paired_t
+from bgars.checks.matt_fit import fit_normals, matt_lights, promised
+from bgars.checks.view import TILES, tile_sums
+from bgars.records.findings import Finding
+from bgars.records.light_median import light_median
+
+if TYPE_CHECKING:
+    from bgars.checks.view import View
+
+__all__ = ["check_odd_image"]
+
+Array = NDArray[np.float64]
+Floats = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+MIN_LIGHTS = 6
+"""Of fewer, what is left over does not tell which image is off."""
+BETTER = 0.5
+"""Of the misfit as it is: most of it must be explained."""
+AS_OTHERS = 2.0
+"""Times the usual misfit of the other images, from which on an image is odd, and up to which it fits."""
+EQUAL = 1e-4
+"""Misfit, relative and squared, to which images fit at best: a percent, of rounding and noise."""
+MOVED_DEG = 15.0
+"""Directions of lights differ by less where only a lamp is off; 30 and more lie between neighbours of a ring."""
+SLOPES = 0.1
+"""Root mean square of the slopes, along any direction, from which on a surface tells a light's direction."""
+MIN_PIXELS = 300
+SHADOWED, SHINES = 0.15, 2.0
+"""Of the pixel's median: darker is taken as shadow (as `matt_fit.SHADOWED`), brighter as a highlight."""
+ROUNDS = 5
+TURNS: tuple[tuple[str, Callable[[Floats], Floats]], ...] = (
+    ("turned by 180 degrees", lambda image: image[::-1, ::-1]),
+    ("mirrored left to right", lambda image: image[:, ::-1]),
+    ("mirrored top to bottom", lambda image: image[::-1]),
+)
+QUARTERS: tuple[tuple[str, Callable[[Floats], Floats]], ...] = (
+    ("turned by 90 degrees counter-clockwise", lambda image: np.rot90(image, -1)),
+    ("turned by 90 degrees clockwise", lambda image: np.rot90(image, 1)),
+)
+
+
+class _Surface(NamedTuple):
+    """What the other images say: normals times albedo (3, h, w), pixels where they do, and their usual light."""
+
+    normal: Array
+    known: Mask
+    middle: Floats
+    usual: float
+    """Their own misfit."""
+
+
+def check_odd_image(view: View) -> list[Finding]:
+    """Find the image that belongs to its light least, if another light or a turn explains it."""
+    if len(view.lights) < MIN_LIGHTS:
+        return []
+    misfits = _misfits(view)
+    index = int(np.argmax(misfits))
+    if misfits[index] < AS_OTHERS * max(float(np.median(misfits)), EQUAL):
+        return []
+    surface = _surface(view.without(index))
+    if int(surface.known.sum()) < MIN_PIXELS:
+        return []
+    image = view.values[index]
+
+    light = view.lights[index]
+    turns = TURNS + (QUARTERS if image.shape[0] == image.shape[1] else ())
+    turned = [name for name, turn in turns if _explains(view, surface, (image, light), (turn(image), light))]
+    seen = _seen_light(image, light, surface)
+    # A lamp that is only dimmer stands where it should.
+    if seen is not None and not _explains(
+        view, surface, (image, light * _strength(image, light, surface)), (image, seen)
+    ):
+        seen = None
+    return _told(view, index, turned, seen)
+
+
+def _misfits(view: View) -> Array:
+    """(L,) mean square of what each image differs from the promise of the others, over the usual light."""
+    promise = promised(view)
+    middle = light_median(view.values)
+    known = np.isfinite(promise) & view.use & ~view.clipped & _matt(view.values, middle)
+    left = np.square((view.values - promise) / np.maximum(middle, 1e-6))
+    total = np.where(known, np.minimum(left, 1.0), 0.0).sum(axis=(1, 2))
+    return np.asarray(total / np.maximum(known.sum(axis=(1, 2)), 1), np.float64)
+
+
+def _surface(others: View) -> _Surface:
+    count, rows, cols = others.values.shape
+    keep = matt_lights(others).reshape(count, -1)
+    fit = fit_normals(others.values.reshape(count, -1).astype(np.float64), keep, others.lights)
+    known = (fit.solved & (fit.normal[2] > 0.0)).reshape(rows, cols) & others.use & ~others.clipped.any(axis=0)
+    usual = float(np.median(_misfits(others)))
+    return _Surface(fit.normal.reshape(3, rows, cols), known, light_median(others.values), usual)
+
+
+def _matt(values: Floats, middle: Floats) -> Mask:
+    """Pixels that are neither in shadow nor in a highlight, of which nothing is promised."""
+    matt: Mask = (values > SHADOWED * middle) & (values < SHINES * middle)
+    return matt
+
+
+def _explains(view: View, surface: _Surface, given: tuple[Floats, Array], other: tuple[Floats, Array]) -> bool:
+    """Whether most of the misfit is gone, as far as the other images fit, in all parts of the image."""
+    known = surface.known & _matt(given[0], surface.middle) & _matt(other[0], surface.middle)
+    if int(known.sum()) < MIN_PIXELS:
+        return False
+    before, after = (
+        np.minimum(np.square((image - np.einsum("k,khw->hw", light, surface.normal)) / surface.middle.clip(1e-6)), 1.0)
+        for image, light in (given, other)
+    )
+    mean = float(after[known].mean())
+    if mean > BETTER * float(before[known].mean()) or mean > AS_OTHERS * max(surface.usual, EQUAL):
+        return False
+    one, two = tile_sums(view.tiles, before, known), tile_sums(view.tiles, after, known)
+    weight = one + two
+    there = weight > 0.0
+    t, tiles = paired_t((one - two)[there] / weight[there], weight[there])
+    return t > critical_t(min(tiles, TILES * TILES), len(view.lights) * (len(TURNS) + len(QUARTERS) + 1))
+
+
+def _strength(image: Floats, light: Array, surface: _Surface) -> float:
+    """Usual light over the promised one."""
+    promise = np.einsum("k,khw->hw", light, surface.normal)
+    known = surface.known & _matt(image, surface.middle) & (promise > SHADOWED * surface.middle)
+    return float(np.median(image[known] / promise[known])) if known.any() else 1.0
+
+
+def _seen_light(image: Floats, light: Array, surface: _Surface) -> Array | None:
+    """The light that an image was taken under, where the surface tells it and it is another than stated."""
+    known = surface.known & _matt(image, surface.middle)
+    if int(known.sum()) < MIN_PIXELS:
+        return None
+    normal, value = surface.normal[:, known], image[known].astype(np.float64)
+    slopes = np.cov(normal[:2] / np.maximum(normal[2], 1e-9))
+    if float(np.linalg.eigvalsh(slopes)[0]) < SLOPES**2:
+        return None
+    weight = 1.0 / np.maximum(surface.middle[known].astype(np.float64), 1e-6) ** 2
+    trust = np.ones_like(weight)
+    found = light
+    for _ in range(ROUNDS):
+        both = weight * trust
+        product, right = np.einsum("in,n,jn->ij", normal, both, normal), np.einsum("in,n->i", normal, both * value)
+        found = np.linalg.solve(product, right)
+        left = np.square(value - np.einsum("in,i->n", normal, found)) * weight
+        trust = 1.0 / (1.0 + left / max(float(np.median(left)), EQUAL)) ** 2
+    length = float(np.linalg.norm(found))
+    if not found[2] > 0.0 or float(found @ light) > np.cos(np.radians(MOVED_DEG)) * length:
+        return None
+    return np.asarray(found, np.float64)
+
+
+def _told(view: View, index: int, turned: list[str], seen: Array | None) -> list[Finding]:
+    if not turned and seen is None:
+        return []
+    name = view.names[index]
+    line = (
+        ""
+        if seen is None
+        else f"{name} shows light from {_angles(seen)}, but the table says {_angles(view.lights[index])}"
+    )
+    if not turned:
+        advice = "correct its line in the table of lights, or take the image again under its own lamp"
+        return [Finding("order", "error", line, advice, image=index)]
+    either = f"{name} is {' or '.join(turned)} against the other images" + (
+        f", or its line of the table is wrong: {line}" if line else ""
+    )
+    return [
+        Finding(
+            "orientation",
+            "error",
+            either,
+            "turn it back" + (", or correct its line in the table of lights" if line else ""),
+            image=index,
+        )
+    ]
+
+
+def _angles(light: Array) -> str:
+    azimuth, elevation = np.degrees(
+        [np.arctan2(light[1], light[0]) % (2.0 * np.pi), np.arcsin(light[2] / np.linalg.norm(light))]
+    )
+    return f"azimuth {azimuth:.0f}, elevation {elevation:.0f} degrees"
