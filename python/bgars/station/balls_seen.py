@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from bgars.station.levels import Levels
     from bgars.station.outline import Outline
 
-__all__ = ["given_outlines", "outlines_of"]
+__all__ = ["disc_of_mask", "given_outlines", "outlines_of"]
 
 Array = NDArray[np.float64]
 
@@ -78,7 +78,7 @@ def outlines_of(
     findings: list[Remark] = []
     outlines: list[Outline] = []
     if given is None:
-        start = _disc_of_mask(capture)
+        start = disc_of_mask(capture)
         found = (
             find_outline(pictures, partial(shading_misfit, levels) if matt else None, steps)
             if start is None
@@ -201,8 +201,8 @@ def _overlap(one_px: Array, other_px: Array) -> bool:
     return bool(np.hypot(*(one_px[:2] - other_px[:2])) < 0.5 * max(one_px[2], other_px[2]))
 
 
-def _disc_of_mask(capture: Capture) -> Array | None:
-    """Circle of a mask that is a disc; None for any other mask, or one of all pixels."""
+def disc_of_mask(capture: Capture) -> Array | None:
+    """Return the circle of a mask that is a disc; None for any other mask, or one of all pixels."""
     mask = capture.mask
     if mask.all():
         return None
