@@ -59,9 +59,11 @@ def test_a_board_that_does_not_show_the_lights_is_not_measured(more: dict[str, f
     assert "taken as equal" in message
 
 
-def test_a_ball_that_fills_the_image_leaves_no_board() -> None:
-    images = render(ring(4, 48.0), ball=(0.0, 0.0, 20.0), size=(44, 44), **CLIPPED)
-    found = bgars.calibrate_lights(capture_of(images), outline=(0.0, 0.0, 20.0))
+def test_too_little_board_is_not_measured() -> None:
+    images = shot((7.3, -4.6, 70.0), 220, 48.0)
+    corner = np.zeros((220, 220), np.bool_)
+    corner[:10, :12] = True
+    found = bgars.calibrate_lights(replace(capture_of(images), mask=corner))
     message = next(one.message for one in found.findings if one.code == "no-intensities")
     assert "the board beside the ball and its shadows is less than 200 pixels" in message
 
