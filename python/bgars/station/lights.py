@@ -14,6 +14,7 @@ from bgars.records.capture import Capture
 from bgars.records.light_calibration import BallView, LightCalibration
 from bgars.records.remark import Remark
 from bgars.records.rig import LightRig
+from bgars.records.same_images import refuse_repeated
 from bgars.records.scalar_checks import check_pitch
 from bgars.records.whole_capture import need_whole
 from bgars.station.light_bundle import solve_lights
@@ -58,11 +59,12 @@ def calibrate_lights(
     CalibrationError
         No ball, a ball that is cut off or overexposed, a light whose highlight is on no ball.
     InputError
-        Captures with different numbers of images, or an outline of a wrong shape.
+        Captures with different numbers of images, the same image twice, or an outline of a wrong shape.
     """
     captures = [capture] if isinstance(capture, Capture) else list(capture)
     for each in captures:
         need_whole(each)
+        refuse_repeated(each)
     if sphere not in {"mirror", "matt"}:
         msg = f"sphere: must be 'mirror', 'matt' or 'balls', got {sphere!r}"
         raise InputError(msg)
