@@ -18,6 +18,7 @@ from bgars.records.same_images import refuse_repeated
 from bgars.records.scalar_checks import check_pitch
 from bgars.records.whole_capture import need_whole
 from bgars.station.light_bundle import solve_lights
+from bgars.station.mirror_lights import together
 from bgars.station.observe import observe, outlines_a_capture
 from bgars.station.strengths import strengths_of
 
@@ -81,7 +82,7 @@ def calibrate_lights(
     solution, pitch_um = _solve(captures, seen, diameter_um, near, findings)
     strengths = strengths_of(sphere, captures, seen, solution, findings)
     rig = _rig(solution, pitch_um, strengths.relative)
-    findings += _judge(solution, balls, captures, rig)
+    findings += together(_judge(solution, balls, captures, rig), captures[0].name, len(rig))
     own = solution.u_own_deg
     alone = [ball.own_deg for ball in balls if ball.own_deg is not None]
     if alone:
