@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 from bgars.records.remark import Remark
@@ -38,7 +37,7 @@ def another_ball(
 ) -> list[Remark]:
     """Return a note on a ball beside the one that is used: a plain circle that shows the lights, as a ball does."""
     height, width = pictures[0].shape
-    found = find_outline(pictures, partial(shading_misfit, levels) if matt else None, steps, used)
+    found = find_outline(pictures, None, steps, used)
     if found is None or found.arc < PLAIN_ARC or found.radius_px < LEAST_SHARE * used.radius_px:
         return []
     if not found.inside(height, width):

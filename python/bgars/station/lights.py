@@ -99,6 +99,8 @@ def calibrate_lights(
         u_positions_um=_u_positions(solution, pitch_um),
         u_intensities=strengths.u,
         lamp_deg=seen.lamp_deg,
+        level=strengths.level,
+        level_by=strengths.by,
         findings=tuple(findings),
     )
 

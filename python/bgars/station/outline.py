@@ -203,7 +203,10 @@ def _fit_edge(picture: Array, start_px: Array, step: float = 0.0) -> Outline | N
         if len(edge.angles) < 12:  # noqa: PLR2004 - three unknowns, and something to judge them by
             return None
         points = circle[:2] + edge.radii[:, None] * np.column_stack([np.cos(edge.angles), np.sin(edge.angles)])
-        fit = _circle(points, edge, circle, _rays(circle[2]), step)
+        try:
+            fit = _circle(points, edge, circle, _rays(circle[2]), step)
+        except np.linalg.LinAlgError:  # edges all on one side, or a circle that ran away: none
+            return None
         if fit is None:
             return None
         if (
