@@ -101,12 +101,12 @@ class ScaleTable(Strict):
 
     pixel_pitch_um: Positive = Field(description="size of a pixel on the board")
     pixel_pitch_u_um: Positive = Field(description="its standard uncertainty")
-    tilt_deg: Number | None = Field(None, description="tilt of the grid against the image plane, where measurable")
+    tilt_deg: Number | None = Field(None, description="tilt of the grid against the image plane; not measured")
     rotation_deg: Number = Field(0.0, description="rotation of the grid in the image")
     distortion: Number = Field(0.0, description="radial displacement at the corner over its distance from the centre")
     residual_px: NotNegative = Field(0.0, description="root mean square residual of the points of the grid")
     points: int = Field(0, description="number of points of the grid")
-    camera_distance_mm: Positive | None = Field(None, description="distance of the camera, where known")
+    camera_distance_mm: Positive | None = Field(None, description="distance of the camera, if written by hand")
 
 
 class VerifyTable(Strict):

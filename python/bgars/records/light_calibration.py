@@ -69,12 +69,12 @@ class LightCalibration:
         One per ball and capture.
     residual_px : float
         Root mean square of the residuals; 0 where there is nothing to spare.
+    findings : tuple of Remark
+        Findings.
     level : float
         Mean strength of the lights, grey levels of 255, of what `level_by` names: "highlights" (times their solid
         angle), "shading" of a white facet, or the "board"; NaN where not measured.
     level_by : str
-    findings : tuple of Remark
-        Findings.
     """
 
     rig: LightRig
@@ -88,9 +88,9 @@ class LightCalibration:
     u_intensities: Array | None = None
     u_lens_deg: Array | None = None
     lamp_deg: float = float("nan")
+    findings: tuple[Remark, ...] = field(default=())
     level: float = float("nan")
     level_by: str = ""
-    findings: tuple[Remark, ...] = field(default=())
 
     @property
     def doubts(self) -> tuple[Remark, ...]:
