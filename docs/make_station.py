@@ -25,7 +25,8 @@ from scipy import ndimage
 
 sys.path.append(str(Path(__file__).parent.parent / "tests" / "unit"))
 from rendered_spheres import render, ring
-from station_trial import LIGHTS, SIDE, as_capture, calibrated, hardware, spoiled, trial
+from station_trial import LIGHTS, SIDE, as_capture, calibrated, dome, hardware, spoiled, trial, unit
+from station_wanted import DOME_PX, ERROR_DEG, NEAR_SHARE, OF_EXACT, TWO, WITHIN_2U, WITHIN_U, covered, marked
 
 Array = NDArray[np.float64]
 HERE = Path(__file__).parent
@@ -39,23 +40,6 @@ RENDERED = {
 }
 SEEDS, MATT_SEEDS, NEAR_SEEDS, PARTS = 12, 6, 3, 10
 DISC_PX = 1200.0
-TWO = 2.0
-WITHIN_U, WITHIN_2U = 68.0, 95.0
-"""Per cent of errors that a standard uncertainty, and twice one, holds if it is what it says."""
-ERROR_DEG, NEAR_SHARE, DOME_PX, OF_EXACT = 0.1, 1.0, 3.0, 1.5
-"""What the tests of the station want, too: mean error of a ball's lights, median of near lamps (%), dome of a flat
-board, errors of a calibrated station against those of exact knowledge."""
-
-
-def marked(text: str, *, reached: bool) -> str:
-    """A cell, bold where it falls short."""
-    return text if reached else f"**{text}**"
-
-
-def covered(z: Array) -> str:
-    """Two cells: per cent of errors within u and within 2 u."""
-    cells = [(100 * float(np.mean(np.abs(z) < times)), least) for times, least in ((1.0, WITHIN_U), (TWO, WITHIN_2U))]
-    return " | ".join(marked(f"{share:.0f} %", reached=round(share) >= least) for share, least in cells)
 
 
 def apart_deg(one: Array, other: Array) -> Array:
@@ -195,11 +179,6 @@ def photographs() -> Iterator[str]:
     yield against("frog: both balls and published", apart_deg(both.rig.directions, probes), both.u_deg)
 
 
-def unit(vectors: Array) -> Array:
-    """Rows of length 1."""
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
-
-
 def against(name: str, off: Array, u: Array) -> str:
     """A line of the table of photographs; an error of u on either axis is one of 1.18 u in its median."""
     share = 100 * float(np.mean(off < TWO * np.sqrt(2) * u))
@@ -264,12 +243,6 @@ def board() -> Iterator[str]:
         use = ndimage.binary_erosion(field.mask, iterations=5)[5:-5, 5:-5] & np.isfinite(height)
         # A dome grows with the square of the width that it spans, as a share of it with the width.
         yield f"| {name} | {dome(height[use], rows[use], cols[use]) * (DISC_PX / SIDE) ** 2:.1f} |"
-
-
-def dome(height: Array, x: Array, y: Array) -> float:
-    """Range of heights at places (x, y) about their best plane."""
-    plane = np.column_stack([np.ones(len(height)), x, y])
-    return float(np.ptp(height - plane @ np.linalg.lstsq(plane, height, rcond=None)[0]))
 
 
 def disc() -> Iterator[str]:

@@ -27,7 +27,7 @@ from bgars.io.image_listing import Listing, list_folder, role_of
 from bgars.io.image_tags import upright
 from bgars.io.images import MAX_MEGAPIXELS, WEIGHTS
 from bgars.io.light_discovery import choose_mask, default_recipe
-from bgars.io.masks import opaque_everywhere, read_mask
+from bgars.io.masks import opaque_everywhere, read_mask, refuse_nan
 from bgars.io.recipe import RECIPE_NAME, CaptureRecipe, read_recipe
 from bgars.io.station_file import read_station
 from bgars.records.capture import Capture
@@ -111,10 +111,8 @@ def read_capture(
     folder = need_folder(folder)
     notes: list[str] = []
     listing = list_folder(folder)
-    recipe_path = folder / RECIPE_NAME
-    has_recipe = RECIPE_NAME in (*listing.others, *listing.folders)
-    if has_recipe:
-        recipe = read_recipe(recipe_path)
+    if RECIPE_NAME in (*listing.others, *listing.folders):
+        recipe = read_recipe(folder / RECIPE_NAME)
     else:
         recipe = _undescribed(folder, listing, notes, may_lack_lights=station is not None)
     known = _station(folder, recipe, station)
@@ -129,8 +127,7 @@ def read_capture(
         capture = _load_bracket(folder, recipe, lights, listing, channel, max_megapixels, threads, notes, known)
     else:
         capture = _load_chosen(folder, recipe, lights, listing, images, channel, max_megapixels, threads, notes)
-    for note in notes:
-        warnings.warn(f"{folder}: {note}", CaptureWarning, stacklevel=2)
+    _tell(folder, notes)
     return capture if known is None else with_station(capture, known)
 
 
@@ -161,9 +158,13 @@ def read_unlit(folder: str | PathLike[str], *, channel: ChannelName | None = Non
         raise InputError(msg)
     lights = _by_order(LightRig.ring(max(count, 3)), str(folder))
     capture = _load_chosen(folder, recipe, lights, listing, None, channel, MAX_MEGAPIXELS, None, notes)
-    for note in notes:
-        warnings.warn(f"{folder}: {note}", CaptureWarning, stacklevel=2)
+    _tell(folder, notes)
     return capture
+
+
+def _tell(folder: Path, notes: list[str]) -> None:
+    for note in notes:
+        warnings.warn(f"{folder}: {note}", CaptureWarning, stacklevel=3)
 
 
 def _undescribed(folder: Path, listing: Listing, notes: list[str], *, may_lack_lights: bool) -> CaptureRecipe:
@@ -265,7 +266,7 @@ def _load(
     images, linear, code_scale = decoding.decode(table, gains)
     images = _turn(images, headers, notes)
     mask = _mask(folder, recipe, images, headers, notes)
-    _refuse_nan(images, mask, paths)
+    refuse_nan(images, mask, paths)
 
     levels = levels_of(folder, recipe, images, code_scale, threads, notes)
     dark_path = None if recipe.dark is None else folder / recipe.dark
@@ -342,17 +343,3 @@ def _one_intensity(intensities: NDArray[np.float64], channel: ChannelName) -> ND
     weights = np.array(WEIGHTS[channel])
     combined: NDArray[np.float64] = intensities @ weights / weights.sum()
     return combined
-
-
-def _refuse_nan(images: PixelArray, mask: BoolArray, paths: list[Path]) -> None:
-    if images.dtype.kind != "f":
-        return
-    for image, path in zip(images, paths, strict=True):
-        bad = ~np.isfinite(image) & mask
-        if bad.any():
-            row, col = np.argwhere(bad)[0]
-            msg = (
-                f"{path}: {int(bad.sum())} pixels inside the mask are not finite (first at row {row}, column {col}); "
-                "mask them out"
-            )
-            raise InputError(msg)

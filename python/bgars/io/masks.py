@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bgars.records.pixels import BoolArray
+    from bgars.records.pixels import BoolArray, PixelArray
 
-__all__ = ["opaque_everywhere", "read_mask"]
+__all__ = ["opaque_everywhere", "read_mask", "refuse_nan"]
 
 WITH_ALPHA = (2, 4)
 
@@ -82,3 +82,18 @@ def _opaque(path: Path, orientation: int) -> BoolArray | None:
     full = integer_full_scale(alpha) or 1.0
     opaque: BoolArray = np.asarray(upright(alpha, orientation) > full / 2)
     return opaque
+
+
+def refuse_nan(images: PixelArray, mask: BoolArray, paths: list[Path]) -> None:
+    """Raise InputError where a pixel inside the mask is not finite."""
+    if images.dtype.kind != "f":
+        return
+    for image, path in zip(images, paths, strict=True):
+        bad = ~np.isfinite(image) & mask
+        if bad.any():
+            row, col = np.argwhere(bad)[0]
+            msg = (
+                f"{path}: {int(bad.sum())} pixels inside the mask are not finite (first at row {row}, column {col}); "
+                "mask them out"
+            )
+            raise InputError(msg)
