@@ -174,3 +174,14 @@ def trial(parts: int, seed: int = 0) -> list[Trial]:
         rms = np.sqrt(np.mean(every**2, axis=0)) if len(every) else np.full(4, np.nan)
         rows.append(Trial(name, rms, len(every)))
     return rows
+
+
+def unit(vectors: Array) -> Array:
+    """Rows of length 1."""
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
+
+
+def dome(height: Array, x: Array, y: Array) -> float:
+    """Range of heights at places (x, y) about their best plane."""
+    plane = np.column_stack([np.ones(len(height)), x, y])
+    return float(np.ptp(height - plane @ np.linalg.lstsq(plane, height, rcond=None)[0]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,6 +13,7 @@ import bgars
 import imageio.v3 as iio
 import numpy as np
 import pytest
+import typer
 from bgars.cli.station_output import write_pages
 from bgars.io.capture import read_unlit
 from bgars.records.remark import Remark
@@ -213,3 +215,33 @@ def test_a_grid_that_is_no_square_one_is_doubted() -> None:
     steps = np.stack(np.meshgrid(np.arange(10.0), np.arange(10.0)), axis=-1).reshape(-1, 2) - 4.5
     _, said = fit_grid(20.0 * steps * [1.03, 1.0], 500.0, None, size_px=(220, 220))
     assert (said[0].code, said[0].severity) == ("grid", "doubt")
+
+
+def test_init_counts_the_images(tmp_path: Path) -> None:
+    folder = shoot(tmp_path / "part", np.full((8, 6, 6), 0.5))
+    run = bgars_command("init", folder, "--ring", "6,45")
+    assert (run.code, (folder / "capture.toml").exists()) == (2, False)
+    assert f"--ring: 6 lights, but {folder} holds 8 images, one a light" in run.stderr
+    run = bgars_command("init", folder, "--ring", "4,45")
+    assert run.code == 0
+    assert "note: --ring: 4 lights, but 8 images: of an exposure bracket, add" in run.stdout
+    lights = bgars.LightCalibration(bgars.LightRig.ring(5), *(np.full(5, 0.1),) * 3, "mirror", (), 0.0)
+    bgars.write_station(bgars.Station("line 3", lights=lights), tmp_path / "station.toml")
+    run = bgars_command("init", folder, "--station", tmp_path / "station.toml", "--force")
+    assert run.code == 2
+    assert "station.toml: 5 lights, but" in run.stderr
+
+
+def test_init_asks_again_where_an_answer_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = iter(["none.toml", "", "8", "6,45", "8,45", "3,4", "-1", "3.4"])
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
+    monkeypatch.setattr(sys.modules[typer.prompt.__module__], "visible_prompt_func", lambda _: next(answers))
+    folder = shoot(tmp_path / "part", np.full((8, 6, 6), 0.5))
+    run = bgars_command("init", folder)
+    assert run.code == 0, run.stderr
+    assert list(answers) == []
+    text = (folder / "capture.toml").read_text(encoding="utf-8")
+    assert "pixel_pitch_um = 3.4" in text
+    assert "ring = { count = 8, elevation_deg = 45.0 }" in text
+    for words in ("none.toml", "--ring: must be COUNT,ELEVATION", "8 images, one a light", "must be a number"):
+        assert words in run.stdout + run.stderr

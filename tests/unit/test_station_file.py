@@ -215,7 +215,7 @@ def test_commands_calibrate_use_and_compare(tmp_path: Path) -> None:
     )
     assert run.code == 1
     assert "fail: light 2" in run.stdout
-    assert "1 of 13 comparisons exceed the limit" in run.stdout
+    assert "1 of 14 comparisons exceed the limit" in run.stdout
     run = bgars_command("init", first, "--station", tmp_path / "station.toml")
     assert run.code == 0, run.stderr
     assert bgars.read_capture(first).rig.u_deg is not None

@@ -76,7 +76,7 @@ def test_the_rig_of_the_capture_is_a_starting_guess_only(mirror: NDArray[np.uint
 def test_a_wrong_radius_moves_all_lights_together_and_is_doubted(lights: Array, mirror: NDArray[np.uint8]) -> None:
     found = bgars.calibrate_lights(capture_of(mirror), outline=(BALL[0], BALL[1], 104.0))
     assert found.doubts[0].code == "wrong-outline"
-    assert "stated radius 104.00 px" in found.doubts[0].message
+    assert "--outline 136.8,134.1,104.0 is stated, but the images show an edge at" in found.doubts[0].message
     assert float(np.median(found.u_common_deg)) > 2 * float(np.median(found.u_own_deg))
     assert (off_deg(found.rig.directions, lights) < 3 * np.sqrt(2) * found.u_deg).all()
 

@@ -50,7 +50,10 @@ def test_a_golden_part_teaches_its_recipe(tmp_path: Path) -> None:
     bgars.write_simulation(*bgars.simulate(scene, rig, material, bgars.Camera()), tmp_path / "golden")
     run = bgars_command("teach", tmp_path / "golden", "-o", tmp_path / "part.toml")
     assert run.code == 0, run.stderr
+    header = " ".join(line[2:] for line in (tmp_path / "part.toml").read_text(encoding="utf-8").splitlines()[:3])
+    assert "the largest golden reading + 4 u, position 10 % of the pitch at least. Put" in header
     recipe = bgars.read_part_recipe(tmp_path / "part.toml")
+    assert recipe.limits.true_position_um == pytest.approx(0.1 * recipe.layout.pitch_um, abs=0.06)
     assert (recipe.layout.rows, recipe.layout.cols) == (3, 3)
     assert recipe.limits.height_um is not None
     result = bgars.inspect(bgars.read_capture(tmp_path / "golden"), recipe)

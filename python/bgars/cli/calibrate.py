@@ -11,6 +11,7 @@ import bgars
 from bgars.cli.calibrate_camera import register as register_camera
 from bgars.cli.calibrate_station import register as register_station
 from bgars.cli.console import print_json, say, stage_progress
+from bgars.cli.drift import register as register_drift
 from bgars.io.masks import read_mask
 from bgars.io.material_file import material_path
 from bgars.io.own_files import need_new_or_own
@@ -39,6 +40,7 @@ def register(app: typer.Typer) -> None:
     group.command("material")(material)
     register_station(group)
     register_camera(group)
+    register_drift(group)
     app.add_typer(group)
 
 

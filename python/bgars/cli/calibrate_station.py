@@ -1,4 +1,4 @@
-"""The commands ``bgars calibrate lights | flat | response | scale | station | drift``."""
+"""The commands ``bgars calibrate lights | flat | station``."""
 
 from __future__ import annotations
 
@@ -12,12 +12,10 @@ import bgars
 from bgars.cli.calibrated_lights import lights_values, said_values, tell_lights
 from bgars.cli.camera_option import CameraOption, seen_by
 from bgars.cli.console import print_json, say, stage_progress
-from bgars.cli.station_output import existing_station, keep_part, need_different, shown_severity, tell_findings
+from bgars.cli.station_output import existing_station, keep_part, need_different, tell_findings
 from bgars.errors import InputError
 from bgars.io.capture import read_unlit
-from bgars.io.station_file import read_station
 from bgars.report.figures.station_balls import write_balls
-from bgars.station import drift as station_drift
 from bgars.station.flat import falloff_findings
 
 if TYPE_CHECKING:
@@ -28,9 +26,11 @@ if TYPE_CHECKING:
     from bgars.records.remark import Remark
     from bgars.records.station import Station
 
-__all__ = ["FolderArgument", "JsonOption", "OutputOption", "register", "said_values"]
+__all__ = [
+    "FolderArgument", "JsonOption", "OutlineOption", "OutputOption", "circles_of", "raw_capture", "register",
+    "said_values",
+]  # fmt: skip
 
-EXIT_MOVED = 1
 BALL_AGAIN = "photograph the ball once for each of its places"
 
 OutputOption = Annotated[
@@ -99,7 +99,6 @@ def register(group: typer.Typer) -> None:
     group.command("lights")(lights)
     group.command("flat")(flat)
     group.command("station")(station)
-    group.command("drift")(drift)
 
 
 def lights(
@@ -120,7 +119,7 @@ def lights(
     need_different(folders, BALL_AGAIN)
     known = existing_station(output)
     read = bgars.read_capture if sphere == "balls" else read_unlit
-    captures = [seen_by(_raw(folder, known, read), camera) for folder in folders]
+    captures = [seen_by(raw_capture(folder, known, read), camera) for folder in folders]
     found = _calibrate_lights(captures, sphere, outline, near, diameter_mm, recipe)
     write_balls(captures, found, output.with_suffix(".balls.svg"))
     keep_part(output, {"lights": found}, found.findings)
@@ -138,7 +137,7 @@ def flat(folder: FolderArgument, output: OutputOption, as_json: JsonOption = Fal
     fall-off no longer bend the surface.
     """
     known = existing_station(output)
-    found, findings = bgars.calibrate_flat(_raw(folder, replace(known, scale=None)))
+    found, findings = bgars.calibrate_flat(raw_capture(folder, replace(known, scale=None)))
     if known.lights is not None and known.scale is not None:
         findings = (*findings, *falloff_findings(found, known.lights, known.scale.pixel_pitch_um))
     keep_part(output, {"flat": found}, findings)
@@ -190,13 +189,13 @@ def station(
             findings += said
             known = replace(known, scale=parts["scale"])
         report("scale", 1.0)
-        captures = [seen_by(_raw(folder, known), camera) for folder in folders]
+        captures = [seen_by(raw_capture(folder, known), camera) for folder in folders]
         found = _calibrate_lights(captures, sphere, outline, near, diameter_mm)
         parts["lights"] = found
         findings += found.findings
         report("lights", 1.0)
         if board is not None:
-            parts["flat"], said = bgars.calibrate_flat(_raw(board, replace(known, scale=None)))
+            parts["flat"], said = bgars.calibrate_flat(raw_capture(board, replace(known, scale=None)))
             findings += said
             if known.scale is not None:
                 findings += falloff_findings(parts["flat"], found, known.scale.pixel_pitch_um)
@@ -215,42 +214,6 @@ def station(
     tell_findings(tuple(findings), output)
 
 
-def drift(
-    folder: FolderArgument,
-    station: Annotated[Path, typer.Option(metavar="station.toml", help="The station.", show_default=False)],
-    reference: Annotated[
-        Literal["mirror", "matt", "flat"] | None,
-        typer.Option(help="Reference in view; by default the kind of ball of the calibration.", show_default=False),
-    ] = None,
-    outline: OutlineOption = None,
-    camera: CameraOption = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Say what moved since the calibration, on a new capture of its reference.
-
-    Exit code 0: nothing beyond its limit. 1: something moved. 2: wrong use, or the reference cannot be read.
-    """
-    known = read_station(station)
-    kind = reference or (known.lights.sphere if known.lights is not None else "flat")
-    capture = seen_by(_raw(folder, replace(known, scale=None) if kind == "flat" else known), camera)
-    circles = _circles(outline, [capture])
-    found = station_drift(known, capture, reference=reference, outline=None if circles is None else circles[0])
-    moved = [finding for finding in found if finding.severity == "fail"]
-    if as_json:
-        print_json({"station": str(station), "moved": len(moved), **said_values(found)})
-    else:
-        for finding in found:
-            if finding.severity != "note":
-                say(f"{shown_severity(finding)}: {finding.message}")
-        say(
-            f"{known.name}: {len(moved)} of {len(found)} comparisons exceed the limit"
-            if moved
-            else f"{known.name}: nothing moved"
-        )
-    if moved:
-        raise typer.Exit(EXIT_MOVED)
-
-
 def _calibrate_lights(
     captures: list[Capture],
     sphere: str,
@@ -259,7 +222,7 @@ def _calibrate_lights(
     diameter_mm: float | None,
     recipe: Path | None = None,
 ) -> LightCalibration:
-    circles = _circles(outline, captures)
+    circles = circles_of(outline, captures)
     with stage_progress() as report:
         return bgars.calibrate_lights(
             captures,
@@ -272,8 +235,8 @@ def _calibrate_lights(
         )
 
 
-def _circles(outline: list[str] | None, captures: list[Capture]) -> list[list[list[float]]] | None:
-    """Circles x, y, radius from the image centre, as a list a capture."""
+def circles_of(outline: list[str] | None, captures: list[Capture]) -> list[list[list[float]]] | None:
+    """Return circles x, y, radius from the image centre, as a list a capture."""
     if not outline:
         return None
     found = []
@@ -293,7 +256,7 @@ def _circles(outline: list[str] | None, captures: list[Capture]) -> list[list[li
     return [[circle] for circle in found]
 
 
-def _raw(folder: Path, known: Station, read: Callable[[Path], Capture] = read_unlit) -> Capture:
-    """A capture with the response, scale and distortion that are known already."""
+def raw_capture(folder: Path, known: Station, read: Callable[[Path], Capture] = read_unlit) -> Capture:
+    """Return a capture with the response, scale and distortion that are known already."""
     capture = read(folder)
     return bgars.with_station(capture, bgars.Station(known.name, response=known.response, scale=known.scale))

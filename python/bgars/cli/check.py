@@ -10,8 +10,10 @@ import typer
 
 import bgars
 from bgars.checks.response import DOUBT
-from bgars.cli.calibrate_station import drift
+from bgars.cli.calibrate_station import OutlineOption
+from bgars.cli.camera_option import CameraOption
 from bgars.cli.console import print_json, say
+from bgars.cli.drift import LogOption, drift
 from bgars.errors import CaptureWarning, InputError
 from bgars.io.atomic import FolderNames, atomic_file, atomic_folder
 from bgars.io.given_paths import need_folder, need_output
@@ -57,13 +59,17 @@ def check(
             show_default=False,
         ),
     ] = None,
+    outline: OutlineOption = None,
+    camera: CameraOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
+    log_line: LogOption = False,
 ) -> None:
     """Check whether images and lights belong together, and find other faults of a capture, before it is measured.
 
     Order and handedness of the lights, lights below the surface, the same image twice, dead and uneven lamps, exposure,
     partly lit frames, ambient light, vignetting, motion, focus, noise, response, bit depth. What a capture cannot show
-    (a flat part has no shading) is not judged. With --station: changes since its calibration (docs/station.md).
+    (a flat part has no shading) is not judged. With --station (and --outline, --camera, --log): changes since its
+    calibration (docs/station.md).
 
     Exit code 0: no error was found (there may be warnings). 1: an error was found: numbers from this capture would be
     wrong. 2: wrong use, or a capture that cannot be read.
@@ -73,8 +79,11 @@ def check(
         if output is not None:
             msg = "--station, --output: give one of them; bgars calibrate writes the page of a station"
             raise InputError(msg)
-        drift(folder, station, as_json=as_json)
+        drift(folder, station, None, outline, camera, as_json, log_line)
         return
+    if alone := [name for name, given in (("--outline", outline), ("--camera", camera), ("--log", log_line)) if given]:
+        msg = f"{alone[0]}: goes with --station only; a capture that is checked by itself has no use for it"
+        raise InputError(msg)
     if output is not None and not _is_page(output):
         need_output(output, folder)
     with warnings.catch_warnings():

@@ -6,18 +6,24 @@ import json
 import math
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
 from bgars.cli.console import say
-from bgars.errors import InputError
+from bgars.errors import BgarsError, InputError
 from bgars.io.atomic import atomic_file
 from bgars.io.given_paths import need_file, need_folder
+from bgars.io.image_listing import list_folder
 from bgars.io.recipe import RECIPE_NAME, read_recipe
 from bgars.io.station_file import read_station
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
 __all__ = ["register"]
+
+T = TypeVar("T")
 
 
 def register(app: typer.Typer) -> None:
@@ -58,15 +64,16 @@ def init(
         msg = f"{place}: exists; --force replaces it"
         raise InputError(msg)
     if station is None and ring is None and sys.stdin.isatty():
-        answer = typer.prompt("Station file (empty: none)", default="", show_default=False)
-        station = Path(answer) if answer else None
+        station = _asked("Station file (empty: none)", lambda text: _known_station(text, folder) if text else None)
         if station is None:
-            ring = typer.prompt("Lights of a ring in equal steps: count,elevation in degrees", default="8,45")
-        if station is None and pitch_um is None:
-            answer = typer.prompt(
-                "Size of a pixel on the board in um (empty: not known)", default="", show_default=False
+            ring = _asked(
+                "Lights of a ring in equal steps: count,elevation in degrees",
+                lambda text: _checked(text, folder),
+                "8,45",
             )
-            pitch_um = _number(answer) if answer else None
+        if station is None and pitch_um is None:
+            question = "Size of a pixel on the board in um (empty: not known)"
+            pitch_um = _asked(question, lambda text: _above_0(text) if text else None)
     if (station is None) == (ring is None):
         msg = "--station or --ring: give one of them, to say where the lights are"
         raise InputError(msg)
@@ -75,10 +82,10 @@ def init(
         need_file(folder / dark)
         lines.append(f"dark = {json.dumps(dark)}")
     if station is not None:
-        read_station(station)
+        _known_station(station, folder)
         lines.append(f"station = {json.dumps(str(station.resolve()))}")
     if ring is not None:
-        lines += ["", "[lights]", f"ring = {_ring(ring)}"]
+        lines += ["", "[lights]", f"ring = {_ring(_checked(ring, folder))}"]
     with atomic_file(place) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
         try:
@@ -87,6 +94,53 @@ def init(
             msg = str(error).removeprefix(f"{temporary}: ")
             raise InputError(msg) from None
     say(f"Written: {place}. Next: bgars info {folder}")
+
+
+def _asked(question: str, read: Callable[[str], T], default: str = "") -> T:
+    """Ask until the answer can be read."""
+
+    def once(text: str) -> T:
+        try:
+            return read(text.strip())
+        except BgarsError as error:
+            raise typer.BadParameter(str(error)) from None
+
+    found: T = typer.prompt(question, default=default, show_default=bool(default), value_proc=once)
+    return found
+
+
+def _known_station(path: str | Path, folder: Path) -> Path:
+    lights = read_station(path).lights
+    if lights is not None:
+        _need_images(folder, len(lights.rig), f"{path}: {len(lights.rig)} lights")
+    return Path(path)
+
+
+def _checked(ring: str, folder: Path) -> str:
+    """The ring as it was given, once it can be read and fits the images."""
+    _ring(ring)
+    count = int(float(ring.split(",", maxsplit=1)[0]))
+    _need_images(folder, count, f"--ring: {count} lights")
+    return ring
+
+
+def _need_images(folder: Path, lights: int, what: str) -> None:
+    """Refuse another number of images than lights; none, one (a stack) or several a light (a bracket) may be right."""
+    images = len(list_folder(folder).images)
+    if images in {0, 1} or images % lights == 0:
+        if images > lights:
+            say(f"note: {what}, but {images} images: of an exposure bracket, add exposures_ms (docs/captures.md)")
+        return
+    msg = f"{what}, but {folder} holds {images} images, one a light: correct the count, or move away what is no part"
+    raise InputError(msg)
+
+
+def _above_0(text: str) -> float:
+    value = _number(text)
+    if not 0 < value < math.inf:
+        msg = f"must be a number above 0, got {text!r}"
+        raise InputError(msg)
+    return value
 
 
 def _ring(text: str) -> str:

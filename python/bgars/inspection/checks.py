@@ -7,25 +7,22 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bgars.errors import CalibrationError, InputError
+from bgars.errors import CalibrationError
 from bgars.files.light_names import light_name, numbered
 from bgars.inspection.board import Board
 from bgars.inspection.image_shifts import MIN_STRETCHES
 from bgars.inspection.in_view import fitting_stretches
 from bgars.inspection.shadow_model import Balls, Lights
 from bgars.inspection.start import edge_steps
-from bgars.records.same_images import same_images
 
 if TYPE_CHECKING:
     from bgars.inspection.problem import Problem
     from bgars.inspection.shadow_edges import Edges
-    from bgars.records.capture import Capture
 
 __all__ = [
     "Complaint",
     "explain_dark_steps",
     "refuse_misfits",
-    "refuse_repeated",
 ]
 
 Array = NDArray[np.float64]
@@ -49,16 +46,6 @@ NEAR_DEG = 7.5
 OUTLINE_BESIDE = 0.1  # of the radius: how far in and out of an outline contrast is taken
 SHARPER = 1.15  # ratio of contrasts of outlines that confirms a shift
 LOWEST_DEG, HIGHEST_DEG = 5.0, 88.0  # elevations within which lights are looked for
-
-
-def refuse_repeated(capture: Capture) -> None:
-    """Raise InputError where two images are the same, unless both are empty."""
-    same = same_images(capture.images)
-    if same is not None:
-        files = [path.name for path in capture.files]
-        first, second = (files[each] if files else light_name(each, what="image") for each in same)
-        msg = f"images: {first} and {second} are the same picture; each light needs its own"
-        raise InputError(msg)
 
 
 class Complaint(NamedTuple):

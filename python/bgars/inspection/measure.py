@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bgars.errors import InputError
-from bgars.inspection.checks import refuse_repeated
 from bgars.inspection.flat_top import flat_tops
 from bgars.inspection.problem import make_problem, thread_count
 from bgars.inspection.results import measurement
 from bgars.inspection.shadow_fit import fit_shadows
+from bgars.records.same_images import refuse_repeated
 from bgars.records.scalar_checks import check_progress
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ from bgars.io.capture_radiometry import (
 )
 from bgars.io.capture_values import note_light_below_zero, refuse_nan
 from bgars.io.given_paths import need_folder
-from bgars.io.image_listing import Listing, list_folder
+from bgars.io.image_listing import Listing, list_folder, role_of
 from bgars.io.image_tags import upright
 from bgars.io.images import MAX_MEGAPIXELS, WEIGHTS
 from bgars.io.light_discovery import choose_mask, default_recipe
@@ -113,10 +113,8 @@ def read_capture(
     folder = need_folder(folder)
     notes: list[str] = []
     listing = list_folder(folder)
-    recipe_path = folder / RECIPE_NAME
-    has_recipe = RECIPE_NAME in (*listing.others, *listing.folders)
-    if has_recipe:
-        recipe = read_recipe(recipe_path)
+    if RECIPE_NAME in (*listing.others, *listing.folders):
+        recipe = read_recipe(folder / RECIPE_NAME)
     else:
         recipe = _undescribed(folder, listing, notes, may_lack_lights=station is not None)
     known = _station(folder, recipe, station)
@@ -131,15 +129,15 @@ def read_capture(
         capture = _load_bracket(folder, recipe, lights, listing, channel, max_megapixels, threads, notes, known)
     else:
         capture = _load_chosen(folder, recipe, lights, listing, images, channel, max_megapixels, threads, notes)
-    for note in notes:
-        warnings.warn(f"{folder}: {note}", CaptureWarning, stacklevel=2)
+    _tell(folder, notes)
     return capture if known is None else with_station(capture, known)
 
 
 def read_unlit(folder: str | PathLike[str], *, channel: ChannelName | None = None) -> Capture:
     """Read the images of a folder whose lights are not known yet; an even ring at 45 degrees stands in for them.
 
-    As :func:`read_capture` in all else. Where the folder does describe lights, these are read.
+    As :func:`read_capture` in all else, but that the only image called dark is taken as the dark frame where nothing
+    is described. Where the folder does describe lights, these are read.
     """
     folder = need_folder(folder)
     notes: list[str] = []
@@ -148,6 +146,10 @@ def read_unlit(folder: str | PathLike[str], *, channel: ChannelName | None = Non
         recipe = read_recipe(folder / RECIPE_NAME)
     else:
         recipe = _undescribed(folder, listing, notes, may_lack_lights=True)
+        darks = [name for name in listing.special if role_of(name) == "a dark frame"]
+        if recipe.lights is None and len(darks) == 1:
+            recipe = recipe.model_copy(update={"dark": darks[0]})
+            notes.append(f"{darks[0]} taken as the dark frame, and subtracted")
     if recipe.lights is not None:
         return read_capture(folder, channel=channel)
     if recipe.exposures_ms is not None:
@@ -157,7 +159,14 @@ def read_unlit(folder: str | PathLike[str], *, channel: ChannelName | None = Non
         msg = f"{folder}: {count} image{'s'[: count - 1]}, 3 are needed or more; of a grid, copies will do"
         raise InputError(msg)
     lights = _by_order(LightRig.ring(max(count, 3)), str(folder))
-    return _load_chosen(folder, recipe, lights, listing, None, channel, MAX_MEGAPIXELS, None, notes)
+    capture = _load_chosen(folder, recipe, lights, listing, None, channel, MAX_MEGAPIXELS, None, notes)
+    _tell(folder, notes)
+    return capture
+
+
+def _tell(folder: Path, notes: list[str]) -> None:
+    for note in notes:
+        warnings.warn(f"{folder}: {note}", CaptureWarning, stacklevel=3)
 
 
 def _undescribed(folder: Path, listing: Listing, notes: list[str], *, may_lack_lights: bool) -> CaptureRecipe:

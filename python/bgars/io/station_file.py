@@ -7,16 +7,16 @@ import json
 import math
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import Field, model_validator
 
 from bgars.errors import FileFormatError, InputError
 from bgars.io.atomic import atomic_file
-from bgars.io.strict_toml import Strict, checked, read_values
+from bgars.io.station_tables import FlatTable, LightsTable, ResponseTable, ScaleTable, StationFile, VerifyTable
+from bgars.io.strict_toml import checked, read_values
 from bgars.records.flat_field import FlatField
-from bgars.records.light_calibration import LightCalibration
+from bgars.records.light_calibration import BallView, LightCalibration
 from bgars.records.remark import Remark
 from bgars.records.response_curve import ResponseCurve
 from bgars.records.rig import LightRig
@@ -26,143 +26,13 @@ from bgars.records.station import Station, Verification
 if TYPE_CHECKING:
     from os import PathLike
 
+    from pydantic import BaseModel
+
 __all__ = ["STATION_FORMAT", "is_station_file", "read_station", "station_keys", "write_station"]
 
 STATION_FORMAT = "bgars-station"
 STATION_VERSION = 1
 MM = 1000.0
-
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Number = Annotated[float, Field(allow_inf_nan=False)]
-Vector = tuple[Number, Number, Number]
-
-
-class LightsTable(Strict):
-    """The ``[lights]`` table."""
-
-    sphere: str = Field("", description="what was in view: mirror, matt or balls")
-    directions: list[Vector] | None = Field(None, description="unit vectors from the board to the lights, by image")
-    positions_mm: list[Vector] | None = Field(None, description="or positions, origin = image centre on the board")
-    intensities: list[Positive] = Field(description="relative intensities, mean 1")
-    u_deg: list[Positive] = Field(description="standard uncertainty of each direction, per axis across it")
-    u_own_deg: list[NotNegative] = Field(description="the component of each light alone")
-    u_common_deg: list[NotNegative] = Field(description="the component common to all lights (outlines of the balls)")
-    u_lens_deg: list[NotNegative] | None = Field(None, description="the component of a lens that was not stated")
-    u_positions_mm: list[Vector] | None = Field(None, description="standard uncertainties of positions_mm")
-    u_intensities: list[NotNegative] | None = Field(
-        None, description="standard uncertainties of intensities, if measured"
-    )
-    lamp_deg: NotNegative | None = Field(None, description="angular diameter of a lamp, where it was measured")
-    residual_px: NotNegative = Field(0.0, description="root mean square residual of the highlights")
-    balls: int = Field(0, description="number of balls, or of places of a ball")
-
-    @model_validator(mode="after")
-    def _one_a_light(self) -> LightsTable:
-        if (self.directions is None) == (self.positions_mm is None):
-            msg = "needs exactly one of directions, positions_mm"
-            raise ValueError(msg)
-        count = len(self.directions or self.positions_mm or ())
-        for name in (
-            "intensities",
-            "u_deg",
-            "u_own_deg",
-            "u_common_deg",
-            "u_lens_deg",
-            "u_positions_mm",
-            "u_intensities",
-        ):
-            values = getattr(self, name)
-            if values is not None and len(values) != count:
-                msg = f"{name}: must have one entry for each of the {count} lights, got {len(values)}"
-                raise ValueError(msg)
-        return self
-
-
-class FlatTable(Strict):
-    """The ``[flat]`` table."""
-
-    file: str = Field(description="coefficients of the gain maps, .npz, relative to station.toml")
-    sha256: str = Field(description="checksum of that file")
-    degree: Annotated[int, Field(ge=0, le=20)] = Field(description="degree of the polynomials")
-    size_px: tuple[int, int] = Field(description="height and width of the images")
-    residual: NotNegative = Field(0.0, description="relative residual of the board's levels")
-
-
-class ResponseTable(Strict):
-    """The ``[response]`` table."""
-
-    levels: list[NotNegative] = Field(description="grey levels, 0 to 1 = full scale")
-    radiances: list[NotNegative] = Field(description="their radiances, 1 at full scale")
-    u_radiance: NotNegative = Field(0.0, description="standard uncertainty of the radiances, 1 = full scale")
-    source: str = Field("", description="how it was measured")
-
-    @model_validator(mode="after")
-    def _grows(self) -> ResponseTable:
-        least = 2
-        if len(self.levels) != len(self.radiances) or len(self.levels) < least:
-            msg = (
-                f"levels and radiances: must be equally many, 2 or more, got {len(self.levels)} and "
-                f"{len(self.radiances)}"
-            )
-            raise ValueError(msg)
-        if min(np.diff(self.levels)) <= 0 or min(np.diff(self.radiances)) <= 0:
-            msg = "levels and radiances: must grow from entry to entry"
-            raise ValueError(msg)
-        return self
-
-
-class ScaleTable(Strict):
-    """The ``[scale]`` table."""
-
-    pixel_pitch_um: Positive = Field(description="size of a pixel on the board")
-    pixel_pitch_u_um: Positive = Field(description="its standard uncertainty")
-    tilt_deg: Number | None = Field(None, description="tilt of the grid against the image plane, where measurable")
-    rotation_deg: Number = Field(0.0, description="rotation of the grid in the image")
-    distortion: Number = Field(0.0, description="radial displacement at the corner over its distance from the centre")
-    residual_px: NotNegative = Field(0.0, description="root mean square residual of the points of the grid")
-    points: int = Field(0, description="number of points of the grid")
-    camera_distance_mm: Positive | None = Field(None, description="distance of the camera, where known")
-
-
-class VerifyTable(Strict):
-    """An entry of ``[[verified]]``."""
-
-    quantity: Literal["height", "diameter"] = Field(description="height or diameter")
-    captures: int = Field(description="number of inspections of the part")
-    balls: int = Field(description="number of balls of known size")
-    bias_um: Number = Field(description="mean error")
-    u_bias_um: NotNegative | None = Field(None, description="its standard uncertainty, known sizes included")
-    slope: Number | None = Field(None, description="change of the error per unit of size")
-    u_slope: NotNegative | None = Field(None, description="its standard uncertainty")
-    repeatability_um: NotNegative | None = Field(None, description="standard deviation over replacements of the part")
-    largest_um: NotNegative = Field(description="largest error of a single reading")
-    mpe_um: Positive | None = Field(None, description="maximum permissible error applied")
-
-
-class FindingTable(Strict):
-    """An entry of ``[[findings]]``."""
-
-    severity: Literal["note", "doubt", "fail"]
-    message: str
-    code: str = ""
-
-
-class StationFile(Strict):
-    """The whole file."""
-
-    format: Literal["bgars-station"] = Field(description='"bgars-station"')
-    version: Literal[1] = Field(description="1")
-    name: str = Field("station", description="name of the station")
-    calibrated_utc: str = Field("", description="time of the last calibration, ISO 8601")
-    bgars: str = Field("", description="version that wrote it")
-    lights: LightsTable | None = None
-    flat: FlatTable | None = None
-    response: ResponseTable | None = None
-    scale: ScaleTable | None = None
-    verified_utc: str = Field("", description="time of the last comparison with a part of known sizes, ISO 8601")
-    verified: list[VerifyTable] = Field(default_factory=list, description="how it compared (bgars verify)")
-    findings: list[FindingTable] = Field(default_factory=list, description="findings of the calibrations")
 
 
 def is_station_file(path: str | PathLike[str]) -> bool:
@@ -175,7 +45,7 @@ def is_station_file(path: str | PathLike[str]) -> bool:
 
 def station_keys() -> list[tuple[str, str]]:
     """Return every key of the file and what it means, for the documentation."""
-    tables: dict[str, type[Strict]] = {
+    tables: dict[str, type[BaseModel]] = {
         "lights": LightsTable,
         "flat": FlatTable,
         "response": ResponseTable,
@@ -262,12 +132,21 @@ def _lights(table: LightsTable) -> LightCalibration:
         u_common_deg=np.array(table.u_common_deg),
         u_lens_deg=None if table.u_lens_deg is None else np.array(table.u_lens_deg),
         sphere=table.sphere,
-        balls=(),
+        balls=_balls(table, len(rig)),
         residual_px=table.residual_px,
         u_positions_um=None if u_mm is None else np.array(u_mm) * MM,
         u_intensities=None if table.u_intensities is None else np.array(table.u_intensities),
         lamp_deg=math.nan if table.lamp_deg is None else table.lamp_deg,
+        level=math.nan if table.level is None else table.level,
+        level_by=table.level_by,
     )
+
+
+def _balls(table: LightsTable, lights: int) -> tuple[BallView, ...]:
+    """The balls without their highlights and uncertainties, which the file does not hold."""
+    unseen = np.full((lights, 2), np.nan)
+    u = np.full(3, np.nan)
+    return tuple(BallView("", np.array(outline), u, unseen, unseen) for outline in table.outlines_px or ())
 
 
 def _flat(path: Path, table: FlatTable) -> FlatField:
@@ -327,6 +206,8 @@ def _lights_values(lights: LightCalibration) -> dict[str, Any]:
     places = {"directions": rig.directions.tolist()}
     if rig.positions_um is not None:
         places = {"positions_mm": (rig.positions_um / MM).round(6).tolist()}
+    # Solder balls differ from part to part: they say nothing of the station's scale.
+    outlines = [] if lights.sphere == "balls" else [ball.outline_px.tolist() for ball in lights.balls]
     return {
         "sphere": lights.sphere,
         **places,
@@ -340,6 +221,9 @@ def _lights_values(lights: LightCalibration) -> dict[str, Any]:
         "lamp_deg": lights.lamp_deg,
         "residual_px": lights.residual_px,
         "balls": len(lights.balls),
+        "outlines_px": outlines or None,
+        "level": lights.level,
+        "level_by": lights.level_by or None,
     }
 
 

@@ -72,6 +72,10 @@ class LightCalibration(Short):
         Root mean square of the residuals; 0 where there is nothing to spare.
     findings : tuple of Remark
         Findings.
+    level : float
+        Mean strength of the lights, grey levels of 255, of what `level_by` names: "highlights" (times their solid
+        angle), "shading" of a white facet, or the "board"; NaN where not measured.
+    level_by : str
     """
 
     rig: LightRig
@@ -86,6 +90,8 @@ class LightCalibration(Short):
     u_lens_deg: Array | None = None
     lamp_deg: float = float("nan")
     findings: tuple[Remark, ...] = field(default=())
+    level: float = float("nan")
+    level_by: str = ""
 
     @property
     def doubts(self) -> tuple[Remark, ...]:

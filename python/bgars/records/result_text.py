@@ -13,9 +13,11 @@ from bgars.records.ball_result import BallResult, Verdict
 from bgars.records.keys import DIGITS, keys_of, plain_value
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from bgars.records.part_result import PartResult
 
-__all__ = ["csv_text", "error_line", "log_line", "table_text"]
+__all__ = ["csv_text", "error_line", "log_line", "log_pairs", "table_text"]
 
 CSV_DIGITS = 3
 CSV_PART = ("part_serial", "part_lot", "part_capture", "part_inspected_utc", "part_round")
@@ -113,7 +115,18 @@ def log_line(result: PartResult) -> str:
 
 def _line(pairs: dict[str, Any]) -> str:
     """Pairs as a line that always has the same keys in the same order."""
-    return " ".join(f"{key}={_log_value(pairs.get(key))}" for key in LINE_KEYS)
+    return log_pairs({key: pairs.get(key) for key in LINE_KEYS})
+
+
+def log_pairs(pairs: Mapping[str, float | str | None]) -> str:
+    """Return key=value pairs as one line of a log.
+
+    Examples
+    --------
+    >>> log_pairs({"moved": 2, "level": 0.01, "scale": None, "reason": "light 2 moved"})
+    'moved=2 level=0.010 scale=null reason="light 2 moved"'
+    """
+    return " ".join(f"{key}={_log_value(value)}" for key, value in pairs.items())
 
 
 def _csv_cell(name: str, value: Any) -> Any:  # noqa: ANN401 - a field of a record

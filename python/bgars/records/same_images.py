@@ -6,10 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bgars.errors import InputError
+from bgars.files.light_names import light_name
+
 if TYPE_CHECKING:
+    from bgars.records.capture import Capture
     from bgars.records.pixels import PixelArray
 
-__all__ = ["same_images"]
+__all__ = ["refuse_repeated", "same_images"]
 
 SAMPLE = 50_000
 
@@ -34,3 +38,13 @@ def same_images(images: PixelArray) -> tuple[int, int] | None:
             if np.array_equal(sample[first], sample[second]) and np.array_equal(stack[first], stack[second]):
                 return first, second
     return None
+
+
+def refuse_repeated(capture: Capture) -> None:
+    """Raise InputError where two images are the same, unless both are empty."""
+    same = same_images(capture.images)
+    if same is not None:
+        files = [path.name for path in capture.files]
+        first, second = (files[each] if files else light_name(each, what="image") for each in same)
+        msg = f"{capture.name}: images: {first} and {second} are the same picture; each light needs its own"
+        raise InputError(msg)

@@ -12,32 +12,27 @@ from numpy.typing import ArrayLike, NDArray
 
 from bgars.errors import CalibrationError, InputError
 from bgars.records.remark import Remark
+from bgars.station.another_ball import another_ball
 from bgars.station.horizon import radius_around
 from bgars.station.matt_lights import shading_misfit
 from bgars.station.outline import as_outline, find_outline, refine_outline
-from bgars.station.rim import fit_rim
+from bgars.station.overexposed import BURNT, HIDDEN, TOUCHED, clipped_ball, clipped_ground, moved_share
+from bgars.station.rim import sharpened
+from bgars.station.stated_outline import joined, stated_outline
 
 if TYPE_CHECKING:
     from bgars.records.capture import Capture
     from bgars.station.levels import Levels
     from bgars.station.outline import Outline
 
-__all__ = ["given_outlines", "outlines_of"]
+__all__ = ["disc_of_mask", "given_outlines", "outlines_of"]
 
 Array = NDArray[np.float64]
 
-WRONG_SIGMAS, WRONG_SHARE = 4.0, 0.01
-"""A stated radius that differs by more from what the images show is doubted."""
 SOFT_PX = 2.5
 """Width of an edge from which on a ball is out of focus."""
 SOFT_SHARE = 0.03
-UNEXPLAINED_PX = 0.15
-"""Shading runs into the edge of a matt ball, and a mirror is brighter at its rim: laws of edges differ by so much."""
-STRAYED_PX = 1.5
-NOT_SEEN_U_PX = 0.5
-"""Uncertainty of a stated outline that the images do not show."""
 NOT_A_DISC = 0.1
-SEEN_ARC = 0.5
 LEAST_RADIUS_PX = 12.0
 
 
@@ -78,65 +73,38 @@ def outlines_of(
     findings: list[Remark] = []
     outlines: list[Outline] = []
     if given is None:
-        start = _disc_of_mask(capture)
+        start = disc_of_mask(capture)
         found = (
             find_outline(pictures, partial(shading_misfit, levels) if matt else None, steps)
             if start is None
             else refine_outline(pictures, start, steps)
         )
-        found = _sharpened(levels, found, matt)
+        found = sharpened(levels, found, matt=matt)
         around_px = None if matt or found is None else radius_around(levels, found)
         if found is not None and around_px is not None:
-            found = _sharpened(levels, replace(found, radius_px=around_px), matt)
+            found = sharpened(levels, replace(found, radius_px=around_px), matt=matt)
         if start is not None:
-            found = _joined(found, start)
+            found = joined(found, start)
         if found is None:
             msg = (
                 f"{capture.name}: no ball found: no sharp circle in the images (out of focus, or of the level of its "
                 "background); photograph it again, or give its outline"
             )
             raise CalibrationError(msg)
+        found, said = (found, []) if matt else _exposed(capture, levels, found)
         outlines.append(found)
+        findings += said
+        findings += another_ball(capture, levels, pictures, found, steps, matt=matt)
     for index, circle in enumerate(() if given is None else given):
         if circle[2] > max(height, width):
             _judge(capture, as_outline(circle), height, width)
-        seen = refine_outline(pictures, circle, steps)
         name = "outline" if given is None or len(given) == 1 else f"outline {index}"
-        if seen is None or seen.arc < SEEN_ARC:
-            other = find_outline(pictures, None, steps)
-            if other is not None and other.arc > SEEN_ARC and _overlap(other.circle_px, circle):
-                message = (
-                    f"{capture.name}: {name}: no edge at the stated circle, radius {circle[2]:.1f} px at "
-                    f"({circle[0]:.1f}, {circle[1]:.1f}); the images show one of {other.radius_px:.1f} px at "
-                    f"({other.x_px:.1f}, {other.y_px:.1f}), x right, y up from the middle"
-                )
-                off = float(np.abs(other.circle_px - circle).max())
-                findings.append(Remark("doubt", message, "wrong-outline", off, None, "px"))
-                outlines.append(replace(as_outline(circle), u_centre_px=off, u_radius_px=off))
-                continue
-            outlines.append(as_outline(circle, NOT_SEEN_U_PX))
-            findings.append(
-                Remark("note", f"{capture.name}: {name}: not seen in the images, taken as stated", "outline-unseen")
-            )
-            continue
-        off = np.abs(seen.circle_px - circle)
-        allowed = max(WRONG_SHARE * circle[2], WRONG_SIGMAS * math.hypot(seen.u_radius_px, NOT_SEEN_U_PX))
-        if off.max() > allowed:
-            findings.append(
-                Remark(
-                    "doubt",
-                    f"{capture.name}: {name}: stated radius {circle[2]:.2f} px at ({circle[0]:.1f}, {circle[1]:.1f}), "
-                    f"the images show {seen.radius_px:.2f} px at ({seen.x_px:.1f}, {seen.y_px:.1f})",
-                    "wrong-outline",
-                    float(off.max()),
-                    allowed,
-                    "px",
-                )
-            )
-            u_px = np.maximum(off, NOT_SEEN_U_PX)
-            outlines.append(replace(as_outline(circle), u_centre_px=float(u_px[:2].max()), u_radius_px=float(u_px[2])))
-        else:
-            outlines.append(_joined(_sharpened(levels, seen, matt), circle))
+        outline, said = stated_outline(capture, levels, pictures, circle, steps, name, matt=matt)
+        findings += said
+        if not matt and clipped_ground(levels, outline) <= HIDDEN:
+            outline, said = _exposed(capture, levels, outline)
+            findings += said
+        outlines.append(outline)
     for outline in outlines:
         findings += _judge(capture, outline, height, width)
     return outlines, findings
@@ -145,8 +113,9 @@ def outlines_of(
 def _judge(capture: Capture, outline: Outline, height: int, width: int) -> list[Remark]:
     if not outline.inside(height, width):
         msg = (
-            f"{capture.name}: the ball is cut off: radius {outline.radius_px:.6g} px at ({outline.x_px:.6g}, "
-            f"{outline.y_px:.1f}) from the middle of an image of {width} x {height} pixels"
+            f"{capture.name}: the ball is cut off: radius {outline.radius_px:.6g} px at column "
+            f"{outline.x_px + width / 2.0 - 0.5:.1f}, row {height / 2.0 - outline.y_px - 0.5:.1f} of an image of "
+            f"{width} x {height} pixels"
         )
         raise CalibrationError(msg)
     if outline.radius_px < LEAST_RADIUS_PX:
@@ -171,38 +140,51 @@ def _judge(capture: Capture, outline: Outline, height: int, width: int) -> list[
     return []
 
 
+def _exposed(capture: Capture, levels: Levels, outline: Outline) -> tuple[Outline, list[Remark]]:
+    """The outline of a mirror ball with what clipped ground leaves of it.
+
+    Raises
+    ------
+    CalibrationError
+        Most of the lit ground beside it is clipped.
+    """
+    ground, ball = clipped_ground(levels, outline), clipped_ball(levels, outline)
+    findings = []
+    if ground > HIDDEN:
+        msg = (
+            f"{capture.name}: overexposed: {100 * ground:.0f} % of the ground beside the ball is clipped, at most "
+            f"{100 * HIDDEN:.0f} % leaves its edge to be seen; expose shorter (a bracket measures highlights, too), or "
+            "give its outline"
+        )
+        raise CalibrationError(msg)
+    if ground > TOUCHED:
+        message = (
+            f"{capture.name}: overexposed: {100 * ground:.0f} % of the ground beside the ball is clipped (limit "
+            f"{100 * TOUCHED:.0f} %), which moves its edge; expose shorter"
+        )
+        findings.append(Remark("doubt", message, "overexposed-ground", ground, TOUCHED))
+        u_px = moved_share(ground) * outline.radius_px
+        outline = replace(
+            outline,
+            u_centre_px=math.hypot(outline.u_centre_px, u_px),
+            u_radius_px=math.hypot(outline.u_radius_px, u_px),
+        )
+    if ball > BURNT:
+        message = (
+            f"{capture.name}: overexposed: {100 * ball:.0f} % of the ball is clipped (limit {100 * BURNT:.0f} %), "
+            "which hides highlights; expose shorter"
+        )
+        findings.append(Remark("doubt", message, "overexposed-ball", ball, BURNT))
+    return outline, findings
+
+
 def _pictures(levels: Levels) -> list[Array]:
     mean = levels.images.mean(axis=0)
     return [mean, levels.images.max(axis=0), np.log(np.maximum(mean, 0.0) + 2.0 * levels.noise)]
 
 
-def _sharpened(levels: Levels, outline: Outline | None, matt: bool) -> Outline | None:
-    """An outline as the pixels around it have it, where a law of their levels explains them."""
-    if outline is None:
-        return None
-    fitted = fit_rim(levels, outline, matt=matt)
-    if fitted is not None and float(np.abs(fitted.circle_px - outline.circle_px).max()) < STRAYED_PX:
-        return fitted
-    return replace(outline, u_radius_px=math.hypot(outline.u_radius_px, UNEXPLAINED_PX))
-
-
-def _joined(seen: Outline | None, stated_px: Array) -> Outline:
-    """Mean of a stated circle and what the images show, by their uncertainties."""
-    if seen is None:
-        return as_outline(stated_px, NOT_SEEN_U_PX)
-    centre, radius = (1.0 / (1.0 + (u / NOT_SEEN_U_PX) ** 2) for u in (seen.u_centre_px, seen.u_radius_px))
-    x, y, r = stated_px + np.array([centre, centre, radius]) * (seen.circle_px - stated_px)
-    u_centre, u_radius = (NOT_SEEN_U_PX * math.sqrt(1.0 - share) for share in (centre, radius))
-    return replace(seen, x_px=float(x), y_px=float(y), radius_px=float(r), u_centre_px=u_centre, u_radius_px=u_radius)
-
-
-def _overlap(one_px: Array, other_px: Array) -> bool:
-    """True where two circles can be meant for one ball."""
-    return bool(np.hypot(*(one_px[:2] - other_px[:2])) < 0.5 * max(one_px[2], other_px[2]))
-
-
-def _disc_of_mask(capture: Capture) -> Array | None:
-    """Circle of a mask that is a disc; None for any other mask, or one of all pixels."""
+def disc_of_mask(capture: Capture) -> Array | None:
+    """Return the circle of a mask that is a disc; None for any other mask, or one of all pixels."""
     mask = capture.mask
     if mask.all():
         return None

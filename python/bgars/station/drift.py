@@ -21,12 +21,21 @@ if TYPE_CHECKING:
     from bgars.records.light_calibration import LightCalibration
     from bgars.records.station import Station
 
-__all__ = ["drift"]
+__all__ = ["COMPARED", "drift"]
 
 COVERAGE = 2.0
 """Standard uncertainties, of both calibrations together, that a difference may have."""
 LIMIT_DEG, LIMIT_INTENSITY, LIMIT_EVENNESS = 0.5, 0.05, 0.03
 """What may change beside that: directions in degrees, intensities and evenness as shares."""
+LIMIT_LEVEL = 0.1
+"""All lights alike: LEDs lose some per cent while they warm up, which costs noise and bends nothing; a changed exposure
+or lens aperture is more."""
+LIMIT_SCALE = 0.005
+"""Magnification: heights and diameters change by the same share, 1.5 um of 300 um."""
+SAME_BALL = 0.02
+"""Spread of the radii of a calibration's balls, of their mean, up to which they are one ball or alike."""
+COMPARED = frozenset({"light-moved", "light-strength", "level", "scale", "evenness"})
+"""Codes of remarks that compare something with its limit."""
 
 
 def drift(
@@ -56,7 +65,8 @@ def drift(
     Returns
     -------
     tuple of Remark
-        One for each light and quantity: "fail" beyond the limit, "note" within; `value` is in `unit`.
+        One for each light and quantity, and for level and scale: "fail" beyond the limit, "note" within; `value` is in
+        `unit`. A note "not-compared" names what the station file, or this reference, cannot tell.
 
     Raises
     ------
@@ -107,7 +117,45 @@ def drift(
             )
             severity: Severity = "fail" if abs(change[index]) > limit else "note"
             found.append(Remark(severity, words, "light-strength", float(change[index]), limit, "", index))
-    return tuple(found)
+    return (*found, *_of_all(before, now))
+
+
+def _of_all(before: LightCalibration, now: LightCalibration) -> list[Remark]:
+    """Compare what all lights share: their level, and the size of the ball in pixels."""
+    found, missing = [], []
+    if before.level_by == now.level_by and before.level > 0 and now.level > 0:
+        us = [one.u_intensities for one in (before, now)]
+        u = math.hypot(*(0.0 if each is None else float(each.mean()) for each in us))
+        found.append(_level(now.level / before.level - 1.0, LIMIT_LEVEL + COVERAGE * u))
+    elif before.level_by and now.level_by:
+        missing.append(f"the level of all lights ({before.level_by} at calibration, {now.level_by} now)")
+    else:
+        when = "now" if before.level_by else "in the station file"
+        missing.append(f"the level of all lights (none {when})")
+    circles = np.array([ball.outline_px for ball in before.balls])
+    if not len(circles):
+        missing.append("the magnification (no outline in the station file)")
+    elif np.ptp(circles[:, 2]) > SAME_BALL * circles[:, 2].mean():
+        missing.append("the magnification (calibrated on balls of different sizes)")
+    else:
+        ball = now.balls[0]
+        x, y, radius = ball.outline_px
+        change = float(radius / circles[:, 2].mean()) - 1.0
+        # The outline of the calibration was known about as well as this one.
+        limit = LIMIT_SCALE + COVERAGE * math.sqrt(2.0) * float(ball.u_outline_px[2] / radius)
+        words = (
+            f"the ball's diameter in pixels changed by {100 * change:+.2f} % (limit {100 * limit:.2f} %): the "
+            "magnification, unless it is another ball"
+        )
+        found.append(Remark("fail" if abs(change) > limit else "note", words, "scale", change, limit))
+        moved = float(np.hypot(circles[:, 0] - x, circles[:, 1] - y).min())
+        missing.append(f"the place of the ball ({moved:.1f} px from that of the calibration; it is put there by hand)")
+    return [*found, Remark("note", f"not compared: {'; '.join(missing)}", "not-compared")] if missing else found
+
+
+def _level(change: float, limit: float) -> Remark:
+    words = f"the level of all lights changed by {100 * change:+.1f} % (limit {100 * limit:.1f} %): lamps or exposure"
+    return Remark("fail" if abs(change) > limit else "note", words, "level", change, limit)
 
 
 def _without_lens(lights: LightCalibration) -> np.ndarray:
@@ -155,4 +203,6 @@ def _even(station: Station, capture: Capture, limit_intensity: float) -> tuple[R
         words = f"{name}: its evenness changed by {100 * uneven:.1f} % (limit {100 * LIMIT_EVENNESS:.1f} %)"
         severity = "fail" if uneven > LIMIT_EVENNESS else "note"
         found.append(Remark(severity, words, "evenness", uneven, LIMIT_EVENNESS, "", index))
-    return tuple(found)
+    found.append(_level(float(new.mean() / old.mean()) - 1.0, LIMIT_LEVEL))
+    words = "not compared: the directions of the lights and the magnification (a board shows neither)"
+    return (*found, Remark("note", words, "not-compared"))

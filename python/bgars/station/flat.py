@@ -12,6 +12,7 @@ from bgars.errors import CalibrationError
 from bgars.files.light_names import light_name
 from bgars.records.flat_field import FlatField
 from bgars.records.remark import Remark
+from bgars.records.same_images import refuse_repeated
 from bgars.records.station_apply import flat_maps
 from bgars.station.levels import linear_levels
 
@@ -56,6 +57,8 @@ def calibrate_flat(capture: Capture) -> tuple[FlatField, tuple[Remark, ...]]:
     ------
     CalibrationError
         An image too dark or clipped, or no even board.
+    InputError
+        The same image twice.
 
     Examples
     --------
@@ -66,6 +69,7 @@ def calibrate_flat(capture: Capture) -> tuple[FlatField, tuple[Remark, ...]]:
     (2, True)
     """
     levels = linear_levels(capture)
+    refuse_repeated(capture)
     height, width = capture.mask.shape
     step = max(1, math.ceil(max(height, width) / BLOCKS))
     means, weights, x, y = _blocks(levels.images, capture.mask, step)

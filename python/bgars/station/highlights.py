@@ -59,6 +59,8 @@ class Spot:
     area_px: float
     second_share: float
     """Area of the next spot, of this one's."""
+    second_place: tuple[float, float]
+    """Row and column of that; of this one where there is none."""
     pixels: NDArray[np.intp]
     """(N, 2) rows and columns of its bright pixels."""
 
@@ -127,14 +129,11 @@ def find_spot(image: Array, still: Array, usable: NDArray[np.bool_], clip: float
     row, col = ndimage.center_of_mass(np.where(where, 1.0, 0.0))
     rows, cols = np.nonzero(where)
     extent = max(float(np.hypot(rows - row, cols - col).max()) + 0.5, 1.0)
-    apart = [
-        float(areas[index])
-        for index in order[1:]
-        if np.hypot(*(np.array(ndimage.center_of_mass(labels == which[index])) - [row, col])) > 3.0 * extent
-    ]
-    second = max(apart, default=0.0) / float(areas[order[0]])
-    peak_level = float(change[where].max())
-    return Spot(row, col, extent, peak_level, float(areas[order[0]]), second, np.column_stack([rows, cols]))
+    middles = ((float(areas[one]), *ndimage.center_of_mass(labels == which[one])) for one in order[1:])
+    apart = [one for one in middles if math.hypot(one[1] - row, one[2] - col) > 3.0 * extent]
+    second, *place = max(apart, default=(0.0, row, col))
+    peak_level, area = float(change[where].max()), float(areas[order[0]])
+    return Spot(row, col, extent, peak_level, area, second / area, (place[0], place[1]), np.column_stack([rows, cols]))
 
 
 def fit_highlight(

@@ -14,10 +14,13 @@ from bgars.records.capture import Capture
 from bgars.records.light_calibration import BallView, LightCalibration
 from bgars.records.remark import Remark
 from bgars.records.rig import LightRig
+from bgars.records.same_images import refuse_repeated
 from bgars.records.scalar_checks import check_pitch
 from bgars.records.whole_capture import need_whole
 from bgars.station.light_bundle import solve_lights
+from bgars.station.mirror_lights import together
 from bgars.station.observe import observe, outlines_a_capture
+from bgars.station.strengths import strengths_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -57,11 +60,12 @@ def calibrate_lights(
     CalibrationError
         No ball, a ball that is cut off or overexposed, a light whose highlight is on no ball.
     InputError
-        Captures with different numbers of images, or an outline of a wrong shape.
+        Captures with different numbers of images, the same image twice, or an outline of a wrong shape.
     """
     captures = [capture] if isinstance(capture, Capture) else list(capture)
     for each in captures:
         need_whole(each)
+        refuse_repeated(each)
     if sphere not in {"mirror", "matt"}:
         msg = f"sphere: must be 'mirror', 'matt' or 'balls', got {sphere!r}"
         raise InputError(msg)
@@ -76,9 +80,9 @@ def calibrate_lights(
     seen = observe(captures, sphere, outlines_a_capture(captures, outline), diameter_um, progress)
     balls, findings = seen.balls, seen.findings
     solution, pitch_um = _solve(captures, seen, diameter_um, near, findings)
-    intensities, u_intensities = _intensities(sphere, captures, seen, solution, findings)
-    rig = _rig(solution, pitch_um, intensities)
-    findings += _judge(solution, balls, captures, rig)
+    strengths = strengths_of(sphere, captures, seen, solution, findings)
+    rig = _rig(solution, pitch_um, strengths.relative)
+    findings += together(_judge(solution, balls, captures, rig), captures[0].name, len(rig))
     own = solution.u_own_deg
     alone = [ball.own_deg for ball in balls if ball.own_deg is not None]
     if alone:
@@ -93,8 +97,10 @@ def calibrate_lights(
         residual_px=_rms(solution.residuals_px),
         u_lens_deg=solution.u_lens_deg,
         u_positions_um=_u_positions(solution, pitch_um),
-        u_intensities=u_intensities,
+        u_intensities=strengths.u,
         lamp_deg=seen.lamp_deg,
+        level=strengths.level,
+        level_by=strengths.by,
         findings=tuple(findings),
     )
 
@@ -163,42 +169,6 @@ def _u_positions(solution: LightSolution, pitch_um: float | None) -> Array | Non
         columns = np.column_stack([*(solution.tangents[index] / w), -direction / w**2])
         found[index] = np.sqrt(np.diag(columns @ solution.covariance[index] @ columns.T))
     return found * pitch_um
-
-
-def _intensities(
-    sphere: str,
-    captures: list[Capture],
-    seen: Observed,
-    solution: LightSolution,
-    findings: list[Remark],
-) -> tuple[Array, Array | None]:
-    """Relative intensities, mean 1, and their scatter from ball to ball."""
-    usable = [row / row.mean() for row in seen.strengths if np.isfinite(row).all() and (row > 0).all()]
-    if usable:
-        mean = np.mean(usable, axis=0)
-        spread = np.std(usable, axis=0) if len(usable) > 1 else np.full(len(mean), 0.01 if sphere == "matt" else 0.03)
-        return mean / mean.mean(), np.maximum(spread, 0.002)
-    board = [np.median(one.images.reshape(len(one.images), -1), axis=1) for one in seen.levels]
-    level = np.mean(board, axis=0) / np.maximum(solution.directions[:, 2], 0.05)
-    least = 10.0
-    if np.min(board) > least:
-        findings.append(
-            Remark(
-                "note",
-                "intensities by the median level of the images (a matt board in view); the highlights are clipped",
-                "board-intensities",
-            )
-        )
-        return level / level.mean(), np.full(len(level), 0.03)
-    findings.append(
-        Remark(
-            "note",
-            f"{captures[0].name}: intensities not measured (clipped highlights, dark board): taken as equal; "
-            "bgars calibrate flat measures them",
-            "no-intensities",
-        )
-    )
-    return np.ones(len(solution.directions)), None
 
 
 def _judge(solution: LightSolution, balls: list[SeenBall], captures: list[Capture], rig: LightRig) -> list[Remark]:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from bgars.station.outline import Outline
     from bgars.station.small_spots import SmallSpot
 
-__all__ = ["SeenHighlights", "highlights_on"]
+__all__ = ["SeenHighlights", "highlights_on", "together"]
 
 Array = NDArray[np.float64]
 
@@ -40,6 +40,9 @@ ROUGH_SHARE = 0.15
 """Uncertainty of the middle of a highlight of any shape, of its radius."""
 ALIKE = {
     "wide-highlight": "wide highlights: broad lamps, a rough ball, or overexposed",
+    "two-highlights": "two highlights on the ball, the larger is taken, and u holds both; area of the second, of the "
+    "first one's",
+    "unsure": "directions are known to some degrees only",
     "no-disc": "the highlight is no disc; the middle of its bright pixels is taken",
 }
 FEW = 3
@@ -81,8 +84,8 @@ def highlights_on(capture: Capture, levels: Levels, outline: Outline, camera_px:
         wide_deg = math.degrees(4.0 * math.sqrt(spot.area_px / math.pi) / outline.radius_px)
         if wide_deg > TOO_WIDE_DEG:
             msg = (
-                f"{capture.name}: {name}: overexposed: its highlight covers {wide_deg:.0f} deg of directions, at most "
-                f"{TOO_WIDE_DEG:g} can be one lamp on a mirror; expose shorter, or use sphere 'matt'"
+                f"{capture.name}: {name}: overexposed or out of focus: its highlight covers {wide_deg:.0f} deg of "
+                f"directions, at most {TOO_WIDE_DEG:g} can be one lamp on a mirror; expose shorter, or sphere 'matt'"
             )
             raise CalibrationError(msg)
         if wide_deg > WIDE_DEG:
@@ -92,12 +95,12 @@ def highlights_on(capture: Capture, levels: Levels, outline: Outline, camera_px:
             )
             findings.append(Remark("doubt", message, "wide-highlight", wide_deg, WIDE_DEG, "deg", index))
         if spot.second_share > SECOND_SHARE:
+            share, limit = 100 * spot.second_share, 100 * SECOND_SHARE
             message = (
-                f"{capture.name}: {name}: two highlights on the ball (the second has "
-                f"{100 * spot.second_share:.0f} % of "
-                "the first one's area); the larger is taken"
+                f"{capture.name}: {name}: two highlights on the ball (the second has {share:.0f} % of the first one's "
+                "area); the larger is taken, and u holds both"
             )
-            findings.append(Remark("doubt", message, "two-highlights", spot.second_share, SECOND_SHARE, "", index))
+            findings.append(Remark("doubt", message, "two-highlights", share, limit, "%", index))
         spots[index] = spot
     small = [index for index, spot in spots.items() if spot.extent_px <= SMALL_PX and _saturated(levels, index, spot)]
     if small:
@@ -121,7 +124,12 @@ def highlights_on(capture: Capture, levels: Levels, outline: Outline, camera_px:
             continue
         places[index], covariances[index] = (fit.x_px, fit.y_px), fit.covariance_px2
         lamp_deg[index], flux[index] = fit.lamp_deg, fit.flux
-    return SeenHighlights(places, covariances, lamp_deg, flux, _together(findings, capture.name, count))
+    for index, spot in spots.items():
+        if spot.second_share > SECOND_SHARE:
+            # Either may be the lamp.
+            apart = np.array([spot.second_place[1] - spot.col, spot.row - spot.second_place[0]])
+            covariances[index] += np.outer(apart, apart)
+    return SeenHighlights(places, covariances, lamp_deg, flux, together(findings, capture.name, count))
 
 
 def _place_small(
@@ -142,8 +150,8 @@ def _place_small(
     ]
 
 
-def _together(findings: list[Remark], name: str, count: int) -> list[Remark]:
-    """Say once what is true of many lights."""
+def together(findings: list[Remark], name: str, count: int) -> list[Remark]:
+    """Say once what is true of many lights: of `count`, in the capture that is named."""
     kept = []
     for code, words in ALIKE.items():
         alike = [one for one in findings if one.code == code]

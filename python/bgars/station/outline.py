@@ -23,6 +23,8 @@ LEAST_SHARE, MOST_SHARE = 0.06, 0.62
 """Radii looked for, of the shorter side; more than half of it is a ball that is cut off."""
 FAINT = 1e-3
 """Change of the logarithm of the level, over a pixel, that is no edge."""
+VOTED_PX = 4.0
+"""Pixels of that image beside a known outline whose edges are its own: three widths of the filter, and one."""
 STRONGEST = 4000
 """Edge pixels that vote."""
 WINDOWS = (0.10, 0.05, 0.025)
@@ -102,14 +104,17 @@ def as_outline(circle_px: Array, u_px: float = 0.5) -> Outline:
 
 
 def find_outline(
-    pictures: list[Array], misfit: Callable[[Outline], float] | None = None, steps: Sequence[float] = ()
+    pictures: list[Array],
+    misfit: Callable[[Outline], float] | None = None,
+    steps: Sequence[float] = (),
+    beside: Outline | None = None,
 ) -> Outline | None:
     """Look for the outline of one ball in several pictures of it (H, W); None where there is no circle.
 
     `misfit` says how badly a circle explains what is inside it, where that can be told; else the ball is the largest
-    of the plainest circles.
+    of the plainest circles. Edges of a ball that is known already (`beside`) do not vote.
     """
-    starts = [start for picture in pictures if (start := _vote(picture)) is not None]
+    starts = [start for picture in pictures if (start := _vote(picture, beside)) is not None]
     # A mirror ball shows the horizon as a circle of 1 / sqrt(2) of its radius, often plainer than its own outline.
     starts += [start * [1.0, 1.0, math.sqrt(2.0)] for start in starts]
     found = [refined for start in starts if (refined := refine_outline(pictures, start, steps)) is not None]
@@ -143,7 +148,7 @@ def refine_outline(pictures: list[Array], start_px: Array, steps: Sequence[float
     )
 
 
-def _vote(picture: Array) -> Array | None:
+def _vote(picture: Array, beside: Outline | None = None) -> Array | None:
     """Circle on which most edges point to one centre (Duda & Hart 1972, with directions of edges)."""
     step = max(1, math.ceil(max(picture.shape) / COARSE_PX))
     height, width = picture.shape[0] // step, picture.shape[1] // step
@@ -154,6 +159,10 @@ def _vote(picture: Array) -> Array | None:
     tones = np.log(np.maximum(coarse, 0.0) + 0.02 * top)
     down, right = ndimage.gaussian_filter(tones, 1.0, order=(1, 0)), ndimage.gaussian_filter(tones, 1.0, order=(0, 1))
     size = np.hypot(down, right)
+    if beside is not None:
+        x = (np.arange(width) + 0.5) * step - picture.shape[1] / 2.0 - beside.x_px
+        y = picture.shape[0] / 2.0 - (np.arange(height) + 0.5) * step - beside.y_px
+        size[np.hypot(x[None, :], y[:, None]) < beside.radius_px + VOTED_PX * step] = 0.0
     places = np.argsort(size.ravel())[::-1][:STRONGEST]
     places = places[size.ravel()[places] > FAINT]
     if places.size == 0:
@@ -194,7 +203,10 @@ def _fit_edge(picture: Array, start_px: Array, step: float = 0.0) -> Outline | N
         if len(edge.angles) < 12:  # noqa: PLR2004 - three unknowns, and something to judge them by
             return None
         points = circle[:2] + edge.radii[:, None] * np.column_stack([np.cos(edge.angles), np.sin(edge.angles)])
-        fit = _circle(points, edge, circle, _rays(circle[2]), step)
+        try:
+            fit = _circle(points, edge, circle, _rays(circle[2]), step)
+        except np.linalg.LinAlgError:  # edges all on one side, or a circle that ran away: none
+            return None
         if fit is None:
             return None
         if (

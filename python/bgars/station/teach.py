@@ -93,8 +93,9 @@ def teach_text(taught: Taught) -> str:
     """Return the recipe as the text of a ``part.toml``."""
     lines = [
         f"# Golden parts: {taught.parts}; nominal = median; limits = nominal +- the larger of 4 sqrt(s^2 + u^2)",
-        "# and 5 %; position, coplanarity and warpage: the largest golden reading + 4 u. Put the drawing's "
-        "limits here.",
+        f"# and {100 * FLOOR_SHARE:.0f} %; position, coplanarity and warpage: the largest golden reading + 4 u, "
+        f"position {100 * POSITION_SHARE:.0f} % of the",
+        "# pitch at least. Put the drawing's limits here.",
         f"name = {json.dumps(taught.name)}",
         f"rows = {taught.rows}",
         f"cols = {taught.cols}",
