@@ -252,25 +252,6 @@ def normals(
 
 
 @app.command()
-def info(folder: FolderArgument, channel: ChannelChoice = None, as_json: JsonOption = False) -> None:
-    """Describe a capture: images, lights, scale, clipped pixels.
-
-    What 'bgars check' finds in it is told besides.
-    """
-    from bgars.cli.describe import describe, describe_in_words  # noqa: PLC0415 - loaded when it runs
-    from bgars.cli.first_check import check_first  # noqa: PLC0415 - as above
-
-    capture = bgars.read_capture(folder, channel=channel)
-    facts = describe(capture)
-    findings = check_first(capture, force=True)
-    if as_json:
-        print_json({**facts, **findings.to_dict()})
-        return
-    for line in describe_in_words(facts):
-        say(line)
-
-
-@app.command()
 def evaluate(
     folder: FolderArgument,
     method: Annotated[

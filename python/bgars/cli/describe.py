@@ -1,4 +1,4 @@
-"""What ``bgars info`` says of a capture."""
+"""``bgars info``: what a capture is."""
 
 from __future__ import annotations
 
@@ -6,12 +6,39 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+import bgars
+from bgars.cli.console import print_json, say
+from bgars.cli.first_check import check_first
+from bgars.cli.options import ChannelChoice, FolderArgument, JsonOption
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    import typer
+
     from bgars.records.capture import Capture
 
-__all__ = ["describe", "describe_in_words"]
+__all__ = ["describe", "describe_in_words", "register"]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("info")(info)
+
+
+def info(folder: FolderArgument, channel: ChannelChoice = None, as_json: JsonOption = False) -> None:
+    """Describe a capture: images, lights, scale, clipped pixels.
+
+    What 'bgars check' finds in it is told besides.
+    """
+    capture = bgars.read_capture(folder, channel=channel)
+    facts = describe(capture)
+    findings = check_first(capture, force=True)
+    if as_json:
+        print_json({**facts, **findings.to_dict()})
+        return
+    for line in describe_in_words(facts):
+        say(line)
 
 
 def describe(capture: Capture) -> dict[str, Any]:

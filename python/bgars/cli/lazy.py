@@ -15,6 +15,7 @@ from bgars.normals.methods import TABLE, method_names
 __all__ = ["LAZY_COMMANDS", "LazyGroup"]
 
 LAZY_COMMANDS = {
+    "info": ("bgars.cli.describe", "Describe a capture: images, lights, scale, clipped pixels."),
     "check": (
         "bgars.cli.check",
         "Check whether images and lights belong together, and find other faults of a capture.",
