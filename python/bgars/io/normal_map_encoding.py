@@ -14,6 +14,7 @@ from bgars.errors import FileFormatError
 from bgars.io.normal_map_background import border_color, is_cut_out
 from bgars.io.normal_map_blocks import mixed_with
 from bgars.io.normal_map_green import curl_of
+from bgars.records.response_curve import srgb_light
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -193,9 +194,7 @@ def _signed(values: FloatArray, bits: int) -> FloatArray:
 
 def _linear(values: FloatArray, bits: int) -> FloatArray:
     """The same where a program took the codes for a picture and gave them the curve of sRGB (IEC 61966-2-1)."""
-    share = values / np.float32(2**bits - 1)
-    light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)  # noqa: PLR2004 - of sRGB
-    signed = (light * 2.0 - 1.0).astype(np.float32)
+    signed = (srgb_light(values / np.float32(2**bits - 1)) * 2.0 - 1.0).astype(np.float32)
     step = np.float32(2.0 * 2.0 / (2**bits - 1))  # a code near half, where the curve is about twice as steep
     signed[np.abs(signed) <= step / 2] = 0.0
     return signed

@@ -8,6 +8,7 @@ import numpy as np
 
 from bgars.errors import FileFormatError, InputError
 from bgars.files.light_files import read_text
+from bgars.records.response_curve import srgb_light
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,8 +23,6 @@ Curve = tuple["NDArray[np.float64]", "NDArray[np.float64]"]
 """Grey levels (increasing) and the radiance of each."""
 
 COLUMNS = 2
-SRGB_LINEAR_BELOW, SRGB_SLOPE, SRGB_OFFSET, SRGB_EXPONENT = 0.04045, 12.92, 0.055, 2.4
-"""The constants of IEC 61966-2-1."""
 
 
 def gamma_curve(gamma: float, full_scale: float) -> Curve:
@@ -33,7 +32,7 @@ def gamma_curve(gamma: float, full_scale: float) -> Curve:
 
 
 def srgb_curve(full_scale: float) -> Curve:
-    """Inverse response of sRGB, the encoding of most JPEG files (IEC 61966-2-1, equations 5 and 6), finely sampled.
+    """Inverse response of sRGB, finely sampled.
 
     Examples
     --------
@@ -42,13 +41,7 @@ def srgb_curve(full_scale: float) -> Curve:
     0.215861
     """
     levels = np.linspace(0.0, full_scale, 1 << 16)
-    encoded = levels / full_scale
-    linear = np.where(
-        encoded <= SRGB_LINEAR_BELOW,
-        encoded / SRGB_SLOPE,
-        ((encoded + SRGB_OFFSET) / (1.0 + SRGB_OFFSET)) ** SRGB_EXPONENT,
-    )
-    return levels, linear
+    return levels, srgb_light(levels / full_scale)
 
 
 def read_response_table(path: Path, full_scale: float) -> Curve:

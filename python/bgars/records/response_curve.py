@@ -9,9 +9,24 @@ from numpy.typing import NDArray
 
 from bgars.records.short import Short
 
-__all__ = ["ResponseCurve"]
+__all__ = ["ResponseCurve", "srgb_light"]
 
 Array = NDArray[np.float64]
+
+SRGB_LINEAR_BELOW, SRGB_SLOPE, SRGB_OFFSET, SRGB_EXPONENT = 0.04045, 12.92, 0.055, 2.4
+"""The constants of IEC 61966-2-1."""
+
+
+def srgb_light(encoded: NDArray[np.floating]) -> Array:
+    """Light behind values 0 to 1 that sRGB encoded, the encoding of most JPEG files (IEC 61966-2-1, equations 5 and 6).
+
+    Examples
+    --------
+    >>> round(float(srgb_light(np.array([0.5]))[0]), 3)
+    0.214
+    """
+    curved = ((encoded + SRGB_OFFSET) / (1.0 + SRGB_OFFSET)) ** SRGB_EXPONENT
+    return np.where(encoded <= SRGB_LINEAR_BELOW, encoded / SRGB_SLOPE, curved)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares, nnls
 
 from bgars.errors import CalibrationError, InputError
 from bgars.records.remark import Remark
-from bgars.records.response_curve import ResponseCurve
+from bgars.records.response_curve import ResponseCurve, srgb_light
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -165,9 +165,7 @@ def srgb_response() -> ResponseCurve:
     0.214
     """
     levels = np.linspace(0.0, 1.0, 257)
-    linear, offset, slope, exponent = 0.04045, 0.055, 12.92, 2.4
-    radiances = np.where(levels <= linear, levels / slope, ((levels + offset) / (1.0 + offset)) ** exponent)
-    return ResponseCurve(levels, radiances, 0.0, "sRGB")
+    return ResponseCurve(levels, srgb_light(levels), 0.0, "sRGB")
 
 
 def _ramps(levels: Array) -> Array:
