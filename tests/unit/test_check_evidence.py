@@ -66,20 +66,25 @@ def told(capture: bgars.Capture) -> list[tuple[str, str, int | None]]:
 @pytest.mark.parametrize(
     ("change", "kind"),
     [
-        (lambda levels: np.full_like(levels, 100.0), "duplicate"),
         (lambda levels: np.broadcast_to(levels[3], levels.shape), "duplicate"),
         (lambda levels: 0.0 * levels, "dark"),
         (lambda levels: np.random.default_rng(0).uniform(0.0, 255.0, levels.shape), "noise"),
         (lambda levels: np.random.default_rng(1).normal(100.0, 60.0, levels.shape), "noise"),
         (lambda levels: levels + np.random.default_rng(0).normal(0.0, 25.0, levels.shape), "noise"),
     ],
-    ids=["blank", "one image", "black", "uniform noise", "normal noise", "drowned"],
+    ids=["one image", "black", "uniform noise", "normal noise", "drowned"],
 )
 def test_a_capture_without_information_is_refused(ball: bgars.Capture, change: object, kind: str) -> None:
     nothing = changed(ball, change)  # type: ignore[arg-type]
     assert told(nothing) == [("error", kind, None)]
     with pytest.raises(bgars.InputError, match="check=False continues"):
         bgars.reconstruct(nothing)
+
+
+def test_blank_images_are_told_but_may_be_a_simulated_plane(ball: bgars.Capture) -> None:
+    blank = changed(ball, lambda levels: np.full_like(levels, 100.0))
+    assert [(each.severity, each.kind) for each in bgars.check(blank).findings] == [("note", "duplicate")]
+    assert bgars.inspect(blank).verdict == "undecided"
 
 
 def test_faults_are_told_of_a_single_shiny_ball(ball: bgars.Capture) -> None:

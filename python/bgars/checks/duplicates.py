@@ -13,6 +13,7 @@ from bgars.records.same_images import same_images
 if TYPE_CHECKING:
     from bgars.checks.view import View
     from bgars.records.capture import Capture
+    from bgars.records.findings import Severity
 
 __all__ = ["alike_images", "check_all_alike", "check_duplicates"]
 
@@ -59,13 +60,17 @@ def check_all_alike(capture: Capture) -> list[Finding]:
     images = capture.images
     if len(images) < 2 or not all(np.array_equal(images[0], each) for each in images[1:]):  # noqa: PLR2004
         return []
+    is_blank = images[0].min() == images[0].max()
+    # A plane without texture is blank, too, where nothing adds noise, as in a simulation: its normals are right.
+    severity: Severity = "note" if is_blank else "error"
     return [
         Finding(
             "duplicate",
-            "error",
-            f"all {len(images)} images are the same picture",
-            "they hold no shading, so that nothing can be measured: look for one file under several names, lamps that "
-            "do not switch, or a camera that sends one frame again and again",
+            severity,
+            f"all {len(images)} images are {'one even grey' if is_blank else 'the same picture'}",
+            ("a plane looks so, and nothing else can be told" if is_blank else "they hold no shading")
+            + ": look for one file under several names, lamps that do not switch, or a camera that sends one frame again "
+            "and again",
         )
     ]
 
