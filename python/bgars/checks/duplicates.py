@@ -69,8 +69,7 @@ def check_all_alike(capture: Capture) -> list[Finding]:
             severity,
             f"all {len(images)} images are {'one even grey' if is_blank else 'the same picture'}",
             ("a plane looks so, and nothing else can be told" if is_blank else "they hold no shading")
-            + ": look for one file under several names, lamps that do not switch, or a camera that sends one frame again "
-            "and again",
+            + ": look for one file under several names, lamps that do not switch, or a camera that repeats one frame",
         )
     ]
 
