@@ -7,29 +7,20 @@ from dataclasses import fields, replace
 from functools import cache
 
 import bgars
+import demo_part
 import numpy as np
 from bgars.inspection.judge import judge_part
 from bgars.records.ball_layout import BallLayout
 from bgars.records.ball_result import BallResult
 from bgars.records.part_material import part_material
-from bgars.records.part_recipe import Limits, PartRecipe
+from bgars.records.part_recipe import PartRecipe
 from solder_fit import SOLDER_FIT
 from synthetic_parts import measured_part
 
 NASTY = "</script><script>document.title='owned'</script><img src=x onerror=\"document.title='owned'\">"
 CAMERA = bgars.Camera(pixel_pitch_um=25.0)
 RIG = bgars.LightRig.ring(4)
-LIMITS = Limits(
-    true_position_um=50.0,
-    diameter_um=(560.0, 640.0),
-    height_um=(460.0, 540.0),
-    aspect_ratio=(0.97, 1.03),
-    flat_top_depth_um=10.0,
-    pitch_um=(998.0, 1002.0),
-    seating_coplanarity_um=60.0,
-    regression_coplanarity_um=80.0,
-    warpage_um=50.0,
-)
+LIMITS = replace(demo_part.LIMITS, regression_coplanarity_um=80.0)
 
 
 @cache

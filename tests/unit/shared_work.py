@@ -15,7 +15,10 @@ FAILED = "failed"
 
 
 def shared(factory: pytest.TempPathFactory, name: str, make: Callable[[], Made]) -> Made:
-    """Return what `make()` returns: of the workers of a run one makes it, the others wait for it and read it."""
+    """Return what `make()` returns: of the workers of a run one makes it, the others wait for it and read it.
+
+    The time limit of their tests ends the wait, should that worker be killed.
+    """
     if "PYTEST_XDIST_WORKER" not in os.environ:
         return make()
     place = factory.getbasetemp().parent / f"{name}.pickle"

@@ -44,6 +44,12 @@ def test_colour_is_taken_as_its_luminance(dtype: DTypeLike, channels: int) -> No
     assert capture.dark.dtype == capture.images.dtype
 
 
+def test_colour_with_a_response_is_refused() -> None:
+    rgb = np.repeat(LEVELS[..., None], 3, axis=3)
+    with pytest.raises(bgars.InputError, match="images: must have one value per pixel with a response"):
+        bgars.Capture(rgb, RIG, np.ones((5, 7), bool), response=np.arange(256.0) ** 2)
+
+
 def test_what_is_hidden_in_one_channel_is_not_used() -> None:
     rgb = np.ma.array(np.repeat(LEVELS[..., None], 3, axis=3))
     rgb[2, 1, 4, 0] = np.ma.masked

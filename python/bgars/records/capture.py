@@ -94,6 +94,9 @@ class Capture(ShownCapture):
         if self.dark is not None:
             arrays["dark"] = _like(arrays["images"], plain("dark", self.dark))
         if self.response is not None:
+            if np.ndim(self.images) > STACK_NDIM:
+                msg = "images: must have one value per pixel with a response: luminance is a sum of light, not of codes"
+                raise InputError(msg)
             arrays["response"] = plain("response", self.response, np.float32)
         keep(self, arrays)
         keep(self, self._levels())

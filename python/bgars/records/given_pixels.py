@@ -25,8 +25,8 @@ def grey_pixels(name: str, pixels: ArrayLike) -> PixelArray:
     """Return pixels as the kernels read them, copied only where they are not so.
 
     Floats of other sizes become float32, whole numbers of other types uint8 where none is above 255, else uint16; of
-    (L, H, W, 3) the luminance is taken, of (L, H, W, 4) without the fourth
-    channel. What a numpy masked array hides is 0.
+    (L, H, W, 3) the luminance is taken, of (L, H, W, 4) without the fourth channel. What a numpy
+    masked array hides is 0.
 
     Raises
     ------
