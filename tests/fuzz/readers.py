@@ -112,6 +112,7 @@ def make_dialects(folder: Path) -> None:
         iio.imwrite(folder / f"d.{suffix}", np.stack([grey] * 3, axis=-1))
     np.save(folder / "d.npy", grey)
     iio.imwrite(folder / "d.tif", grey, plugin="pillow", compression="tiff_lzw")
+    (folder / "d.pfm").write_bytes(b"PF\n3 2\n1.0\n" + bytes(72))
     (folder / "d.hdr").write_bytes(
         b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 9\n" + (b"\2\2\0\x09" + b"\x89\x10" * 4) * 2
     )

@@ -86,6 +86,7 @@ IMAGES = {
     ".webp": picture("webp", RGBA),
     ".npy": saved(np.save, GREY),
     ".hdr": b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 9\n" + (b"\2\2\0\x09" + b"\x89\x10" * 4) * 2,
+    ".pfm": b"Pf\n3 2\n-1.0\n" + bytes(24),
     ".exr": b"\x76\x2f\x31\x01" + b"\2\0\0\0channels\0chlist\0" + bytes(80),
 }  # fmt: skip
 TABLES = {

@@ -119,3 +119,10 @@ def refused(folder: Path, *words: str) -> None:
     assert len(message) < 1500
     for word in words:
         assert re.search(re.escape(word), message), message
+
+
+def pfm(values: np.ndarray, order: str = "<") -> bytes:
+    """A PFM file of grey or RGB values."""
+    rows, columns = values.shape[:2]
+    head = f"{'Pf' if values.ndim == 2 else 'PF'}\n{columns} {rows}\n{'-1.0' if order == '<' else '1.0'}\n"
+    return head.encode() + values[::-1].astype(f"{order}f4").tobytes()

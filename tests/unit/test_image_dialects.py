@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from pathlib import Path
 
+import bgars
 import imageio.v3 as iio
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from case_captures import (
     COUNT,
     levels,
     names_of,
+    pfm,
     radiances,
     read_with_notes,
     reads_right,
@@ -40,6 +42,7 @@ LOSSY = "hardly ever linear"
         ("a{}.npy", []),
         ("a{}.exr", []),
         ("a{}.hdr", []),
+        ("a{}.pfm", []),
     ],
 )
 def test_formats(tmp_path: Path, pattern: str, words: list[str]) -> None:
@@ -53,6 +56,8 @@ def test_formats(tmp_path: Path, pattern: str, words: list[str]) -> None:
             write_exr(path, exact)
         elif path.suffix == ".hdr":
             write_hdr(path, exact, packed=bool(len(name) % 2))
+        elif path.suffix == ".pfm":
+            path.write_bytes(pfm(exact, order=">" if len(name) % 2 else "<"))
         elif path.suffix == ".webp":
             Image.fromarray(image).save(path, lossless=True)
         else:
@@ -84,9 +89,26 @@ def write_hdr(path: Path, image: np.ndarray, *, packed: bool) -> None:
     path.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n" + f"-Y {rows} +X {columns}\n".encode() + body)
 
 
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (b"Pf\n4 3\n-1.0\n" + bytes(47), "47 bytes of pixels, 48 expected"),
+        (b"PF\n4 x\n-1.0\n", "no PFM header"),
+        (b"Pf\n0 3\n-1.0\n", "0 x 3 pixels"),
+        (b"Pf\n900000000 900000000\n-1.0\n", "megapixels"),
+    ],
+)
+def test_a_damaged_pfm_is_refused(tmp_path: Path, content: bytes, told: str) -> None:
+    from bgars.io.image_formats import read_pixels  # noqa: PLC0415 - pixels alone
+
+    (tmp_path / "a.pfm").write_bytes(content)
+    with pytest.raises(bgars.FileFormatError, match=told):
+        read_pixels(tmp_path / "a.pfm", 100.0)
+
+
 @pytest.mark.parametrize("packed", [False, True])
 def test_radiance_values_are_exact(tmp_path: Path, packed: bool) -> None:
-    from bgars.io.image_formats import read_pixels  # noqa: PLC0415 - the only test of pixels alone
+    from bgars.io.image_formats import read_pixels  # noqa: PLC0415 - pixels alone
 
     exact = np.array([[0.5, 0.25, 1.0, 96.0, 0.75, 0.5, 0.5, 0.5, 2.0]] * 3)
     write_hdr(tmp_path / "a.hdr", exact, packed=packed)

@@ -14,6 +14,7 @@ import pytest
 import tifffile
 from bgars.cli.app import app
 from bgars.io.normal_map import read_stored_normals
+from case_captures import pfm
 from PIL import Image
 from scipy.io import savemat
 from typer.testing import CliRunner
@@ -167,6 +168,7 @@ READ: dict[str, tuple[Callable[[Path], Path], np.ndarray, str]] = {
     "TGA": (saved("n.tga", lambda path: Image.fromarray(codes(truth())).save(path)), MASK | True, ""),
     "WebP": (saved("n.webp", lambda path: Image.fromarray(codes(truth())).save(path, lossless=True)), MASK | True, ""),
     "Radiance HDR": (saved("n.hdr", radiance), MASK | True, "from 0 to 1"),
+    "PFM": (saved("n.pfm", lambda path: path.write_bytes(pfm(truth()))), MASK | True, ""),
     "EXR": (saved("n.exr", exr), MASK | True, ""),
 }
 

@@ -50,7 +50,7 @@ def shadows(*, hidden_share: float = 0.0) -> ShadowMap:
 
 @pytest.mark.parametrize("noise_levels", [1.0, 4.0])
 def test_shifts_are_seen_by_texture_within_their_uncertainty(noise_levels: float) -> None:
-    found = texture_shifts(Radiance(board(0.1, noise_levels=noise_levels)), shadows(), RING)
+    found = texture_shifts(Radiance(board(0.1, noise_levels=noise_levels)), shadows(), RING, threads=2)
     off = np.abs(found.move_px - MOVES) / found.u_px[:, None]
     assert off.max() < 3.0
     assert found.u_px[:4].max() < 0.02
@@ -68,12 +68,12 @@ def test_ridges_that_are_brighter_are_no_shift() -> None:
         shading = z - x * slope_right + y * slope_up
         images.append(np.clip(np.rint(120.0 * (1.0 + 1.5 * height) * shading), 0, 254))
     capture = bgars.Capture(np.array(images, np.uint8), bgars.LightRig.ring(LIGHTS), np.ones((SIDE, SIDE), np.bool_))
-    assert np.isinf(texture_shifts(Radiance(capture), shadows(), RING).u_px).all()
+    assert np.isinf(texture_shifts(Radiance(capture), shadows(), RING, threads=2).u_px).all()
 
 
 @pytest.mark.parametrize(("contrast", "hidden_share"), [(0.0, 0.0), (0.1, 0.95)])
 def test_without_texture_or_board_nothing_is_claimed(contrast: float, hidden_share: float) -> None:
-    found = texture_shifts(Radiance(board(contrast)), shadows(hidden_share=hidden_share), RING)
+    found = texture_shifts(Radiance(board(contrast)), shadows(hidden_share=hidden_share), RING, threads=1)
     size = np.hypot(*found.move_px.T)
     assert (size < 4.0 * found.u_px).all()
     assert found.u_px.min() > 0.1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -175,12 +176,15 @@ class ShadowPasses:
         problem, seen = self.problem, _as_seen(self.state.balls, self.state.common)
         azimuths = np.arctan2(self.state.vectors[:, 1], self.state.vectors[:, 0])
         radiance, sharp_px = problem.radiance, self.spread.sharp_px
-        fine = outline_centres(radiance, shadows, seen, azimuths, sharp_px)
         # Of some balls in the middle, looked for farther off, to tell whether an image is shifted.
         few = np.argsort(np.hypot(seen[:, 0], seen[:, 1]))[:SHIFT_BALLS]
-        self.outlines = outline_centres(radiance, shadows, seen[few], azimuths, sharp_px, coarse=True)
+        looks = [(seen, False), (seen[few], True)]
+        with ThreadPoolExecutor(self.threads) as pool:
+            fine, self.outlines = pool.map(
+                lambda look: outline_centres(radiance, shadows, look[0], azimuths, sharp_px, coarse=look[1]), looks
+            )
         by_outlines = agreed_shifts(image_shifts(self.outlines), image_shifts(fine))
-        self.shifts = with_texture(by_outlines, texture_shifts(radiance, shadows, self.state.vectors))
+        self.shifts = with_texture(by_outlines, texture_shifts(radiance, shadows, self.state.vectors, self.threads))
         self.priors = with_shifts(self.priors, self.shifts)
         if self.priors.shifts_px.any():
             fine = moved_back(fine, seen, self.priors.shifts_px)

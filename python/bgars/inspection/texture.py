@@ -12,6 +12,7 @@ seem to move by c l, each away from its lamp or towards it, as no part moves: th
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,6 +30,8 @@ Array = NDArray[np.float64]
 
 TILE_PX, MOST_TILES, FEWEST_TILES = 32, 96, 4
 """Side of a tile, how many are looked at, and of how few their scatter still says how good they are."""
+TOGETHER = 12
+"""Tiles that are worked on at once: their pixels under all lights fit a processor's cache."""
 BORDER_PX = 4
 """Around a tile, for filters and gradients."""
 LEAST_PIXELS = 192
@@ -49,7 +52,7 @@ CAUCHY = 2.5
 RIDGE = 1e-9
 
 
-def texture_shifts(radiance: Radiance, shadows: ShadowMap, vectors: Array) -> ImageShifts:
+def texture_shifts(radiance: Radiance, shadows: ShadowMap, vectors: Array, threads: int) -> ImageShifts:
     """Shifts of images against where most of them show the board; u is infinite where there is too little texture.
 
     Parameters
@@ -59,6 +62,7 @@ def texture_shifts(radiance: Radiance, shadows: ShadowMap, vectors: Array) -> Im
         Which board no ball hides or shadows, with margins.
     vectors : (L, 3) float64
         Towards the lights.
+    threads : int
     """
     lights = radiance.lights
     unknown = ImageShifts(np.zeros((lights, 2)), np.full(lights, np.inf))
@@ -66,7 +70,10 @@ def texture_shifts(radiance: Radiance, shadows: ShadowMap, vectors: Array) -> Im
     corners = _free_tiles(radiance, free, shadows.step)
     if len(corners) < FEWEST_TILES:
         return unknown
-    moves, information = _by_tile(radiance, shadows, free, corners)
+    with ThreadPoolExecutor(threads) as pool:
+        some = np.array_split(corners, -(-len(corners) // TOGETHER))
+        by_tile = list(pool.map(lambda few: _by_tile(radiance, shadows, free, few), some))
+    moves, information = (np.concatenate(parts) for parts in zip(*by_tile, strict=True))
     if len(moves) < FEWEST_TILES:
         return unknown
     move_px, u_px = _together(moves, information)

@@ -65,6 +65,7 @@ IMAGE_FORMATS = (
     ImageFormat("GIF", (".gif",), (b"GIF87a", b"GIF89a"), "pillow", lossy=True),
     ImageFormat("OpenEXR", (".exr",), (b"\x76\x2f\x31\x01",), "exr"),
     ImageFormat("Radiance HDR", (".hdr",), (b"#?RADIANCE", b"#?RGBE"), "hdr"),
+    ImageFormat("PFM", (".pfm",), (b"PF", b"Pf"), "pfm"),
     ImageFormat("NumPy array", (".npy",), (b"\x93NUMPY",), "npy", stack=True),
     ImageFormat("TGA", (".tga",), (), "pillow"),
 )

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["NORMAL_MAP_SUFFIXES", "Pixels", "is_normal_array", "read_pixels"]
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".ppm")
-OTHER_IMAGE_SUFFIXES = (".webp", ".tga", ".hdr")
+OTHER_IMAGE_SUFFIXES = (".webp", ".tga", ".hdr", ".pfm")
 """Of images that the compiled decoder does not read."""
 ARRAY_SUFFIXES = (".exr", ".npy", ".npz", ".mat")
 NORMAL_MAP_SUFFIXES = (*IMAGE_SUFFIXES, *OTHER_IMAGE_SUFFIXES, ".tif", ".tiff", *ARRAY_SUFFIXES)
