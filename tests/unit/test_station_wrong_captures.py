@@ -66,6 +66,20 @@ def test_a_dark_frame_beside_the_images_of_a_board_is_used_and_said(tmp_path: Pa
     np.testing.assert_allclose(*found, atol=0.01)
 
 
+def noisy(images: NDArray[np.uint8], seed: int) -> NDArray[np.uint8]:
+    noise = np.random.default_rng(seed).normal(0.0, 1.0, images.shape)
+    return np.clip(np.rint(images + noise), 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("sphere", ["mirror", "matt"])
+def test_a_lamp_that_fired_twice_is_named(mirror: NDArray[np.uint8], sphere: str) -> None:
+    images = mirror if sphere == "mirror" else render(LIGHTS, kind="matt", ball=SMALL, size=(180, 180), samples=2)
+    sound = bgars.calibrate_lights(capture_of(noisy(images, 1)), sphere)
+    assert not of_kind(sound, "one-lamp-twice")
+    found = bgars.calibrate_lights(capture_of(noisy(images[[0, 1, 2, 2]], 1)), sphere)
+    assert "image 2 (counted from 0) and image 3" in of_kind(found, "one-lamp-twice")[0]
+
+
 def of_kind(found: bgars.LightCalibration, code: str) -> list[str]:
     return [one.message for one in found.findings if one.code == code]
 

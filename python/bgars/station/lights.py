@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import combinations
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -24,6 +25,7 @@ from bgars.station.strengths import strengths_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+    from pathlib import Path
 
     from bgars.station.light_bundle import LightSolution
     from bgars.station.observe import Observed, SeenBall
@@ -42,6 +44,10 @@ UNSURE_DEG = 2.0
 """Standard uncertainty of a direction that is worth a word."""
 FAR_DEG = 15.0
 """Turn of a light against the rig that the capture brings, from which on the order of the images is doubted."""
+
+ONE_PLACE_DEG, ONE_PLACE_SIGMAS = (0.2, 1.0), 3.0
+"""Two lamps this near each other are one that was fired twice: within three standard uncertainties, but not below the
+width of the smallest LED, 1 mm at 300 mm, nor above what two housings need, 5 mm."""
 
 
 def calibrate_lights(
@@ -199,6 +205,7 @@ def _judge(solution: LightSolution, balls: list[SeenBall], captures: list[Captur
     for index in np.flatnonzero(solution.u_deg > UNSURE_DEG):
         message = f"{light_name(int(index), files)}: its direction is known to {solution.u_deg[index]:.1f} deg only"
         found.append(Remark("doubt", message, "unsure", float(solution.u_deg[index]), UNSURE_DEG, "deg", int(index)))
+    found += _judge_places(solution, files)
     declared = captures[0].rig
     if len(declared) == len(rig) and captures[0].folder is not None and declared.u_deg is None:
         turn = np.degrees(np.arccos(np.clip(declared.directions @ rig.directions.T, -1.0, 1.0)))
@@ -215,6 +222,23 @@ def _judge(solution: LightSolution, balls: list[SeenBall], captures: list[Captur
                 f"light {int(nearest[first])} is"
             )
             found.append(Remark("note", message, "order", light=first))
+    return found
+
+
+def _judge_places(solution: LightSolution, files: Sequence[Path]) -> list[Remark]:
+    """Lights that stand in one place: two photographs of one lamp."""
+    found: list[Remark] = []
+    for one, two in combinations(range(len(solution.directions)), 2):
+        chord = float(np.linalg.norm(solution.directions[one] - solution.directions[two]))
+        apart = math.degrees(2.0 * math.asin(min(chord / 2.0, 1.0)))
+        limit = float(np.clip(ONE_PLACE_SIGMAS * math.hypot(*solution.u_own_deg[[one, two]]), *ONE_PLACE_DEG))
+        if apart < limit:
+            first, second = (light_name(each, files, what="image") for each in (one, two))
+            message = (
+                f"{first} and {second} show a lamp in the same place, {apart:.2f} deg "
+                "apart: was one lamp fired twice, and another not at all?"
+            )
+            found.append(Remark("doubt", message, "one-lamp-twice", apart, limit, "deg", two))
     return found
 
 
