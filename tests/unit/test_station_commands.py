@@ -18,7 +18,7 @@ from bgars.cli.station_output import write_pages
 from bgars.io.capture import read_unlit
 from bgars.records.remark import Remark
 from bgars.station import response_from_bracket, verify
-from bgars.station.scale import fit_grid
+from bgars.station.grid_fit import fit_grid
 from bgars.station.verify import Known, read_known
 from numpy.typing import NDArray
 from rendered_spheres import render, ring

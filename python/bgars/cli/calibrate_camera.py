@@ -11,7 +11,7 @@ import numpy as np
 import typer
 
 import bgars
-from bgars.cli.calibrate_station import FolderArgument, JsonOption, OutputOption, said_values
+from bgars.cli.calibrate_station import JsonOption, OutputOption, said_values
 from bgars.cli.console import print_json, say
 from bgars.cli.station_output import existing_station, keep_part, tell_findings
 from bgars.errors import InputError
@@ -70,7 +70,7 @@ def response(
             capture = read_unlit(folder)
         full = capture.full_scale if math.isfinite(capture.full_scale) else float(capture.images.max())
         if exposures is not None:
-            curve, findings = response_from_bracket(list(capture.images), _times(exposures), full)
+            curve, findings = response_from_bracket(list(capture.images), _numbers(exposures, "--exposures"), full)
         else:
             if len(capture.images) != SUMS:
                 msg = f"{folder}: --sums needs three images (a, b, both), got {len(capture.images)}"
@@ -90,7 +90,10 @@ def response(
 
 
 def scale(
-    folder: FolderArgument,
+    folders: Annotated[
+        list[Path],
+        typer.Argument(metavar="FOLDERS...", help="Grid where parts lie; or at several heights.", show_default=False),
+    ],
     output: OutputOption,
     pitch_mm: Annotated[
         float, typer.Option(metavar="MM", help="Distance of neighbouring dots or crossings.", show_default=False)
@@ -100,19 +103,41 @@ def scale(
         typer.Option(metavar="MM", help="Its standard uncertainty; 0.01 % by default.", show_default=False),
     ] = None,
     target: Annotated[Literal["dots", "chessboard"], typer.Option(help="Kind of target.")] = "dots",
+    heights_mm: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MM,MM,...",
+            help="Height of the grid above the board in each folder: gives the distance of the camera, and the tilt.",
+            show_default=False,
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Measure the pixel pitch on a grid that lies where parts lie; says how much the lens distorts."""
+    """Measure the pixel pitch on a grid that lies where parts lie; says how much the lens distorts.
+
+    With the grid at two known heights or more, also how far the camera is, or that it is telecentric.
+    """
     existing_station(output)
     u_um = None if u_pitch_mm is None else 1000.0 * u_pitch_mm
-    found, findings = bgars.calibrate_scale(read_unlit(folder), 1000.0 * pitch_mm, target=target, u_pitch_um=u_um)
+    if len(folders) > 1 and heights_mm is None:
+        msg = f"--heights-mm: needed with several folders ({len(folders)}): the height of the grid in each"
+        raise InputError(msg)
+    heights_um = None if heights_mm is None else [1000.0 * height for height in _numbers(heights_mm, "--heights-mm")]
+    grids = [read_unlit(folder) for folder in folders]
+    found, findings = bgars.calibrate_scale(
+        grids, 1000.0 * pitch_mm, target=target, u_pitch_um=u_um, heights_um=heights_um
+    )
     keep_part(output, {"scale": found}, findings)
     if as_json:
+        is_telecentric = found.camera_distance_mm is not None and math.isinf(found.camera_distance_mm)
         values = {"pixel_pitch_um": found.pixel_pitch_um, "pixel_pitch_u_um": found.pixel_pitch_u_um}
         print_json(
             {
                 **values,
                 "distortion": found.distortion,
+                "camera_distance_mm": None if is_telecentric else found.camera_distance_mm,
+                "telecentric": is_telecentric,
+                "tilt_deg": None if math.isnan(found.tilt_deg) else found.tilt_deg,
                 "points": found.points,
                 **said_values(findings),
                 "file": str(output),
@@ -137,9 +162,9 @@ def _made_before(known: Station, curve: ResponseCurve) -> list[Remark]:
     return found
 
 
-def _times(text: str) -> list[float]:
+def _numbers(text: str, option: str) -> list[float]:
     try:
         return [float(value) for value in text.split(",")]
     except ValueError:
-        msg = f"--exposures: must be numbers with commas between, got {text!r}"
+        msg = f"{option}: must be numbers with commas between, got {text!r}"
         raise InputError(msg) from None

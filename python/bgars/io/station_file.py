@@ -230,4 +230,8 @@ def _lights_values(lights: LightCalibration) -> dict[str, Any]:
 def _table(name: str, values: dict[str, Any]) -> list[str]:
     """A table of TOML; JSON's numbers, texts and arrays are TOML's, too. None and NaN are left out."""
     kept = {key: value for key, value in values.items() if value is not None and value == value}  # noqa: PLR0124 - NaN
-    return ["", f"[{name}]", *(f"{key} = {json.dumps(value)}" for key, value in kept.items())]
+    return [
+        "",
+        f"[{name}]",
+        *(f"{key} = {'inf' if value == math.inf else json.dumps(value)}" for key, value in kept.items()),
+    ]

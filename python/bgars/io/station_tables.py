@@ -14,6 +14,8 @@ __all__ = ["FlatTable", "LightsTable", "ResponseTable", "ScaleTable", "StationFi
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
+Distance = Annotated[float, Field(gt=0)]
+"""May be endless."""
 Vector = tuple[Number, Number, Number]
 
 
@@ -101,12 +103,14 @@ class ScaleTable(Strict):
 
     pixel_pitch_um: Positive = Field(description="size of a pixel on the board")
     pixel_pitch_u_um: Positive = Field(description="its standard uncertainty")
-    tilt_deg: Number | None = Field(None, description="tilt of the grid against the image plane; not measured")
+    tilt_deg: Number | None = Field(
+        None, description="tilt of the grid against the image plane, if the distance of the camera is known"
+    )
     rotation_deg: Number = Field(0.0, description="rotation of the grid in the image")
     distortion: Number = Field(0.0, description="radial displacement at the corner over its distance from the centre")
     residual_px: NotNegative = Field(0.0, description="root mean square residual of the points of the grid")
     points: int = Field(0, description="number of points of the grid")
-    camera_distance_mm: Positive | None = Field(None, description="distance of the camera, if written by hand")
+    camera_distance_mm: Distance | None = Field(None, description="distance of the camera; inf: telecentric")
 
 
 class VerifyTable(Strict):

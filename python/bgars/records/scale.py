@@ -16,7 +16,7 @@ class Scale:
     pixel_pitch_um, pixel_pitch_u_um : float
         Size of a pixel on the board, at the image centre, and its standard uncertainty.
     tilt_deg : float
-        Angle of the grid against the image plane; NaN where it cannot be measured (telecentric lens).
+        Angle of the grid against the image plane; NaN where the distance of the camera is not known, or endless.
     rotation_deg : float
         Of the grid in the image, counter-clockwise.
     distortion : float
@@ -26,7 +26,7 @@ class Scale:
     points : int
         Points of the grid.
     camera_distance_mm : float or None
-        Where it is known.
+        From the camera to the board, by grids at two heights or more; infinite of a telecentric lens.
     """
 
     pixel_pitch_um: float

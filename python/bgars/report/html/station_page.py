@@ -188,8 +188,17 @@ def _scale(scale: Scale) -> Iterable[str]:
     yield (
         f"<p>A pixel is {scale.pixel_pitch_um:.4f} um (u {scale.pixel_pitch_u_um:.2g} um) by {scale.points} "
         "points, residual "
-        f"{scale.residual_px:.3f} px; distortion at the corners {100 * scale.distortion:.2f} %.</p>"
+        f"{scale.residual_px:.3f} px; distortion at the corners {100 * scale.distortion:.2f} %{_camera(scale)}.</p>"
     )
+
+
+def _camera(scale: Scale) -> str:
+    if scale.camera_distance_mm is None:
+        return ""
+    if math.isinf(scale.camera_distance_mm):
+        return "; the lens is telecentric"
+    tilt = "" if math.isnan(scale.tilt_deg) else f"; the grid was tilted by {scale.tilt_deg:.2f} deg"
+    return f"; the camera is {scale.camera_distance_mm:.1f} mm above the board{tilt}"
 
 
 def _verified(station: Station) -> Iterable[str]:
