@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from bgars.errors import FileFormatError, InputError
+from bgars.store.read_only import need_reading
 from bgars.store.repair import raise_damage
 from bgars.store.schema import OLD_NAMES, TABLES, arrow_schema
 
@@ -76,7 +77,7 @@ def query(folder: Path, sql: str) -> Any:  # noqa: ANN401 - pyarrow has no types
     Raises
     ------
     InputError
-        DuckDB is not installed, or refuses the question.
+        DuckDB is not installed or refuses the question, or this is no single SELECT that only reads.
     FileFormatError
         A file of the store cannot be read.
     """
@@ -84,10 +85,8 @@ def query(folder: Path, sql: str) -> Any:  # noqa: ANN401 - pyarrow has no types
     for attempt in range(TRIES):
         try:
             with connect(folder) as connection:
-                answer = connection.sql(sql)
-                if answer is None:
-                    break
-                return answer.to_arrow_table()
+                need_reading(connection, sql)
+                return connection.sql(sql).to_arrow_table()
         except duckdb.Error as error:
             is_file = isinstance(error, duckdb.IOException)
             if is_file and attempt + 1 < TRIES and any(word in str(error) for word in LOST):
@@ -100,8 +99,8 @@ def query(folder: Path, sql: str) -> Any:  # noqa: ANN401 - pyarrow has no types
                 raise FileFormatError(msg) from error
             msg = f"query: {_one_line(error)}"
             raise InputError(msg) from error
-    msg = f"query: must be a query that returns rows, such as 'select count(*) from parts', got {sql!r}"
-    raise InputError(msg)
+    msg = f"{folder}: files of the store go while they are read; try again"
+    raise FileFormatError(msg)
 
 
 def connect(folder: Path) -> Any:  # noqa: ANN401 - duckdb's connection
