@@ -71,7 +71,8 @@ def watch(
         str,
         typer.Option(
             metavar="PATTERN",
-            help="Pattern of images in INBOX itself, such as '{serial}_{image}.png'; needs --count.",
+            help="Pattern of images in INBOX itself, such as '{serial}_{image}.png', or {number} for digits; needs "
+            "--count.",
             show_default=False,
         ),
     ] = "",

@@ -25,7 +25,8 @@ __all__ = ["CODE", "Naming", "identity_of", "with_capture"]
 CODE = "code"
 """A pattern that asks for the code in the images."""
 NAMES = ("serial", *(entry.name for entry in fields(PartIdentity) if entry.name != "captured_utc"))
-FORMS = {"round": "0*[1-9][0-9]{0,5}"}
+SHORT, LONG = "?", ""
+"""What follows a repetition that is to be as short, or as long, as it can be."""
 DEFAULT_PATTERN = "{serial}"
 
 
@@ -79,20 +80,23 @@ class Naming:
         Raises
         ------
         InputError
-            The name does not follow the pattern, and the side file names no serial number.
+            The name does not follow the pattern, or in more than one way, and the side file names no serial number.
         """
         known = _side_file(folder if side is None else side)
         found: dict[str, Any] = {}
         if self.pattern != CODE:
             depth = self.pattern.count("/") + 1
             told = "/".join(folder.absolute().parts[-depth:])
-            match = self._expression().fullmatch(told)
-            if match is not None:
+            match, other = (self._expression(many).fullmatch(told) for many in (SHORT, LONG))
+            if match is not None and other is not None and match.groupdict() == other.groupdict():
                 found = match.groupdict()
                 if "round" in found:
                     found["round"] = int(found["round"])
             elif not known.get("serial"):
                 msg = f"{folder}: its name must follow the pattern {self.pattern!r}, got {told!r}"
+                if match is not None and other is not None:
+                    ways = f"{match['serial']!r} or {other['serial']!r}"
+                    msg = f"{folder}: its name fits {self.pattern!r} in more than one way: serial number {ways}"
                 raise InputError(msg)
         values = self.common.known() | found | known
         serial = values.pop("serial", "")
@@ -114,8 +118,8 @@ class Naming:
             raise InputError(msg)
         return text
 
-    def _expression(self) -> re.Pattern[str]:
-        """The pattern as a regular expression; every name once, each as short as it can be."""
+    def _expression(self, many: str = SHORT) -> re.Pattern[str]:
+        """The pattern as a regular expression; every name once, each as short, or as long, as it can be."""
         pieces = re.split(r"\{(\w*)\}", self.pattern)
         names = pieces[1::2]
         unknown = next((name for name in names if name not in NAMES), None)
@@ -125,8 +129,9 @@ class Naming:
         if "serial" not in names or len(set(names)) < len(names):
             msg = f"serial-from: must hold {{serial}}, and each name once, got {self.pattern!r}"
             raise InputError(msg)
+        forms = {"round": f"0*[1-9][0-9]{{0,5}}{many}"}
         told = "".join(
-            f"(?P<{piece}>{FORMS.get(piece, '[^/]+?')})" if at % 2 else re.escape(piece)
+            f"(?P<{piece}>{forms.get(piece, f'[^/]+{many}')})" if at % 2 else re.escape(piece)
             for at, piece in enumerate(pieces)
         )
         return re.compile(told)
