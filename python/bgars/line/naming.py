@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bgars.errors import InputError
+from bgars.files.encodable import encodable, is_encodable
 from bgars.io.recipe import RECIPE_NAME, CaptureRecipe, read_recipe
 from bgars.io.strict_toml import read_values
 from bgars.records.part_identity import PartIdentity
@@ -82,6 +83,9 @@ class Naming:
         InputError
             The name does not follow the pattern, or in more than one way, and the side file names no serial number.
         """
+        if not is_encodable(folder.name):
+            msg = f"{encodable(str(folder))}: its name must be UTF-8"
+            raise InputError(msg)
         known = _side_file(folder if side is None else side)
         found: dict[str, Any] = {}
         if self.pattern != CODE:
@@ -99,8 +103,7 @@ class Naming:
                     msg = f"{folder}: its name fits {self.pattern!r} in more than one way: serial number {ways}"
                 raise InputError(msg)
         values = self.common.known() | found | known
-        serial = values.pop("serial", "")
-        return serial, PartIdentity(**values)
+        return _printable(folder, values.pop("serial", "")), PartIdentity(**values)
 
     def of_capture(self, folder: Path, capture: Capture, serial: str) -> str:
         """Return the serial number, read from the images where the pattern is ``code`` and nothing named one.
@@ -116,7 +119,7 @@ class Naming:
         if not text:
             msg = f"{folder}: no DataMatrix or QR code can be read in its images"
             raise InputError(msg)
-        return text
+        return _printable(folder, text)
 
     def _expression(self, many: str = SHORT) -> re.Pattern[str]:
         """The pattern as a regular expression; every name once, each as short, or as long, as it can be."""
@@ -144,8 +147,17 @@ def identity_of(capture: Capture, common: PartIdentity, station: Path | None = N
     """
     known = {} if capture.folder is None else _side_file(capture.folder)
     values = common.known() | known
-    serial = values.pop("serial", "")
+    serial = _printable(capture.folder, values.pop("serial", ""))
     return serial, with_capture(PartIdentity(**values), capture, station)
+
+
+def _printable(folder: Path | None, serial: str) -> str:
+    """A serial number, unless it would not stay one line in a log, an environment variable or a name of a file."""
+    if serial and not serial.isprintable():
+        where = "" if folder is None else f"{encodable(str(folder))}: "
+        msg = f"{where}serial: must be one printable line, got {serial!r}"
+        raise InputError(msg)
+    return serial
 
 
 def with_capture(identity: PartIdentity, capture: Capture, station: Path | None = None) -> PartIdentity:

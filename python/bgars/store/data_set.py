@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bgars.errors import FileFormatError, InputError
+from bgars.files.encodable import encodable
 from bgars.io.parquet import need_pyarrow
 from bgars.store.append import PARTIAL, append_rows, partition, write_durably
 from bgars.store.compact import compact
@@ -79,7 +80,8 @@ class Store:
         if key in self.known():
             return False
         _raise_version(self.folder / MARK)
-        rows = result_rows(result, sequence=self._next_sequence(), capture_folder=capture_folder, seconds=seconds)
+        folder = encodable(capture_folder)
+        rows = result_rows(result, sequence=self._next_sequence(), capture_folder=folder, seconds=seconds)
         place = partition(result.inspected_utc[:10], result.name if result.recipe is not None else "")
         append_rows(self.folder, place, f"p-{key[:40]}", rows)
         self._parts().add(self.folder / "parts" / place / f"p-{key[:40]}.parquet", rows["parts"][0])
@@ -117,6 +119,7 @@ class Store:
     ) -> None:
         """Keep why a capture could not be inspected; a later success hides it from queries."""
         now = datetime.now(timezone.utc)
+        capture_folder, serial = encodable(capture_folder), encodable(serial)
         key = failure_key(capture_folder, serial=serial, recipe=recipe, version=version)
         row = {
             "part_key": key,
@@ -125,7 +128,7 @@ class Store:
             "lot": lot,
             "capture_folder": capture_folder,
             "failed_utc": now.replace(tzinfo=None),
-            "reason": " ".join(reason.split()),
+            "reason": " ".join(encodable(reason).split()),
             "version": version,
         }
         place = partition(now.strftime(TIME_FORM)[:10], recipe)
