@@ -58,11 +58,13 @@ FROM {files} s JOIN parts_taken p ON s.part_key = p.part_key AND parse_filename(
 WHERE p.is_latest;
 """
 FAILURES = """
-CREATE VIEW failures AS SELECT * EXCLUDE (filename, copy) FROM (
-    SELECT *, row_number() OVER (PARTITION BY part_key ORDER BY sequence DESC, filename) AS copy FROM {failures}) f
-WHERE copy = 1 AND NOT EXISTS (
+CREATE VIEW failures_taken AS SELECT * EXCLUDE (filename, copy) FROM (
+    SELECT *, row_number() OVER (PARTITION BY part_key ORDER BY sequence DESC, filename) AS copy FROM {failures})
+WHERE copy = 1;
+CREATE VIEW failures AS SELECT * FROM failures_taken f WHERE NOT EXISTS (
     SELECT 1 FROM parts_taken p
-    WHERE p.sequence > f.sequence
+    -- A success under another recipe, such as for the other side, says nothing; 'none' is of before it was known.
+    WHERE p.sequence > f.sequence AND (f.recipe = p.recipe OR f.recipe = 'none')
       AND ((f.serial <> '' AND p.serial = f.serial)
            OR (p.capture_folder = f.capture_folder
                -- Another part of the same strip, which is named STRIP-PLACE, says nothing of this one.
