@@ -60,12 +60,11 @@ class FolderCamera:
             described = [name for name in list_folder(folder).images if Path(name).suffix.lower() in IMAGES]
         self.files = [folder / name for name in described]
         lost = next((path for path in self.files if not path.is_file()), None)
-        if lost is not None or not self.files:
-            msg = (
-                f"{folder}: holds no images"
-                if lost is None
-                else f"{folder / RECIPE_NAME}: images: no such file: {lost}"
-            )
+        if lost is not None:
+            msg = f"{folder / RECIPE_NAME}: images: no such file: {lost}"
+            raise FileFormatError(msg)
+        if not self.files:
+            msg = f"{folder}: holds no images"
             raise FileFormatError(msg)
 
     def grab(self, light: int) -> NDArray[Any]:

@@ -9,10 +9,12 @@ from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import unquote
 
 from bgars.errors import FileFormatError, InputError
 from bgars.files.encodable import encodable
 from bgars.io.parquet import need_pyarrow
+from bgars.records.short import facts_table
 from bgars.store.append import PARTIAL, append_rows, partition, write_durably
 from bgars.store.compact import compact
 from bgars.store.export import export
@@ -50,6 +52,18 @@ class Store:
 
     def __repr__(self) -> str:
         return f"Store({str(self.folder)!r})"
+
+    def _repr_html_(self) -> str:
+        """What the store holds, for notebooks; only names of folders are read, and keys once."""
+        places = sorted((self.folder / "parts").glob("day=*/recipe=*"))
+        days = sorted({place.parent.name.removeprefix("day=") for place in places})
+        facts = {
+            "folder": self.folder,
+            "parts": f"{len(self.known())} (all inspections)",
+            "recipes": ", ".join(sorted({unquote(place.name.removeprefix("recipe=")) for place in places})) or "none",
+            "days": " to ".join(dict.fromkeys((days[0], days[-1]))) if days else "none",
+        }
+        return facts_table("Store", facts)
 
     def append(self, result: PartResult, *, capture_folder: str = "", seconds: float = math.nan) -> bool:
         """Add a result, durably and whole, unless it is there; with the round of :meth:`numbered`.
