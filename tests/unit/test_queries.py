@@ -78,6 +78,21 @@ def test_no_cell_of_csv_is_a_formula(store: bgars.Store) -> None:
     assert rows == [["'=name", "at", "number", "list"], ["'=1+2", "'@x", "-1.5", "'+a; b"]]
 
 
+def test_json_has_every_column_and_every_kind_of_value(store: bgars.Store) -> None:
+    sql = """select 1 as a, 2 as a, {'x': 1, 'y': ['nan'::double]} as s, '\\xAA'::blob as b,
+        interval '1 month 2 days 3.5 seconds' as i, time '10:11:12' as t, timestamptz '2026-01-02 10:00:00+02' as z,
+        map {'k': 1} as m, sum(1) as n, date '2026-01-02' as d"""
+    answer = json.loads(run(store.folder, sql, "--json").output)
+    assert answer["columns"] == ["a", "a_1", "s", "b", "i", "t", "z", "m", "n", "d"]
+    assert list(answer["rows"][0].values()) == [
+        *(1, 2, {"x": 1, "y": [None]}, "aa", "P1M2DT3.5S", "10:11:12"),
+        *("2026-01-02T08:00:00Z", [["k", 1]], 1, "2026-01-02"),
+    ]
+    assert type(answer["rows"][0]["n"]) is int
+    cells = next(csv.reader([run(store.folder, sql, "--csv").output.splitlines()[1]]))
+    assert cells[2] == '{"x": 1, "y": [null]}'
+
+
 @pytest.mark.parametrize(
     ("sql", "words"),
     [
