@@ -169,7 +169,7 @@ def test_a_mistyped_folder_leaves_no_store(tmp_path: Path) -> None:
 
 def test_bad_numbers_and_recipes_are_refused_before_any_work(tmp_path: Path) -> None:
     folder = copy_capture(tmp_path / "in")
-    with pytest.raises(bgars.InputError, match="processes: must be 1 or more, got 0"):
+    with pytest.raises(bgars.InputError, match="processes: must be a whole number of 1 or more, got 0"):
         bgars.inspect_many([folder], processes=0)
     with pytest.raises(bgars.FileFormatError, match=r"none\.toml"):
         bgars.inspect_many([folder], tmp_path / "none.toml")
@@ -231,3 +231,29 @@ def test_the_command_says_what_it_did(tmp_path: Path) -> None:
     assert run.exit_code == 0, "nothing new that does not pass"
     assert "1 were in the store" in run.output
     assert bgars.open_store(tmp_path / "s").query("select lot from parts")["lot"].to_pylist() == ["L1"]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"method": "magic"}, "method: must be one of"),
+        ({"naming": "serial"}, r"naming: must be a Naming, such as .*, got 'serial'"),
+        ({"processes": 1.5}, r"processes: must be a whole number of 1 or more, got 1\.5"),
+        ({"threads": True}, "threads: must be a whole number"),
+        ({"store": 5}, "store: must be a path, got 5"),
+        ({"recipe": 5}, "recipe: must be a path, got 5"),
+        ({"folders": [5]}, "folders: must be paths, got 5"),
+        ({"folders": 5}, "folders: must be paths, got 5"),
+    ],
+)
+def test_wrong_arguments_are_refused_before_the_first_capture(options: dict[str, object], words: str) -> None:
+    with pytest.raises(bgars.InputError, match=words):
+        bgars.inspect_many(**{"folders": [bgars.sample_capture()], **options})
+
+
+def test_one_folder_needs_no_list_and_what_became_of_it_is_one_line(tmp_path: Path) -> None:
+    copy_capture(tmp_path / "in" / "P0")
+    done = bgars.inspect_many(str(tmp_path / "in"), store=tmp_path / "store", processes=1)
+    assert repr(done).startswith("Batch(total=1, pass=0, fail=0, undecided=1, known=0, failures=0, seconds=")
+    shown = bgars.open_store(tmp_path / "store")._repr_html_()
+    assert "<td style='text-align:left'>1 (all inspections)</td>" in shown

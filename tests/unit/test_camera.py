@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import bgars
+import imageio.v3 as iio
 import numpy as np
 import pytest
 from bgars.cli.app import app
@@ -30,6 +31,19 @@ def test_a_capture_through_a_camera_is_what_the_camera_showed(tmp_path: Path) ->
     assert run.exit_code == 0, run.output
     assert np.array_equal(bgars.read_capture(out).images, bgars.read_capture(bgars.sample_capture()).images)
     assert [path.name for path in out.parent.iterdir()] == ["SN1"], "nothing half-written"
+
+
+def test_a_folder_shows_its_images_in_the_order_of_a_capture(tmp_path: Path) -> None:
+    for light in (10, 5, 1):
+        iio.imwrite(tmp_path / f"img_{light}.png", np.full((4, 5), light, np.uint8))
+    iio.imwrite(tmp_path / "MASK.png", np.ones((4, 5), np.uint8))
+    shown = FolderCamera(tmp_path)
+    assert [int(shown.grab(light)[0, 0]) for light in range(len(shown.files))] == [1, 5, 10]
+    (tmp_path / "capture.toml").write_text('images = ["img_10.png", "img_1.png"]\n' + RIG)
+    assert [path.name for path in FolderCamera(tmp_path).files] == ["img_10.png", "img_1.png"]
+    (tmp_path / "img_1.png").unlink()
+    with pytest.raises(bgars.FileFormatError, match=r"capture\.toml: images: no such file: .*img_1\.png"):
+        FolderCamera(tmp_path)
 
 
 def test_a_rig_is_named_by_its_folder_too_and_a_clean_check_says_so(tmp_path: Path) -> None:

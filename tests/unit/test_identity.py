@@ -185,3 +185,10 @@ def test_the_demo_of_a_line_finds_the_defects_that_were_put_in(tmp_path: Path) -
     assert told["failed"] == told["defects_put_in"]
     assert (tmp_path / "demo" / "store" / "pages" / "SN0003.html").is_file()
     assert 'href="SN0003.html"' in Path(told["page"]).read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("pattern", ["{lot}_{serial}", "{serial}_{position}", "{round}{serial}"])
+def test_a_name_that_fits_in_two_ways_names_no_part(tmp_path: Path, pattern: str) -> None:
+    with pytest.raises(bgars.InputError, match="in more than one way: serial number"):
+        bgars.Naming(pattern).of_name(tmp_path / "12_A_3")
+    assert bgars.Naming("{lot}_A_{serial}").of_name(tmp_path / "12_A_3")[0] == "3"

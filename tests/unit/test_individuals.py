@@ -10,7 +10,7 @@ import bgars
 import numpy as np
 import pytest
 from bgars.cli.app import app
-from bgars.studies.control_chart import individuals_chart
+from bgars.studies.control_chart import c4, control_chart, individuals_chart
 from bgars.studies.nelson import NELSON, nelson_signals, parse_rules
 from bgars.studies.query_chart import query_charts
 from bgars.studies.trend import MOVING_RANGE_DF
@@ -27,6 +27,22 @@ PATTERNS = {
     7: [0.5, 0.4, -0.5] * 5,
     8: [1.5, 1.4, -1.5, -1.4, 1.5, 1.4, -1.5, -1.4],
 }
+
+
+@pytest.mark.parametrize(
+    ("rule", "values"), [(5, [2.5, 2.5]), (5, [2.5, 0.0, 2.5]), (6, [1.5] * 4), (6, [1.5, 0.0, 1.5, 1.5, 1.5])]
+)
+def test_a_pattern_at_the_beginning_of_a_chart_is_found(rule: int, values: list[float]) -> None:
+    deviations = np.array([*values, 0.0, 0.0])
+    assert list(nelson_signals(deviations, [rule])) == [(len(values) - 1, NELSON[rule])]
+    assert list(nelson_signals(deviations[1:], [rule])) == []
+
+
+def test_zone_rules_look_at_the_beginning_too() -> None:
+    means = np.array([2.5, 2.5, *[-0.2] * 25])  # around 0
+    half = 2.0 * c4(2)  # half a subgroup of two apart, such that the means have a sigma of 1
+    chart = control_chart(np.stack([means - half / 2, means + half / 2], axis=1), zone_rules=True)
+    assert (1, "2 of 3 beyond 2 sigma on one side") in {(each.subgroup, each.rule) for each in chart.signals}
 
 
 @pytest.mark.parametrize("rule", PATTERNS)

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import http.client
+import os
+import sys
 from pathlib import Path
 
 import bgars
 import pytest
+from bgars.line import notify
 from bgars.line.inbox import Inbox
 from bgars.line.notify import Notifier
 from bgars.line.pages import page_name
 from bgars.line.send import Mqtt
 from bgars.line.watch import Watch
-from line_captures import RECIPE
+from line_captures import RECIPE, copy_capture
 from test_calibrate import bgars_command
 
 
@@ -63,6 +67,56 @@ def test_a_trigger_is_a_name(inbox: Path, name: str) -> None:
 def test_a_port_that_cannot_be_is_refused(port: str) -> None:
     with pytest.raises(bgars.InputError, match="--tcp: must be HOST:PORT"):
         Notifier(tcp=f"plc:{port}")
+
+
+@pytest.mark.parametrize(
+    "receiver",
+    [
+        {"url": "http://plc/a b"},
+        {"url": "http:///result"},
+        {"url": f"http://{'x' * 64}/result"},
+        {"url": "http://plc/größe"},
+        {"tcp": f"{'x' * 64}:2000"},
+        {"command": " "},
+        {"command": "''"},
+    ],
+)
+def test_a_receiver_that_cannot_be_is_refused_before_the_first_part(receiver: dict[str, str]) -> None:
+    with pytest.raises(bgars.InputError, match=r"^--(post|tcp|on-result): must"):
+        Notifier(**receiver)
+
+
+@pytest.mark.parametrize("error", [http.client.BadStatusLine("hello"), ValueError("embedded null byte"), KeyError()])
+def test_no_receiver_stops_a_line(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
+    def post(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(notify, "_post", post)
+    (problem,) = Notifier(url="http://plc/result").send({"serial": "A", "verdict": "pass"}, "line")
+    assert problem.startswith("--post http://plc/result: ")
+    assert problem.endswith(str(error) or type(error).__name__)
+
+
+def test_a_serial_number_is_one_printable_line(tmp_path: Path) -> None:
+    (tmp_path / "SN1").mkdir()
+    (tmp_path / "SN1" / "capture.toml").write_text('[part]\nserial = "A\\u0000B"\n', encoding="utf-8")
+    with pytest.raises(bgars.InputError, match=r"serial: must be one printable line, got 'A\\x00B'"):
+        bgars.Naming().of_name(tmp_path / "SN1")
+
+
+@pytest.mark.skipif(os.name == "nt" or sys.platform == "darwin", reason="names there are text")
+def test_a_folder_whose_name_is_no_text_is_a_failure_of_its_part_alone(tmp_path: Path) -> None:
+    good, bad = copy_capture(tmp_path / "in" / "SN1"), tmp_path / "in" / os.fsdecode(b"SN\xff")
+    good.rename(bad)
+    listed = copy_capture(tmp_path / "in" / "SN2")
+    (listed / "filenames.txt").unlink()
+    (listed / "light_00.png").rename(listed / os.fsdecode(b"light_00\xff.png"))
+    done = bgars.inspect_many([tmp_path / "in"], store=tmp_path / "store", processes=1)
+    assert (done.inspected, len(done.failures)) == (0, 2)
+    rows = bgars.open_store(tmp_path / "store").query("select serial, capture_folder, reason from failures").to_pylist()
+    told = {Path(row["capture_folder"]).name: (row["serial"], row["reason"]) for row in rows}
+    assert told[r"SN\udcff"] == ("", f"{tmp_path}/in/SN\\udcff: its name must be UTF-8")
+    assert told["SN2"][1].endswith(r"light_00\udcff.png: its name must be UTF-8")
 
 
 @pytest.mark.parametrize("url", ["mqtt://user:secret@host:99999/topic", "mqtt://[::1/topic"])

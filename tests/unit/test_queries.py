@@ -78,14 +78,31 @@ def test_no_cell_of_csv_is_a_formula(store: bgars.Store) -> None:
     assert rows == [["'=name", "at", "number", "list"], ["'=1+2", "'@x", "-1.5", "'+a; b"]]
 
 
+def test_json_has_every_column_and_every_kind_of_value(store: bgars.Store) -> None:
+    sql = """select 1 as a, 2 as a, {'x': 1, 'y': ['nan'::double]} as s, '\\xAA'::blob as b,
+        interval '1 month 2 days 3.5 seconds' as i, time '10:11:12' as t, timestamptz '2026-01-02 10:00:00+02' as z,
+        map {'k': 1} as m, sum(1) as n, date '2026-01-02' as d"""
+    answer = json.loads(run(store.folder, sql, "--json").output)
+    assert answer["columns"] == ["a", "a_1", "s", "b", "i", "t", "z", "m", "n", "d"]
+    assert list(answer["rows"][0].values()) == [
+        *(1, 2, {"x": 1, "y": [None]}, "aa", "P1M2DT3.5S", "10:11:12"),
+        *("2026-01-02T08:00:00Z", [["k", 1]], 1, "2026-01-02"),
+    ]
+    assert type(answer["rows"][0]["n"]) is int
+    cells = next(csv.reader([run(store.folder, sql, "--csv").output.splitlines()[1]]))
+    assert cells[2] == '{"x": 1, "y": [null]}'
+
+
 @pytest.mark.parametrize(
     ("sql", "words"),
     [
         ("selec 1", "query: Parser Error"),
         ("select * from nothing", "Table with name nothing does not exist"),
         ("select * from read_csv('/etc/passwd')", "Permission Error"),
-        ("copy parts to '/tmp/bgars-test.csv'", "Permission Error"),
-        ("-- no question", "must be a query that returns rows"),
+        ("copy parts to '/tmp/bgars-test.csv'", "must be one SELECT that returns rows"),
+        ("-- no question", "must be one SELECT that returns rows"),
+        ("select 1; select 2", "got 2 statements"),
+        ("pivot parts on verdict using count(*)", "got PIVOT without IN"),
     ],
 )
 def test_a_question_that_is_none_gets_one_line(store: bgars.Store, sql: str, words: str) -> None:
@@ -93,6 +110,42 @@ def test_a_question_that_is_none_gets_one_line(store: bgars.Store, sql: str, wor
         store.query(sql)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "sql",
+    [
+        "copy (select 1 a) to '{store}/store.json' (format csv)",
+        "with w as (copy (select 1 a) to '{store}/store.json' (format csv)) select 1",
+        "select * from (select 1) where exists (with w as (copy (select 1 a) to '{store}/store.json') select 1)",
+        "explain analyze copy (select 1 a) to '{store}/store.json' (format csv)",
+        "select 1; copy (select 1 a) to '{store}/store.json' (format csv)",
+        "with w as (delete from parts_taken returning serial) select * from w",
+        "attach '{store}/new.db' as d",
+        "export database '{store}/dump'",
+        "create table t as select 1 a",
+        "drop view parts",
+    ],
+)
+def test_no_question_writes_into_the_store(store: bgars.Store, sql: str) -> None:
+    before = {path: path.read_bytes() for path in store.folder.rglob("*") if path.is_file()}
+    with pytest.raises(bgars.InputError, match=r"query: (must be one SELECT|Binder Error|Parser Error)"):
+        store.query(sql.replace("{store}", str(store.folder)))
+    assert {path: path.read_bytes() for path in store.folder.rglob("*") if path.is_file()} == before
+
+
+@pytest.mark.parametrize(
+    "sql",
+    [
+        "with recursive n as (select 1 i union all select i + 1 from n where i < 3) select i from n",
+        "pivot parts on verdict in ('pass', 'fail') using count(*)",
+        "describe parts",
+        "from parts limit 1;",
+        "select 'copy' a union values ('insert')",
+    ],
+)
+def test_questions_that_read_in_other_words_are_answered(store: bgars.Store, sql: str) -> None:
+    assert store.query(sql).num_rows >= 1
 
 
 def test_what_rework_mended_and_what_it_did_not(tmp_path: Path) -> None:

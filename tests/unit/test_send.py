@@ -86,12 +86,41 @@ def test_a_part_that_comes_late_with_a_lower_number_is_sent(tmp_path: Path, monk
         ("http://x/y", "must be mqtt://HOST/TOPIC"),
         ("mqtt://host", "must be mqtt://HOST/TOPIC"),
         ("mqtt://ada:secret@host/topic", "go into BGARS_MQTT_USER"),
+        ("mqtt://host/line/+/results", r"must be without \+, # and \?"),
+        ("mqtt://host/line/#", r"must be without \+, # and \?"),
     ],
 )
 def test_addresses_are_checked_and_hold_no_password(url: str, words: str) -> None:
     with pytest.raises(bgars.InputError, match=words) as caught:
         Mqtt(url)
     assert "secret" not in str(caught.value)
+
+
+def test_topics_that_look_alike_as_file_names_are_remembered_apart(tmp_path: Path) -> None:
+    store = filled_store(tmp_path / "store", 1)
+    (store.folder / "sent").mkdir()
+    former = store.folder / "sent" / "mqtt___h_1883_line_results.json"
+    former.write_text(json.dumps(dict.fromkeys(store.known(), store.last_sequence())))
+    got = {}
+    for topic in ("line/results", "line_results", "x" * 300):
+        channel = Channel()
+        channel.name = f"mqtt://h:1883/{topic}"
+        Sender(store, channel).run(follow=False)
+        Sender(store, channel).run(follow=False)
+        got[topic] = channel.got
+    assert got == {"line/results": [], "line_results": ["SN0000"], "x" * 300: ["SN0000"]}, "the first took the old file"
+    assert not former.exists()
+
+
+def test_a_store_in_which_nothing_changes_is_not_queried_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store, asked = filled_store(tmp_path / "store", 1), []
+    query = store.query
+    monkeypatch.setattr(store, "query", lambda sql: asked.append(sql) or query(sql))
+    sender = Sender(store, Channel())
+    assert [sender.step() for _ in range(4)] == [1, 0, 0, 0]
+    assert len(asked) == 4, "twice with two questions: what there is, and that there is nothing more"
+    store.append(part(1))
+    assert sender.step() == 1
 
 
 class Broker:

@@ -86,6 +86,14 @@ def test_failures_are_kept_in_one_line_until_a_success(tmp_path: Path) -> None:
     assert store.query("select * from failures").num_rows == 0
 
 
+def test_a_success_under_another_recipe_hides_no_failure(tmp_path: Path) -> None:
+    store = bgars.open_store(tmp_path / "store", create=True)
+    for recipe in ("top", part(1).name):
+        store.append_failure("/c/SN0001", f"under {recipe}", serial="SN0001", recipe=recipe)
+    store.append(part(1), capture_folder="/c/SN0001")
+    assert store.query("select reason from failures")["reason"].to_pylist() == ["under top"]
+
+
 def test_compaction_keeps_every_row_and_makes_few_files(tmp_path: Path) -> None:
     store = filled_store(tmp_path / "store", 8)
     before = store.query("select * exclude (day, recipe) from balls order by serial, name")
@@ -246,6 +254,20 @@ def test_sqlite_gets_every_new_part_once(tmp_path: Path) -> None:
         row = connection.execute("select verdict, defects, day from bgars_parts where serial = 'SN0003'").fetchone()
     connection.close()
     assert row == ("fail", "missing", "2026-01-01")
+
+
+def test_an_export_leaves_the_failures_of_another_store(tmp_path: Path) -> None:
+    url, stores = f"sqlite:///{tmp_path / 'parts.db'}", []
+    for name in "AB":
+        stores.append(bgars.open_store(tmp_path / name, create=True))
+        stores[-1].append_failure(f"/{name}/SN0001", f"of {name}", serial="SN0001")
+        stores[-1].export(url)
+    with closing(sqlite3.connect(tmp_path / "parts.db")) as base:
+        told = "select reason from bgars_failures order by reason"
+        assert base.execute(told).fetchall() == [("of A",), ("of B",)]
+        stores[0].append(part(1))
+        stores[0].export(url)
+        assert base.execute(told).fetchall() == [("of B",)]
 
 
 def test_a_database_that_cannot_be_reached_gets_one_line_without_its_password(tmp_path: Path) -> None:

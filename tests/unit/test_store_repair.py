@@ -5,9 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import bgars
+import pyarrow
 import pytest
 from bgars.cli.app import app
 from bgars.records.keys import DIGITS
+from pyarrow import parquet
 from stored_parts import filled_store, part
 from typer.testing import CliRunner
 
@@ -58,3 +60,14 @@ def test_a_damaged_file_of_a_part_is_set_aside_without_the_others(tmp_path: Path
     assert store.query("select count(*) n from parts")["n"].to_pylist() == [3]
     assert [store.append(part(number)) for number in range(4)].count(True) == 1, "it comes again, the others are there"
     assert rows(store) == before
+
+
+def test_a_file_that_lacks_a_column_is_named_and_set_aside(tmp_path: Path) -> None:
+    store = filled_store(tmp_path / "store", 2)
+    foreign, *_ = sorted((store.folder / "parts").rglob("*.parquet"))
+    parquet.write_table(pyarrow.table({"part_key": ["x"]}), foreign)
+    with pytest.raises(bgars.FileFormatError, match=r"is not a readable file of a store \(has no column serial\)"):
+        bgars.open_store(store.folder).known()
+    told = CliRunner().invoke(app, ["store", "repair", str(store.folder)]).output
+    assert f"moved to {store.folder / 'damaged'}" in told
+    assert len(bgars.open_store(store.folder).known()) == 1

@@ -59,7 +59,7 @@ def test_each_part_has_its_result_in_the_store(tmp_path: Path) -> None:
             assert row["x"] == pytest.approx(STRIP.place(row["position"]).x_um, abs=5.0)
     again = bgars.inspect_many([folder], recipe, store=tmp_path / "store", processes=1)
     assert (again.inspected, again.known) == (0, 5)
-    source = write_part_page(store, "STRIP7-R2C3")
+    source, _ = write_part_page(store, "STRIP7-R2C3")
     assert source.photograph is not None
     assert source.photograph.left_um > 0, "its own window only"
     write_lot_page(store, tmp_path / "lot.html")

@@ -131,3 +131,33 @@ def test_images_beside_the_folders_of_parts_are_spoken_of_once(inbox: Path, monk
         f"{inbox}: 3 images not in the folder of a part, such as SN7_img0.png: waiting for --count 4 images of one "
         "serial number whose names follow --files"
     ]
+
+
+def test_images_whose_names_fit_in_two_ways_are_mixed_into_no_part(
+    inbox: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(inbox_module, "LOOSE_S", 0.0)
+    for part_name, lights in (("L7_A", range(4)), ("L7_B", range(4, 8))):
+        drop(inbox, part_name, 1)
+        for light, path in zip(lights, sorted((inbox / part_name).glob("*.png")), strict=True):
+            path.rename(inbox / f"{part_name}_{light}.png")
+        (inbox / part_name).rmdir()
+    look = Inbox(inbox, count=4, trigger="", settle_s=0.0, files="{serial}_{image}.png")
+    assert (look.look(), look.flat.gather()) == ([], [])
+    assert "L7_A_0.png: fits --files in more than one way (serial number L7 or L7_A); use {number}" in look.loose(60.0)
+    clear = Inbox(inbox, count=4, trigger="", settle_s=0.0, files="{serial}_{number}.png")
+    assert [found.folder.name for found in clear.look()] == ["L7_A", "L7_B"]
+
+
+def test_images_of_a_serial_number_that_would_be_a_hidden_folder_stay_and_are_spoken_of(
+    inbox: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(inbox_module, "LOOSE_S", 0.0)
+    drop(inbox, "P1", 1)
+    for path in list((inbox / "P1").glob("*.png")):
+        path.rename(inbox / f"_7-{path.name}")
+    (inbox / "P1").rmdir()
+    look = Inbox(inbox, count=4, trigger="", settle_s=0.0, files="{serial}-{image}.png")
+    assert look.look() == []
+    assert len(list(inbox.glob("_7-*.png"))) == 4
+    assert "4 images not taken, such as _7-img0.png: serial number _7: begins with _" in look.loose(60.0)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from bgars.errors import CaptureWarning
+from bgars.files.encodable import encodable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -62,12 +63,7 @@ def error_console() -> Console:
 
 def say(text: str = "") -> None:
     """Print a line of a command's result."""
-    sys.stdout.write(f"{_encodable(text)}\n")
-
-
-def _encodable(text: str) -> str:
-    """Text that any terminal can take: names of files may hold bytes that are no text."""
-    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+    sys.stdout.write(f"{encodable(text)}\n")
 
 
 def say_files(output: Path, files: Mapping[str, str]) -> None:
@@ -107,7 +103,7 @@ def activation() -> str:
 
 def print_json(values: dict[str, Any]) -> None:
     """Print a result for machines: one JSON object, nothing else."""
-    sys.stdout.write(json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    sys.stdout.write(encodable(json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False)) + "\n")
 
 
 def utc_now() -> str:
@@ -121,12 +117,12 @@ def fail(message: str) -> None:
     """Print an error for people."""
     console = error_console()
     console.print("error:", style="bold red", end=" ")
-    console.print(_encodable(" ".join(message.splitlines())), markup=False, emoji=False)
+    console.print(encodable(" ".join(message.splitlines())), markup=False, emoji=False)
 
 
 def warn(message: str) -> None:
     """Print, beside the result, what people should know of it."""
-    sys.stderr.write(f"warning: {_encodable(message)}\n")
+    sys.stderr.write(f"warning: {encodable(message)}\n")
 
 
 def notes_to_stderr() -> None:
@@ -142,7 +138,7 @@ def notes_to_stderr() -> None:
         line: str | None = None,
     ) -> None:
         if issubclass(category, CaptureWarning | FutureWarning):
-            sys.stderr.write(f"note: {_encodable(str(message))}\n")
+            sys.stderr.write(f"note: {encodable(str(message))}\n")
         else:
             other(message, category, filename, lineno, file, line)
 

@@ -12,7 +12,7 @@ from bgars.line.inbox import Inbox
 from bgars.line.inbox_lock import watched
 from bgars.line.lot_page import write_lot_page
 from bgars.line.naming import Naming
-from bgars.line.pages import page_name, write_part_page
+from bgars.line.pages import write_part_page
 from bgars.line.watch import Watch
 from bgars.records.part_identity import PartIdentity
 from bgars.store import open_store
@@ -54,7 +54,7 @@ def demo_line(output: Path, *, parts: int | None = None, opens: bool = True, as_
     page = store_folder / "pages" / "index.html"
     page.parent.mkdir(exist_ok=True)
     for serial in store.query("select serial from parts where verdict <> 'pass' order by serial")["serial"].to_pylist():
-        write_part_page(store, serial, page.with_name(page_name(serial)))
+        write_part_page(store, serial)
     facts = write_lot_page(store, page, lot=LOT)
     put_in = [serial_of(number) for number in range(parts) if defects_of(number, parts)]
     found = [row["serial"] for row in facts["last"] if row["verdict"] == "fail"][::-1]

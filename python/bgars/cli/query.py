@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import csv
-import datetime
 import sys
-from decimal import Decimal
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from bgars.cli.console import print_json, say
 from bgars.cli.options import JsonOption
+from bgars.cli.plain_cells import distinct_names, plain, text_of
 from bgars.errors import InputError
 from bgars.files.csv_cells import harmless
 from bgars.io.result_file import read_result
 from bgars.store import open_store
 from bgars.store.query import VIEWS
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
 __all__ = ["register"]
 
 MOST_WIDE = 60
+BLOCK_ROWS = 10_000
 StoreArgument = Annotated[
     Path, typer.Argument(metavar="STORE", help="Store that bgars batch or bgars watch wrote.", show_default=False)
 ]
@@ -66,18 +69,18 @@ def query(
         _say_tables(opened, as_json=as_json)
         return
     answer = opened.query(sql)
-    names, rows = answer.column_names, [[_plain(value) for value in row.values()] for row in answer.to_pylist()]
-    if len(set(names)) != len(names):  # rows come by name
-        columns = ([_plain(value) for value in column.to_pylist()] for column in answer.columns)
-        rows = [list(row) for row in zip(*columns, strict=True)]
+    names = answer.column_names
+    # As Python's objects, an answer takes many times its memory: a part at a time.
+    rows = (row for part in answer.to_batches(max_chunksize=BLOCK_ROWS) for row in _rows(part))
     if as_json:
+        names = distinct_names(names)
         print_json({"columns": names, "rows": [dict(zip(names, row, strict=True)) for row in rows]})
     elif as_csv:
         writer = csv.writer(sys.stdout, lineterminator="\n")
         writer.writerow([harmless(name) for name in names])
-        writer.writerows([[_csv_cell(value) for value in row] for row in rows])
+        writer.writerows([_csv_cell(value) for value in row] for row in rows)
     else:
-        _say_table(names, rows)
+        _say_table(names, list(rows))
 
 
 def compact(store: StoreArgument, as_json: JsonOption = False) -> None:
@@ -151,6 +154,11 @@ def repair(store: StoreArgument, as_json: JsonOption = False) -> None:
         say(f"{store}: every file is readable")
 
 
+def _rows(part: Any) -> Iterator[list[Any]]:  # noqa: ANN401 - pyarrow has no types
+    columns = [[plain(value) for value in column.to_pylist()] for column in part.columns]
+    return map(list, zip(*columns, strict=True))
+
+
 def _say_tables(opened: Any, *, as_json: bool) -> None:  # noqa: ANN401 - a Store
     counts = {name: opened.query(f"select count(*) n from {name}")["n"][0].as_py() for name in VIEWS}
     columns = {name: opened.query(f"select * from {name} limit 0").column_names for name in VIEWS}
@@ -179,8 +187,8 @@ def _say_table(names: list[str], rows: list[list[Any]]) -> None:
 
 def _csv_cell(value: Any) -> Any:  # noqa: ANN401 - whatever was asked for
     """Numbers as they are; texts such that no spreadsheet runs them."""
-    if isinstance(value, list):
-        value = "; ".join(map(str, value))
+    if isinstance(value, list | dict):
+        value = text_of(value)
     return harmless(value) if isinstance(value, str) else value
 
 
@@ -189,19 +197,5 @@ def _cell(value: Any) -> str:  # noqa: ANN401 - whatever was asked for
         return "-"
     if isinstance(value, float):
         return f"{value:.6g}"
-    text = "; ".join(map(str, value)) if isinstance(value, list) else str(value)
-    text = " ".join(text.split())
+    text = " ".join(text_of(value).split())
     return text if len(text) <= MOST_WIDE else f"{text[: MOST_WIDE - 3]}..."
-
-
-def _plain(value: Any) -> Any:  # noqa: ANN401 - as above
-    """What JSON and CSV can hold."""
-    if isinstance(value, float):
-        return value if value == value and abs(value) != float("inf") else None  # noqa: PLR0124 - NaN
-    if isinstance(value, Decimal):
-        return float(value)
-    if isinstance(value, datetime.datetime):
-        return value.isoformat(timespec="seconds") + "Z"
-    if isinstance(value, list):
-        return [_plain(each) for each in value]
-    return value if isinstance(value, int | str | bool | None) else str(value)

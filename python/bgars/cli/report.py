@@ -12,8 +12,8 @@ from bgars.cli.options import JsonOption
 from bgars.errors import InputError
 from bgars.io.own_files import need_new_or_own
 from bgars.io.result_file import RESULT_NAME
-from bgars.line.lot_page import lot_facts, write_lot_page
-from bgars.line.pages import page_name, write_part_page
+from bgars.line.lot_page import lot_facts, pages_of, write_lot_page
+from bgars.line.pages import write_part_page
 from bgars.report.html.page import write_page
 from bgars.report.html.source import read_page_source
 from bgars.store import Store, is_store, open_store
@@ -63,6 +63,14 @@ def report(
         int | None,
         typer.Option("--round", min=1, help="Number of the inspection of the serial number; the last by default."),
     ] = None,
+    recipe_name: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Name of the recipe, for a serial number that was inspected under several.",
+            show_default=False,
+        ),
+    ] = None,
     pages: Annotated[
         bool, typer.Option("--pages", help="With the overview, write the pages of its last parts, too.")
     ] = False,
@@ -80,10 +88,10 @@ def report(
     Exit code 0: the page was written, whatever the verdict. 2: there is no result, or it is not one.
     """
     if is_store(result):
-        _report_store(open_store(result), serial, output, lot, round_, pages=pages, as_json=as_json)
+        _report_store(open_store(result), serial, output, lot, round_, recipe_name, pages=pages, as_json=as_json)
         return
-    if serial is not None or lot is not None or round_ is not None or pages:
-        msg = f"{result}: is not a store: SERIAL, --lot, --round and --pages need one"
+    if serial is not None or lot is not None or round_ is not None or recipe_name is not None or pages:
+        msg = f"{result}: is not a store: SERIAL, --lot, --round, --recipe-name and --pages need one"
         raise InputError(msg)
     page = output or (result if result.is_dir() else result.parent) / PAGE
     need_new_or_own(page, result)
@@ -104,6 +112,7 @@ def _report_store(
     output: Path | None,
     lot: str | None,
     round_: int | None,
+    recipe_name: str | None,
     *,
     pages: bool,
     as_json: bool,
@@ -112,15 +121,16 @@ def _report_store(
     if output is not None:
         need_new_or_own(output)
     if serial is not None:
-        page = output or store.folder / PAGES / page_name(serial, round_)
-        page.parent.mkdir(exist_ok=True)
-        warnings += write_part_page(store, serial, page, round_=round_).warnings
+        source, page = write_part_page(store, serial, output, round_=round_, recipe=recipe_name)
+        warnings += source.warnings
     else:
         page = output or store.folder / PAGES / OVERVIEW
         page.parent.mkdir(exist_ok=True)
         if pages:
-            for each in dict.fromkeys(row["serial"] for row in lot_facts(store, lot)["last"]):
-                warnings += write_part_page(store, each, page.with_name(page_name(each))).warnings
+            for row in pages_of(lot_facts(store, lot)):
+                beside = page.with_name(row["page_name"])
+                options = {"round_": row["round"], "recipe": row["recipe"]}
+                warnings += write_part_page(store, row["serial"], beside, **options)[0].warnings
         write_lot_page(store, page, lot=lot)
     if as_json:
         print_json({"store": str(store.folder), "output": str(page), "warnings": warnings})

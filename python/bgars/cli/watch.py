@@ -18,6 +18,7 @@ from bgars.cli.options import (
     StoreOption,
 )
 from bgars.cli.stopping import ended_by_signals
+from bgars.files.encodable import encodable
 from bgars.io.given_paths import need_path
 from bgars.line.inbox import Inbox
 from bgars.line.inbox_lock import watched
@@ -71,7 +72,8 @@ def watch(
         str,
         typer.Option(
             metavar="PATTERN",
-            help="Pattern of images in INBOX itself, such as '{serial}_{image}.png'; needs --count.",
+            help="Pattern of images in INBOX itself, such as '{serial}_{image}.png', or {number} for digits; needs "
+            "--count.",
             show_default=False,
         ),
     ] = "",
@@ -157,5 +159,5 @@ def watch(
 
 def _say(line: str) -> None:
     """Print a line at once: a program may be reading."""
-    sys.stdout.write(f"{line}\n")
+    sys.stdout.write(f"{encodable(line)}\n")
     sys.stdout.flush()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
@@ -15,8 +16,9 @@ from bgars.line.folders import capture_folders
 from bgars.line.job import Job, Outcome, place_serial, with_content
 from bgars.line.local_pool import run_local, share_cores, thread_environment
 from bgars.line.naming import Naming
-from bgars.normals.methods import DEFAULT_METHOD, Method
+from bgars.normals.methods import ALL_METHODS, DEFAULT_METHOD, Method, added_method
 from bgars.records.scalar_checks import check_progress
+from bgars.records.short import Short
 from bgars.store import Store, open_store
 from bgars.store.rows import TIME_FORM
 
@@ -63,8 +65,8 @@ class Progress:
         return (self.total - self.done) * self.seconds / self.done if self.done else float("inf")
 
 
-@dataclass
-class Batch:
+@dataclass(repr=False)
+class Batch(Short):
     """What a run did.
 
     Attributes
@@ -101,9 +103,13 @@ class Batch:
         """Parts that this run inspected."""
         return sum(self.verdicts.values())
 
+    def _facts(self) -> dict[str, object]:
+        told = {"total": self.total, **self.verdicts, "known": self.known, "failures": len(self.failures)}
+        return {**told, "seconds": f"{self.seconds:.1f}"}
+
 
 def inspect_many(
-    folders: Iterable[str | PathLike[str]],
+    folders: str | PathLike[str] | Iterable[str | PathLike[str]],
     recipe: str | PathLike[str] | None = None,
     *,
     store: Store | str | PathLike[str] | None = None,
@@ -122,7 +128,7 @@ def inspect_many(
 
     Parameters
     ----------
-    folders : iterable of path
+    folders : path or iterable of path
         Captures, folders of captures, or patterns such as ``"lots/L7/*"``.
     recipe : path, optional
         Part recipe.
@@ -165,10 +171,7 @@ def inspect_many(
     ({'pass': 0, 'fail': 0, 'undecided': 1}, 'one_ball')
     """
     check_progress(progress)
-    for name, count in (("processes", processes), ("threads", threads)):
-        if count is not None and count < 1:
-            msg = f"{name}: must be 1 or more, got {count}"
-            raise InputError(msg)
+    _check_arguments(recipe, store, method, naming, {"processes": processes, "threads": threads})
     captures = capture_folders(folders)
     part = None if recipe is None else read_part_recipe(recipe)
     if send_images and part is not None and part.material_file is not None:
@@ -195,6 +198,23 @@ def inspect_many(
     if opened is not None and batch.inspected >= COMPACT_FROM:
         opened.compact()
     return batch
+
+
+def _check_arguments(recipe: object, store: object, method: str, naming: object, counts: dict[str, object]) -> None:
+    """Refuse what would fail every capture, or after the first of them."""
+    for name, value in (("recipe", recipe), ("store", store)):
+        if not isinstance(value, str | os.PathLike | None) and not (name == "store" and isinstance(value, Store)):
+            msg = f"{name}: must be a path, got {value!r}"
+            raise InputError(msg)
+    if not isinstance(naming, Naming | None):
+        msg = f"naming: must be a Naming, such as bgars.Naming('{{lot}}/{{serial}}'), got {naming!r}"
+        raise InputError(msg)
+    for name, count in counts.items():
+        if count is not None and (isinstance(count, bool) or not isinstance(count, int) or count < 1):
+            msg = f"{name}: must be a whole number of 1 or more, got {count!r}"
+            raise InputError(msg)
+    if method not in ALL_METHODS:
+        added_method(method)
 
 
 def store_outcome(

@@ -13,6 +13,7 @@ import imageio.v3 as iio
 import numpy as np
 
 from bgars.errors import BgarsError, FileFormatError, InputError
+from bgars.io.image_listing import list_folder
 from bgars.io.recipe import RECIPE_NAME, CaptureRecipe, read_recipe
 from bgars.line.folders import IMAGES
 from bgars.records.scalar_checks import check_progress
@@ -51,17 +52,23 @@ class FolderCamera:
 
     def __init__(self, folder: str | Path) -> None:
         folder = Path(folder)
-        self.files = sorted(
-            path
-            for path in folder.glob("*")
-            if path.suffix.lower() in IMAGES and not path.name.startswith(("mask", "dark", "."))
-        )
+        if not folder.is_dir():
+            msg = f"{folder}: is not a folder" if folder.exists() else f"{folder}: no such folder"
+            raise FileFormatError(msg)
+        described = read_recipe(folder / RECIPE_NAME).images if (folder / RECIPE_NAME).is_file() else None
+        if not isinstance(described, list):
+            described = [name for name in list_folder(folder).images if Path(name).suffix.lower() in IMAGES]
+        self.files = [folder / name for name in described]
+        lost = next((path for path in self.files if not path.is_file()), None)
+        if lost is not None:
+            msg = f"{folder / RECIPE_NAME}: images: no such file: {lost}"
+            raise FileFormatError(msg)
         if not self.files:
             msg = f"{folder}: holds no images"
             raise FileFormatError(msg)
 
     def grab(self, light: int) -> NDArray[Any]:
-        """Return the image of a light, in the order of the names."""
+        """Return the image of a light: as capture.toml in the folder lists them, else in the order of their numbers."""
         if not 0 <= light < len(self.files):
             msg = f"light: must be 0 to {len(self.files) - 1}, got {light}"
             raise InputError(msg)

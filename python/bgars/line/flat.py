@@ -8,9 +8,11 @@ from pathlib import Path
 
 from bgars.errors import InputError
 
-__all__ = ["FlatFiles"]
+__all__ = ["HIDDEN", "FlatFiles"]
 
 GATHERING = ".gathering-"
+HIDDEN = (".", "_")
+"""How the names of folders begin that are no parts."""
 NAMES = re.compile(r"\{(\w*)\}")
 
 
@@ -22,7 +24,8 @@ class FlatFiles:
     folder : Path
         The inbox.
     pattern : str
-        With ``{serial}``, and ``{image}`` for what differs between the images of a part: ``{serial}_{image}.png``.
+        With ``{serial}``, and ``{image}`` for what differs between the images of a part: ``{serial}_{image}.png``;
+        ``{number}`` in its place takes only digits, where serial numbers contain what stands between the two.
     count : int
         Images of a part.
     settle_s : float
@@ -31,17 +34,21 @@ class FlatFiles:
     Raises
     ------
     InputError
-        A pattern without ``{serial}`` and ``{image}``.
+        A pattern without ``{serial}`` and ``{image}`` or ``{number}``.
+
+    Attributes
+    ----------
+    refused : dict of str
+        Files that belong to no part for certain, and why.
     """
 
     def __init__(self, folder: Path, pattern: str, *, count: int, settle_s: float) -> None:
-        if sorted(NAMES.findall(pattern)) != ["image", "serial"]:
-            msg = f"--files: must hold {{serial}} and {{image}} once each, got {pattern!r}"
+        if sorted(NAMES.findall(pattern)) not in (["image", "serial"], ["number", "serial"]):
+            msg = f"--files: must hold {{serial}} and {{image}} (or {{number}}) once each, got {pattern!r}"
             raise InputError(msg)
-        pieces = NAMES.split(pattern)
-        told = "".join(f"(?P<{piece}>.+?)" if at % 2 else re.escape(piece) for at, piece in enumerate(pieces))
         self.folder, self.count, self.settle_s = folder, count, settle_s
-        self._expression = re.compile(told)
+        self._shortest, self._longest = _expression(pattern, "+?"), _expression(pattern, "+")
+        self.refused: dict[str, str] = {}
         self._since: dict[str, tuple[tuple[int, int], float]] = {}
 
     def gather(self) -> list[str]:
@@ -52,9 +59,12 @@ class FlatFiles:
         ready: dict[str, list[Path]] = {}
         now = time.monotonic()
         seen = {}
+        self.refused = {}
         for path in sorted(path for path in self.folder.iterdir() if path.is_file()):
-            match = self._expression.fullmatch(path.name)
-            if match is None:
+            serial, problem = self._serial(path.name)
+            if problem:
+                self.refused[path.name] = problem
+            if not serial:
                 continue
             try:
                 stat = path.stat()
@@ -64,7 +74,7 @@ class FlatFiles:
             earlier = self._since.get(path.name)
             seen[path.name] = earlier if earlier is not None and earlier[0] == state else (state, now)
             if now - seen[path.name][1] >= self.settle_s:
-                ready.setdefault(match["serial"], []).append(path)
+                ready.setdefault(serial, []).append(path)
         self._since = seen
         gathered = []
         for serial, files in ready.items():
@@ -81,3 +91,23 @@ class FlatFiles:
             if len(list(place.iterdir())) >= self.count and not target.exists():
                 place.replace(target)
         return gathered
+
+    def _serial(self, name: str) -> tuple[str, str]:
+        """The serial number of a file, or why it has none for certain; "" twice: the name does not follow."""
+        short, long = self._shortest.fullmatch(name), self._longest.fullmatch(name)
+        if short is None or long is None:
+            return "", ""
+        serial = short["serial"]
+        if serial != long["serial"]:
+            both = f"serial number {serial} or {long['serial']}"
+            return "", f"fits --files in more than one way ({both}); use {{number}}, or write what lies between"
+        if serial.startswith(HIDDEN):
+            return "", f"serial number {serial}: begins with {serial[0]}, as folders that are no parts"
+        return serial, ""
+
+
+def _expression(pattern: str, many: str) -> re.Pattern[str]:
+    """A pattern whose names are as short, or as long, as they can be."""
+    forms = {"serial": ".", "image": ".", "number": "[0-9]"}
+    pieces = enumerate(NAMES.split(pattern))
+    return re.compile("".join(f"(?P<{each}>{forms[each]}{many})" if at % 2 else re.escape(each) for at, each in pieces))

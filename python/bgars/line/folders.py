@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import glob
+import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +13,6 @@ from bgars.io.recipe import RECIPE_NAME
 from bgars.store.data_set import is_store
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
     from os import PathLike
 
 __all__ = ["IMAGES", "capture_folders"]
@@ -21,7 +22,7 @@ NO_CAPTURE = (".", "_")
 IMAGES = {".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".pgm", ".ppm", ".pnm"}
 
 
-def capture_folders(given: Iterable[str | PathLike[str]]) -> list[Path]:
+def capture_folders(given: str | PathLike[str] | Iterable[str | PathLike[str]]) -> list[Path]:
     """Return the capture folders that are meant, each once, in the order of what was given.
 
     A pattern stands for the folders that match, a folder of folders for those in it; stores are left out of both.
@@ -34,8 +35,7 @@ def capture_folders(given: Iterable[str | PathLike[str]]) -> list[Path]:
         A pattern that matches nothing, or no folders at all.
     """
     found: dict[Path, Path] = {}
-    for entry in given:
-        path = Path(entry)
+    for path in _paths(given):
         if path.is_dir():
             places = _captures_in(path)
         elif WILD & set(str(path)):
@@ -53,6 +53,18 @@ def capture_folders(given: Iterable[str | PathLike[str]]) -> list[Path]:
         msg = "folders: must be at least one capture, got none"
         raise InputError(msg)
     return list(found.values())
+
+
+def _paths(given: object) -> list[Path]:
+    """One path, or several; a text is a path, and not its letters."""
+    entries = list(given) if isinstance(given, Iterable) and not isinstance(given, str) else [given]
+    paths = []
+    for entry in entries:
+        if not isinstance(entry, str | os.PathLike):
+            msg = f"folders: must be paths, got {entry!r}"
+            raise InputError(msg)
+        paths.append(Path(entry))
+    return paths
 
 
 def _captures_in(folder: Path) -> list[Path]:

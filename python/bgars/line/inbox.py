@@ -8,14 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bgars.errors import InputError
-from bgars.line.flat import FlatFiles
+from bgars.line.flat import HIDDEN, FlatFiles
 from bgars.line.folders import IMAGES
 
 __all__ = ["HIDDEN", "Inbox", "Waiting"]
 
 Signature = tuple[tuple[str, int, int], ...]
-HIDDEN = (".", "_")
-"""How the names of folders begin that are no parts."""
 LOOSE_S = 2.0
 """How long images may lie beside the folders: software that makes a folder and moves them into it takes less."""
 
@@ -99,6 +97,7 @@ class Inbox:
         folders = [entry for entry in shown if _is_folder(entry)]
         images = {entry.name for entry in shown if Path(entry.name).suffix.lower() in IMAGES}
         images -= {entry.name for entry in folders}
+        images |= set() if self.flat is None else self.flat.refused.keys()
         self._loose_s = {name: self._loose_s.get(name, now) for name in images}
         for entry in sorted(folders, key=lambda entry: entry.name):
             signature = _signature(Path(entry.path))
@@ -118,9 +117,15 @@ class Inbox:
 
         With a pattern of files they may be waiting for others of their part, as long as `patience_s`.
         """
-        least_s = max(self.settle_s, LOOSE_S) if self.flat is None else patience_s
-        now = time.monotonic()
-        names = sorted(name for name, since_s in self._loose_s.items() if now - since_s >= least_s)
+        refused = {} if self.flat is None else self.flat.refused
+        soon_s, now = max(self.settle_s, LOOSE_S), time.monotonic()
+        lain_s = {name: now - since_s for name, since_s in sorted(self._loose_s.items())}
+        names = [name for name in lain_s if name in refused and lain_s[name] >= soon_s]
+        if names:
+            images = f"{len(names)} images" if len(names) > 1 else "1 image"
+            return f"{images} not taken, such as {names[0]}: {refused[names[0]]}"
+        least_s = soon_s if self.flat is None else patience_s
+        names = [name for name in lain_s if lain_s[name] >= least_s]
         if not names:
             return ""
         images = f"{len(names)} images" if len(names) > 1 else "1 image"

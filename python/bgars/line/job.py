@@ -10,7 +10,8 @@ from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bgars.errors import BgarsError
+from bgars.errors import BgarsError, InputError
+from bgars.files.encodable import encodable, is_encodable
 from bgars.io.capture import read_capture
 from bgars.io.part_recipe import read_part_recipe
 from bgars.io.provenance import capture_files, checksums
@@ -23,7 +24,7 @@ from bgars.store.keys import key_of, part_key
 from bgars.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from bgars.records.capture import Capture
     from bgars.records.findings import Findings
@@ -137,7 +138,8 @@ def place_serial(serial: str, place: str) -> str:
 
 def _failed(job: Job, serial: str, error: Exception, started: float) -> Outcome:
     is_told = isinstance(error, BgarsError | OSError)
-    reason = " ".join((str(error) if is_told else f"unexpected {type(error).__name__}: {error}").split())
+    told = str(error) if is_told else f"unexpected {type(error).__name__}: {error}"
+    reason = " ".join(encodable(told).split())
     seconds = time.perf_counter() - started
     return Outcome(job.folder, serial, reason=reason, seconds=seconds, is_input=isinstance(error, BgarsError))
 
@@ -146,6 +148,7 @@ def _inspected(job: Job, folder: Path, recipe_file: str, started: float) -> tupl
     serial, identity = job.naming.of_name(Path(job.folder), side=folder)
     recipe = read_part_recipe(recipe_file) if recipe_file else None
     capture = read_capture(folder, threads=job.threads)
+    _need_text(capture_files(capture))
     serial = job.naming.of_capture(folder, capture, serial)
     digests = [digest for _, digest in checksums((*capture_files(capture), *([Path(recipe_file)] if recipe else [])))]
     identity = with_capture(identity, capture)
@@ -163,6 +166,14 @@ def _inspected(job: Job, folder: Path, recipe_file: str, started: float) -> tupl
             outcomes.append(_failed(job, name, error, started))
         started = time.perf_counter()
     return tuple(outcomes)
+
+
+def _need_text(files: Iterable[Path]) -> None:
+    """Raise InputError for a file whose name is no text: results are UTF-8, and name their files."""
+    for path in files:
+        if not is_encodable(path.name):
+            msg = f"{path}: its name must be UTF-8"
+            raise InputError(msg)
 
 
 def _tell(capture: Capture, findings: Findings) -> tuple[str, ...]:

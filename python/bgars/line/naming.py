@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bgars.errors import InputError
+from bgars.files.encodable import encodable, is_encodable
 from bgars.io.recipe import RECIPE_NAME, CaptureRecipe, read_recipe
 from bgars.io.strict_toml import read_values
 from bgars.records.part_identity import PartIdentity
@@ -25,7 +26,8 @@ __all__ = ["CODE", "Naming", "identity_of", "with_capture"]
 CODE = "code"
 """A pattern that asks for the code in the images."""
 NAMES = ("serial", *(entry.name for entry in fields(PartIdentity) if entry.name != "captured_utc"))
-FORMS = {"round": "0*[1-9][0-9]{0,5}"}
+SHORT, LONG = "?", ""
+"""What follows a repetition that is to be as short, or as long, as it can be."""
 DEFAULT_PATTERN = "{serial}"
 
 
@@ -79,24 +81,29 @@ class Naming:
         Raises
         ------
         InputError
-            The name does not follow the pattern, and the side file names no serial number.
+            The name does not follow the pattern, or in more than one way, and the side file names no serial number.
         """
+        if not is_encodable(folder.name):
+            msg = f"{encodable(str(folder))}: its name must be UTF-8"
+            raise InputError(msg)
         known = _side_file(folder if side is None else side)
         found: dict[str, Any] = {}
         if self.pattern != CODE:
             depth = self.pattern.count("/") + 1
             told = "/".join(folder.absolute().parts[-depth:])
-            match = self._expression().fullmatch(told)
-            if match is not None:
+            match, other = (self._expression(many).fullmatch(told) for many in (SHORT, LONG))
+            if match is not None and other is not None and match.groupdict() == other.groupdict():
                 found = match.groupdict()
                 if "round" in found:
                     found["round"] = int(found["round"])
             elif not known.get("serial"):
                 msg = f"{folder}: its name must follow the pattern {self.pattern!r}, got {told!r}"
+                if match is not None and other is not None:
+                    ways = f"{match['serial']!r} or {other['serial']!r}"
+                    msg = f"{folder}: its name fits {self.pattern!r} in more than one way: serial number {ways}"
                 raise InputError(msg)
         values = self.common.known() | found | known
-        serial = values.pop("serial", "")
-        return serial, PartIdentity(**values)
+        return _printable(folder, values.pop("serial", "")), PartIdentity(**values)
 
     def of_capture(self, folder: Path, capture: Capture, serial: str) -> str:
         """Return the serial number, read from the images where the pattern is ``code`` and nothing named one.
@@ -112,10 +119,10 @@ class Naming:
         if not text:
             msg = f"{folder}: no DataMatrix or QR code can be read in its images"
             raise InputError(msg)
-        return text
+        return _printable(folder, text)
 
-    def _expression(self) -> re.Pattern[str]:
-        """The pattern as a regular expression; every name once, each as short as it can be."""
+    def _expression(self, many: str = SHORT) -> re.Pattern[str]:
+        """The pattern as a regular expression; every name once, each as short, or as long, as it can be."""
         pieces = re.split(r"\{(\w*)\}", self.pattern)
         names = pieces[1::2]
         unknown = next((name for name in names if name not in NAMES), None)
@@ -125,8 +132,9 @@ class Naming:
         if "serial" not in names or len(set(names)) < len(names):
             msg = f"serial-from: must hold {{serial}}, and each name once, got {self.pattern!r}"
             raise InputError(msg)
+        forms = {"round": f"0*[1-9][0-9]{{0,5}}{many}"}
         told = "".join(
-            f"(?P<{piece}>{FORMS.get(piece, '[^/]+?')})" if at % 2 else re.escape(piece)
+            f"(?P<{piece}>{forms.get(piece, f'[^/]+{many}')})" if at % 2 else re.escape(piece)
             for at, piece in enumerate(pieces)
         )
         return re.compile(told)
@@ -139,8 +147,17 @@ def identity_of(capture: Capture, common: PartIdentity, station: Path | None = N
     """
     known = {} if capture.folder is None else _side_file(capture.folder)
     values = common.known() | known
-    serial = values.pop("serial", "")
+    serial = _printable(capture.folder, values.pop("serial", ""))
     return serial, with_capture(PartIdentity(**values), capture, station)
+
+
+def _printable(folder: Path | None, serial: str) -> str:
+    """A serial number, unless it would not stay one line in a log, an environment variable or a name of a file."""
+    if serial and not serial.isprintable():
+        where = "" if folder is None else f"{encodable(str(folder))}: "
+        msg = f"{where}serial: must be one printable line, got {serial!r}"
+        raise InputError(msg)
+    return serial
 
 
 def with_capture(identity: PartIdentity, capture: Capture, station: Path | None = None) -> PartIdentity:

@@ -7,14 +7,13 @@ import os
 import shlex
 import socket
 import subprocess
-import urllib.error
 import urllib.request
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
-from bgars.errors import BgarsError, InputError
+from bgars.errors import InputError
 from bgars.line.credentials import split_address
 from bgars.store.append import write_durably
 from bgars.version import __version__
@@ -58,17 +57,25 @@ class Notifier:
         if self.url and split_address(self.url, "--post").scheme not in {"http", "https"}:
             msg = f"--post: must be an http:// or https:// address, got {self.url!r}"
             raise InputError(msg)
+        if self.url and not _is_url(self.url):
+            msg = (
+                f"--post: must be a host and a path without spaces, in ASCII (%20 is a space), got {_bare(self.url)!r}"
+            )
+            raise InputError(msg)
         if self.tcp:
             host, _, port = self.tcp.rpartition(":")
-            if not host or not port.isdecimal() or not 0 < int(port) < 1 << 16:
+            if not _is_host(host) or not port.isdecimal() or not 0 < int(port) < 1 << 16:
                 msg = f"--tcp: must be HOST:PORT, got {self.tcp!r}"
                 raise InputError(msg)
         if self.command:
             try:
-                shlex.split(self.command)
+                words = shlex.split(self.command)
             except ValueError as error:
                 msg = f"--on-result: is no command ({error}), got {self.command!r}"
                 raise InputError(msg) from None
+            if not words or not words[0]:
+                msg = f"--on-result: must name a program, got {self.command!r}"
+                raise InputError(msg)
 
     def send(self, values: dict[str, Any], line: str) -> list[str]:
         """Send a message, and its line; return what went wrong, one line each: the line goes on."""
@@ -76,8 +83,9 @@ class Notifier:
         for name, action in self._actions(values, line):
             try:
                 action()
-            except (OSError, BgarsError, subprocess.SubprocessError, urllib.error.URLError) as error:
-                problems.append(f"{name}: {error}".replace("\n", " "))
+            except Exception as error:  # an answer that is no HTTP, too: no receiver stops a line
+                told = " ".join(str(error).split())
+                problems.append(f"{name}: {told or type(error).__name__}")
         return problems
 
     def _actions(self, values: dict[str, Any], line: str) -> Iterator[Any]:
@@ -150,6 +158,21 @@ def _run(command: str, values: dict[str, Any]) -> None:
         check=True,
         stdout=subprocess.DEVNULL,
     )
+
+
+def _is_host(host: str) -> bool:
+    """Whether names of hosts look like this."""
+    try:
+        return bool(host.encode("idna")) and host.isprintable() and " " not in host
+    except UnicodeError:  # an empty label, or one of more than 63 characters
+        return False
+
+
+def _is_url(url: str) -> bool:
+    """Whether a request can be made of an address."""
+    parts = urlsplit(url)
+    path = f"{parts.path}?{parts.query}"
+    return _is_host(parts.hostname or "") and path.isascii() and path.isprintable() and " " not in path
 
 
 def _bare(url: str) -> str:

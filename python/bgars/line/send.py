@@ -5,8 +5,10 @@ The store is the outbox: what was sent is remembered beside it, and what was not
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import json
+import os
 import re
 import time
 from dataclasses import dataclass, field
@@ -21,7 +23,7 @@ from bgars.line.notify import message
 from bgars.store.append import write_durably
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from bgars.store import Store
 
@@ -31,7 +33,10 @@ ACK_S = 10.0
 BLOCK_PARTS = 50
 LATE_NS = 3_600 * 10**9
 """A part may come into the store after one of a higher number: so far back it is looked for."""
+LONGEST_NAME = 255
 LONGEST_PAUSE_S = 60.0
+SHOWN = 60
+"""Characters of an address in the name of the file that remembers what it got."""
 USER, PASSWORD = "BGARS_MQTT_USER", "BGARS_MQTT_PASSWORD"
 
 
@@ -53,6 +58,9 @@ class Mqtt:
         parts = split_address(url, "mqtt")
         if parts.scheme not in {"mqtt", "mqtts"} or not parts.hostname or not parts.path.strip("/"):
             msg = "mqtt: must be mqtt://HOST/TOPIC or mqtts://HOST/TOPIC"
+            raise InputError(msg)
+        if parts.query or parts.fragment or url.endswith(("#", "?")) or "+" in parts.path:
+            msg = "mqtt: a topic to send to must be without +, # and ?"
             raise InputError(msg)
         if parts.username or parts.password:
             msg = f"mqtt: user and password go into {USER} and {PASSWORD}, not into the address, which comes into logs"
@@ -132,10 +140,14 @@ class Sender:
     sent: int = 0
     _problem: str = ""
     _state: dict[str, int] = field(default_factory=dict)
+    _looked: frozenset[str] | None = None
 
     def __post_init__(self) -> None:
         """Read what was sent to this place before."""
         try:
+            could_be = len(self._former.name) <= LONGEST_NAME
+            if could_be and self._former.is_file() and not self._file.exists():
+                self._former.replace(self._file)
             text = self._file.read_text(encoding="utf-8") if self._file.is_file() else "{}"
             self._state = {str(key): int(value) for key, value in json.loads(text).items()}
         except (OSError, ValueError, AttributeError) as error:
@@ -144,6 +156,14 @@ class Sender:
 
     @property
     def _file(self) -> Path:
+        """Of this place alone: different addresses may be alike as names of files, or too long for one."""
+        kind = "cfx" if self.is_cfx else "short"
+        own = hashlib.sha256(f"{kind} {self.channel.name}".encode()).hexdigest()[:8]
+        return self._former.with_name(f"{self._former.stem[:SHOWN]}-{own}.json")
+
+    @property
+    def _former(self) -> Path:
+        """As an earlier bgars named it; the first address that would have had it takes it over."""
         name = re.sub(r"[^\w.-]", "_", f"{self.channel.name}{'-cfx' if self.is_cfx else ''}")
         return self.store.folder / "sent" / f"{name}.json"
 
@@ -182,16 +202,22 @@ class Sender:
 
     def step(self) -> int:
         """Send the next parts in their order; return how many. Each is remembered when the broker has it."""
+        files = frozenset(path.path for path in _files(self.store.folder / "parts"))
+        if files == self._looked:  # DuckDB would read them all
+            return 0
         count = 0
         since = max(self._state.values(), default=0) - LATE_NS
         rows = self.store.query(
-            "select p.sequence, p.part_key, p.capture_folder, r.result_json "
-            f"from inspections p join results r using (part_key) where p.sequence > {since} order by p.sequence"
+            f"select sequence, part_key, capture_folder from inspections where sequence > {since} order by sequence"
         ).to_pylist()
-        for row in [row for row in rows if row["part_key"] not in self._state][:BLOCK_PARTS]:
+        rows = [row for row in rows if row["part_key"] not in self._state]
+        block = ", ".join(f"'{row['part_key']}'" for row in rows[:BLOCK_PARTS])
+        found = self.store.query(f"select part_key, result_json from results where part_key in ({block or 'NULL'})")
+        texts = {row["part_key"]: row["result_json"] for row in found.to_pylist()}
+        for row in (row for row in rows[:BLOCK_PARTS] if row["part_key"] in texts):
             if self.is_stopping:
                 break
-            result = parse_result(row["result_json"].encode(), self.store.folder / RESULT_NAME)
+            result = parse_result(texts[row["part_key"]].encode(), self.store.folder / RESULT_NAME)
             values = to_cfx(result) if self.is_cfx else message(result, Path(row["capture_folder"]))
             self.channel.send(json.dumps(values, ensure_ascii=False))
             self._state[row["part_key"]] = row["sequence"]
@@ -200,7 +226,23 @@ class Sender:
             write_durably(self._file, json.dumps(self._state).encode())
             count += 1
             self.sent += 1
+        if not rows:
+            self._looked = files
         return count
+
+
+def _files(folder: Path, depth: int = 2) -> Iterator[os.DirEntry[str]]:
+    """Files of a table, in its folders by day and recipe; what goes meanwhile is left out."""
+    try:
+        with os.scandir(folder) as entries:
+            found = list(entries)
+    except (FileNotFoundError, NotADirectoryError):
+        return
+    for entry in found:
+        if depth:
+            yield from _files(Path(entry.path), depth - 1)
+        else:
+            yield entry
 
 
 def _need_paho() -> Any:  # noqa: ANN401 - a module

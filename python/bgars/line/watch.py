@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bgars.errors import BgarsError, FileFormatError, InputError
+from bgars.files.encodable import encodable
 from bgars.io.part_recipe import read_part_recipe
 from bgars.io.recipe import RECIPE_NAME, read_recipe
 from bgars.io.station_file import read_station
@@ -222,9 +223,11 @@ class Watch:
         self.say(f"{line} seconds={outcome.seconds:.2f}")
 
     def _tell_failure(self, outcome: Outcome, place: Path) -> None:
-        capture, now = Path(outcome.folder).name, now_utc()
+        capture, now = encodable(Path(outcome.folder).name), now_utc()
         told = {"serial": outcome.serial, "reason": outcome.reason, "part": self._name or capture}
-        values = failure_message(folder=place, identity=self.naming.common, inspected_utc=now, **told)
+        values = failure_message(
+            folder=Path(encodable(str(place))), identity=self.naming.common, inspected_utc=now, **told
+        )
         self._tell(outcome, values, error_line(time=now, capture=capture, version=__version__, **told))
 
     def _move(self, part: Waiting, place: Path) -> bool:
@@ -270,7 +273,7 @@ class Watch:
         try:
             return self.naming.of_name(folder)[0]
         except (BgarsError, OSError):
-            return folder.name
+            return encodable(folder.name)
 
     def _problem_once(self, text: str) -> None:
         """Say what is wrong when it begins, and not at every look."""

@@ -3,14 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import fields, is_dataclass
-from typing import Any
+from html import escape
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-__all__ = ["Short"]
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+__all__ = ["Short", "facts_table"]
 
 LONGEST = 40
 """Characters of a single value."""
+
+
+def facts_table(title: str, facts: Mapping[str, object]) -> str:
+    """Return facts as a table in HTML, for notebooks."""
+    left = "style='text-align:left'"
+    rows = "".join(
+        f"<tr><th {left}>{escape(name)}</th><td {left}>{escape(str(fact))}</td></tr>" for name, fact in facts.items()
+    )
+    return f"<table><caption><b>{escape(title)}</b></caption>{rows}</table>"
 
 
 class Short:

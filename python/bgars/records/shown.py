@@ -5,14 +5,13 @@ from __future__ import annotations
 import io
 import math
 from base64 import b64encode
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bgars.errors import InputError
 from bgars.records.plain_arrays import plain
-from bgars.records.short import Short
+from bgars.records.short import Short, facts_table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,7 +22,16 @@ if TYPE_CHECKING:
 
     from bgars.records.ball_result import BallResult
 
-__all__ = ["ABSENT", "VERDICT_COLORS", "ShownCapture", "ShownField", "ShownHeight", "ShownPart", "counted"]
+__all__ = [
+    "ABSENT",
+    "VERDICT_COLORS",
+    "ShownCapture",
+    "ShownField",
+    "ShownHeight",
+    "ShownPart",
+    "counted",
+    "facts_table",
+]
 
 VERDICT_COLORS = {"pass": "#56B4E9", "fail": "#D55E00", "undecided": "#E69F00"}
 """Okabe and Ito, Color universal design, 2008: told apart by colour-blind readers."""
@@ -50,15 +58,8 @@ class Shown(Short):
         file = io.BytesIO()
         self._picture().save(file, "png")
         source = f"data:image/png;base64,{b64encode(file.getvalue()).decode('ascii')}"
-        left = "style='text-align:left'"
-        rows = "".join(
-            f"<tr><th {left}>{escape(name)}</th><td {left}>{escape(str(fact))}</td></tr>"
-            for name, fact in self._facts().items()
-        )
-        return (
-            f"<div style='display:flex;gap:1em;align-items:center'><img src='{source}' alt=''>"
-            f"<table><caption><b>{type(self).__name__}</b></caption>{rows}</table></div>"
-        )
+        table = facts_table(type(self).__name__, self._facts())
+        return f"<div style='display:flex;gap:1em;align-items:center'><img src='{source}' alt=''>{table}</div>"
 
 
 class ShownCapture(Shown):

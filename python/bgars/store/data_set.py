@@ -9,9 +9,12 @@ from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import unquote
 
 from bgars.errors import FileFormatError, InputError
+from bgars.files.encodable import encodable
 from bgars.io.parquet import need_pyarrow
+from bgars.records.short import facts_table
 from bgars.store.append import PARTIAL, append_rows, partition, write_durably
 from bgars.store.compact import compact
 from bgars.store.export import export
@@ -50,6 +53,18 @@ class Store:
     def __repr__(self) -> str:
         return f"Store({str(self.folder)!r})"
 
+    def _repr_html_(self) -> str:
+        """What the store holds, for notebooks; only names of folders are read, and keys once."""
+        places = sorted((self.folder / "parts").glob("day=*/recipe=*"))
+        days = sorted({place.parent.name.removeprefix("day=") for place in places})
+        facts = {
+            "folder": self.folder,
+            "parts": f"{len(self.known())} (all inspections)",
+            "recipes": ", ".join(sorted({unquote(place.name.removeprefix("recipe=")) for place in places})) or "none",
+            "days": " to ".join(dict.fromkeys((days[0], days[-1]))) if days else "none",
+        }
+        return facts_table("Store", facts)
+
     def append(self, result: PartResult, *, capture_folder: str = "", seconds: float = math.nan) -> bool:
         """Add a result, durably and whole, unless it is there; with the round of :meth:`numbered`.
 
@@ -79,7 +94,8 @@ class Store:
         if key in self.known():
             return False
         _raise_version(self.folder / MARK)
-        rows = result_rows(result, sequence=self._next_sequence(), capture_folder=capture_folder, seconds=seconds)
+        folder = encodable(capture_folder)
+        rows = result_rows(result, sequence=self._next_sequence(), capture_folder=folder, seconds=seconds)
         place = partition(result.inspected_utc[:10], result.name if result.recipe is not None else "")
         append_rows(self.folder, place, f"p-{key[:40]}", rows)
         self._parts().add(self.folder / "parts" / place / f"p-{key[:40]}.parquet", rows["parts"][0])
@@ -117,6 +133,7 @@ class Store:
     ) -> None:
         """Keep why a capture could not be inspected; a later success hides it from queries."""
         now = datetime.now(timezone.utc)
+        capture_folder, serial = encodable(capture_folder), encodable(serial)
         key = failure_key(capture_folder, serial=serial, recipe=recipe, version=version)
         row = {
             "part_key": key,
@@ -125,7 +142,7 @@ class Store:
             "lot": lot,
             "capture_folder": capture_folder,
             "failed_utc": now.replace(tzinfo=None),
-            "reason": " ".join(reason.split()),
+            "reason": " ".join(encodable(reason).split()),
             "version": version,
         }
         place = partition(now.strftime(TIME_FORM)[:10], recipe)

@@ -82,8 +82,12 @@ def _copy(alchemy: Any, engine: Any, folder: Path) -> dict[str, int]:  # noqa: A
                 names = [column.name for column in tables[name].columns if column.name != "row_id"]
                 sql = f"select {', '.join(_name(each) for each in names)} from {name} where part_key in ({block})"
                 added[f"{PREFIX}{name}"] += _insert(connection, tables[name], query(folder, sql))
-    with engine.begin() as connection:  # failures are few and may go: they are copied as they are now
-        connection.execute(tables["failures"].delete())
+    # Failures are few and may go: those of this store, and not of another one, are copied as they are now.
+    own = query(folder, "select part_key from failures_taken")["part_key"].to_pylist()
+    with engine.begin() as connection:
+        for start in range(0, len(own), BLOCK_PARTS):
+            of_store = tables["failures"].c.part_key.in_(own[start : start + BLOCK_PARTS])
+            connection.execute(tables["failures"].delete().where(of_store))
         every = ", ".join(column.name for column in tables["failures"].columns)
         rows = query(folder, f"select {every} from failures")
         added[f"{PREFIX}failures"] += _insert(connection, tables["failures"], rows)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from bgars.io.parquet import need_pyarrow
 from bgars.store.keys import images_key
-from bgars.store.repair import damage
+from bgars.store.repair import damage, need_columns
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -158,9 +158,10 @@ def _rows(path: str, recipe: str, columns: tuple[str, ...] = READ) -> list[dict[
     _, parquet = need_pyarrow()
     try:
         with parquet.ParquetFile(path) as file:
-            rows: list[dict[str, Any]] = file.read(
-                [name for name in columns if name in file.schema_arrow.names]
-            ).to_pylist()
+            need_columns(file.schema_arrow.names)
+            # Files of an earlier bgars have no rounds, or no checksum of the images.
+            there = [name for name in columns if name in file.schema_arrow.names]
+            rows: list[dict[str, Any]] = file.read(there).to_pylist()
     except FileNotFoundError:  # gone into a compacted file, which is read, or a second copy of it
         return []
     except (OSError, ValueError) as error:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from bgars.errors import FileFormatError, InputError
+from bgars.store.read_only import need_reading
 from bgars.store.repair import raise_damage
 from bgars.store.schema import OLD_NAMES, TABLES, arrow_schema
 
@@ -57,11 +58,13 @@ FROM {files} s JOIN parts_taken p ON s.part_key = p.part_key AND parse_filename(
 WHERE p.is_latest;
 """
 FAILURES = """
-CREATE VIEW failures AS SELECT * EXCLUDE (filename, copy) FROM (
-    SELECT *, row_number() OVER (PARTITION BY part_key ORDER BY sequence DESC, filename) AS copy FROM {failures}) f
-WHERE copy = 1 AND NOT EXISTS (
+CREATE VIEW failures_taken AS SELECT * EXCLUDE (filename, copy) FROM (
+    SELECT *, row_number() OVER (PARTITION BY part_key ORDER BY sequence DESC, filename) AS copy FROM {failures})
+WHERE copy = 1;
+CREATE VIEW failures AS SELECT * FROM failures_taken f WHERE NOT EXISTS (
     SELECT 1 FROM parts_taken p
-    WHERE p.sequence > f.sequence
+    -- A success under another recipe, such as for the other side, says nothing; 'none' is of before it was known.
+    WHERE p.sequence > f.sequence AND (f.recipe = p.recipe OR f.recipe = 'none')
       AND ((f.serial <> '' AND p.serial = f.serial)
            OR (p.capture_folder = f.capture_folder
                -- Another part of the same strip, which is named STRIP-PLACE, says nothing of this one.
@@ -76,7 +79,7 @@ def query(folder: Path, sql: str) -> Any:  # noqa: ANN401 - pyarrow has no types
     Raises
     ------
     InputError
-        DuckDB is not installed, or refuses the question.
+        DuckDB is not installed or refuses the question, or this is no single SELECT that only reads.
     FileFormatError
         A file of the store cannot be read.
     """
@@ -84,10 +87,8 @@ def query(folder: Path, sql: str) -> Any:  # noqa: ANN401 - pyarrow has no types
     for attempt in range(TRIES):
         try:
             with connect(folder) as connection:
-                answer = connection.sql(sql)
-                if answer is None:
-                    break
-                return answer.to_arrow_table()
+                need_reading(connection, sql)
+                return connection.sql(sql).to_arrow_table()
         except duckdb.Error as error:
             is_file = isinstance(error, duckdb.IOException)
             if is_file and attempt + 1 < TRIES and any(word in str(error) for word in LOST):
@@ -100,8 +101,8 @@ def query(folder: Path, sql: str) -> Any:  # noqa: ANN401 - pyarrow has no types
                 raise FileFormatError(msg) from error
             msg = f"query: {_one_line(error)}"
             raise InputError(msg) from error
-    msg = f"query: must be a query that returns rows, such as 'select count(*) from parts', got {sql!r}"
-    raise InputError(msg)
+    msg = f"{folder}: files of the store go while they are read; try again"
+    raise FileFormatError(msg)
 
 
 def connect(folder: Path) -> Any:  # noqa: ANN401 - duckdb's connection

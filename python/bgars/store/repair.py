@@ -14,10 +14,12 @@ from bgars.store.schema import TABLES, arrow_schema
 if TYPE_CHECKING:
     from pathlib import Path
 
-__all__ = ["damage", "raise_damage", "repair"]
+__all__ = ["damage", "need_columns", "raise_damage", "repair"]
 
 ASIDE = "damaged"
 """Folder of the store for files that were set aside; they keep their place in it."""
+NEEDED = ("part_key", "serial", "sequence", "inspected_utc", "lot", "result_json")
+"""Columns that a file of parts has had since the first store."""
 SIDES = ("balls", "checks", "budgets")
 
 
@@ -27,6 +29,14 @@ def damage(path: Path, error: Exception) -> FileFormatError:
     told = " ".join(str(error).split()).rstrip(".")
     way_out = f"'bgars store repair {store}' makes it again or sets it aside"
     return FileFormatError(f"{path}: is not a readable file of a store ({told}); {way_out}")
+
+
+def need_columns(names: list[str], needed: tuple[str, ...] = NEEDED) -> None:
+    """Raise ValueError where a file lacks a column: another program wrote it."""
+    lost = [name for name in needed if name not in names]
+    if lost:
+        msg = f"has no column {lost[0]}"
+        raise ValueError(msg)
 
 
 def raise_damage(folder: Path) -> None:
@@ -78,6 +88,7 @@ def _table(path: Path) -> Any:  # noqa: ANN401 - pyarrow has no types
     pyarrow, parquet = need_pyarrow()
     try:
         with parquet.ParquetFile(path) as file:
+            need_columns(file.schema_arrow.names, NEEDED if path.parents[2].name == COMMIT else NEEDED[:1])
             return file.read()
     except (OSError, ValueError, pyarrow.ArrowException) as error:
         raise damage(path, error) from error

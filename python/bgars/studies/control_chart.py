@@ -217,7 +217,7 @@ def _zones(deviations: NDArray[np.float64]) -> list[Signal]:
     for rule, needed, window, beyond in WESTERN_ELECTRIC:
         for side in (1.0, -1.0):
             outside = side * deviations > beyond
-            for at in range(window - 1, len(deviations)):
-                if outside[at] and int(outside[at - window + 1 : at + 1].sum()) >= needed:
+            for at in range(needed - 1, len(deviations)):
+                if outside[at] and int(outside[max(0, at - window + 1) : at + 1].sum()) >= needed:
                     found.append(Signal(at, "mean", rule))
     return found

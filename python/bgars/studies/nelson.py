@@ -71,9 +71,9 @@ def nelson_signals(deviations: NDArray[np.float64], rules: Iterable[int]) -> Ite
     [(2, 'Nelson 1: beyond 3 sigma')]
     """
     for rule in rules:
-        window, holds = RULES[rule]
-        for at in range(window - 1, len(deviations)):
-            if holds(deviations[at + 1 - window : at + 1]):
+        fewest, window, holds = RULES[rule]
+        for at in range(fewest - 1, len(deviations)):
+            if holds(deviations[max(0, at + 1 - window) : at + 1]):
                 yield at, NELSON[rule]
 
 
@@ -104,14 +104,14 @@ def _is_torn(window: NDArray[np.float64]) -> bool:
     return bool((np.abs(window) > 1.0).all() and (window > 0).any() and (window < 0).any())
 
 
-RULES: dict[int, tuple[int, Callable[[NDArray[np.float64]], bool]]] = {
-    1: (1, _beyond(1, 3.0)),
-    2: (9, _beyond(9, 0.0)),
-    3: (6, _runs),
-    4: (14, _alternates),
-    5: (3, _beyond(2, 2.0)),
-    6: (5, _beyond(4, 1.0)),
-    7: (15, _is_calm),
-    8: (8, _is_torn),
+RULES: dict[int, tuple[int, int, Callable[[NDArray[np.float64]], bool]]] = {
+    1: (1, 1, _beyond(1, 3.0)),
+    2: (9, 9, _beyond(9, 0.0)),
+    3: (6, 6, _runs),
+    4: (14, 14, _alternates),
+    5: (2, 3, _beyond(2, 2.0)),
+    6: (4, 5, _beyond(4, 1.0)),
+    7: (15, 15, _is_calm),
+    8: (8, 8, _is_torn),
 }
-"""Values that a rule looks at, and whether it holds for them."""
+"""Values that can hold the pattern of a rule, as at the start of a chart; those that it looks at; whether it holds."""
