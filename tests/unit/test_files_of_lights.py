@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from bgars.files.image_endings import IMAGE_ENDINGS
 from bgars.io.image_formats import IMAGE_SUFFIXES
-from case_captures import COUNT, LIGHTS, read_with_notes, reads_right, refused, write_images
+from case_captures import COUNT, LIGHTS, levels, read_with_notes, reads_right, refused, write_images
 from scipy.io import savemat
 
 NAMES = [f"img_{index:02d}.png" for index in range(1, COUNT + 1)]
@@ -109,3 +109,19 @@ def test_another_number_of_names_is_refused(tmp_path: Path) -> None:
 
 def test_every_image_that_is_read_counts_as_a_name() -> None:
     assert set(IMAGE_ENDINGS) >= IMAGE_SUFFIXES
+
+
+@pytest.mark.parametrize("name", ["L.npy", "l.npy", "S.npy", "light.npy"])
+@pytest.mark.parametrize("vectors", [LIGHTS, LIGHTS.T])
+def test_an_array_of_vectors_is_no_image(tmp_path: Path, name: str, vectors: np.ndarray) -> None:
+    write_images(tmp_path)
+    np.save(tmp_path / name, vectors)
+    np.save(tmp_path / "intensities.npy", np.ones(COUNT))
+    reads_right(tmp_path, f"lights taken from {name}", "intensities taken from intensities.npy")
+
+
+def test_an_array_of_vectors_beside_arrays_of_images(tmp_path: Path) -> None:
+    for name, image in zip(NAMES, levels(), strict=True):
+        np.save(tmp_path / f"{name[:-4]}.npy", image)
+    np.save(tmp_path / "L.npy", LIGHTS)
+    reads_right(tmp_path, "lights taken from L.npy")
