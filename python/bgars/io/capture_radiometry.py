@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Decoding", "Levels", "levels_of", "linearise_floats", "read_dark", "response_table", "subtract_offset"]
 
-U16_SCALE = 65535.0
+U8_SCALE, U16_SCALE = 255.0, 65535.0
 
 
 class Levels(NamedTuple):
@@ -111,6 +111,11 @@ def levels_of(
             f"({min(full_scale, saturation):g}), got {recipe.black_level:g}"
         )
         raise InputError(msg)
+    if 0.0 < recipe.black_level < 1.0 and full_scale >= U8_SCALE:
+        notes.append(
+            f"black_level = {recipe.black_level:g} is less than one of {full_scale:g} grey levels; if it is a share of "
+            f"full scale, write black_level = {recipe.black_level * full_scale:.4g}"
+        )
     return Levels(full_scale, saturation, recipe.black_level)
 
 
