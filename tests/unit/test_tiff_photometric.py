@@ -83,6 +83,18 @@ def write(folder: Path, kind: str, images: np.ndarray, stack: bool) -> None:
                 file.write(numbers, **{"photometric": kind, "metadata": None, **options})  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("mode", ["L", "RGB", "YCbCr"])
+@pytest.mark.parametrize("stack", [False, True], ids=["one a file", "stack"])
+def test_jpeg_within_a_tiff(tmp_path: Path, mode: str, stack: bool) -> None:
+    write_directions(tmp_path)
+    pages = [Image.fromarray(image).convert("RGB").convert(mode) for image in levels()]
+    for index, image in enumerate(pages[: 1 if stack else COUNT]):
+        rest = pages[1:] if stack else []
+        image.save(tmp_path / f"a{index}.tif", compression="jpeg", quality=95, save_all=True, append_images=rest)
+    capture = reads_right(tmp_path, *(["stack of 8 images"] if stack else []), within_deg=2.0)
+    np.testing.assert_allclose(capture.images.astype(int), levels().astype(int), atol=3)
+
+
 @pytest.mark.parametrize("kind", ["CMYK", "YCbCr", "P"])
 def test_normal_maps_too(tmp_path: Path, kind: str) -> None:
     codes = Image.fromarray(np.rint((truth() + 1.0) * 127.5).astype(np.uint8))

@@ -101,6 +101,11 @@ def test_a_black_level_is_a_grey_level(tmp_path: Path, black_level: float, bits:
     assert all(told in note for note in notes)
 
 
+def test_a_saturation_is_a_grey_level(folder: Path) -> None:
+    recipe(folder, f"saturation = 1.0\n{LIST}")
+    refused(folder, "capture.toml: saturation: must be the grey level that clips, of 255, got 1")
+
+
 @pytest.mark.parametrize(("dark", "said"), [(0, False), (38, False), (120, True)])
 def test_a_dark_frame_of_a_lit_part_is_said(folder: Path, dark: int, said: bool) -> None:
     Image.fromarray(np.full(SHAPE, dark, np.uint8)).save(folder / "dark.png")

@@ -99,6 +99,12 @@ def levels_of(
             f"got {recipe.saturation:g}"
         )
         raise InputError(msg)
+    if code_scale is not None and recipe.saturation is not None and recipe.saturation <= 1.0:
+        msg = (
+            f"{folder / RECIPE_NAME}: saturation: must be the grey level that clips, of {code_scale:g}, "
+            f"got {recipe.saturation:g}; leave it out if that is full scale"
+        )
+        raise InputError(msg)
     if code_scale is not None:
         full_scale, saturation = _integer_levels(recipe, images, code_scale, notes)
     elif recipe.saturation is not None:

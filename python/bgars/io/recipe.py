@@ -70,7 +70,7 @@ class RingRecipe(Strict):
     @classmethod
     def _in_degrees(cls, value: float) -> float:
         if value <= HIGHEST_RAD:
-            msg = f"must be in degrees, got {value:g}, which looks like radians ({math.degrees(value):.3g} degrees)"
+            msg = f"must be in degrees, and this looks like radians ({math.degrees(value):.3g} degrees)"
             raise ValueError(msg)
         return value
 

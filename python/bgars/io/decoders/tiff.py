@@ -10,7 +10,7 @@ import numpy as np
 
 from bgars.errors import FileFormatError
 from bgars.io.decoders.limits import check_size
-from bgars.io.decoders.tiff_photometric import keeps_ycbcr, light_of, rgb_of_ycbcr
+from bgars.io.decoders.tiff_photometric import by_pillow, light_of, needs_pillow
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -51,8 +51,8 @@ def page_pixels(path: Path, page: Any, index: int, workers: int | None = None) -
     FileFormatError
         They mean something else.
     """
-    if keeps_ycbcr(page):
-        return rgb_of_ycbcr(path, index)
+    if needs_pillow(page):
+        return by_pillow(path, index)
     pixels = np.asarray(page.asarray(maxworkers=workers))
     if pixels.ndim == 3 and getattr(page, "planarconfig", 1) == PLANAR_SEPARATE:  # noqa: PLR2004 - colour
         pixels = np.moveaxis(pixels, 0, -1)

@@ -17,12 +17,13 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["is_palette", "keeps_ycbcr", "light_of", "rgb_of_ycbcr"]
+__all__ = ["by_pillow", "is_palette", "light_of", "needs_pillow"]
 
 PHOTOMETRIC, INK_SET = 262, 332
 WHITE_IS_ZERO, BLACK_IS_ZERO, RGB, PALETTE, SEPARATED, YCBCR, LINEAR_RAW = 0, 1, 2, 3, 5, 6, 34892
 AS_STORED = (BLACK_IS_ZERO, RGB, LINEAR_RAW)
 CMYK_INKS = 1
+JPEG = 7
 CMYK, NDIM = 4, 3
 MAX_BITS = 16
 BYTE = 8
@@ -34,9 +35,10 @@ def is_palette(page: Any) -> bool:  # noqa: ANN401 - tifffile has pages and fram
     return _kind_of(page) == PALETTE
 
 
-def keeps_ycbcr(page: Any) -> bool:  # noqa: ANN401 - as above
-    """Whether a page holds luma and two differences of colour, often fewer of these (TIFF 6.0, section 21)."""
-    return _kind_of(page) == YCBCR
+def needs_pillow(page: Any) -> bool:  # noqa: ANN401 - as above
+    """Whether tifffile alone cannot read a page: luma and two differences of colour (section 21), or JPEG."""
+    is_jpeg = page.keyframe.compression == JPEG and _kind_of(page) in (BLACK_IS_ZERO, RGB)
+    return _kind_of(page) == YCBCR or is_jpeg
 
 
 def light_of(path: Path, page: Any, index: int, pixels: NDArray[Any]) -> NDArray[Any]:  # noqa: ANN401 - as above
@@ -100,12 +102,12 @@ def _of_inks(pixels: NDArray[Any], full: int) -> NDArray[Any]:
     return np.asarray(colors.astype(pixels.dtype))
 
 
-def rgb_of_ycbcr(path: Path, index: int) -> NDArray[np.uint8]:
-    """Red, green and blue of a page of luma and two differences of colour."""
+def by_pillow(path: Path, index: int) -> NDArray[np.uint8]:
+    """Return grey, or red, green and blue, of a page that :func:`needs_pillow`."""
     from PIL import Image  # noqa: PLC0415 - most captures never need it
 
     with path.open("rb") as file, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # its own limit of size: the caller has one
-        image = Image.open(file, formats=("TIFF",))
+        image: Image.Image = Image.open(file, formats=("TIFF",))
         image.seek(index)
-        return np.asarray(image.convert("RGB"))
+        return np.asarray(image.convert("RGB") if image.mode == "YCbCr" else image)
