@@ -125,3 +125,11 @@ def test_an_array_of_vectors_beside_arrays_of_images(tmp_path: Path) -> None:
         np.save(tmp_path / f"{name[:-4]}.npy", image)
     np.save(tmp_path / "L.npy", LIGHTS)
     reads_right(tmp_path, "lights taken from L.npy")
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\3\4", b"\x93NUMPY\1\0\x0a\0{'descr': ("])
+def test_a_damaged_array_is_left_to_its_reader(tmp_path: Path, content: bytes) -> None:
+    write_images(tmp_path, NAMES[1:], levels()[1:])
+    (tmp_path / "img_01.npy").write_bytes(content)
+    np.save(tmp_path / "L.npy", LIGHTS)
+    refused(tmp_path, "img_01.npy")
