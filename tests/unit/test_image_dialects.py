@@ -24,7 +24,7 @@ from case_captures import (
     write_directions,
     write_images,
 )
-from PIL import Image, ImageCms
+from PIL import Image, ImageCms, PngImagePlugin
 
 LOSSY = "hardly ever linear"
 
@@ -228,6 +228,19 @@ def test_a_colour_profile_is_doubted_as_jpeg_is(tmp_path: Path, suffix: str) -> 
     for name, image in zip(names_of("a{}" + suffix), levels(), strict=True):
         Image.fromarray(np.dstack([image] * 3)).save(tmp_path / name, icc_profile=profile)
     reads_right(tmp_path, "colour profile (a1.", LOSSY)
+
+
+@pytest.mark.parametrize(
+    ("gamma", "words"), [(1.0, []), (0.45455, ["gamma 0.455 by its header (a1.png)", LOSSY]), (0.0, [])]
+)
+@pytest.mark.parametrize("bits", [8, 16])
+def test_a_gamma_in_the_header_is_doubted_too(tmp_path: Path, gamma: float, words: list[str], bits: int) -> None:
+    write_directions(tmp_path)
+    chunk = PngImagePlugin.PngInfo()
+    chunk.add(b"gAMA", struct.pack(">I", round(100_000 * gamma)))
+    for name, image in zip(names_of("a{}.png"), levels(bits), strict=True):
+        Image.fromarray(image).save(tmp_path / name, pnginfo=chunk)
+    reads_right(tmp_path, *words)
 
 
 def test_an_animation_is_not_one_image(tmp_path: Path) -> None:

@@ -95,7 +95,7 @@ def float_images(folder: Path, images: np.ndarray) -> list[str]:
     write_directions(folder)
     for name, image in zip(names_of("a{}.tif"), images.astype(np.float32), strict=True):
         tifffile.imwrite(folder / name, image)
-    return [note for note in read_with_notes(folder)[1] if "below 0" in note]
+    return [note for note in read_with_notes(folder)[1] if "by more than noise" in note]
 
 
 @pytest.mark.parametrize("level", [0.5, 0.65])

@@ -98,5 +98,7 @@ def test_a_normal_map_of_floats_from_0_to_255_is_read(tmp_path: Path) -> None:
 def test_angles_in_radians_given_as_degrees_are_no_good_capture(folder: Path) -> None:
     angles = np.radians(np.column_stack([AZIMUTHS_DEG, np.full(8, 50.0)])).tolist()
     (folder / "capture.toml").write_text(f"[lights]\nangles_deg = {angles}\n", encoding="utf-8")
-    with pytest.raises(bgars.InputError, match=r"one plane.*angles are in degrees"):
+    with pytest.raises(
+        bgars.InputError, match=r"angles are in degrees, but no elevation is above 0\.873, which looks like radians"
+    ):
         bgars.check(folder)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 import typer
 
 import bgars
@@ -91,8 +92,16 @@ def read_surface(
     """Return the heights of a map, and what was assumed about it. `integration`: as integrate_normals takes it."""
     if is_normal_map(source):
         normals = read_stored_normals(source, directx=directx, mask=mask)
+        _need_some(source, normals.vectors, "normal")
         return _integrated(normals.vectors, pixel_pitch_um, integration or {}, report), normals.notes
-    return _stored_height(source, pixel_pitch_um), ()
+    return _stored_height(source, pixel_pitch_um)
+
+
+def _need_some(source: Path, values: FloatArray, what: str) -> None:
+    if not np.isfinite(values).any():
+        rows, columns = values.shape[:2]
+        msg = f"{source}: holds no {what}: all of its {columns} x {rows} pixels are invalid"
+        raise FileFormatError(msg)
 
 
 def _integrated(
@@ -108,9 +117,10 @@ def _integrated(
     return height
 
 
-def _stored_height(source: Path, pixel_pitch_um: float | None) -> bgars.HeightMap:
-    """A height map in the unit that its file names, or in um where only the command names a pitch."""
-    values, unit, stored_um = read_stored_height(source)
+def _stored_height(source: Path, pixel_pitch_um: float | None) -> tuple[bgars.HeightMap, tuple[str, ...]]:
+    """A height map in the unit that its file names, or in um where only the command names a pitch; and its notes."""
+    values, unit, stored_um, notes = read_stored_height(source)
+    _need_some(source, values, "height")
     if stored_um is not None and pixel_pitch_um not in {None, stored_um}:
         msg = f"--pixel-pitch-um: {source} says {stored_um}, got {pixel_pitch_um}; leave it out"
         raise InputError(msg)
@@ -119,4 +129,4 @@ def _stored_height(source: Path, pixel_pitch_um: float | None) -> bgars.HeightMa
         raise InputError(msg)
     if unit == "px" and pixel_pitch_um is not None:
         values = values * pixel_pitch_um
-    return bgars.HeightMap.from_array(values, pixel_pitch_um=pixel_pitch_um or stored_um)
+    return bgars.HeightMap.from_array(values, pixel_pitch_um=pixel_pitch_um or stored_um), notes

@@ -291,7 +291,7 @@ def _load(
         np.ones(len(paths)) if in_values else _one_intensity(lights.intensities, channel), files=files
     )
     pitch_um = lights.pixel_pitch_um if recipe.pixel_pitch_um is None else recipe.pixel_pitch_um
-    check_near_lights(rig, pitch_um, images.shape[1:], str(folder / RECIPE_NAME))
+    check_near_lights(rig, pitch_um, images.shape[1:], str(folder / RECIPE_NAME), notes)
     return Capture(
         images=images,
         rig=rig,

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Headers", "read_headers"]
 
+GAMMA_WITHIN = 0.01
+"""Of 1: the roundings of writers, which turn a mid grey by less than one level of 255."""
+
 
 class Headers(NamedTuple):
     """What the images of a capture have in common.
@@ -59,6 +62,11 @@ def read_headers(paths: Sequence[Path], *, stack: bool) -> Headers:
     doubted = [kind.name for kind in kinds if kind.lossy]
     doubted += [
         f"an image with a colour profile ({path.name})" for path, tag in zip(paths, tags, strict=True) if tag.profile
+    ]
+    doubted += [
+        f"an image of gamma {tag.gamma:.3g} by its header ({path.name})"
+        for path, tag in zip(paths, tags, strict=True)
+        if abs(tag.gamma - 1.0) > GAMMA_WITHIN
     ]
     doubt = f"{doubted[0]} is hardly ever linear in light" if doubted else ""
     with_alpha = tuple(path for path, tag in zip(paths, tags, strict=True) if tag.alpha)

@@ -14,7 +14,7 @@ from bgars.files.light_files import read_intensities, read_numbers
 from bgars.files.light_formats import LightTable, read_light_file
 from bgars.files.light_formats.angles import read_angle_table
 from bgars.files.light_names import light_name
-from bgars.io.recipe import RECIPE_NAME
+from bgars.io.recipe import HIGHEST_RAD, RECIPE_NAME
 from bgars.records.rig import LightRig
 
 if TYPE_CHECKING:
@@ -30,6 +30,8 @@ UNIT_WITHIN = 0.01
 """Vectors whose lengths differ from 1, or from each other, by less are directions."""
 STRONGEST = 10.0
 """Longest vector that can be a direction times an intensity; longer ones are positions, in whatever unit."""
+FARTHEST_UM = 1e7
+"""Ten metres: no lamp over a part is as far."""
 SOURCES = ("directions", "angles_deg", "positions_mm", "lp", "ring")
 
 
@@ -92,7 +94,7 @@ def read_lights(folder: Path, recipe: CaptureRecipe, notes: list[str]) -> Lights
         notes.append(f"intensities in {Path(source).name} are not used: others are given")
         strength = None
     intensities = strength if strength is not None else _intensity_rows(folder, lights.intensities, len(rig), source)
-    return Lights(rig, intensities, source, path, pitch_um)
+    return Lights(rig, _relative(intensities, notes), source, path, pitch_um)
 
 
 def _rig(
@@ -107,6 +109,7 @@ def _rig(
             notes.extend(f"{path.name}: {note}" for note in of_angles.notes)
             return LightRig.from_directions(of_angles.vectors, files=of_angles.files), None, None
         angles = lights.angles_deg if path is None else read_numbers(path, (2,), "azimuth and elevation in degrees")
+        _refuse_radians(np.array(angles, dtype=np.float64).reshape(-1, 2)[:, 1])
         return LightRig.from_angles(angles), None, None
     if path is None:
         table = LightTable(np.array(lights.directions or lights.positions_mm, dtype=np.float64).reshape(-1, 3))
@@ -129,6 +132,13 @@ def _rig(
     return LightRig.from_directions(vectors, files=table.files), strength, None
 
 
+def _refuse_radians(elevations_deg: NDArray[np.float64]) -> None:
+    if len(elevations_deg) and (np.abs(elevations_deg) <= HIGHEST_RAD).all():
+        highest = float(np.abs(elevations_deg).max())
+        msg = f"angles are in degrees, but no elevation is above {highest:.3g}, which looks like radians"
+        raise InputError(msg)
+
+
 def _are_positions(table: LightTable, recipe: CaptureRecipe) -> bool:
     """Whether a header gives the unit of positions, and the scale is known that near lights need."""
     is_stated = table.kind == "positions_mm" and not table.free_length and recipe.pixel_pitch_um is not None
@@ -146,8 +156,12 @@ def _refuse_unit_lengths(table: LightTable) -> None:
         raise InputError(msg)
 
 
-def check_near_lights(rig: LightRig, pixel_pitch_um: float | None, shape: tuple[int, ...], where: str) -> None:
+def check_near_lights(
+    rig: LightRig, pixel_pitch_um: float | None, shape: tuple[int, ...], where: str, notes: list[str]
+) -> None:
     """Refuse near lights without a scale, and such that all stand within the picture: they would hide the part.
+
+    Lights that are farther than any room is wide are noted.
 
     Raises
     ------
@@ -167,6 +181,10 @@ def check_near_lights(rig: LightRig, pixel_pitch_um: float | None, shape: tuple[
             f"image are {corner_um / 1000.0:.3g} mm from it: are positions_mm in mm, and pixel_pitch_um in um?"
         )
         raise InputError(msg)
+    if farthest_um > FARTHEST_UM:
+        notes.append(
+            f"lights up to {farthest_um / 1e6:.4g} m from the image centre: are positions_mm in mm? Divide um by 1000"
+        )
 
 
 def _unit(table: LightTable, path: Path, notes: list[str]) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
@@ -244,6 +262,19 @@ def _intensity_rows(folder: Path, value: str | Sequence[object] | None, count: i
         raise InputError(msg)
     _check_intensities(intensities, where)
     return intensities
+
+
+def _relative(intensities: NDArray[np.float64], notes: list[str]) -> NDArray[np.float64]:
+    """Intensities whose median is about 1: levels are compared with full scale once these are divided out.
+
+    A table in another unit (255, or candela) would make all images black, or all white.
+    """
+    median = float(np.median(intensities))
+    if 1.0 / STRONGEST <= median <= STRONGEST:
+        return intensities
+    low, high = intensities.min(), intensities.max()
+    notes.append(f"intensities of {low:.4g} to {high:.4g} taken relative to their median, {median:.4g}")
+    return intensities / median
 
 
 def _check_intensities(intensities: NDArray[np.float64], where: str) -> None:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Decoding", "Levels", "levels_of", "linearise_floats", "read_dark", "response_table", "subtract_offset"]
 
-U16_SCALE = 65535.0
+U8_SCALE, U16_SCALE = 255.0, 65535.0
 
 
 class Levels(NamedTuple):
@@ -99,6 +99,12 @@ def levels_of(
             f"got {recipe.saturation:g}"
         )
         raise InputError(msg)
+    if code_scale is not None and recipe.saturation is not None and recipe.saturation <= 1.0:
+        msg = (
+            f"{folder / RECIPE_NAME}: saturation: must be the grey level that clips, of {code_scale:g}, "
+            f"got {recipe.saturation:g}; leave it out if that is full scale"
+        )
+        raise InputError(msg)
     if code_scale is not None:
         full_scale, saturation = _integer_levels(recipe, images, code_scale, notes)
     elif recipe.saturation is not None:
@@ -111,6 +117,11 @@ def levels_of(
             f"({min(full_scale, saturation):g}), got {recipe.black_level:g}"
         )
         raise InputError(msg)
+    if 0.0 < recipe.black_level < 1.0 and full_scale >= U8_SCALE:
+        notes.append(
+            f"black_level = {recipe.black_level:g} is less than one of {full_scale:g} grey levels; if it is a share of "
+            f"full scale, write black_level = {recipe.black_level * full_scale:.4g}"
+        )
     return Levels(full_scale, saturation, recipe.black_level)
 
 

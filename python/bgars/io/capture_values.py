@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from bgars.records.pixels import BoolArray, FloatArray, PixelArray
+    from bgars.records.pixels import BoolArray, PixelArray
 
 __all__ = ["note_light_below_zero", "refuse_nan"]
 
@@ -54,23 +55,35 @@ def note_light_below_zero(
     images: PixelArray, offset: PixelArray | float, mask: BoolArray, paths: Sequence[Path], notes: list[str]
 ) -> None:
     """Say where light is negative by more than noise can make it once `offset`, what no light reads, is subtracted."""
-    if images.dtype.kind != "f":
+    is_dark = isinstance(offset, np.ndarray)
+    if images.dtype.kind != "f" and not is_dark and not offset > 0:
         return
     found = [(share, path) for image, path in zip(images, paths, strict=True) if (share := _share(image, offset, mask))]
-    if found:
-        share, path = max(found, key=lambda each: each[0])
-        others = f" and {len(found) - 1} others" if len(found) > 1 else ""
+    if not found:
+        return
+    share, path = max(found, key=lambda each: each[0])
+    others = f" and {len(found) - 1} others" if len(found) > 1 else ""
+    said = f"{path.name}{others}: {100.0 * share:.0f} % of the used pixels are"
+    if is_dark:
+        notes.append(f"{said} darker than the dark frame by more than noise; it must be taken without any of the lamps")
+    elif offset > 0:
         notes.append(
-            f"{path.name}{others}: {100.0 * share:.0f} % of the used pixels are below 0 by more than noise; if the "
-            "images were centred, or a level was subtracted, add it again, and state what no light reads as "
-            f"black_level in {RECIPE_NAME}"
+            f"{said} below black_level = {offset:g} by more than noise; it must be the grey level that no light reads"
+        )
+    else:
+        notes.append(
+            f"{said} below 0 by more than noise; if the images were centred, or a level was subtracted, add it again, "
+            f"and state what no light reads as black_level in {RECIPE_NAME}"
         )
 
 
-def _share(image: FloatArray, offset: PixelArray | float, mask: BoolArray) -> float:
+def _share(image: PixelArray, offset: PixelArray | float, mask: BoolArray) -> float:
     """Share of the blocks within the mask that are negative by a relevant amount; 0 where they are but few."""
     rows, cols = (size // BLOCK_PX for size in image.shape)
-    light = (image - offset)[: rows * BLOCK_PX, : cols * BLOCK_PX]
+    is_integer = image.dtype.kind != "f"
+    if is_integer and not _any_below(image, offset, mask):
+        return 0.0
+    light = (image.astype(np.float32) - np.float32(offset))[: rows * BLOCK_PX, : cols * BLOCK_PX]
     use = mask[: rows * BLOCK_PX, : cols * BLOCK_PX]
     whole = use.reshape(rows, BLOCK_PX, cols, BLOCK_PX).all(axis=(1, 3))
     below = use & (light < 0.0)
@@ -80,5 +93,13 @@ def _share(image: FloatArray, offset: PixelArray | float, mask: BoolArray) -> fl
     relevant = RELEVANT_LEVEL * float(np.percentile(np.abs(means), BRIGHT_PERCENT))
     differences = np.abs(np.diff(light, axis=1))[below[:, 1:] & use[:, :-1]]
     noise = float(np.median(differences)) / MEDIAN_OF_DIFFERENCES if differences.size else 0.0
-    share = float(np.mean(means < -max(SURE_SIGMA * noise / BLOCK_PX, relevant)))
+    rounding = 1.0 if is_integer else 0.0  # half a level of the image and half of the dark frame
+    share = float(np.mean(means < -max(SURE_SIGMA * noise / BLOCK_PX, relevant, rounding)))
     return share if share > RELEVANT_SHARE else 0.0
+
+
+def _any_below(image: PixelArray, offset: PixelArray | float, mask: BoolArray) -> bool:
+    """Whether so many pixels are below an offset that blocks of them can be, which takes more than half of each."""
+    lowest = offset if isinstance(offset, np.ndarray) else image.dtype.type(math.ceil(offset))
+    below = np.count_nonzero((image < lowest) & mask)
+    return bool(below > RELEVANT_SHARE / 2.0 * np.count_nonzero(mask))

@@ -12,7 +12,8 @@ import tifffile
 
 from bgars.errors import FileFormatError
 from bgars.files.safe_files import need_readable
-from bgars.io.decoders.tiff import quiet
+from bgars.io.decoders.tiff import page_pixels, quiet
+from bgars.io.decoders.tiff_photometric import is_palette
 from bgars.io.described_tiff import description_of
 from bgars.io.images import MAX_MEGAPIXELS
 
@@ -29,6 +30,7 @@ MAX_VALUES = int(MAX_MEGAPIXELS * 1e6) * 4
 MAX_MEMBERS = 64
 NUMBERS = "buif"
 NPY_MAGIC_BYTES = 8
+RGB = 3
 
 
 @contextmanager
@@ -94,7 +96,8 @@ def stored_shape(path: Path, what: str) -> tuple[int, ...]:
     if path.suffix.lower() == ".npy":
         return load_npy(path, what).shape
     with decoding(path, what), quiet(), tifffile.TiffFile(path) as tiff:
-        return tuple(tiff.pages.first.shape)
+        page = tiff.pages.first
+        return (*page.shape, RGB) if is_palette(page) else tuple(page.shape)
 
 
 def _npy(file: IO[bytes], size_bytes: int, path: Path) -> NDArray[Any]:
@@ -132,7 +135,7 @@ def load_tiff(path: Path, what: str) -> tuple[NDArray[Any], dict[str, Any]]:
         if page.tags.get("NewSubfileType") is None and _has_second(tiff):
             msg = f"{path}: must hold one image, got several pages; save the one that counts alone"
             raise FileFormatError(msg)
-        return np.asarray(page.asarray(maxworkers=1)), description_of(tiff)
+        return page_pixels(path, page, 0, workers=1), description_of(tiff)
 
 
 def _check_page(path: Path, page: tifffile.TiffPage, size_bytes: int) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -13,6 +14,7 @@ from bgars.io.areal_files import check_areal, write_gsf, write_sdf, write_x3p
 from bgars.io.atomic import atomic_file
 from bgars.io.described_tiff import OWN, write_described
 from bgars.io.guarded import load_npy, load_tiff
+from bgars.io.height_marks import without_marks
 from bgars.records.height_map import need_height
 
 if TYPE_CHECKING:
@@ -50,11 +52,14 @@ class StoredHeight(NamedTuple):
         Of the values; None: the file does not say.
     pixel_pitch_um : float or None
         None: the file does not say.
+    notes : tuple of str
+        What had to be assumed, without the name of the file.
     """
 
     values: FloatArray
     unit: Literal["um", "px"] | None
     pixel_pitch_um: float | None
+    notes: tuple[str, ...] = ()
 
 
 def write_height(height: HeightMap, path: str | PathLike[str]) -> None:
@@ -107,6 +112,9 @@ def check_height_file(path: Path, *, has_pitch: bool) -> None:
 def read_height(path: str | PathLike[str]) -> tuple[FloatArray, float | None]:
     """Read a height map.
 
+    Numbers with which programs mark pixels without a height, such as -9999, -32768 or 1e30, become NaN, and a warning
+    says so.
+
     Returns
     -------
     height : (H, W) float32
@@ -132,6 +140,8 @@ def read_height(path: str | PathLike[str]) -> tuple[FloatArray, float | None]:
     ([[1.0, 1.0]], 5.0)
     """
     stored = read_stored_height(path)
+    for note in stored.notes:
+        warnings.warn(f"{path}: {note}", stacklevel=2)
     return stored.values, stored.pixel_pitch_um
 
 
@@ -151,14 +161,15 @@ def read_stored_height(path: str | PathLike[str]) -> StoredHeight:
     if content.startswith(OWN) and content != OWN + CONTENT:
         msg = f"{path}: must hold a height map, but its description says {content!r}"
         raise FileFormatError(msg)
+    heights, notes = without_marks(values.astype(np.float32))
     pitch_um = fields.get("pixel_pitch_um")
     if not isinstance(pitch_um, (int, float)):
         # Ours without a pitch is in pixels; of another's nothing is known.
-        return StoredHeight(values.astype(np.float32), "px" if content else None, None)
+        return StoredHeight(heights, "px" if content else None, None, notes)
     if not (math.isfinite(pitch_um) and pitch_um > 0):
         msg = f"{path}: pixel_pitch_um of its description: must be finite and above 0, got {pitch_um:g}"
         raise FileFormatError(msg)
-    return StoredHeight(values.astype(np.float32), "um", float(pitch_um))
+    return StoredHeight(heights, "um", float(pitch_um), notes)
 
 
 def _check_suffix(path: Path, suffixes: Iterable[str]) -> None:

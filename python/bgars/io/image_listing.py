@@ -6,6 +6,8 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from numpy.lib.format import open_memmap
+
 from bgars.errors import FileFormatError
 from bgars.files.safe_files import shown
 from bgars.io.image_formats import IMAGE_FORMATS, IMAGE_SUFFIXES
@@ -41,6 +43,7 @@ ROLES = {
 }
 """Words in the names of files that are no image of one light; together they are ignored, and named."""
 MAX_ENTRIES = 100_000
+AXES = 3
 SHOWN = 6
 
 
@@ -155,8 +158,16 @@ def _group(path: Path) -> str:
 
 
 def _is_array_of_lights(path: Path) -> bool:
-    """True for a ``.npy`` whose name says that it holds lights."""
-    return path.suffix.lower() == ".npy" and re.search(r"light|led|dir|normal", path.stem, re.IGNORECASE) is not None
+    """True for a ``.npy`` whose name says that it holds lights, or whose shape that it holds vectors or numbers."""
+    if path.suffix.lower() != ".npy":
+        return False
+    if re.search(r"light|led|dir|normal", path.stem, re.IGNORECASE) is not None:
+        return True
+    try:
+        shape = open_memmap(path, mode="r").shape if path.is_file() else ()  # a pipe would wait
+    except Exception:  # whatever damaged bytes make of the header: its reader will say what is wrong
+        return False
+    return len(shape) == 1 or (len(shape) == 2 and min(shape) <= AXES)  # noqa: PLR2004 - a picture is wider
 
 
 def choose_series(names: Iterable[str], count: int) -> tuple[str, ...] | None:

@@ -28,6 +28,8 @@ MAX_PAGES = 10_000
 MAX_CHUNKS = 10_000
 EXIF_BYTES = 1 << 16
 PNG_WITH_ALPHA = (4, 6)
+GAMMA_ONE = 100_000
+"""PNG (ISO/IEC 15948), 11.3.3.2: the exponent times this."""
 WEBP_ALPHA = 0x10
 TGA_ALPHA_BITS = 0x0F
 JPEG_SCAN, JPEG_END, JPEG_APP1 = 0xDA, 0xD9, 0xE1
@@ -50,6 +52,8 @@ class ImageTags(NamedTuple):
         The file declares sRGB or another profile for the display of its colours.
     white_bits : bool
         A pixel is one bit, and 0 means white (TIFF).
+    gamma : float
+        Exponent with which samples were made from light (PNG, chunk gAMA); 1 where the file names none.
     """
 
     orientation: int = UPRIGHT
@@ -58,6 +62,7 @@ class ImageTags(NamedTuple):
     preview_first: bool = False
     profile: bool = False
     white_bits: bool = False
+    gamma: float = 1.0
 
 
 def read_tags(path: Path, kind: ImageFormat) -> ImageTags:
@@ -143,7 +148,7 @@ def _jpeg_tags(file: BinaryIO) -> ImageTags:
 
 def _png_tags(file: BinaryIO) -> ImageTags:
     file.seek(8)
-    orientation, alpha, pages, profile = UPRIGHT, False, 1, False
+    orientation, alpha, pages, profile, gamma = UPRIGHT, False, 1, False, 1.0
     for _ in range(MAX_CHUNKS):
         length, name = struct.unpack(">I4s", file.read(8))
         if name == b"IHDR":
@@ -152,6 +157,8 @@ def _png_tags(file: BinaryIO) -> ImageTags:
             orientation = _exif_orientation(file.read(length))
         elif name == b"acTL":  # an animation
             (pages,) = struct.unpack_from(">I", file.read(length))
+        elif name == b"gAMA" and length == 4:  # noqa: PLR2004 - one number
+            gamma = struct.unpack(">I", file.read(length))[0] / GAMMA_ONE or 1.0
         elif name == b"IEND":
             break
         else:
@@ -159,7 +166,7 @@ def _png_tags(file: BinaryIO) -> ImageTags:
             profile |= name in (b"sRGB", b"iCCP")
             file.seek(length, io.SEEK_CUR)
         file.seek(4, io.SEEK_CUR)
-    return ImageTags(orientation, pages, alpha, profile=profile)
+    return ImageTags(orientation, pages, alpha, profile=profile, gamma=gamma)
 
 
 def _webp_tags(file: BinaryIO) -> ImageTags:

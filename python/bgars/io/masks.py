@@ -10,6 +10,7 @@ import tifffile
 from bgars.errors import FileFormatError, InputError
 from bgars.io.decoders.tiff import quiet
 from bgars.io.image_formats import format_of, read_pixels
+from bgars.io.image_stacks import read_stack
 from bgars.io.image_tags import read_tags, upright
 from bgars.io.images import MAX_MEGAPIXELS, decode_stack
 from bgars.records.plain_arrays import integer_full_scale
@@ -81,8 +82,8 @@ def _bits(path: Path, notes: list[str]) -> NDArray[Any] | None:
     notes.append(
         f"{path.name}: its bits of 1 are used, as True of the array that tifffile wrote (viewers show it inverted)"
     )
-    bits: NDArray[Any] = read_pixels(path, MAX_MEGAPIXELS)
-    return bits
+    shown: NDArray[Any] = read_pixels(path, MAX_MEGAPIXELS)
+    return ~shown
 
 
 def opaque_everywhere(paths: Sequence[Path], orientation: int) -> BoolArray | None:
@@ -97,10 +98,13 @@ def opaque_everywhere(paths: Sequence[Path], orientation: int) -> BoolArray | No
 
 def _opaque(path: Path, orientation: int) -> BoolArray | None:
     """True where the opacity of an image is above one half; None where it does not vary."""
-    pixels: NDArray[Any] = read_pixels(path, MAX_MEGAPIXELS)
-    if pixels.ndim != 3 or pixels.shape[2] not in WITH_ALPHA:  # noqa: PLR2004 - rows, columns, channels
+    kind = format_of(path)
+    count = read_tags(path, kind).pages
+    one = count == 1
+    pages = read_pixels(path, MAX_MEGAPIXELS, kind)[None] if one else read_stack(path, kind, count, MAX_MEGAPIXELS)
+    if pages.ndim != 4 or pages.shape[3] not in WITH_ALPHA:  # noqa: PLR2004 - pages, rows, columns, channels
         return None
-    alpha = pixels[..., -1]
+    alpha: NDArray[Any] = pages[..., -1].min(axis=0)
     low, high = alpha.min(), alpha.max()
     if low == high:
         return None

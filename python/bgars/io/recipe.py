@@ -12,6 +12,7 @@ from bgars.files.light_formats import MAX_LIGHTS
 from bgars.io.strict_toml import Strict, checked, read_values
 
 __all__ = [
+    "HIGHEST_RAD",
     "RECIPE_NAME",
     "CameraRecipe",
     "CaptureRecipe",
@@ -32,6 +33,8 @@ FileName = Annotated[str, AfterValidator(lambda name: name.replace("\\", "/"))]
 """Relative to the folder of the recipe; Windows writes its paths with backslashes."""
 FINEST_PITCH_UM = 0.05
 """Pixels of a quarter of what visible light resolves (0.2 um, E. Abbe): smaller ones are given in another unit."""
+HIGHEST_RAD = math.pi / 2
+"""Of an elevation in radians. In degrees no rig stands so low: shadows would be 36 times as long as a part is high."""
 PITCH_OVER_U = 10.0
 """Least ratio of the pixel pitch to its standard uncertainty: below it the pitch is a guess, or the unit is wrong."""
 
@@ -62,6 +65,14 @@ class RingRecipe(Strict):
     count: Annotated[int, Field(ge=3, le=MAX_LIGHTS)]
     elevation_deg: Annotated[float, Field(gt=0, lt=90)] = 45.0
     azimuth0_deg: float = 0.0
+
+    @field_validator("elevation_deg")
+    @classmethod
+    def _in_degrees(cls, value: float) -> float:
+        if value <= HIGHEST_RAD:
+            msg = f"must be in degrees, and this looks like radians ({math.degrees(value):.3g} degrees)"
+            raise ValueError(msg)
+        return value
 
 
 class CameraRecipe(Strict):

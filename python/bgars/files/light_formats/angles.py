@@ -60,9 +60,14 @@ def read_angle_table(path: Path) -> LightTable | None:
             raise FileFormatError(msg)
     values = np.array([row.numbers for row in rows if row is not None], dtype=np.float64).reshape(-1, ANGLES)
     is_radian = "rad" in units or (not units and bool((np.abs(values) <= TURN_RAD).all()))
-    if not is_radian:
-        values = np.radians(values)
     azimuth, other = values.T if _kind(angles[0]) == "azimuth" else values.T[::-1]
+    if not is_radian:
+        if len(values) and np.abs(azimuth).max() <= TURN_RAD and np.abs(other).max() <= np.pi / 2.0:
+            msg = (
+                f"{path}: the header says degrees, but no angle is above {np.abs(values).max():.3g}: are they radians?"
+            )
+            raise FileFormatError(msg)
+        azimuth, other = np.radians(azimuth), np.radians(other)
     elevation = other if "up" in {_kind(name) for name in angles} else np.pi / 2.0 - other
     level = np.cos(elevation)
     vectors = np.column_stack([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bgars.errors import FileFormatError
+from bgars.files.light_formats.named_lists import with_lists
 from bgars.files.light_formats.table import LightTable, checked_vectors, rows_of_three
-from bgars.files.mat_files import read_arrays
+from bgars.files.mat_files import read_arrays, read_texts
 from bgars.files.safe_files import read_bounded, shown
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -86,7 +88,7 @@ def read_mat_table(path: Path) -> LightTable:
         The file cannot be read, or holds no such variable, or several.
     """
     content = read_bounded(path, MAX_BYTES, "light file")
-    arrays = _mat_arrays(content, path)
+    arrays = _mat(read_arrays, content, path)
     shapes = {name: array.shape for name, array in arrays.items()}
     wanted = {name for name, shape in shapes.items() if len(shape) == 2 and np.prod(shape, dtype=float) <= MAX_VALUES}  # noqa: PLR2004 - matrices
     vectors_like = [name for name in wanted if 3 in shapes[name]]  # noqa: PLR2004 - x, y, z
@@ -108,7 +110,11 @@ def read_mat_table(path: Path) -> LightTable:
     if intensities is not None:
         notes = (*notes, f"variable {strength!r} as their intensities")
     kind = "camera_mm" if near else "directions"
-    return LightTable(checked_vectors(vectors, path), kind, intensities, notes=notes)  # type: ignore[arg-type]
+    table = LightTable(checked_vectors(vectors, path), kind, intensities, notes=notes)  # type: ignore[arg-type]
+    used = {name, strength, *((CAMERA_POSITIONS, LED_AXES) if near else ())}
+    lists = {key: array.ravel() for key, array in arrays.items() if key not in used and array.size == max(array.shape)}
+    others: dict[str, Any] = {key: [*array] for key, array in lists.items()}
+    return with_lists(table, {**others, **_mat(read_texts, content, path)}, path)
 
 
 def _pick(names: list[str], known: tuple[str, ...]) -> str | None:
@@ -123,9 +129,9 @@ def _intensities(array: NDArray[np.float64], count: int) -> NDArray[np.float64] 
     return array.reshape(count, -1) if array.shape[0] == count else np.ascontiguousarray(array.T).reshape(count, -1)
 
 
-def _mat_arrays(content: bytes, path: Path) -> dict[str, NDArray[Any]]:
+def _mat(read: Callable[[bytes, int], dict[str, Any]], content: bytes, path: Path) -> dict[str, Any]:
     try:
-        return read_arrays(content, MAX_BYTES)
+        return read(content, MAX_BYTES)
     except ValueError as error:
         if MATLAB_73 in content[:128]:
             msg = f"{path}: is a MATLAB 7.3 (HDF5) file, which is not read; save it in MATLAB with save(..., '-v7')"

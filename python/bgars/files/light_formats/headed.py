@@ -6,6 +6,7 @@ import csv
 import re
 from typing import TYPE_CHECKING, NamedTuple
 
+from bgars.files.image_endings import are_image_names
 from bgars.files.light_formats.columns import Line, Row, Style, as_number, by_number
 
 if TYPE_CHECKING:
@@ -55,6 +56,13 @@ def axes_of(header: Sequence[str]) -> list[str]:
     return [match[1] for field in header if (match := AXIS.fullmatch(field.lower()))]
 
 
+def _file_column(names: Sequence[str], fields: Sequence[Sequence[str]]) -> int | None:
+    """Place of the column of the images: by its name and what it holds, else by what it holds, else by its name."""
+    called = [names.index(name) for name in NAMES if name in names]
+    holding = [place for place in range(len(names)) if are_image_names([each[place] for each in fields])]
+    return next((place for place in (*(each for each in called if each in holding), *holding, *called)), None)
+
+
 def rows_under(header: Line, lines: Sequence[Line], style: Style) -> Headed | None:
     """Return the rows of a table, in the order of their numbers; None where its columns are not those of its header."""
     names = [field.lower() for field in fields_of(header.text, style)]
@@ -64,7 +72,7 @@ def rows_under(header: Line, lines: Sequence[Line], style: Style) -> Headed | No
     fields = [fields_of(line.text, style) for line in lines]
     if len(axes) != len(axes_of(names)) or len(axes) != 3 or any(len(each) != len(names) for each in fields):  # noqa: PLR2004 - x, y, z
         return None
-    file = next((names.index(name) for name in NAMES if name in names), None)
+    file = _file_column(names, fields)
     strengths = [names.index(name) for name in STRENGTHS if name in names][:1]
     for colors in COLORS:
         if set(colors) <= set(names):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bgars.errors import FileFormatError
+from bgars.files.light_formats.named_lists import names_in, order_of, with_lists
 from bgars.files.light_formats.table import MAX_LIGHTS, LightTable, checked_vectors
 from bgars.files.safe_files import read_text
 
@@ -22,6 +23,7 @@ __all__ = ["read_dome_table", "read_json_table"]
 AXES = ("x", "y", "z")
 CHANNELS = ("r", "g", "b")
 TABLES = ("lights", "directions", "light_directions")
+DOME_LISTS = ("directions", "positionsSphere", "positions3d", "positions", "lights")
 STRENGTHS = ("intensities", "light_intensities")
 EXPECTED = (
     'expected {"image.png": [x, y, z], ...}, a list of [x, y, z], or Meshroom\'s {"lights": [{"direction": [x, y, z], '
@@ -40,23 +42,36 @@ def read_json_table(path: Path) -> LightTable:
         The file is no JSON, or holds something else.
     """
     values = _load(path)
-    beside = None
+    beside, others = None, {}
     if isinstance(values, dict):
         beside = next((values[key] for key in STRENGTHS if isinstance(values.get(key), list)), None)
-        values = next((values[key] for key in TABLES if isinstance(values.get(key), list | dict)), values)
-    table = _read(values, path)
-    if beside is None or table.intensities is not None:
+        key = next((key for key in TABLES if isinstance(values.get(key), list | dict)), None)
+        if key is not None:
+            others = {name: other for name, other in values.items() if name not in {key, *STRENGTHS}}
+            values = values[key]
+    table = with_lists(_read(values, path), others, path)
+    if beside is not None and table.intensities is None:
+        intensities = _strengths(beside, path)
+        if len(beside) != len(table.vectors):
+            msg = f"{path}: {len(beside)} intensities, but {len(table.vectors)} lights"
+            raise FileFormatError(msg)
+        table = replace(table, intensities=intensities)
+    if table.files or not isinstance(values, list) or not isinstance(next(iter(values), None), dict):
         return table
-    intensities = _strengths(beside, path)
-    if len(beside) != len(table.vectors):
-        msg = f"{path}: {len(beside)} intensities, but {len(table.vectors)} lights"
-        raise FileFormatError(msg)
-    return replace(table, intensities=intensities)
+    order, told = order_of(values)
+    if not told and _has_directions(values):
+        told = ("lights taken in the order of the images, since Meshroom numbers views without their file names",)
+    strength = None if table.intensities is None else table.intensities[order]
+    return replace(table, vectors=table.vectors[order], intensities=strength, notes=(*told, *table.notes))
+
+
+def _has_directions(entries: list[Any]) -> bool:
+    return bool(entries) and all(isinstance(entry, dict) and "direction" in entry for entry in entries)
 
 
 def _read(values: list[Any] | dict[str, Any], path: Path) -> LightTable:
     entries = list(values.values()) if isinstance(values, dict) else values
-    if entries and all(isinstance(entry, dict) and "direction" in entry for entry in entries):
+    if _has_directions(entries):
         return _meshroom(values, path)
     intensities = _strengths([entry.get("intensity") if isinstance(entry, dict) else None for entry in entries], path)
     if isinstance(values, dict):
@@ -71,7 +86,7 @@ def _read(values: list[Any] | dict[str, Any], path: Path) -> LightTable:
         lists, told = [_vector(each, path) for each in zip(*values, strict=True)], len(values[0])
         note = f"3 rows of {told} numbers taken as x, y and z of the lights"
         return LightTable(checked_vectors(np.array(lists).reshape(-1, 3), path), notes=(note,))
-    vectors, files = np.array([_vector(vector, path) for vector in values]).reshape(-1, 3), _names(values)
+    vectors, files = np.array([_vector(vector, path) for vector in values]).reshape(-1, 3), names_in(values)
     return LightTable(checked_vectors(vectors, path, files), intensities=intensities, files=files)
 
 
@@ -102,23 +117,23 @@ def read_dome_table(path: Path) -> LightTable:
         if (factors > 0).all() and not np.allclose(factors, 1.0):
             intensities = 1.0 / factors
             notes = (*notes, "ledAdjust taken as the inverse of the intensities")
-    return LightTable(checked_vectors(vectors, path), intensities=intensities, free_length=True, notes=notes)
+    table = LightTable(checked_vectors(vectors, path), intensities=intensities, free_length=True, notes=notes)
+    known = {*DOME_LISTS, "ledAdjust"}
+    return with_lists(table, {name: other for name, other in values.items() if name not in known}, path)
 
 
 def _dome_keys(values: dict[str, Any]) -> tuple[str, ...]:
     if values.get("lightConfiguration") == "lights3d":
         return ("positions3d", "positions", "directions")
-    return ("directions", "positionsSphere", "positions3d", "positions", "lights")
+    return DOME_LISTS
 
 
 def _meshroom(lights: list[Any] | dict[str, Any], path: Path) -> LightTable:
     entries = list(lights.values()) if isinstance(lights, dict) else lights
-    files = tuple(str(name) for name in lights) if isinstance(lights, dict) else _names(entries)
+    files = tuple(str(name) for name in lights) if isinstance(lights, dict) else names_in(entries)
+    notes: tuple[str, ...] = ()
     vectors = np.array([_vector(entry["direction"], path) for entry in entries]).reshape(-1, 3)
     intensities = _strengths([entry.get("intensity") for entry in entries], path)
-    notes: tuple[str, ...] = ()
-    if not files:
-        notes = ("lights taken in the order of the images, since Meshroom numbers views without their file names",)
     if len(vectors) and (vectors[:, 2] < 0).all():
         vectors = vectors * np.array([1.0, -1.0, -1.0])
         notes = (*notes, "axes of Meshroom (y down, z away from the camera) turned to y up, z to the camera")
@@ -134,15 +149,6 @@ def _strengths(values: list[Any], path: Path) -> NDArray[np.float64] | None:
     if all(isinstance(value, int | float) for value in values):
         return np.array([_vector([value], path, CHANNELS[:1]) for value in values])
     return np.array([_vector(value, path, CHANNELS) for value in values]).reshape(-1, 3)
-
-
-def _names(entries: list[Any]) -> tuple[str, ...]:
-    """Image of each light, where every one has it under one of the usual keys."""
-    for key in ("file", "filename", "image", "path", "name"):
-        names = [entry.get(key) for entry in entries if isinstance(entry, dict)]
-        if names and len(names) == len(entries) and all(isinstance(name, str) for name in names):
-            return tuple(str(name) for name in names)
-    return ()
 
 
 def _vector(value: Any, path: Path, keys: tuple[str, ...] = AXES) -> list[float]:  # noqa: ANN401 - whatever a file held
