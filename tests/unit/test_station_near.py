@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import bgars
 import imageio.v3 as iio
 import numpy as np
 import pytest
+from bgars.station import drift
+from rendered_spheres import render, ring
 from test_calibrate import bgars_command
+from test_station_lights import capture_of
 
 LAMPS = """format = "bgars-station"
 version = 1
@@ -65,3 +69,48 @@ def test_lamps_within_the_picture_are_refused_by_the_station_that_holds_them(par
     place.write_text(LAMPS + SCALE.replace("20.0", "2000.0"))
     with pytest.raises(bgars.InputError, match=r"station\.toml: all lights are within 70\.7 mm"):
         bgars.read_capture(part, station=place)
+
+
+LAMPS_PX = 560.0 * ring(4, 45.0)
+PLACES = [(-50.0, -40.0, 45.0), (50.0, -35.0, 45.0), (5.0, 50.0, 45.0)]
+
+
+def seen(place: tuple[float, float, float], seed: int, **more: object) -> bgars.Capture:
+    images = render(
+        LAMPS_PX, ball=place, size=(220, 220), near=True, seed=seed, blur_px=0.6, lamp_level=20.0, samples=2, **more
+    )
+    return capture_of(images, camera_distance_mm=np.inf)
+
+
+@pytest.fixture(scope="module")
+def near(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The file of a station calibrated on a ball of 2 mm at three places, without a scale."""
+    captures = [seen(place, seed) for seed, place in enumerate(PLACES)]
+    found = bgars.calibrate_lights(captures, near=True, diameter_um=2000.0)
+    assert found.level_by == "board"
+    place = tmp_path_factory.mktemp("near") / "station.toml"
+    bgars.write_station(bgars.Station("near", lights=found), place)
+    return place
+
+
+def moved(station: Path, capture: bgars.Capture) -> set[tuple[str, int | None]]:
+    return {(one.code, one.light) for one in drift(bgars.read_station(station), capture) if one.severity == "fail"}
+
+
+def test_a_near_station_is_compared_by_the_places_of_its_lamps(near: Path) -> None:
+    """Seen as distant lamps from one ball, the images of the calibration itself were 100 % and more off."""
+    assert moved(near, seen(PLACES[0], 0)) == set()
+    assert moved(near, seen((-40.0, 45.0, 45.0), 7)) == set()
+    weak = seen(PLACES[0], 8, intensities=np.array([1.0, 0.6, 1.0, 1.0]))
+    assert moved(near, weak) == {("light-strength", 1)}
+    assert ("level", None) in moved(near, seen(PLACES[1], 9, exposure=0.6 * 180.0))
+
+
+def test_without_a_pitch_near_lamps_are_not_compared(near: Path) -> None:
+    known = bgars.read_station(near)
+    assert known.lights is not None
+    assert known.lights.pixel_pitch_um == pytest.approx(2000.0 / 90.0, rel=0.005)
+    older = replace(known, lights=replace(known.lights, pixel_pitch_um=None))
+    found = drift(older, seen(PLACES[0], 0))
+    assert not {"light-moved", "light-strength", "level"} & {one.code for one in found}
+    assert "directions and strengths of near lamps" in found[-1].message

@@ -42,6 +42,7 @@ class LightsTable(Strict):
     )
     level: Positive | None = Field(None, description="mean level of what measured the intensities, of 255")
     level_by: str = Field("", description="what that was: highlights, shading or board")
+    pixel_pitch_um: Positive | None = Field(None, description="size of a pixel that positions_mm were measured with")
 
     @model_validator(mode="after")
     def _one_a_light(self) -> LightsTable:

@@ -41,7 +41,11 @@ def strengths_of(
     sphere: str, captures: list[Capture], seen: Observed, solution: LightSolution, findings: list[Remark]
 ) -> Strengths:
     """Strengths of the lights; what they are taken from is added to the findings, where it is not the balls."""
-    usable = [row for row in seen.strengths if np.isfinite(row).all() and (row > 0).all()]
+    usable = [
+        row * _farther(circle, solution)
+        for row, circle in zip(seen.strengths, solution.outlines_px, strict=True)
+        if np.isfinite(row).all() and (row > 0).all()
+    ]
     if usable:
         single = SHADING_U if sphere == "matt" else HIGHLIGHT_U
         relative, u = _mean(usable, [np.full(len(row), single if len(usable) == 1 else 0.0) for row in usable])
@@ -67,6 +71,13 @@ def strengths_of(
     )
     findings.append(Remark("note", message, "no-intensities"))
     return Strengths(np.ones(len(solution.directions)), None, math.nan, "")
+
+
+def _farther(circle_px: Array, solution: LightSolution) -> Array:
+    """(L,) square of the distance of each light from a ball, over that from the origin: 1 of distant lights."""
+    ways = solution.directions - solution.nearness[:, None] * np.array([circle_px[0], circle_px[1], circle_px[2]])
+    square: Array = np.square(ways).sum(axis=1)
+    return square
 
 
 def _mean(rows: list[Array], us: list[Array]) -> tuple[Array, Array]:
