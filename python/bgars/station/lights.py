@@ -87,7 +87,7 @@ def calibrate_lights(
         near = False
     check_pitch(diameter_um, "diameter_um")
     for each in captures:
-        _need_scale_of_camera(each, sphere, diameter_um)
+        _need_scale_of_camera(each, diameter_um)
     seen = observe(captures, sphere, outlines_a_capture(captures, outline), diameter_um, progress)
     balls, findings = seen.balls, seen.findings
     solution, pitch_um = _solve(captures, seen, diameter_um, near, findings)
@@ -118,10 +118,10 @@ def calibrate_lights(
     )
 
 
-def _need_scale_of_camera(capture: Capture, sphere: str, diameter_um: float | None) -> None:
+def _need_scale_of_camera(capture: Capture, diameter_um: float | None) -> None:
     """Refuse a camera at a distance in mm where no scale says how many pixels that is: it would count as infinite."""
     distance_mm = capture.camera_distance_mm
-    if sphere == "matt" or distance_mm is None or math.isinf(distance_mm):
+    if distance_mm is None or math.isinf(distance_mm):
         return
     if capture.pixel_pitch_um is None and diameter_um is None:
         msg = (
