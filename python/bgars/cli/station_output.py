@@ -25,7 +25,7 @@ __all__ = [
 
 SECTIONS = {
     "flat": ("flat-structure", "evenness", "falloff", "flat-before-response"),
-    "response": ("linear", "not-linear"),
+    "response": ("linear", "not-linear", "response-structure", "black-level"),
     "scale": ("grid", "distortion", "tilt"),
     "verified": ("mpe", "mpe-open", "bias-", "slope-", "unread-"),
 }
