@@ -56,7 +56,7 @@ def response(
     if [exposures is not None, sums, srgb].count(True) != 1:
         msg = "--exposures, --sums, --srgb: give one of them"
         raise InputError(msg)
-    known = existing_station(output)
+    known = existing_station(output, folder)
     findings: tuple[Remark, ...] = ()
     above = ""
     if srgb:
@@ -124,7 +124,7 @@ def scale(
 
     With the grid at two known heights or more, also how far the camera is, or that it is telecentric.
     """
-    existing_station(output)
+    existing_station(output, *folders)
     u_um = None if u_pitch_mm is None else 1000.0 * u_pitch_mm
     if len(folders) > 1 and heights_mm is None:
         msg = f"--heights-mm: needed with several folders ({len(folders)}): the height of the grid in each"
