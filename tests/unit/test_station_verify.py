@@ -96,9 +96,8 @@ def test_each_error_is_judged_by_the_certificate_of_its_own_ball() -> None:
 
 def test_an_uncertainty_that_is_not_stated_is_not_0(tmp_path: Path) -> None:
     table = tmp_path / "known.csv"
-    table.write_text(
-        "name,height_um,u_um\n" + "".join(f"{name},{size},\n" for name, size in zip(NAMES, SIZES, strict=True))
-    )
+    lines = [f"{name},{size}" for name, size in zip(NAMES, SIZES, strict=True)]
+    table.write_text("\n".join(["name,height_um,u_um", *(f"{line}," for line in lines)]))
     known = read_known(table)
     _, said = verify([read(np.full(8, 0.2))], known, mpe_um=1.0)
     assert [one.severity for one in said if one.code == "mpe-open"] == ["fail"]

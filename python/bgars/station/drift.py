@@ -15,6 +15,7 @@ from bgars.records.remark import Remark, Severity
 from bgars.records.station_apply import flat_maps
 from bgars.station.flat import calibrate_flat
 from bgars.station.lights import calibrate_lights
+from bgars.station.strengths import repeatable
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -125,18 +126,16 @@ def _of_each(
     )
     # What an unknown lens does to both calibrations is alike, and no drift.
     u_deg = np.sqrt(_without_lens(before) ** 2 + _without_lens(now) ** 2 + u_parallax_deg**2) * math.sqrt(2.0)
-    change = (
-        now.rig.intensities / now.rig.intensities.mean() / (before.rig.intensities / before.rig.intensities.mean())
-        - 1.0
-    )
+    change = _against_others(now.rig.intensities / before.rig.intensities)
+    u_before, u_now = _u_strengths(before, now)
     for index in range(len(before.rig)):
         name = light_name(index, capture.files)
         limit = limit_deg + COVERAGE * float(u_deg[index])
         moved = float(turn_deg[index])
         words = f"{name}: moved by {moved:.2f} deg since calibration (limit {limit:.2f} deg)"
         found.append(Remark("fail" if moved > limit else "note", words, "light-moved", moved, limit, "deg", index))
-        if before.u_intensities is not None and now.u_intensities is not None:
-            limit = limit_intensity + COVERAGE * math.hypot(before.u_intensities[index], now.u_intensities[index])
+        if u_before is not None and u_now is not None:
+            limit = limit_intensity + COVERAGE * math.hypot(u_before[index], u_now[index])
             words = (
                 f"{name}: {100 * change[index]:+.1f} % in strength against the other lights (limit {100 * limit:.1f} %)"
             )
@@ -149,8 +148,7 @@ def _of_all(before: LightCalibration, now: LightCalibration) -> list[Remark]:
     """Compare what all lights share: their level, and the size of the ball in pixels."""
     found, missing = [], []
     if before.level_by == now.level_by and before.level > 0 and now.level > 0:
-        us = [one.u_intensities for one in (before, now)]
-        u = math.hypot(*(0.0 if each is None else float(each.mean()) for each in us))
+        u = math.hypot(*(0.0 if each is None else float(each.mean()) for each in _u_strengths(before, now)))
         found.append(_level(now.level / before.level - 1.0, LIMIT_LEVEL + COVERAGE * u))
     elif before.level_by and now.level_by:
         missing.append(f"the level of all lights ({before.level_by} at calibration, {now.level_by} now)")
@@ -176,6 +174,23 @@ def _of_all(before: LightCalibration, now: LightCalibration) -> list[Remark]:
         moved = float(np.hypot(circles[:, 0] - x, circles[:, 1] - y).min())
         missing.append(f"the place of the ball ({moved:.1f} px from that of the calibration; it is put there by hand)")
     return [*found, Remark("note", f"not compared: {'; '.join(missing)}", "not-compared")] if missing else found
+
+
+def _against_others(ratio: Array) -> Array:
+    """(L,) change of each light against the usual one: the mean would make one weak lamp a change of all others."""
+    change: Array = ratio / np.median(ratio) - 1.0
+    return change
+
+
+def _u_strengths(before: LightCalibration, now: LightCalibration) -> list[Array | None]:
+    """Uncertainties of the strengths of either, without what is alike in both where one means measured them."""
+    is_alike = before.level_by == now.level_by
+    return [
+        one.u_intensities
+        if one.u_intensities is None or not is_alike
+        else repeatable(one.u_intensities, one.level_by, len(one.balls))
+        for one in (before, now)
+    ]
 
 
 def _level(change: float, limit: float) -> Remark:
@@ -231,7 +246,7 @@ def _even(station: Station, capture: Capture, limit_intensity: float) -> tuple[R
     now, said = calibrate_flat(capture)
     found = [*said]
     old, new = station.flat.coefficients[:, 0], now.coefficients[:, 0]
-    change = new / new.mean() / (old / old.mean()) - 1.0
+    change = _against_others(new / old)
     for index in range(len(new)):
         name = light_name(index, capture.files)
         words = (

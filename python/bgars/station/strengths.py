@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.records.remark import Remark
-from bgars.station.board_strengths import board_strengths
+from bgars.station.board_strengths import MATT, board_strengths
 
 if TYPE_CHECKING:
     from bgars.records.capture import Capture
     from bgars.station.light_bundle import LightSolution
     from bgars.station.observe import Observed
 
-__all__ = ["Strengths", "strengths_of"]
+__all__ = ["Strengths", "repeatable", "strengths_of"]
 
 Array = NDArray[np.float64]
 
@@ -71,6 +71,17 @@ def strengths_of(
     )
     findings.append(Remark("note", message, "no-intensities"))
     return Strengths(np.ones(len(solution.directions)), None, math.nan, "")
+
+
+def repeatable(u: Array, by: str, balls: int) -> Array:
+    """(L,) of uncertainties of strengths the part that another calibration on the same reference would show.
+
+    How real boards and balls differ from Lambert's law is alike in both. Of highlights all of it is scatter: it grows
+    from the few pixels that a lamp is on the ball.
+    """
+    alike = MATT if by == "board" else SHADING_U if by == "shading" and balls == 1 else 0.0
+    rest: Array = np.sqrt(np.maximum(u**2 - alike**2, LEAST_U**2))
+    return rest
 
 
 def _farther(circle_px: Array, solution: LightSolution) -> Array:
