@@ -114,3 +114,26 @@ def test_without_a_pitch_near_lamps_are_not_compared(near: Path) -> None:
     found = drift(older, seen(PLACES[0], 0))
     assert not {"light-moved", "light-strength", "level"} & {one.code for one in found}
     assert "directions and strengths of near lamps" in found[-1].message
+
+
+def test_images_of_another_size_are_refused_and_a_contradicting_pitch_is_said(part: Path) -> None:
+    place = part.parent / "station.toml"
+    place.write_text(LAMPS + "size_px = [60, 60]\n" + SCALE + "size_px = [60, 60]\n")
+    (part / "capture.toml").write_text('pixel_pitch_um = 5.0\nstation = "../station.toml"\n')
+    with pytest.warns(bgars.CaptureWarning, match=r"pixel_pitch_um = 5, but 20 \(u 0.01\) by .*station.toml, which is"):
+        capture = bgars.read_capture(part)
+    assert capture.pixel_pitch_um == 20.0
+    assert "pixel_pitch_um = 5" in capture.assumed[-1]
+    for text, words in (
+        (LAMPS + "size_px = [120, 120]\n" + SCALE, "the positions of the lights of near are those of 120 x 120"),
+        (LAMPS + SCALE + "size_px = [30, 60]\n", "60 x 60 pixels, but scale and lens of near are those of 60 x 30"),
+    ):
+        place.write_text(text)
+        with pytest.raises(bgars.InputError, match=words):
+            bgars.read_capture(part)
+
+
+def test_a_calibration_keeps_the_size_of_its_images(near: Path) -> None:
+    lights = bgars.read_station(near).lights
+    assert lights is not None
+    assert lights.size_px == (220, 220)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
+import warnings
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from bgars.errors import CaptureWarning
 from bgars.io.capture_lights import check_near_lights
 from bgars.io.recipe import RECIPE_NAME
 from bgars.io.station_file import read_station
@@ -20,6 +24,9 @@ if TYPE_CHECKING:
     Given = Station | str | PathLike[str] | None
 
 __all__ = ["seen_through", "station_of"]
+
+CONTRADICTS = 3.0
+"""Standard uncertainties by which a stated pixel pitch and that of the station may differ."""
 
 
 def station_of(folder: Path, recipe: CaptureRecipe, given: Given) -> tuple[Station | None, str]:
@@ -43,6 +50,24 @@ def seen_through(capture: Capture, station: Station | None, folder: Path, name: 
     if station is None:
         check_near_lights(capture, where)
         return capture
+    note = _other_pitch(capture, station, where, name)
     capture = with_station(capture, station)
+    if note:
+        warnings.warn(note, CaptureWarning, stacklevel=3)
+        capture = replace(capture, assumed=(*capture.assumed, note))
     check_near_lights(capture, where, None if station.lights is None else name)
     return capture
+
+
+def _other_pitch(capture: Capture, station: Station, where: str, name: str) -> str:
+    """What to say of a stated pixel pitch that is not that of the station; "" where it is."""
+    stated, scale = capture.pixel_pitch_um, station.scale
+    if stated is None or scale is None:
+        return ""
+    u = math.hypot(scale.pixel_pitch_u_um, capture.pixel_pitch_u_um or 0.0)
+    if abs(stated - scale.pixel_pitch_um) <= CONTRADICTS * u:
+        return ""
+    return (
+        f"{where}: pixel_pitch_um = {stated:g}, but {scale.pixel_pitch_um:.6g} (u {scale.pixel_pitch_u_um:.2g}) by "
+        f"{name}, which is used"
+    )

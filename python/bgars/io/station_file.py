@@ -140,6 +140,7 @@ def _lights(table: LightsTable) -> LightCalibration:
         level=math.nan if table.level is None else table.level,
         level_by=table.level_by,
         pixel_pitch_um=table.pixel_pitch_um,
+        size_px=table.size_px,
     )
 
 
@@ -226,6 +227,7 @@ def _lights_values(lights: LightCalibration) -> dict[str, Any]:
         "level": lights.level,
         "level_by": lights.level_by or None,
         "pixel_pitch_um": lights.pixel_pitch_um,
+        "size_px": lights.size_px,
     }
 
 

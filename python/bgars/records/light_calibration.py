@@ -78,6 +78,8 @@ class LightCalibration(Short):
     level_by : str
     pixel_pitch_um : float or None
         Near lights: the pitch, by a scale or by the size of the ball, that put their positions in micrometres.
+    size_px : (int, int) or None
+        Height and width of the images, in the middle of which positions have their origin.
     """
 
     rig: LightRig
@@ -95,6 +97,7 @@ class LightCalibration(Short):
     level: float = float("nan")
     level_by: str = ""
     pixel_pitch_um: float | None = None
+    size_px: tuple[int, int] | None = None
 
     @property
     def doubts(self) -> tuple[Remark, ...]:

@@ -114,6 +114,7 @@ def calibrate_lights(
         level=strengths.level,
         level_by=strengths.by,
         pixel_pitch_um=None if rig.positions_um is None else pitch_um,
+        size_px=captures[0].mask.shape,
         findings=tuple(findings),
     )
 
