@@ -245,3 +245,26 @@ def test_init_asks_again_where_an_answer_cannot_be_read(tmp_path: Path, monkeypa
     assert "ring = { count = 8, elevation_deg = 45.0 }" in text
     for words in ("none.toml", "--ring: must be COUNT,ELEVATION", "8 images, one a light", "must be a number"):
         assert words in run.stdout + run.stderr
+
+
+@pytest.mark.parametrize("name", ["capture.toml", "station.toml"])
+def test_a_station_file_is_not_put_among_the_images_that_are_read(tmp_path: Path, grid: Path, name: str) -> None:
+    board = grid.parent / "board"
+    board.mkdir(exist_ok=True)
+    runs = [
+        ("response", grid, "-o", grid / name, "--exposures", "1,2,4"),
+        ("scale", grid, "-o", grid / name, "--pitch-mm", "1"),
+        ("lights", grid, board, "-o", board / name),
+        ("flat", grid, "-o", grid / name),
+        ("station", grid, "-o", board / name, "--board", board),
+    ]
+    words = "is the name of the description" if name == "capture.toml" else ", which this command reads"
+    for arguments in runs:
+        run = bgars_command("calibrate", *arguments)
+        assert (run.code, run.stdout) == (2, "")
+        assert words in run.stderr
+        assert len(run.stderr.splitlines()) == 1
+    assert not list(grid.glob("*.toml"))
+    run = bgars_command("calibrate", "response", "--srgb", "-o", tmp_path / "capture.toml")
+    assert run.code == 2
+    assert not (tmp_path / "capture.toml").exists()

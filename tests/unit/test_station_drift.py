@@ -60,6 +60,16 @@ def test_another_magnification_is_drift_of_the_scale(place: Path, share: float) 
     assert failures(place, shot(tuple(share * value for value in BALL), seed=4)) == {"scale"}
 
 
+def test_limits_of_strengths_hold_what_may_differ_between_two_calibrations_only(place: Path) -> None:
+    """How a ball differs from Lambert's law is alike in both: it was counted twice, and a limit of 5 % was 8 to 14."""
+    found = drift(bgars.read_station(place), capture_of(shot(seed=8), camera_distance_mm=np.inf))
+    limits = [one.limit for one in found if one.code == "light-strength"]
+    assert limits == pytest.approx([0.05] * 4, abs=0.01)
+    assert next(one.limit for one in found if one.code == "level") == pytest.approx(0.10, abs=0.01)
+    weak = shot(seed=9, intensities=np.array([1.0, 1.0, 0.91, 1.0]))
+    assert failures(place, weak) == {"light-strength"}
+
+
 def test_what_cannot_be_compared_is_said(place: Path) -> None:
     known = bgars.read_station(place)
     now = capture_of(shot((17.0, 2.0, 50.0), seed=5), camera_distance_mm=np.inf)

@@ -88,7 +88,8 @@ def part(tmp_path: Path) -> Path:
 
 def test_a_capture_takes_lights_and_scale_from_its_station(tmp_path: Path, part: Path) -> None:
     bgars.write_station(station(scale=bgars.Scale(5.5, 0.01)), tmp_path / "station.toml")
-    capture = bgars.read_capture(part, station=tmp_path / "station.toml")
+    with pytest.warns(bgars.CaptureWarning, match="pixel_pitch_um = 10, but 5.5"):
+        capture = bgars.read_capture(part, station=tmp_path / "station.toml")
     assert (capture.pixel_pitch_um, capture.pixel_pitch_u_um) == (5.5, 0.01)
     np.testing.assert_allclose(capture.rig.u_deg, 0.05)
     (part / "capture.toml").write_text(

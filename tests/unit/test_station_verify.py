@@ -81,3 +81,28 @@ def test_the_command_keeps_its_result_in_the_station(tmp_path: Path) -> None:
     kept = bgars.read_station(station)
     assert [(one.quantity, one.balls, one.mpe_um) for one in kept.verified] == [("height", 16, 5.0)]
     assert "Against a part of known sizes" in station.with_suffix(".html").read_text(encoding="utf-8")
+
+
+def test_each_error_is_judged_by_the_certificate_of_its_own_ball() -> None:
+    """The largest uncertainty of the table took the room from all of them."""
+    known = {**KNOWN, "A8": Known(540.0, math.nan, 0.4)}
+    errors = np.array([0.7, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.1])
+    _, said = verify([read(errors)], known, mpe_um=1.0)
+    assert [(one.code, one.severity) for one in said] == [("mpe", "note")]
+    _, said = verify([read(errors[::-1])], known, mpe_um=1.0)
+    assert [(one.code, one.severity) for one in said] == [("mpe-open", "fail")]
+    assert "error 0.70 um of A8, permissible 1.00 um, less 0.80 um" in said[0].message
+
+
+def test_an_uncertainty_that_is_not_stated_is_not_0(tmp_path: Path) -> None:
+    table = tmp_path / "known.csv"
+    lines = [f"{name},{size}" for name, size in zip(NAMES, SIZES, strict=True)]
+    table.write_text("\n".join(["name,height_um,u_um", *(f"{line}," for line in lines)]))
+    known = read_known(table)
+    _, said = verify([read(np.full(8, 0.2))], known, mpe_um=1.0)
+    assert [one.severity for one in said if one.code == "mpe-open"] == ["fail"]
+    assert "u_um of 8 balls is not in the table (A1, A2, A3" in said[0].message
+    table.write_text("\n".join(["name,height_um", *lines]))
+    assert math.isnan(read_known(table)["A1"].u_um)
+    _, said = verify([read(np.zeros(8))], read_known(table))
+    assert [one.code for one in said] == ["bias-unstated-height"]

@@ -56,8 +56,9 @@ def response(
     if [exposures is not None, sums, srgb].count(True) != 1:
         msg = "--exposures, --sums, --srgb: give one of them"
         raise InputError(msg)
-    known = existing_station(output)
+    known = existing_station(output, folder)
     findings: tuple[Remark, ...] = ()
+    above = ""
     if srgb:
         curve = srgb_response()
     elif folder is None:
@@ -69,13 +70,19 @@ def response(
             warnings.simplefilter("ignore", bgars.CaptureWarning)
             capture = read_unlit(folder)
         full = capture.full_scale if math.isfinite(capture.full_scale) else float(capture.images.max())
+        dark = capture.black_level if capture.dark is None else float(np.median(capture.dark))
+        above = f" above the black level of {dark:g}" if dark > 0 else ""
         if exposures is not None:
-            curve, findings = response_from_bracket(list(capture.images), _numbers(exposures, "--exposures"), full)
+            curve, findings = response_from_bracket(
+                list(capture.images), _numbers(exposures, "--exposures"), full, dark=dark
+            )
         else:
             if len(capture.images) != SUMS:
                 msg = f"{folder}: --sums needs three images (a, b, both), got {len(capture.images)}"
                 raise InputError(msg)
-            curve, findings = response_from_sums(capture.images[0], capture.images[1], capture.images[2], full)
+            curve, findings = response_from_sums(
+                capture.images[0], capture.images[1], capture.images[2], full, dark=dark
+            )
     findings = (*findings, *_made_before(known, curve))
     keep_part(output, {"response": curve}, findings)
     if as_json:
@@ -83,7 +90,7 @@ def response(
         print_json({**values, "nonlinearity": curve.nonlinearity, **said_values(findings), "file": str(output)})
         return
     say(
-        f"Response by {curve.source}: gamma about {curve.gamma:.2f}, {100 * curve.nonlinearity:.1f} % off a "
+        f"Response by {curve.source}{above}: gamma about {curve.gamma:.2f}, {100 * curve.nonlinearity:.1f} % off a "
         "straight line."
     )
     tell_findings(findings, output)
@@ -117,7 +124,7 @@ def scale(
 
     With the grid at two known heights or more, also how far the camera is, or that it is telecentric.
     """
-    existing_station(output)
+    existing_station(output, *folders)
     u_um = None if u_pitch_mm is None else 1000.0 * u_pitch_mm
     if len(folders) > 1 and heights_mm is None:
         msg = f"--heights-mm: needed with several folders ({len(folders)}): the height of the grid in each"

@@ -117,7 +117,7 @@ def lights(
     Exit code 2 where there is no ball, or a light does not show on it; nothing is written then.
     """
     need_different(folders, BALL_AGAIN)
-    known = existing_station(output)
+    known = existing_station(output, *folders)
     read = bgars.read_capture if sphere == "balls" else read_unlit
     captures = [seen_by(raw_capture(folder, known, read), camera) for folder in folders]
     found = _calibrate_lights(captures, sphere, outline, near, diameter_mm, recipe)
@@ -136,7 +136,7 @@ def flat(folder: FolderArgument, output: OutputOption, as_json: JsonOption = Fal
     Inspection and reconstruction with that station then divide by these maps: vignetting, unequal lights and their
     fall-off no longer bend the surface.
     """
-    known = existing_station(output)
+    known = existing_station(output, folder)
     found, findings = bgars.calibrate_flat(raw_capture(folder, replace(known, scale=None)))
     if known.lights is not None and known.scale is not None:
         findings = (*findings, *falloff_findings(found, known.lights, known.scale.pixel_pitch_um))
@@ -180,7 +180,7 @@ def station(
         msg = "--grid and --grid-pitch-mm: give both or none"
         raise InputError(msg)
     need_different(folders, BALL_AGAIN)
-    known = existing_station(output)
+    known = existing_station(output, *folders, board, grid)
     parts: dict[str, Any] = {}
     findings: list[Remark] = []
     with stage_progress() as report:

@@ -83,6 +83,7 @@ def init(
         lines.append(f"dark = {json.dumps(dark)}")
     if station is not None:
         _known_station(station, folder)
+        _need_scale(station, pitch_um)
         lines.append(f"station = {json.dumps(str(station.resolve()))}")
     if ring is not None:
         lines += ["", "[lights]", f"ring = {_ring(_checked(ring, folder))}"]
@@ -114,6 +115,14 @@ def _known_station(path: str | Path, folder: Path) -> Path:
     if lights is not None:
         _need_images(folder, len(lights.rig), f"{path}: {len(lights.rig)} lights")
     return Path(path)
+
+
+def _need_scale(path: Path, pitch_um: float | None) -> None:
+    """Refuse near lights of which nothing says how far a pixel is from them."""
+    known = read_station(path)
+    if known.lights is not None and known.lights.rig.positions_um is not None and known.scale is None and not pitch_um:
+        msg = f"--pitch-um: needed, since {path} has positions of lights, but no scale (bgars calibrate scale)"
+        raise InputError(msg)
 
 
 def _checked(ring: str, folder: Path) -> str:

@@ -9,6 +9,7 @@ import bgars
 from bgars.cli.console import say, utc_now
 from bgars.errors import FileFormatError, InputError
 from bgars.io.own_files import need_new_or_own
+from bgars.io.recipe import RECIPE_NAME
 from bgars.io.station_file import is_station_file, read_station, write_station
 from bgars.report.html.station_page import write_station_page
 
@@ -25,27 +26,35 @@ __all__ = [
 
 SECTIONS = {
     "flat": ("flat-structure", "evenness", "falloff", "flat-before-response"),
-    "response": ("linear", "not-linear"),
+    "response": ("linear", "not-linear", "response-structure", "black-level"),
     "scale": ("grid", "distortion", "tilt"),
     "verified": ("mpe", "mpe-open", "bias-", "slope-", "unread-"),
 }
 """How the codes of findings begin, by section of the station file; all others are of the lights."""
 
 
-def existing_station(path: Path) -> Station:
-    """Return the station of a file, or a new one where there is no file yet.
+def existing_station(path: Path, *inputs: Path | None) -> Station:
+    """Return the station of a file, or a new one where there is no file yet; `inputs` are folders that are read.
 
     Raises
     ------
     FileFormatError, InputError
-        A name that cannot be one of a station, or a file there, or beside it, that bgars did not write.
+        A name that cannot be one of a station, a place among the images that are read, or a file there, or beside it,
+        that bgars did not write.
     """
+    if path.name == RECIPE_NAME:
+        msg = f"{path}: is the name of the description of a capture; name the station file otherwise"
+        raise InputError(msg)
     if path.suffix.lower() != ".toml":
         msg = f"{path}: a station file must end in .toml"
         raise InputError(msg)
     if not path.parent.is_dir():
         msg = f"{path}: cannot be written (no such folder)"
         raise FileFormatError(msg)
+    for folder in inputs:
+        if folder is not None and folder.resolve() == path.parent.resolve():
+            msg = f"{path}: is in {folder}, which this command reads; put the station file elsewhere"
+            raise InputError(msg)
     need_places(path)
     if not path.exists():
         return bgars.Station(path.stem)

@@ -36,6 +36,8 @@ WRONG, UNSURE = 1.3, 1.05
 """Ratio of what two exposures show of one light to what their times say: beyond it they are others, or noted."""
 LEAST_LEVEL = 0.04
 """Of full scale: levels that tell the ratio of two exposures."""
+TOO_DARK = 0.5
+"""Share of the level expected of the shorter exposure by which rounding and noise may move it, and nothing is told."""
 LEAST_PIXELS = 50
 BINS = 12
 SAMPLE = 200_000
@@ -181,20 +183,30 @@ def _check_order(
     clipped: Sequence[NDArray[np.bool_]],
     light: int,
 ) -> list[str]:
-    """Refuse exposures that are not as bright as their times say."""
+    """Refuse exposures that are not as bright as their times say; note what is too dark to tell."""
     notes = []
     for place in range(1, len(times)):
         long, short = levels[place], levels[place - 1]
-        floor = LEAST_LEVEL * captures[place].full_scale
         told = float(times[place] / times[place - 1])
-        # Bright in either of them: a swapped pair is dark where it should be bright.
-        use = ~clipped[place] & ~clipped[place - 1] & (np.maximum(long, short) > floor)
-        use &= np.minimum(long, short) > floor / max(4.0 * told, 16.0)
+        # Chosen by the brighter image alone: noise that helps to choose a level is in its mean.
+        pick, dim = (place, short) if float(long.sum()) >= float(short.sum()) else (place - 1, long)
+        use = ~clipped[pick] & (levels[pick] > LEAST_LEVEL * captures[pick].full_scale)
         if int(use.sum()) < LEAST_PIXELS:
             continue
-        seen = float(np.median(long[use] / short[use]))
-        off = max(seen / told, told / seen)
-        if off > WRONG:
+        bright = float(levels[pick][use].mean())
+        # Rounding of levels and of the dark level moves a mean by half a step at most, noise by three deviations.
+        step = 1.0 if captures[pick].images.dtype.kind == "u" else 0.0
+        spread = float(dim[use].std()) / math.sqrt(int(use.sum()))
+        unsure = (0.5 * step + 3.0 * spread) / (bright / told)
+        if unsure > TOO_DARK:
+            notes.append(
+                f"images at {times[place - 1]:g} ms are too dark to tell whether they are as bright against those at "
+                f"{times[place]:g} ms as the times say"
+            )
+            continue
+        seen = float(long[use].mean()) / max(float(short[use].mean()), 1e-3 * bright / told)
+        off = max(seen / told, told / max(seen, 1e-9))
+        if off > WRONG * (1.0 + unsure):
             first, second = (_file_of(captures[index], light) for index in (place, place - 1))
             msg = (
                 f"{first} is {seen:.2g} times as bright as {second}, but exposures_ms says {told:.2g} times "
@@ -202,7 +214,7 @@ def _check_order(
                 "is not linear"
             )
             raise InputError(msg)
-        if off > UNSURE:
+        if off > UNSURE * (1.0 + unsure):
             notes.append(
                 f"images at {times[place]:g} ms are not as bright against those at {times[place - 1]:g} ms as "
                 "the times say (by more than 5 %): calibrate the response, or check the times"

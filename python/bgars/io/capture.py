@@ -12,7 +12,7 @@ from bgars.errors import CaptureWarning, InputError
 from bgars.io.bracket import bracket_names, lights_in_bracket, merge_exposures, recipe_of_exposure
 from bgars.io.capture_headers import Headers, read_headers
 from bgars.io.capture_images import choose_images, match
-from bgars.io.capture_lights import Lights, check_near_lights, read_lights
+from bgars.io.capture_lights import Lights, note_far_lights, read_lights
 from bgars.io.capture_radiometry import (
     Decoding,
     Levels,
@@ -22,21 +22,20 @@ from bgars.io.capture_radiometry import (
     response_table,
     subtract_offset,
 )
+from bgars.io.capture_station import seen_through, station_of
 from bgars.io.capture_values import note_light_below_zero, refuse_nan
 from bgars.io.given_paths import need_folder
 from bgars.io.image_listing import Listing, list_folder, role_of
 from bgars.io.image_tags import upright
 from bgars.io.images import MAX_MEGAPIXELS, WEIGHTS
-from bgars.io.light_discovery import choose_mask, default_recipe
+from bgars.io.light_discovery import undescribed
 from bgars.io.mask_hints import tell_unused_masks
 from bgars.io.masks import opaque_everywhere, read_mask
 from bgars.io.recipe import RECIPE_NAME, CaptureRecipe, read_recipe
-from bgars.io.station_file import read_station
 from bgars.records.capture import Capture
 from bgars.records.plain_arrays import every_pixel
 from bgars.records.rig import LightRig
 from bgars.records.scalar_checks import thread_count
-from bgars.records.station import Station
 from bgars.records.station_apply import with_station
 
 if TYPE_CHECKING:
@@ -48,6 +47,7 @@ if TYPE_CHECKING:
 
     from bgars.io.recipe import ChannelName
     from bgars.records.pixels import BoolArray, FloatArray, PixelArray
+    from bgars.records.station import Station
 
 __all__ = ["read_capture", "read_unlit"]
 
@@ -116,8 +116,8 @@ def read_capture(
     if RECIPE_NAME in (*listing.others, *listing.folders):
         recipe = read_recipe(folder / RECIPE_NAME)
     else:
-        recipe = _undescribed(folder, listing, notes, may_lack_lights=station is not None)
-    known = _station(folder, recipe, station)
+        recipe = undescribed(folder, listing, notes, may_lack_lights=station is not None)
+    known, station_name = station_of(folder, recipe, station)
     if known is None or known.lights is None or recipe.lights is not None:
         lights = read_lights(folder, recipe, notes)
     else:
@@ -130,7 +130,7 @@ def read_capture(
     else:
         capture = _load_chosen(folder, recipe, lights, listing, images, channel, max_megapixels, threads, notes)
     _tell(folder, notes)
-    return capture if known is None else with_station(capture, known)
+    return seen_through(capture, known, folder, station_name)
 
 
 def read_unlit(folder: str | PathLike[str], *, channel: ChannelName | None = None) -> Capture:
@@ -145,7 +145,7 @@ def read_unlit(folder: str | PathLike[str], *, channel: ChannelName | None = Non
     if RECIPE_NAME in listing.others:
         recipe = read_recipe(folder / RECIPE_NAME)
     else:
-        recipe = _undescribed(folder, listing, notes, may_lack_lights=True)
+        recipe = undescribed(folder, listing, notes, may_lack_lights=True)
         darks = [name for name in listing.special if role_of(name) == "a dark frame"]
         if recipe.lights is None and len(darks) == 1:
             recipe = recipe.model_copy(update={"dark": darks[0]})
@@ -167,22 +167,6 @@ def read_unlit(folder: str | PathLike[str], *, channel: ChannelName | None = Non
 def _tell(folder: Path, notes: list[str]) -> None:
     for note in notes:
         warnings.warn(f"{folder}: {note}", CaptureWarning, stacklevel=3)
-
-
-def _undescribed(folder: Path, listing: Listing, notes: list[str], *, may_lack_lights: bool) -> CaptureRecipe:
-    """The recipe of a folder without one; without lights, too, where something else knows them."""
-    try:
-        return default_recipe(folder, listing, notes)
-    except InputError:
-        if not may_lack_lights:
-            raise
-    return CaptureRecipe.model_validate({"mask": choose_mask(listing, notes)})
-
-
-def _station(folder: Path, recipe: CaptureRecipe, given: Station | str | PathLike[str] | None) -> Station | None:
-    if given is None and recipe.station is not None:
-        given = folder / recipe.station
-    return given if given is None or isinstance(given, Station) else read_station(given)
 
 
 def _by_order(rig: LightRig, source: str) -> Lights:
@@ -290,13 +274,12 @@ def _load(
     rig = lights.rig.with_intensities(
         np.ones(len(paths)) if in_values else _one_intensity(lights.intensities, channel), files=files
     )
-    pitch_um = lights.pixel_pitch_um if recipe.pixel_pitch_um is None else recipe.pixel_pitch_um
-    check_near_lights(rig, pitch_um, images.shape[1:], str(folder / RECIPE_NAME), notes)
+    note_far_lights(rig, notes)
     return Capture(
         images=images,
         rig=rig,
         mask=mask,
-        pixel_pitch_um=pitch_um,
+        pixel_pitch_um=lights.pixel_pitch_um if recipe.pixel_pitch_um is None else recipe.pixel_pitch_um,
         pixel_pitch_u_um=recipe.pixel_pitch_u_um,
         camera_distance_mm=None if recipe.camera is None else recipe.camera.distance_mm,
         dark=dark,

@@ -23,8 +23,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bgars.io.recipe import CaptureRecipe, LightsRecipe
+    from bgars.records.capture import Capture
 
-__all__ = ["Lights", "check_near_lights", "read_lights"]
+__all__ = ["Lights", "check_near_lights", "note_far_lights", "read_lights"]
 
 UNIT_WITHIN = 0.01
 """Vectors whose lengths differ from 1, or from each other, by less are directions."""
@@ -156,31 +157,44 @@ def _refuse_unit_lengths(table: LightTable) -> None:
         raise InputError(msg)
 
 
-def check_near_lights(
-    rig: LightRig, pixel_pitch_um: float | None, shape: tuple[int, ...], where: str, notes: list[str]
-) -> None:
+def check_near_lights(capture: Capture, where: str, station: str | None = None) -> None:
     """Refuse near lights without a scale, and such that all stand within the picture: they would hide the part.
 
-    Lights that are farther than any room is wide are noted.
+    `where` describes the capture; `station` is the file whose lights it has, if it has those of one.
 
     Raises
     ------
     InputError
         No pixel pitch; or all are nearer to the image centre than its corners, as if metres were taken for millimetres.
     """
+    rig, pitch_um = capture.rig, capture.pixel_pitch_um
     if rig.positions_um is None:
         return
-    if pixel_pitch_um is None:
+    if pitch_um is None and station is not None:
+        msg = (
+            f"{station}: scale.pixel_pitch_um: needed with its lights.positions_mm, to place pixels under lights: "
+            f"bgars calibrate scale, or state pixel_pitch_um in {where}"
+        )
+        raise InputError(msg)
+    if pitch_um is None:
         msg = f"{where}: pixel_pitch_um: needed with lights.positions_mm, to place pixels under lights"
         raise InputError(msg)
     farthest_um = float(np.linalg.norm(rig.positions_um, axis=1).max())
-    corner_um = math.hypot(*shape) / 2.0 * pixel_pitch_um
+    corner_um = math.hypot(*capture.images.shape[1:]) / 2.0 * pitch_um
     if farthest_um < corner_um:
         msg = (
-            f"{where}: all lights are within {farthest_um / 1000.0:.3g} mm of the image centre, but the corners of the "
-            f"image are {corner_um / 1000.0:.3g} mm from it: are positions_mm in mm, and pixel_pitch_um in um?"
+            f"{station or where}: all lights are within {farthest_um / 1000.0:.3g} mm of the image centre, but the "
+            f"corners of the image are {corner_um / 1000.0:.3g} mm from it: are positions_mm in mm, and pixel_pitch_um "
+            "in um?"
         )
         raise InputError(msg)
+
+
+def note_far_lights(rig: LightRig, notes: list[str]) -> None:
+    """Note lights that are farther than any room is wide."""
+    if rig.positions_um is None:
+        return
+    farthest_um = float(np.linalg.norm(rig.positions_um, axis=1).max())
     if farthest_um > FARTHEST_UM:
         notes.append(
             f"lights up to {farthest_um / 1e6:.4g} m from the image centre: are positions_mm in mm? Divide um by 1000"

@@ -14,7 +14,7 @@ from bgars.io.recipe import RECIPE_NAME, CaptureRecipe
 if TYPE_CHECKING:
     from bgars.io.image_listing import Listing
 
-__all__ = ["choose_mask", "default_recipe", "is_about_lights"]
+__all__ = ["choose_mask", "default_recipe", "is_about_lights", "undescribed"]
 
 DIRECTIONS, INTENSITIES = "light_directions.txt", "light_intensities.txt"
 SUFFIXES = frozenset(suffix for kind in LIGHT_FORMATS for suffix in kind.suffixes)
@@ -64,6 +64,22 @@ def _strength_file(listing: Listing, notes: list[str]) -> str | None:
     if ignored:
         notes.append(f"files about intensities that are not used: {some_of(ignored)}")
     return chosen
+
+
+def undescribed(folder: Path, listing: Listing, notes: list[str], *, may_lack_lights: bool) -> CaptureRecipe:
+    """The recipe of a folder without one; without lights, too, where something else knows them.
+
+    Raises
+    ------
+    InputError
+        As :func:`default_recipe`, where lights may not be lacking.
+    """
+    try:
+        return default_recipe(folder, listing, notes)
+    except InputError:
+        if not may_lack_lights:
+            raise
+    return CaptureRecipe.model_validate({"mask": choose_mask(listing, notes)})
 
 
 def choose_mask(listing: Listing, notes: list[str]) -> str | None:

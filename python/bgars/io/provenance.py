@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from bgars.errors import FileFormatError
 from bgars.io.bracket import bracket_names, recipe_of_exposure
 from bgars.io.image_listing import list_folder
-from bgars.io.light_discovery import default_recipe
+from bgars.io.light_discovery import undescribed
 from bgars.io.recipe import RECIPE_NAME, TableResponse, read_recipe
 from bgars.records.input_file import InputFile
 
@@ -37,7 +37,10 @@ def capture_files(capture: Capture) -> tuple[Path, ...]:
     if capture.folder is None:
         return capture.files
     path = capture.folder / RECIPE_NAME
-    recipe = read_recipe(path) if path.is_file() else default_recipe(capture.folder, list_folder(capture.folder), [])
+    if path.is_file():
+        recipe = read_recipe(path)
+    else:  # the lights may be those of a station
+        recipe = undescribed(capture.folder, list_folder(capture.folder), [], may_lack_lights=True)
     named = [RECIPE_NAME, FILENAMES if recipe.images is None else None, recipe.dark, recipe.mask, recipe.station]
     if isinstance(recipe.response, TableResponse):
         named.append(recipe.response.table)

@@ -139,6 +139,8 @@ def _lights(table: LightsTable) -> LightCalibration:
         lamp_deg=math.nan if table.lamp_deg is None else table.lamp_deg,
         level=math.nan if table.level is None else table.level,
         level_by=table.level_by,
+        pixel_pitch_um=table.pixel_pitch_um,
+        size_px=table.size_px,
     )
 
 
@@ -224,6 +226,8 @@ def _lights_values(lights: LightCalibration) -> dict[str, Any]:
         "outlines_px": outlines or None,
         "level": lights.level,
         "level_by": lights.level_by or None,
+        "pixel_pitch_um": lights.pixel_pitch_um,
+        "size_px": lights.size_px,
     }
 
 

@@ -42,6 +42,8 @@ class LightsTable(Strict):
     )
     level: Positive | None = Field(None, description="mean level of what measured the intensities, of 255")
     level_by: str = Field("", description="what that was: highlights, shading or board")
+    pixel_pitch_um: Positive | None = Field(None, description="size of a pixel that positions_mm were measured with")
+    size_px: tuple[int, int] | None = Field(None, description="height and width of the images")
 
     @model_validator(mode="after")
     def _one_a_light(self) -> LightsTable:
@@ -111,6 +113,7 @@ class ScaleTable(Strict):
     residual_px: NotNegative = Field(0.0, description="root mean square residual of the points of the grid")
     points: int = Field(0, description="number of points of the grid")
     camera_distance_mm: Distance | None = Field(None, description="distance of the camera; inf: telecentric")
+    size_px: tuple[int, int] | None = Field(None, description="height and width of the images it holds for")
 
 
 class VerifyTable(Strict):

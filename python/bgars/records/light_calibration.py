@@ -76,6 +76,10 @@ class LightCalibration(Short):
         Mean strength of the lights, grey levels of 255, of what `level_by` names: "highlights" (times their solid
         angle), "shading" of a white facet, or the "board"; NaN where not measured.
     level_by : str
+    pixel_pitch_um : float or None
+        Near lights: the pitch, by a scale or by the size of the ball, that put their positions in micrometres.
+    size_px : (int, int) or None
+        Height and width of the images, in the middle of which positions have their origin.
     """
 
     rig: LightRig
@@ -92,6 +96,8 @@ class LightCalibration(Short):
     findings: tuple[Remark, ...] = field(default=())
     level: float = float("nan")
     level_by: str = ""
+    pixel_pitch_um: float | None = None
+    size_px: tuple[int, int] | None = None
 
     @property
     def doubts(self) -> tuple[Remark, ...]:

@@ -27,6 +27,8 @@ class Scale:
         Points of the grid.
     camera_distance_mm : float or None
         From the camera to the board, by grids at two heights or more; infinite of a telecentric lens.
+    size_px : (int, int) or None
+        Height and width of the images that it holds for.
     """
 
     pixel_pitch_um: float
@@ -37,3 +39,4 @@ class Scale:
     residual_px: float = 0.0
     points: int = 0
     camera_distance_mm: float | None = None
+    size_px: tuple[int, int] | None = None

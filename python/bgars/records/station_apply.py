@@ -36,7 +36,8 @@ def with_station(capture: Capture, station: Station) -> Capture:
     Raises
     ------
     InputError
-        Another number or order of images than the station has lights, or another image size than its flat field has.
+        Another number or order of images than the station has lights, or another image size than its flat field, scale
+        or positions of lights have.
     """
     given: object = station
     if not isinstance(given, Station):
@@ -50,9 +51,12 @@ def with_station(capture: Capture, station: Station) -> Capture:
             )
             raise InputError(msg)
         _refuse_other_order(capture, station)
+        if station.lights.rig.positions_um is not None:
+            _refuse_other_size(capture, station.lights.size_px, f"the positions of the lights of {station.name}")
         rig = replace(station.lights.rig, files=capture.rig.files)
         capture = replace(capture, rig=rig)
     if station.scale is not None:
+        _refuse_other_size(capture, station.scale.size_px, f"scale and lens of {station.name}")
         distance_mm = station.scale.camera_distance_mm
         capture = replace(
             capture,
@@ -67,6 +71,17 @@ def with_station(capture: Capture, station: Station) -> Capture:
     if station.scale is not None and station.scale.distortion:
         capture = straightened(capture, station.scale.distortion)
     return capture
+
+
+def _refuse_other_size(capture: Capture, size_px: tuple[int, int] | None, what: str) -> None:
+    """Refuse images of another binning or region of interest: another pitch, or another middle."""
+    height, width = capture.images.shape[1:3]
+    if size_px is not None and (height, width) != tuple(size_px):
+        msg = (
+            f"{capture.name}: images of {width} x {height} pixels, but {what} are those of {size_px[1]} x "
+            f"{size_px[0]}: use the binning and the region of interest of the calibration, or calibrate with these"
+        )
+        raise InputError(msg)
 
 
 def _refuse_other_order(capture: Capture, station: Station) -> None:

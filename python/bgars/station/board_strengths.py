@@ -81,6 +81,8 @@ def board_strengths(capture: Capture, levels: Levels, circles_px: Array, solutio
         pattern = np.where(lit, logs - strengths[:, None], 0.0).sum(axis=0) / np.maximum(lit.sum(axis=0), 1)
         off = logs - pattern - strengths[:, None]
         strengths = strengths + np.array([np.median(one[use]) for one, use in zip(off, lit, strict=True)])
+    # A factor may be that of all lights or that of all pixels: that of the usual pixel is 1.
+    strengths = strengths + float(np.median(pattern[lit.any(axis=0)]))
     around = np.arctan2(places[:, 1] - circles_px[0, 1], places[:, 0] - circles_px[0, 0])
     u = _spread(off, lit, ((around / (2.0 * math.pi) + 0.5) * SECTORS).astype(int) % SECTORS)
     if u is None:

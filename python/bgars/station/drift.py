@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bgars.errors import InputError
 from bgars.files.light_names import light_name
@@ -13,6 +15,7 @@ from bgars.records.remark import Remark, Severity
 from bgars.records.station_apply import flat_maps
 from bgars.station.flat import calibrate_flat
 from bgars.station.lights import calibrate_lights
+from bgars.station.strengths import repeatable
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -22,6 +25,8 @@ if TYPE_CHECKING:
     from bgars.records.station import Station
 
 __all__ = ["COMPARED", "drift"]
+
+Array = NDArray[np.float64]
 
 COVERAGE = 2.0
 """Standard uncertainties, of both calibrations together, that a difference may have."""
@@ -91,41 +96,59 @@ def drift(
     if len(capture.images) != len(before.rig):
         msg = f"{capture.name}: {len(capture.images)} images, but {station.name} has {len(before.rig)} lights"
         raise InputError(msg)
-    now = calibrate_lights(capture, kind, outline, near=False)  # type: ignore[arg-type]
-    found = [*now.findings]
-    seen_from = _origins(station, now.balls[0].outline_px, capture)
+    pitch_um = _pitch_of(station, capture)
+    places_um = before.rig.positions_um
+    placed = None if places_um is None or pitch_um is None else places_um / pitch_um
+    now = calibrate_lights(capture, kind, outline, near=False, places_px=placed)  # type: ignore[arg-type]
+    if places_um is not None and placed is None:
+        # Seen from the side where a ball lies, near lamps are elsewhere, and as strong as the board there says.
+        words = (
+            "not compared: directions and strengths of near lamps, and their level (no pixel pitch is known: calibrate "
+            "the scale, or the lights again)"
+        )
+        return (*now.findings, *_of_all(replace(before, level_by=""), now), Remark("note", words, "not-compared"))
+    return (*now.findings, *_of_each(before, now, placed, capture, limit_deg, limit_intensity), *_of_all(before, now))
+
+
+def _of_each(
+    before: LightCalibration,
+    now: LightCalibration,
+    placed: Array | None,
+    capture: Capture,
+    limit_deg: float,
+    limit_intensity: float,
+) -> list[Remark]:
+    """Compare direction and strength of each light; near ones are at `placed` (L, 3), in pixels of the board."""
+    found: list[Remark] = []
+    seen_from, u_parallax_deg = _origins(before, placed, now.balls[0].outline_px)
     turn_deg = np.degrees(
         2.0 * np.arcsin(np.clip(np.linalg.norm(now.rig.directions - seen_from, axis=1) / 2.0, 0.0, 1.0))
     )
     # What an unknown lens does to both calibrations is alike, and no drift.
-    u_deg = np.hypot(_without_lens(before), _without_lens(now)) * math.sqrt(2.0)
-    measured = before.u_intensities is not None and now.u_intensities is not None
-    change = (
-        now.rig.intensities / now.rig.intensities.mean() / (before.rig.intensities / before.rig.intensities.mean())
-        - 1.0
-    )
+    u_deg = np.sqrt(_without_lens(before) ** 2 + _without_lens(now) ** 2 + u_parallax_deg**2) * math.sqrt(2.0)
+    change = _against_others(now.rig.intensities / before.rig.intensities)
+    u_before, u_now = _u_strengths(before, now)
     for index in range(len(before.rig)):
         name = light_name(index, capture.files)
         limit = limit_deg + COVERAGE * float(u_deg[index])
         moved = float(turn_deg[index])
         words = f"{name}: moved by {moved:.2f} deg since calibration (limit {limit:.2f} deg)"
         found.append(Remark("fail" if moved > limit else "note", words, "light-moved", moved, limit, "deg", index))
-        if measured and before.u_intensities is not None and now.u_intensities is not None:
-            limit = limit_intensity + COVERAGE * math.hypot(before.u_intensities[index], now.u_intensities[index])
+        if u_before is not None and u_now is not None:
+            limit = limit_intensity + COVERAGE * math.hypot(u_before[index], u_now[index])
             words = (
                 f"{name}: {100 * change[index]:+.1f} % in strength against the other lights (limit {100 * limit:.1f} %)"
             )
             severity: Severity = "fail" if abs(change[index]) > limit else "note"
             found.append(Remark(severity, words, "light-strength", float(change[index]), limit, "", index))
-    return (*found, *_of_all(before, now))
+    return found
 
 
 def _of_all(before: LightCalibration, now: LightCalibration) -> list[Remark]:
     """Compare what all lights share: their level, and the size of the ball in pixels."""
     found, missing = [], []
     if before.level_by == now.level_by and before.level > 0 and now.level > 0:
-        us = [one.u_intensities for one in (before, now)]
-        u = math.hypot(*(0.0 if each is None else float(each.mean()) for each in us))
+        u = math.hypot(*(0.0 if each is None else float(each.mean()) for each in _u_strengths(before, now)))
         found.append(_level(now.level / before.level - 1.0, LIMIT_LEVEL + COVERAGE * u))
     elif before.level_by and now.level_by:
         missing.append(f"the level of all lights ({before.level_by} at calibration, {now.level_by} now)")
@@ -153,30 +176,63 @@ def _of_all(before: LightCalibration, now: LightCalibration) -> list[Remark]:
     return [*found, Remark("note", f"not compared: {'; '.join(missing)}", "not-compared")] if missing else found
 
 
+def _against_others(ratio: Array) -> Array:
+    """(L,) change of each light against the usual one: the mean would make one weak lamp a change of all others."""
+    change: Array = ratio / np.median(ratio) - 1.0
+    return change
+
+
+def _u_strengths(before: LightCalibration, now: LightCalibration) -> list[Array | None]:
+    """Uncertainties of the strengths of either, without what is alike in both where one means measured them."""
+    is_alike = before.level_by == now.level_by
+    return [
+        one.u_intensities
+        if one.u_intensities is None or not is_alike
+        else repeatable(one.u_intensities, one.level_by, len(one.balls))
+        for one in (before, now)
+    ]
+
+
 def _level(change: float, limit: float) -> Remark:
     words = f"the level of all lights changed by {100 * change:+.1f} % (limit {100 * limit:.1f} %): lamps or exposure"
     return Remark("fail" if abs(change) > limit else "note", words, "level", change, limit)
 
 
-def _without_lens(lights: LightCalibration) -> np.ndarray:
+def _without_lens(lights: LightCalibration) -> Array:
     if lights.u_lens_deg is None:
         return lights.u_deg
-    u_deg: np.ndarray = np.sqrt(np.maximum(lights.u_deg**2 - lights.u_lens_deg**2, lights.u_own_deg**2))
+    u_deg: Array = np.sqrt(np.maximum(lights.u_deg**2 - lights.u_lens_deg**2, lights.u_own_deg**2))
     return u_deg
 
 
-def _origins(station: Station, outline_px: np.ndarray, capture: Capture) -> np.ndarray:
-    """(L, 3) directions of the station's lights as the ball sees them."""
-    rig = station.lights.rig if station.lights is not None else capture.rig
-    pitch_um = capture.pixel_pitch_um or (station.scale.pixel_pitch_um if station.scale else None)
-    if rig.positions_um is None or pitch_um is None:
-        return rig.directions
-    x, y, radius = outline_px * pitch_um
-    way = rig.positions_um - np.array([x, y, radius])
+def _pitch_of(station: Station, capture: Capture) -> float | None:
+    """The pixel pitch that puts positions where the images show them: best the one that they were measured with."""
+    if station.lights is not None and station.lights.pixel_pitch_um is not None:
+        return station.lights.pixel_pitch_um
+    return capture.pixel_pitch_um if station.scale is None else station.scale.pixel_pitch_um
+
+
+def _origins(before: LightCalibration, placed: Array | None, outline_px: Array) -> tuple[Array, Array]:
+    """(L, 3) directions of the station's lights as the ball sees them, (L,) what their distances leave open of these.
+
+    The latter in degrees, standard deviations.
+    """
+    if placed is None:
+        return before.rig.directions, np.zeros(len(before.rig))
+    x, y, radius = outline_px
+    way = placed - np.array([x, y, radius])
     # A light is seen from its highlight, half way between the top of the ball and the light's side of it.
     way = way - 0.5 * radius * (way / np.linalg.norm(way, axis=1, keepdims=True) + [0.0, 0.0, 1.0])
-    directions: np.ndarray = way / np.linalg.norm(way, axis=1, keepdims=True)
-    return directions
+    size = np.linalg.norm(way, axis=1)
+    directions: Array = way / size[:, None]
+    u_deg = np.zeros(len(placed))
+    if before.u_positions_um is not None and before.rig.positions_um is not None:
+        far_um = np.linalg.norm(before.rig.positions_um, axis=1)
+        across_um = np.radians(before.u_deg) * far_um
+        along_um = np.sqrt(np.maximum(np.square(before.u_positions_um).sum(axis=1) - 2.0 * across_um**2, 0.0))
+        aside = np.linalg.norm(np.cross(before.rig.directions, directions), axis=1)
+        u_deg = np.degrees(along_um / far_um * aside * np.linalg.norm(placed, axis=1) / size)
+    return directions, u_deg / math.sqrt(2.0)  # in one direction, where u_deg of lights is that on either axis
 
 
 def _even(station: Station, capture: Capture, limit_intensity: float) -> tuple[Remark, ...]:
@@ -190,7 +246,7 @@ def _even(station: Station, capture: Capture, limit_intensity: float) -> tuple[R
     now, said = calibrate_flat(capture)
     found = [*said]
     old, new = station.flat.coefficients[:, 0], now.coefficients[:, 0]
-    change = new / new.mean() / (old / old.mean()) - 1.0
+    change = _against_others(new / old)
     for index in range(len(new)):
         name = light_name(index, capture.files)
         words = (

@@ -34,6 +34,11 @@ ROUNDING = 5e-4
 """Share of the level that rounded grey levels leave in the mean of a block."""
 STRUCTURE = 0.01
 """Residual of the maps from which on the board, or dust, is in the light."""
+LARGEST, NO_BOARD = 0.03, 0.1
+"""Largest misfit of a block that is doubted, and of four that is refused: 3 % of the light turn a normal by a degree;
+with a tenth of it images that are divided by the map are worse than those that are not."""
+BLOCK_SIGMAS = 4.0
+"""Of noise, which one of two thousand blocks exceeds seldom."""
 FALLOFF = 0.05
 """How far the shape of a map may be from that of the near-light model."""
 
@@ -56,7 +61,7 @@ def calibrate_flat(capture: Capture) -> tuple[FlatField, tuple[Remark, ...]]:
     Raises
     ------
     CalibrationError
-        An image too dark or clipped, or no even board.
+        An image too dark or clipped, or no board that a smooth map fits within a tenth.
     InputError
         The same image twice.
 
@@ -100,12 +105,22 @@ def calibrate_flat(capture: Capture) -> tuple[FlatField, tuple[Remark, ...]]:
     fitted = (rows @ coefficients).T
     off = np.sqrt(np.average((means - fitted) ** 2, axis=1, weights=weights))
     left = np.sqrt(np.maximum(off**2 - float(np.average(noise**2, weights=weights)), 0.0)) / fitted.mean(axis=1)
+    errors, u_errors = means / fitted - 1.0, noise / fitted
+    wide = _worst(errors, u_errors, x, y, (height / step, width / step))
+    worst = np.maximum(wide, (np.abs(errors) - BLOCK_SIGMAS * u_errors).max(axis=1))
     flat = FlatField(np.array(coefficients.T, dtype=np.float64), degree, (height, width), float(left.max()))
     least = min(float(flat_maps(flat, index).min()) for index in range(len(flat.coefficients)))
     if least <= 0:
         msg = f"{capture.name}: a map falls to 0: the board must be flat, of one colour, and fill the image"
         raise CalibrationError(msg)
-    return flat, tuple(_findings(capture, left, least))
+    for light in np.flatnonzero(wide > NO_BOARD):
+        msg = (
+            f"{capture.name}: {light_name(int(light), capture.files)}: no smooth map fits the board: a place is off by "
+            f"{100 * wide[light]:.0f} % (limit {100 * NO_BOARD:g} %): a pattern, an edge of the board, a shadow, or "
+            "corners that the lens cuts off; photograph a plain board, or mask what is none"
+        )
+        raise CalibrationError(msg)
+    return flat, tuple(_findings(capture, left, worst, least))
 
 
 def falloff_findings(flat: FlatField, lights: LightCalibration, pitch_um: float) -> list[Remark]:
@@ -157,6 +172,25 @@ def _blocks(images: Array, mask: NDArray[np.bool_], step: int) -> tuple[Array, A
     return sums[:, use] / n, n, x[use] / n, y[use] / n
 
 
+def _worst(errors: Array, noise: Array, x: Array, y: Array, blocks: tuple[float, float]) -> Array:
+    """(L,) largest mean of four neighbouring blocks of (L, B) errors, less three standard deviations of their noise."""
+    row = np.minimum((1.0 - y) / 2.0 * blocks[0], blocks[0] - 0.5).astype(int)
+    col = np.minimum((x + 1.0) / 2.0 * blocks[1], blocks[1] - 0.5).astype(int)
+
+    def of_four(values: Array) -> Array:
+        grid = np.zeros((row.max() + 2, col.max() + 2))
+        grid[row, col] = values
+        return np.asarray(grid[1:, 1:] + grid[1:, :-1] + grid[:-1, 1:] + grid[:-1, :-1])
+
+    count = of_four(np.ones(len(x)))
+    whole = count >= min(4.0, float(count.max()))
+    found = []
+    for error, spread in zip(errors, noise, strict=True):
+        size = np.abs(of_four(error)) - 3.0 * np.sqrt(of_four(spread**2))
+        found.append(float(np.max(size[whole] / count[whole], initial=0.0)))
+    return np.array(found)
+
+
 def _rows(x: Array, y: Array, degree: int) -> Array:
     powers = np.eye(degree + 1)
     of_x = [np.polynomial.legendre.legval(x, row) for row in powers]
@@ -184,8 +218,14 @@ def _degree(means: Array, weights: Array, x: Array, y: Array, noise: Array) -> i
     return chosen
 
 
-def _findings(capture: Capture, left: Array, least: float) -> list[Remark]:
+def _findings(capture: Capture, left: Array, worst: Array, least: float) -> list[Remark]:
     found = []
+    for light in np.flatnonzero((worst > LARGEST) & (left <= STRUCTURE)):
+        message = (
+            f"{capture.name}: {light_name(int(light), capture.files)}: the map is off by {100 * worst[light]:.0f} % at "
+            "a place: a shadow, dust, an edge, or corners that the lens cuts off"
+        )
+        found.append(Remark("doubt", message, "flat-structure", float(worst[light]), LARGEST, "", int(light)))
     for light in np.flatnonzero(left > STRUCTURE):
         name = light_name(int(light), capture.files)
         message = (

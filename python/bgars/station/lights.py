@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import combinations
 from typing import TYPE_CHECKING, Literal
 
@@ -57,9 +58,13 @@ def calibrate_lights(
     *,
     near: bool | None = None,
     diameter_um: float | None = None,
+    places_px: Array | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> LightCalibration:
     """Find where the lights are, from a mirror or a matt ball in view: see :func:`bgars.calibrate_lights`.
+
+    With `places_px` (L, 3), positions of near lights in pixels of the board, strengths are those of lamps there: what a
+    single ball shows are directions, by which the light on board and ball does not fall off.
 
     Raises
     ------
@@ -82,11 +87,12 @@ def calibrate_lights(
         near = False
     check_pitch(diameter_um, "diameter_um")
     for each in captures:
-        _need_scale_of_camera(each, sphere, diameter_um)
+        _need_scale_of_camera(each, diameter_um)
     seen = observe(captures, sphere, outlines_a_capture(captures, outline), diameter_um, progress)
     balls, findings = seen.balls, seen.findings
     solution, pitch_um = _solve(captures, seen, diameter_um, near, findings)
-    strengths = strengths_of(sphere, captures, seen, solution, findings)
+    shone = solution if places_px is None else _placed(solution, places_px)
+    strengths = strengths_of(sphere, captures, seen, shone, findings)
     rig = _rig(solution, pitch_um, strengths.relative)
     findings += together(_judge(solution, balls, captures, rig), captures[0].name, len(rig))
     own = solution.u_own_deg
@@ -107,14 +113,16 @@ def calibrate_lights(
         lamp_deg=seen.lamp_deg,
         level=strengths.level,
         level_by=strengths.by,
+        pixel_pitch_um=None if rig.positions_um is None else pitch_um,
+        size_px=captures[0].mask.shape,
         findings=tuple(findings),
     )
 
 
-def _need_scale_of_camera(capture: Capture, sphere: str, diameter_um: float | None) -> None:
+def _need_scale_of_camera(capture: Capture, diameter_um: float | None) -> None:
     """Refuse a camera at a distance in mm where no scale says how many pixels that is: it would count as infinite."""
     distance_mm = capture.camera_distance_mm
-    if sphere == "matt" or distance_mm is None or math.isinf(distance_mm):
+    if distance_mm is None or math.isinf(distance_mm):
         return
     if capture.pixel_pitch_um is None and diameter_um is None:
         msg = (
@@ -165,6 +173,12 @@ def _rig(solution: LightSolution, pitch_um: float | None, intensities: Array) ->
         positions = solution.directions / solution.nearness[:, None] * pitch_um
         return LightRig.from_positions(positions, intensities=intensities, u_deg=solution.u_deg)
     return LightRig.from_directions(solution.directions, intensities=intensities, u_deg=solution.u_deg)
+
+
+def _placed(solution: LightSolution, places_px: Array) -> LightSolution:
+    """The solution with lights at known places."""
+    distances = np.linalg.norm(places_px, axis=1)
+    return replace(solution, directions=places_px / distances[:, None], nearness=1.0 / distances)
 
 
 def _u_positions(solution: LightSolution, pitch_um: float | None) -> Array | None:

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares, minimize
+from scipy.special import ndtr
 
 from bgars.errors import CalibrationError
 from bgars.files.light_names import light_name
 from bgars.records.remark import Remark
 from bgars.station.board_light import board_light
+from bgars.station.mirror import reflected, sphere_of_outline
 
 if TYPE_CHECKING:
     from bgars.records.capture import Capture
@@ -41,6 +43,9 @@ BOARD_SHARE = 0.5
 """Spread of what the board reflects, of the ball's level, before it is measured in the attached shadow."""
 UNEVEN = 0.1
 """Part of the board's light that one side has more of than its shadow says: the ball shines on the board, too."""
+LEAST_SHADOW, CUT_SHARE = 30, 0.02
+"""Pixels of an attached shadow, and their share at the least grey level, from which on noise is cut there: fewer move
+its mean by less than a hundredth of the noise."""
 POLYNOMIAL = 4
 STEP_RAD = 1e-4
 
@@ -56,8 +61,8 @@ class SeenShading(NamedTuple):
     findings: list[Remark]
 
 
-def shading_on(capture: Capture, levels: Levels, outline: Outline) -> SeenShading:
-    """Fit each light on one ball.
+def shading_on(capture: Capture, levels: Levels, outline: Outline, camera_px: float = math.inf) -> SeenShading:
+    """Fit each light on one ball, which a camera at that distance sees (infinite: telecentric).
 
     Raises
     ------
@@ -69,6 +74,7 @@ def shading_on(capture: Capture, levels: Levels, outline: Outline) -> SeenShadin
     directions, strengths, u_strengths = np.zeros((count, 3)), np.zeros(count), np.zeros(count)
     own, jacobians = np.zeros((count, 2, 2)), np.zeros((count, 3, 3))
     points, index = _pixels(levels.images.shape[1:], outline)
+    normals = _normals(points, outline.circle_px, camera_px)
     for light, image in enumerate(levels.images):
         name = light_name(light, capture.files)
         values = image.ravel()[index]
@@ -86,7 +92,7 @@ def shading_on(capture: Capture, levels: Levels, outline: Outline) -> SeenShadin
                 "expose shorter"
             )
             raise CalibrationError(msg)
-        vector, board, residual = _fit(_normals(points, outline.circle_px), values, used, levels.noise)
+        vector, board, residual = _fit(normals, values, used, levels.noise)
         strength = float(np.linalg.norm(vector))
         if vector[2] <= 0:
             msg = (
@@ -95,11 +101,11 @@ def shading_on(capture: Capture, levels: Levels, outline: Outline) -> SeenShadin
             )
             raise CalibrationError(msg)
         direction = vector / strength
-        own[light], jacobians[light] = _spread(points, values, used, outline, levels.noise, direction)
+        own[light], jacobians[light] = _spread(points, values, used, outline, levels.noise, direction, camera_px)
         own[light] += (UNEVEN * board / strength) ** 2 * np.eye(2)
         if residual > EXPLAINED * levels.noise:
             # Two laws that explain the ball as badly: the truth is as likely nearer to either of them.
-            general, left = _monotone(_normals(points, outline.circle_px), values, used, direction)
+            general, left = _monotone(normals, values, used, direction)
             half = 0.5 * _across(direction) @ (general - direction)
             own[light] += np.outer(half, half)
             if residual > NOT_LAMBERT * peak:
@@ -147,9 +153,11 @@ def _pixels(shape: tuple[int, ...], outline: Outline) -> tuple[Array, NDArray[np
     return np.column_stack([x.ravel()[use], y.ravel()[use]]), use
 
 
-def _normals(points: Array, circle: Array) -> Array:
-    flat = (points - circle[:2]) / circle[2]
-    return np.column_stack([flat, np.sqrt(np.maximum(1.0 - np.square(flat).sum(axis=1), 0.0))])
+def _normals(points: Array, circle: Array, camera_px: float = math.inf) -> Array:
+    """(N, 3) normals where the rays of the camera meet the ball of an outline."""
+    sphere = sphere_of_outline(circle, camera_px)
+    normals: Array = (reflected(points, sphere, camera_px)[0] - sphere.centre_px) / sphere.radius_px
+    return normals
 
 
 def _fit(normals: Array, values: Array, used: NDArray[np.bool_], noise: float) -> tuple[Array, float, float]:
@@ -161,17 +169,38 @@ def _fit(normals: Array, values: Array, used: NDArray[np.bool_], noise: float) -
     scale = max(float(values.max()), 1.0)
     spread = math.hypot(noise, 0.01 * scale)
 
-    def residuals(p: Array) -> Array:
-        shade = np.maximum(normals @ p[:3], 0.0)
-        return np.append((values - shade - p[3] - p[4] * below) / spread, p[4] / (BOARD_SHARE * scale))
-
     lit = values > np.percentile(values, 40.0)
     first, *_ = np.linalg.lstsq(normals[lit], values[lit], rcond=None)
-    below = board_light(normals, first / np.linalg.norm(first))
+    toward = first / np.linalg.norm(first)
+    below = board_light(normals, toward)
+    floor = float(values.min())
+    cut = _noise_at(floor, values[normals @ toward < 0.0], noise)
+
+    def residuals(p: Array) -> Array:
+        level = np.maximum(normals @ p[:3], 0.0) + p[3] + p[4] * below
+        if cut > 0.0:
+            level = floor + _mean_of_cut(level - floor, cut)
+        return np.append((values - level) / spread, p[4] / (BOARD_SHARE * scale))
+
     start = np.array([*first, 0.0, 0.0])
     fit = least_squares(residuals, start, loss="soft_l1", max_nfev=60)
     off = np.abs(fit.fun[:-1]) * spread
     return fit.x[:3], abs(float(fit.x[4])), float(np.sqrt(np.mean(np.minimum(off, 4.0 * np.median(off) + noise) ** 2)))
+
+
+def _noise_at(floor: float, shadow: Array, noise: float) -> float:
+    """Noise where the attached shadow lies on the least grey level, which cuts it; 0 where it lies above."""
+    if len(shadow) < LEAST_SHADOW or (shadow <= floor).mean() < CUT_SHARE:
+        return 0.0
+    # Half of the noise at least is seen: photons make that of lit pixels larger, but not that of dark ones.
+    return min(noise, math.sqrt(2.0 * float(np.square(shadow - floor).mean())))
+
+
+def _mean_of_cut(level: Array, noise: float) -> Array:
+    """Mean of levels with normal noise, of which what is below 0 was set to 0."""
+    share = level / noise
+    mean: Array = level * ndtr(share) + noise * np.exp(-0.5 * share**2) / math.sqrt(2.0 * math.pi)
+    return mean
 
 
 def _monotone(normals: Array, values: Array, used: NDArray[np.bool_], start: Array) -> tuple[Array, float]:
@@ -199,11 +228,17 @@ def _monotone(normals: Array, values: Array, used: NDArray[np.bool_], start: Arr
 
 
 def _spread(
-    points: Array, values: Array, used: NDArray[np.bool_], outline: Outline, noise: float, direction: Array
+    points: Array,
+    values: Array,
+    used: NDArray[np.bool_],
+    outline: Outline,
+    noise: float,
+    direction: Array,
+    camera_px: float,
 ) -> tuple[Array, Array]:
     """Covariance (2, 2) of two turns by leaving out sectors; change (3, 3) of the direction by the outline, per px."""
     circle = outline.circle_px
-    normals = _normals(points, circle)
+    normals = _normals(points, circle, camera_px)
     sector = ((np.arctan2(*(points - circle[:2]).T[::-1]) / (2 * math.pi) + 0.5) * SECTORS).astype(int) % SECTORS
     tries = []
     for part in range(SECTORS):
@@ -215,8 +250,8 @@ def _spread(
     columns = []
     step = 0.5
     for axis in np.eye(3):
-        ahead, *_ = _fit(_normals(points, circle + step * axis), values, used, noise)
-        behind, *_ = _fit(_normals(points, circle - step * axis), values, used, noise)
+        ahead, *_ = _fit(_normals(points, circle + step * axis, camera_px), values, used, noise)
+        behind, *_ = _fit(_normals(points, circle - step * axis, camera_px), values, used, noise)
         columns.append((ahead / np.linalg.norm(ahead) - behind / np.linalg.norm(behind)) / (2 * step))
     return across @ covariance @ across.T + STEP_RAD**2 * np.eye(2), np.column_stack(columns)
 

@@ -13,6 +13,7 @@ from bgars.files.light_names import light_name
 from bgars.station.balls_seen import given_outlines, outlines_of
 from bgars.station.levels import linear_levels
 from bgars.station.matt_lights import shading_on
+from bgars.station.mirror import image_of, sphere_of_outline
 from bgars.station.mirror_lights import highlights_on
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from bgars.records.capture import Capture
     from bgars.records.remark import Remark
     from bgars.station.levels import Levels
+    from bgars.station.matt_lights import SeenShading
     from bgars.station.outline import Outline
 
 __all__ = ["Observed", "SeenBall", "observe", "outlines_a_capture"]
@@ -77,23 +79,22 @@ def observe(
         found, said = outlines_of(one, levels, given, matt=sphere == "matt")
         findings += said
         for ball in found:
+            camera_px = _camera_px(one, ball, diameter_um)
             if sphere == "mirror":
-                seen = highlights_on(one, levels, ball, _camera_px(one, ball, diameter_um))
+                seen = highlights_on(one, levels, ball, camera_px)
                 balls.append(SeenBall(one, ball, seen.places_px, seen.covariances_px2))
                 findings += seen.findings
                 lamps.append(seen.lamp_deg)
                 strengths.append(seen.flux)
             else:
-                shading = shading_on(one, levels, ball)
+                shading = shading_on(one, levels, ball, camera_px)
                 findings += shading.findings
                 strengths.append(shading.strengths)
-                balls.append(
-                    _as_highlights(one, ball, shading.directions, shading.own_covariances, shading.outline_jacobians)
-                )
+                balls.append(_as_highlights(one, ball, shading, camera_px))
         if progress is not None:
             progress((index + 1) / len(captures))
     _need_all(balls, captures)
-    camera_px = _camera_px(captures[0], balls[0].outline, diameter_um) if sphere == "mirror" else math.inf
+    camera_px = _camera_px(captures[0], balls[0].outline, diameter_um)
     known = [lamp[np.isfinite(lamp)] for lamp in lamps]
     lamp_deg = float(np.median(np.concatenate(known))) if known and sum(map(len, known)) else math.nan
     return Observed(balls, levels_of, strengths, lamp_deg, camera_px, findings)
@@ -133,13 +134,18 @@ def _camera_px(capture: Capture, outline: Outline, diameter_um: float | None) ->
     return 1000.0 * capture.camera_distance_mm / pitch_um
 
 
-def _as_highlights(capture: Capture, outline: Outline, directions: Array, own: Array, jacobians: Array) -> SeenBall:
+def _as_highlights(capture: Capture, outline: Outline, shading: SeenShading, camera_px: float) -> SeenBall:
     """Lights of a matt ball, written as the highlights that a mirror of its place would show.
 
     The outline's errors move both, by different amounts; the difference is added to the covariance of each light.
     """
-    radius = outline.radius_px
-    places = outline.circle_px[:2] + radius * directions[:, :2] / np.sqrt(2.0 + 2.0 * directions[:, 2:])
+    directions, own = shading.directions, shading.own_covariances
+    sphere = sphere_of_outline(outline.circle_px, camera_px)
+
+    def seen(of: Array) -> Array:
+        return image_of(of, np.zeros(len(of)), sphere, camera_px)
+
+    places = seen(directions)
     covariances = np.zeros((len(directions), 2, 2))
     for index, direction in enumerate(directions):
         level = np.cross([0.0, 0.0, 1.0], direction)
@@ -148,13 +154,14 @@ def _as_highlights(capture: Capture, outline: Outline, directions: Array, own: A
         step = 1e-4
         ahead = direction + step * across
         ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
-        there = outline.circle_px[:2] + radius * ahead[:, :2] / np.sqrt(2.0 + 2.0 * ahead[:, 2:])
-        to_px = (there - places[index]).T / step
-        shading = across @ jacobians[index] * outline.u_px
+        to_px = (seen(ahead) - places[index]).T / step
+        by_outline = across @ shading.outline_jacobians[index] * outline.u_px
         # A highlight that moves with the outline stands for a direction that stays: only the rest is an error.
-        covariance = own[index] + shading @ shading.T
+        covariance = own[index] + by_outline @ by_outline.T
         covariances[index] = to_px @ covariance @ to_px.T
-    fixed = type(outline)(outline.x_px, outline.y_px, radius, 1e-6, 1e-6, outline.edge_px, outline.arc, outline.given)
+    fixed = type(outline)(
+        outline.x_px, outline.y_px, outline.radius_px, 1e-6, 1e-6, outline.edge_px, outline.arc, outline.given
+    )
     own_deg = np.degrees(np.sqrt(0.5 * np.trace(own, axis1=1, axis2=2)))
     return SeenBall(capture, fixed, places, covariances, own_deg, outline.u_px)
 

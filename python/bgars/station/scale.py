@@ -85,7 +85,7 @@ def calibrate_scale(
         for each, (places, size) in zip(captures, grids, strict=True)
     ]
     if heights is None:
-        return fits[0]
+        return replace(fits[0][0], size_px=size_px), fits[0][1]
     if any(size != size_px for _, size in grids):
         msg = f"{', '.join(names)}: images of different sizes, so not of one camera"
         raise InputError(msg)
@@ -95,7 +95,10 @@ def calibrate_scale(
     tilt_deg = fit_grid(grids[lowest][0], pitch_um, u_pitch_um, size_px=size_px, distance_mm=scale.camera_distance_mm)[
         0
     ].tilt_deg
-    return replace(scale, tilt_deg=tilt_deg), (*(remark for _, found in fits for remark in found), *said)
+    return replace(scale, tilt_deg=tilt_deg, size_px=size_px), (
+        *(remark for _, found in fits for remark in found),
+        *said,
+    )
 
 
 def _grid_of(capture: Capture, target: Target) -> tuple[Array, tuple[int, int]]:

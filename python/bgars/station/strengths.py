@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.records.remark import Remark
-from bgars.station.board_strengths import board_strengths
+from bgars.station.board_strengths import MATT, board_strengths
 
 if TYPE_CHECKING:
     from bgars.records.capture import Capture
     from bgars.station.light_bundle import LightSolution
     from bgars.station.observe import Observed
 
-__all__ = ["Strengths", "strengths_of"]
+__all__ = ["Strengths", "repeatable", "strengths_of"]
 
 Array = NDArray[np.float64]
 
@@ -41,7 +41,11 @@ def strengths_of(
     sphere: str, captures: list[Capture], seen: Observed, solution: LightSolution, findings: list[Remark]
 ) -> Strengths:
     """Strengths of the lights; what they are taken from is added to the findings, where it is not the balls."""
-    usable = [row for row in seen.strengths if np.isfinite(row).all() and (row > 0).all()]
+    usable = [
+        row * _farther(circle, solution)
+        for row, circle in zip(seen.strengths, solution.outlines_px, strict=True)
+        if np.isfinite(row).all() and (row > 0).all()
+    ]
     if usable:
         single = SHADING_U if sphere == "matt" else HIGHLIGHT_U
         relative, u = _mean(usable, [np.full(len(row), single if len(usable) == 1 else 0.0) for row in usable])
@@ -67,6 +71,24 @@ def strengths_of(
     )
     findings.append(Remark("note", message, "no-intensities"))
     return Strengths(np.ones(len(solution.directions)), None, math.nan, "")
+
+
+def repeatable(u: Array, by: str, balls: int) -> Array:
+    """(L,) of uncertainties of strengths the part that another calibration on the same reference would show.
+
+    How real boards and balls differ from Lambert's law is alike in both. Of highlights all of it is scatter: it grows
+    from the few pixels that a lamp is on the ball.
+    """
+    alike = MATT if by == "board" else SHADING_U if by == "shading" and balls == 1 else 0.0
+    rest: Array = np.sqrt(np.maximum(u**2 - alike**2, LEAST_U**2))
+    return rest
+
+
+def _farther(circle_px: Array, solution: LightSolution) -> Array:
+    """(L,) square of the distance of each light from a ball, over that from the origin: 1 of distant lights."""
+    ways = solution.directions - solution.nearness[:, None] * np.array([circle_px[0], circle_px[1], circle_px[2]])
+    square: Array = np.square(ways).sum(axis=1)
+    return square
 
 
 def _mean(rows: list[Array], us: list[Array]) -> tuple[Array, Array]:

@@ -35,7 +35,7 @@ LEAST_SIZES = 3
 
 
 class Known(NamedTuple):
-    """Calibrated sizes of a ball and their standard uncertainty, micrometres; NaN where not calibrated."""
+    """Calibrated sizes of a ball and their standard uncertainty, micrometres; NaN where not calibrated or stated."""
 
     height_um: float
     diameter_um: float
@@ -77,7 +77,7 @@ def read_known(path: Path) -> dict[str, Known]:
             msg = f"{path}: line {number}: name must be there once, got {name!r}"
             raise InputError(msg)
         sizes = [_size(path, number, key, line.get(key)) for key in ("height_um", "diameter_um", "u_um")]
-        found[name] = Known(sizes[0], sizes[1], 0.0 if math.isnan(sizes[2]) else sizes[2])
+        found[name] = Known(sizes[0], sizes[1], sizes[2])
     return found
 
 
@@ -147,7 +147,8 @@ def verify(
     )
     means = np.array([one.mean() for one in each])
     sizes = np.array([true[names == name][0] for name in dict.fromkeys(names)])
-    bias, u_bias, slope, u_slope = _line(sizes, means, float(np.sqrt(np.mean(u_known**2))))
+    stated = np.where(np.isfinite(u_known), u_known, 0.0)
+    bias, u_bias, slope, u_slope = _line(sizes, means, float(np.sqrt(np.mean(stated**2))))
     found = Verification(
         quantity,
         len(results),
@@ -163,7 +164,7 @@ def verify(
     read_of = {(row[0], row[1]) for row in rows}
     wanted = [name for name, size in known.items() if math.isfinite(getattr(size, f"{quantity}_um"))]
     unread = [name for turn in range(len(results)) for name in wanted if (turn, name) not in read_of]
-    return found, (*_judge(found, error, u_known), *_unread(unread, found))
+    return found, (*_judge(found, names, error, u_known), *_unread(unread, found))
 
 
 def _unread(names: list[str], found: Verification) -> list[Remark]:
@@ -191,24 +192,34 @@ def _line(sizes: np.ndarray, errors: np.ndarray, u_known: float) -> tuple[float,
     return bias, math.hypot(scatter / math.sqrt(count), u_known), slope, scatter / math.sqrt(float(off @ off))
 
 
-def _judge(found: Verification, error: np.ndarray, u_known: np.ndarray) -> tuple[Remark, ...]:
+def _judge(found: Verification, names: np.ndarray, error: np.ndarray, u_known: np.ndarray) -> tuple[Remark, ...]:
     said: list[Remark] = []
     what = found.quantity
+    unstated = list(dict.fromkeys(names[np.isnan(u_known)].tolist()))
+    of_these = f"u_um of {len(unstated)} balls is not in the table ({', '.join(unstated[:6])})"
     if found.mpe_um is not None:
-        room = found.mpe_um - COVERAGE * float(u_known.max())
-        broken = int((np.abs(error) > found.mpe_um).sum())
+        # Each error has the room that the certificate of its own ball leaves it.
+        room = found.mpe_um - COVERAGE * u_known
+        broken, is_open = int((np.abs(error) > found.mpe_um).sum()), np.abs(error) > room
         words = f"{what}: largest error {found.largest_um:.2f} um, permissible {found.mpe_um:.2f} um"
         if broken:
             said.append(
                 Remark("fail", f"{words}: {broken} readings beyond it", "mpe", found.largest_um, found.mpe_um, "um")
             )
-        elif found.largest_um > room:
-            words += (
-                f", less {found.mpe_um - room:.2f} um for what the calibrated sizes leave open: not shown to be kept"
+        elif is_open.any():
+            worst = int(np.nanargmax(np.abs(error) - room))
+            words = (
+                f"{what}: error {abs(error[worst]):.2f} um of {names[worst]}, permissible {found.mpe_um:.2f} um, less "
+                f"{found.mpe_um - room[worst]:.2f} um for what its calibrated size leaves open: not shown to be kept"
             )
-            said.append(Remark("fail", words, "mpe-open", found.largest_um, room, "um"))
+            said.append(Remark("fail", words, "mpe-open", float(abs(error[worst])), float(room[worst]), "um"))
+        elif unstated:
+            said.append(Remark("fail", f"{words}, but {of_these}: not shown to be kept", "mpe-open", found.largest_um))
         else:
             said.append(Remark("note", f"{words}: kept", "mpe", found.largest_um, found.mpe_um, "um"))
+    elif unstated:
+        words = f"{what}: {of_these}, and is taken as 0 where biases are judged"
+        said.append(Remark("doubt", words, f"bias-unstated-{what}", len(unstated)))
     if abs(found.bias_um) > COVERAGE * found.u_bias_um:
         words = f"{what}: biased by {found.bias_um:+.2f} um (u {found.u_bias_um:.2f} um)"
         said.append(Remark("doubt", words, f"bias-{what}", found.bias_um, COVERAGE * found.u_bias_um, "um"))
