@@ -1,0 +1,56 @@
+"""Checks of good parts of simple shapes, with little texture or none: what their symmetry makes alike is no fault."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bgars
+import numpy as np
+import pytest
+from bgars.records.plain_arrays import every_pixel
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+Array = NDArray[np.float64]
+
+
+def part(
+    shape: str, texture: float = 0.0, *, count: int = 8, elevation_deg: float = 45.0, azimuth0_deg: float = 0.0
+) -> bgars.Capture:
+    """A matt part of 120 x 120 pixels under a ring, 8 bits; texture: relative standard deviation of its albedo."""
+    random = np.random.default_rng(1)
+    y, x = np.mgrid[:120, :120] * 1.0
+    x, y = x - 59.5, 59.5 - y
+    height = {
+        "pin": np.sqrt(np.maximum(100.0**2 - x**2, 0.0)),
+        "grooves": 3.0 * np.sin(x / 6.0),
+        "V grooves": 0.4 * np.abs(x % 24.0 - 12.0),
+        "cap": -0.006 * (x**2 + y**2),
+        "dish": 0.004 * (x**2 + y**2),
+        "saddle": 0.004 * (x**2 - y**2),
+        "tilted": 0.2 * x + 0.1 * y,
+    }[shape]
+    slope_x, slope_y = np.gradient(height, axis=1), -np.gradient(height, axis=0)
+    normal = np.stack([-slope_x, -slope_y, np.ones_like(x)]) / np.sqrt(1.0 + slope_x**2 + slope_y**2)
+    clouds = gaussian_filter(random.normal(size=x.shape), 1.5)
+    albedo = 0.54 * (1.0 + texture * clouds / clouds.std())
+    rig = bgars.LightRig.ring(count, elevation_deg=elevation_deg, azimuth0_deg=azimuth0_deg)
+    light = albedo * np.maximum(np.tensordot(rig.directions, normal, axes=(1, 0)), 0.0)
+    images = np.clip(np.rint(255.0 * (light + random.normal(0.0, 0.002, light.shape))), 0, 255).astype(np.uint8)
+    return bgars.Capture(images, rig, every_pixel(x.shape), saturation=255.0)
+
+
+def told(capture: bgars.Capture) -> list[tuple[str, str, int | None]]:
+    return [(each.severity, each.kind, each.image) for each in bgars.check(capture).told]
+
+
+@pytest.mark.parametrize(
+    ("shape", "azimuth0_deg"), [("pin", 0.0), ("grooves", 0.0), ("V grooves", 22.5)], ids=["pin", "grooves", "V"]
+)
+def test_lights_on_both_sides_of_a_groove_are_two(shape: str, azimuth0_deg: float) -> None:
+    capture = part(shape, 0.1, azimuth0_deg=azimuth0_deg)
+    assert told(capture) == []
+    twice = capture.images.astype(np.float64)
+    twice[2] = twice[1] + np.random.default_rng(0).normal(0.0, 0.8, twice[1].shape)
+    twice = np.clip(np.rint(twice), 0, 255).astype(np.uint8)
+    assert ("error", "duplicate", 2) in told(replace(capture, images=twice))
