@@ -54,3 +54,12 @@ def test_lights_on_both_sides_of_a_groove_are_two(shape: str, azimuth0_deg: floa
     twice[2] = twice[1] + np.random.default_rng(0).normal(0.0, 0.8, twice[1].shape)
     twice = np.clip(np.rint(twice), 0, 255).astype(np.uint8)
     assert ("error", "duplicate", 2) in told(replace(capture, images=twice))
+
+
+@pytest.mark.parametrize(("shape", "count", "elevation_deg"), [("cap", 4, 35), ("cap", 12, 50), ("dish", 8, 45)])
+def test_a_smooth_part_is_its_own_mirror_image(shape: str, count: int, elevation_deg: float) -> None:
+    assert told(part(shape, count=count, elevation_deg=elevation_deg)) == []
+
+
+def test_a_plane_without_texture_says_nothing() -> None:
+    assert told(part("tilted")) == []

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from bgars.checks.evidence import critical_t, paired_t
 from bgars.checks.hypotheses import Hypothesis, alternatives, reordered
 from bgars.checks.matt_fit import MIN_LIGHTS, STEEP, fit_normals, matt_lights
+from bgars.checks.moments import lit_everywhere
 from bgars.checks.reordered import TRIED, image_order
 from bgars.checks.view import TILES, tile_sums
 
@@ -38,6 +39,9 @@ Mask = NDArray[np.bool_]
 BETTER = 0.8
 """Ratio of misfits from which down on another table counts as better: a fifth of all that does not fit comes from the
 given one. That it is no chance is for the test over tiles to say."""
+OVER_NOISE = 3.0
+"""Times the variance of noise up to which a misfit is noise: images of other brightness have as much more or less of
+it, and a wrong table gives the noisy ones another weight."""
 TINY = 1e-9
 TURNS = 3
 """Usual mistakes, one after the other, that make any turn or mirror of a ring."""
@@ -80,6 +84,8 @@ class _Evidence:
     number: NDArray[np.intp]
     """(N,) their tiles."""
     tiles: NDArray[np.intp]
+    floor: float
+    """Photometric misfit up to which noise explains it, summed over these pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +95,8 @@ class _Losses:
     photometric: Array
     curl: Array
     saddle: Array
+    floor: float
+    """Photometric misfit, in all, that says nothing."""
 
 
 def judge_table(view: View) -> Verdict:
@@ -127,7 +135,7 @@ def _judge_order(view: View, table: Array, usual: Verdict) -> Verdict:
     there = weight > 0.0
     ratio = float(other.photometric.sum() / max(given.photometric.sum(), TINY))
     t, count = paired_t((given.photometric - other.photometric)[there] / weight[there], weight[there])
-    if ratio >= BETTER or t < critical_t(count, TRIED):
+    if ratio >= BETTER or t < critical_t(count, TRIED) or given.photometric.sum() <= given.floor:
         return usual
     return Verdict(reordered(view.lights, view.names, table), t, count, usual.losses)
 
@@ -173,7 +181,19 @@ def _evidence(view: View) -> _Evidence | None:
         trust.reshape(rows, cols),
         tiles.ravel()[chosen],
         tiles,
+        OVER_NOISE * _noise(view) * float(np.maximum(keep.reshape(count, -1)[:, chosen].sum(axis=0) - 3.0, 1.0).sum()),
     )
+
+
+def _noise(view: View) -> float:
+    """Relative variance of noise: what three dimensions leave over of matt pixels, whatever the table."""
+    lit = lit_everywhere(view, view.lights, matt=False)
+    if int(lit.sum()) < MIN_PIXELS:
+        return 0.0
+    values = view.values[:, lit].astype(np.float64)
+    values = values[:, :: max(values.shape[1] // MOST_PIXELS, 1)]
+    left: Array = np.linalg.svd(values / np.maximum(values.mean(axis=0), 1e-9), full_matrices=False)[1][3:]
+    return float(np.square(left).sum() / (len(left) * len(values[0])))
 
 
 def _suspects(evidence: _Evidence, lights: Array) -> list[int]:
@@ -202,9 +222,9 @@ def _losses(evidence: _Evidence, given: Array, lights: Array) -> _Losses:
     photometric = np.asarray(np.bincount(evidence.number, weights=misfit, minlength=count), np.float64)
     if not tilted or abs(np.linalg.det(linear)) < 0.2:  # noqa: PLR2004 - no map of one space onto another
         unknown = np.full(count, np.nan)
-        return _Losses(photometric, unknown, unknown)
+        return _Losses(photometric, unknown, unknown, evidence.floor)
     normal = np.einsum("ij,j...->i...", np.linalg.inv(linear), evidence.normal)
-    return _Losses(photometric, *_bending(normal, evidence))
+    return _Losses(photometric, *_bending(normal, evidence), evidence.floor)
 
 
 def _bending(normal: Array, evidence: _Evidence) -> tuple[Array, Array]:
@@ -257,6 +277,8 @@ def _compare(given: _Losses, other: _Losses, tests: int) -> tuple[float, float, 
             continue
         ratio = float(two.sum() / max(one.sum(), TINY))
         t, count = paired_t((one - two)[there] / weight[there], weight[there])
+        if one is given.photometric and one.sum() <= given.floor:
+            continue
         accepted |= ratio < BETTER and t > critical_t(count, tests)
         refused |= one is not given.saddle and t < -critical_t(count)
         if t > best_t:

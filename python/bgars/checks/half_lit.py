@@ -48,6 +48,9 @@ SAME_LIGHT = 0.06
 """Share of the usual difference between neighbouring lights (variance) that noise leaves under one light."""
 DIFFERS = 0.3
 """Share of the same by which either image must differ from its other neighbour."""
+OF_PROMISE = 0.2
+"""Share of the promised difference to its neighbour (variance) that is left of an image under the neighbour's light;
+noise alone, of image and promise, leaves a half and more."""
 SHADED = 0.03
 """Relative standard deviation by which the lights shade a band that tells them apart."""
 BRIGHT = 3.0
@@ -232,7 +235,8 @@ def _late(view: View) -> list[Finding]:
     count = len(view.values)
     values = np.minimum(view.values / np.maximum(view.mean, np.float32(1e-6)), np.float32(BRIGHT))[:, use]
     rows = view.values.shape[1]
-    band = np.broadcast_to((np.arange(rows) * BANDS // rows)[:, None], use.shape)[use]
+    bands = np.broadcast_to((np.arange(rows) * BANDS // rows)[:, None], use.shape)
+    band, promise = bands[use], promised(view)
 
     def product(first: int, second: int) -> Array:
         return np.asarray(
@@ -260,13 +264,15 @@ def _late(view: View) -> list[Finding]:
             told, rest = shaded & inside, shaded & ~inside
             if told.sum() < MIN_BANDS or rest.sum() < MIN_BANDS or same[rest].mean() > 1.0 - AGREEING:
                 continue
-            if best is None or abs(length) > abs(best[2]):
-                best = (first, second, length)
+            # Shutters run down the rows: rows read late see the next lamp, rows read early the one before.
+            image, neighbour = (second, first) if length > 0 else (first, second)
+            if (best is None or abs(length) > abs(best[2])) and _unlike_promise(
+                view, promise[image], (image, neighbour), use & np.isin(bands, np.flatnonzero(told))
+            ):
+                best = (image, neighbour, length)
     if best is None:
         return []
-    first, second, length = best
-    # Shutters run down the rows: rows read late see the next lamp, rows read early the one before.
-    image, neighbour = (second, first) if length > 0 else (first, second)
+    image, neighbour, length = best
     share = abs(length) / BANDS
     return [
         Finding(
@@ -280,6 +286,23 @@ def _late(view: View) -> list[Finding]:
             unit="of the rows",
         )
     ]
+
+
+def _unlike_promise(view: View, promise: Array, pair: tuple[int, int], there: Mask) -> bool:
+    """Whether an image is nearer to a neighbour than its own light promises: on smooth parts two lights may look alike.
+
+    `promise`: (h, w) what the other images promise the first of the pair. `there`: where it is like the second.
+    """
+    middle = light_median(view.values)
+    there = there & np.isfinite(promise) & (promise > LIT * middle)
+    if int(there.sum()) < BANDS:
+        return False
+    own, other = (view.values[index][there] / middle[there] for index in pair)
+    promised_one = promise[there] / middle[there]
+    seen, wanted = (
+        1.0 - float(each @ other) ** 2 / float(each @ each * (other @ other)) for each in (own, promised_one)
+    )
+    return seen < OF_PROMISE * wanted
 
 
 def _run(same: Mask) -> int:
