@@ -63,3 +63,10 @@ def test_a_smooth_part_is_its_own_mirror_image(shape: str, count: int, elevation
 
 def test_a_plane_without_texture_says_nothing() -> None:
     assert told(part("tilted")) == []
+
+
+def test_a_saddle_is_asked_about_and_no_error() -> None:
+    saddle = part("saddle", 0.1, azimuth0_deg=10.0)
+    (finding,) = bgars.check(saddle).told
+    assert (finding.severity, finding.kind) == ("warning", "handedness")
+    assert finding.message.startswith("either the part is a saddle, or ")
