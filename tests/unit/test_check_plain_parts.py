@@ -70,3 +70,11 @@ def test_a_saddle_is_asked_about_and_no_error() -> None:
     (finding,) = bgars.check(saddle).told
     assert (finding.severity, finding.kind) == ("warning", "handedness")
     assert finding.message.startswith("either the part is a saddle, or ")
+
+
+@pytest.mark.parametrize("factor", [0.5, 0.75, 1.25])
+def test_an_uneven_lamp_is_no_step_in_another_image(factor: float) -> None:
+    dish = part("dish", 0.05, azimuth0_deg=10.0)
+    images = 0.75 * dish.images
+    images[2] *= factor
+    assert told(replace(dish, images=np.rint(images).astype(np.uint8))) == [("warning", "lamp-uneven", 2)]

@@ -71,9 +71,12 @@ class ShadowFloor(NamedTuple):
     places: int
 
 
-def shadow_floor(capture: Capture, lights: Array) -> ShadowFloor | None:
-    """Return what is left in the deepest cast shadows; None where there are none."""
-    gains = capture.rig.intensities.astype(np.float32)
+def shadow_floor(capture: Capture, lights: Array, strengths: Array | float = 1.0) -> ShadowFloor | None:
+    """Return what is left in the deepest cast shadows; None where there are none.
+
+    `strengths`: of the lamps, times the stated ones.
+    """
+    gains = (capture.rig.intensities * strengths).astype(np.float32)
     if len(gains) != len(lights):
         return None
     places = []
@@ -154,9 +157,9 @@ def _in_shadow(levels: Floats, usual: Floats, lights: Array) -> Mask:
     return shadowed
 
 
-def check_ambient(capture: Capture, lights: Array) -> list[Finding]:
+def check_ambient(capture: Capture, lights: Array, strengths: Array | float = 1.0) -> list[Finding]:
     """Find light common to all images."""
-    found = shadow_floor(capture, lights)
+    found = shadow_floor(capture, lights, strengths)
     if found is None or found.floor < LEVELS / 255.0 or found.floor < AMBIENT * found.lit:
         return []
     share = found.floor / found.lit

@@ -131,7 +131,14 @@ def _between(capture: Capture, view: View, gone: list[int], levels: list[Finding
         return levels
     found, lights = check_table(capture, view)
     # A frame that is lit in part upsets all that follows, as it does the comparison of tables.
-    halves = check_half_lit(view.with_lights(lights))
+    lit = lit_everywhere(view, lights)
+    by_moments = (
+        None if int(lit.sum()) < FEW_LIT else gains_by_moments(moments_by(view, lit, view.tiles, TILES * TILES))
+    )
+    uneven, factors = check_gains(view, by_moments or gains_by_promise(view), lights)
+    # A dim lamp is missing in what its image promises the others, more in some rows than in others.
+    even = replace(view, values=view.values / factors.astype(np.float32)[:, None, None], lights=lights)
+    halves = check_half_lit(even)
     if halves:
         return _renumbered(halves + [each for each in found if each.kind != "order"], kept) + levels
     if not found:
@@ -139,18 +146,26 @@ def _between(capture: Capture, view: View, gone: list[int], levels: list[Finding
         if found:
             return _renumbered(found, kept) + levels
     # All that follows compares grey levels as if they were light.
-    return _renumbered(found, kept) + (levels or _renumbered(_single(capture, view, lights, kept), kept))
+    return _renumbered(found, kept) + (
+        levels or _renumbered(_single(capture, view, lights, kept, (lit, uneven, factors)), kept)
+    )
 
 
-def _single(capture: Capture, view: View, lights: NDArray[np.float64], kept: NDArray[np.intp]) -> list[Finding]:
-    """Checks of single images under the right table."""
-    lit = lit_everywhere(view, lights)
-    found = check_ambient(capture, lights) + check_vignetting(view, lit)
+def _single(
+    capture: Capture,
+    view: View,
+    lights: NDArray[np.float64],
+    kept: NDArray[np.intp],
+    lamps: tuple[NDArray[np.bool_], list[Finding], NDArray[np.float64]],
+) -> list[Finding]:
+    """Checks of single images under the right table. `lamps`: pixels that all reach, uneven ones, their strengths."""
+    lit, uneven, factors = lamps
+    found = check_ambient(capture, lights, factors if len(factors) == len(capture.rig) else 1.0) + check_vignetting(
+        view, lit
+    )
     blurred = check_focus(capture, kept, view.names)
     veiled = any(each.kind == "ambient" for each in found)
     few = int(lit.sum()) < FEW_LIT
-    by_moments = None if few else gains_by_moments(moments_by(view, lit, view.tiles, TILES * TILES))
-    uneven, factors = check_gains(view, by_moments or gains_by_promise(view), lights)
     stated, lights = lights, lights * factors[:, None]
     # A dim lamp bends what its light leaves of the others; a curve stays once the lamps are as they are.
     curved = [] if veiled or not check_response(view, stated) else check_response(view, lights)
