@@ -78,3 +78,17 @@ def test_an_uneven_lamp_is_no_step_in_another_image(factor: float) -> None:
     images = 0.75 * dish.images
     images[2] *= factor
     assert told(replace(dish, images=np.rint(images).astype(np.uint8))) == [("warning", "lamp-uneven", 2)]
+
+
+@pytest.mark.parametrize(("images", "down", "right"), [((5, 6, 7), 2, -2), ((3,), 4, 3), ((2,), -7, 1)])
+def test_images_of_a_flat_plate_that_lie_elsewhere_have_moved(images: tuple[int, ...], down: int, right: int) -> None:
+    """They differ from the others as by a camera curve, or by noise only among each other."""
+    random = np.random.default_rng(4)
+    clouds = gaussian_filter(random.normal(size=(200, 200)), 1.5)
+    light = np.repeat(80.0 * (1.0 + 0.25 * clouds / clouds.std())[None], 8, axis=0)
+    for index in images:
+        light[index] = np.roll(light[index], (down, right), axis=(0, 1))
+    levels = np.clip(np.rint(light + random.normal(0.0, 0.8, light.shape)), 0, 255).astype(np.uint8)
+    rig = bgars.LightRig.ring(8, azimuth0_deg=10.0)
+    plate = bgars.Capture(levels, rig, every_pixel((200, 200)), saturation=255.0)
+    assert told(plate) == [("warning", "motion", images[0])]
