@@ -92,3 +92,20 @@ def test_images_of_a_flat_plate_that_lie_elsewhere_have_moved(images: tuple[int,
     rig = bgars.LightRig.ring(8, azimuth0_deg=10.0)
     plate = bgars.Capture(levels, rig, every_pixel((200, 200)), saturation=255.0)
     assert told(plate) == [("warning", "motion", images[0])]
+
+
+def test_a_cap_that_slopes_away_is_no_vignetting() -> None:
+    assert [each.kind for each in bgars.check(part("cap", 0.05, azimuth0_deg=10.0)).findings] == []
+
+
+def test_near_lamps_whose_places_are_stated_make_no_steps_of_light() -> None:
+    y, x = np.mgrid[:100, :100] * 100.0
+    x, y = x - 4950.0, 4950.0 - y
+    positions = 25_000.0 * bgars.LightRig.ring(8, azimuth0_deg=10.0).directions
+    away = np.stack([positions[:, 0, None, None] - x, positions[:, 1, None, None] - y])
+    square = np.square(away).sum(axis=0) + positions[:, 2, None, None] ** 2
+    light = positions[:, 2, None, None] * square**-1.5
+    light += np.random.default_rng(0).normal(0.0, 0.002, light.shape) * light.max()
+    images = np.clip(np.rint(230.0 * light / light.max()), 0, 255).astype(np.uint8)
+    rig = bgars.LightRig.from_positions(positions)
+    assert told(bgars.Capture(images, rig, every_pixel((100, 100)), saturation=255.0, pixel_pitch_um=100.0)) == []

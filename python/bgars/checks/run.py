@@ -182,9 +182,8 @@ def _single(
 ) -> list[Finding]:
     """Checks of single images under the right table. `lamps`: pixels that all reach, uneven ones, their strengths."""
     lit, uneven, factors = lamps
-    found = check_ambient(capture, lights, factors if len(factors) == len(capture.rig) else 1.0) + check_vignetting(
-        view, lit
-    )
+    strengths = factors if len(factors) == len(capture.rig) else 1.0
+    found = check_ambient(capture, lights, strengths) + check_vignetting(view.with_lights(lights), lit)
     blurred = check_focus(capture, kept, view.names)
     veiled = any(each.kind == "ambient" for each in found)
     few = int(lit.sum()) < FEW_LIT
