@@ -109,3 +109,21 @@ def test_near_lamps_whose_places_are_stated_make_no_steps_of_light() -> None:
     images = np.clip(np.rint(230.0 * light / light.max()), 0, 255).astype(np.uint8)
     rig = bgars.LightRig.from_positions(positions)
     assert told(bgars.Capture(images, rig, every_pixel((100, 100)), saturation=255.0, pixel_pitch_um=100.0)) == []
+
+
+@pytest.mark.parametrize("share", [0.1, 0.2, 0.3, 0.45])
+def test_a_veil_shows_where_a_ball_faces_away_from_a_lamp(share: float) -> None:
+    random = np.random.default_rng(2)
+    y, x = np.mgrid[:120, :120] * 1.0
+    x, y = (x - 59.5) / 54.0, (59.5 - y) / 54.0
+    mask = x**2 + y**2 < 1.0
+    normal = np.stack([x, y, np.sqrt(np.where(mask, 1.0 - x**2 - y**2, 0.0))]) * mask
+    rig = bgars.LightRig.ring(8, elevation_deg=40.0, azimuth0_deg=10.0)
+    light = np.maximum(np.tensordot(rig.directions, normal, axes=(1, 0)), 0.0)
+    lit = float(np.median(np.median(light, axis=0)[mask]))
+    for veil, wanted in ((0.0, []), (share * lit / (1.0 - share), ["ambient"])):
+        levels = 140.0 * (light + veil * mask) + random.normal(0.0, 0.7, light.shape)
+        images = np.clip(np.rint(levels), 0, 255).astype(np.uint8)
+        found = bgars.check(bgars.Capture(images, rig, mask, saturation=255.0)).told
+        assert [each.kind for each in found] == wanted
+    assert found[0].value == pytest.approx(share, rel=0.3)

@@ -158,9 +158,12 @@ def _compared(capture: Capture, view: View, gone: list[int], levels: list[Findin
         None if int(lit.sum()) < FEW_LIT else gains_by_moments(moments_by(view, lit, view.tiles, TILES * TILES))
     )
     uneven, factors = check_gains(view, by_moments or gains_by_promise(view), lights)
-    # A dim lamp is missing in what its image promises the others, more in some rows than in others.
-    even = replace(view, values=view.values / factors.astype(np.float32)[:, None, None], lights=lights)
-    halves = check_half_lit(even)
+    halves = check_half_lit(view.with_lights(lights))
+    if halves and uneven:
+        # A dim lamp is missing in what its image promises the others, more in some rows than in others.
+        even = replace(view, values=view.values / factors.astype(np.float32)[:, None, None], lights=lights)
+        without = {each.image for each in check_half_lit(even)}
+        halves = [each for each in halves if each.image in without]
     if halves:
         return _renumbered(halves + [each for each in found if each.kind != "order"], kept) + levels
     if not found:
