@@ -75,14 +75,32 @@ def check_half_lit(view: View) -> list[Finding]:
     for along, use, word in axes:
         steps = _steps(along, use)
         index = int(np.argmax([abs(step.size) * (step.score > STANDS_OUT) for step in steps])) if steps else 0
-        if steps and abs(steps[index].size) >= STEP and steps[index].score >= STANDS_OUT:
+        told = steps and abs(steps[index].size) >= STEP and steps[index].score >= STANDS_OUT
+        if told and _stays(view, index, steps[index], word):
             return [_partly_lit(view, index, steps[index], word, STEP)]
     late = _late(view)
     for along, use, word in () if late else axes:
         clear = clear_step(along, use)
-        if clear is not None:
+        if clear is not None and _stays(view, *clear, word):
             return [_partly_lit(view, *clear, word, CLEAR_STEP)]
     return late
+
+
+def _stays(view: View, index: int, step: Step | RowStep, word: str) -> bool:
+    """Whether a step is left whichever other image is not asked: a highlight in one promises the others too much."""
+    for other in range(len(view.lights)):
+        if other == index:
+            continue
+        ratio = _of_promised(view.without(other))[index - (other < index)]
+        along = np.where(view.use, ratio, np.nan)
+        along = along if word == "row" else along.T
+        place = round(step.place * len(along))
+        before, after = along[max(place - 2 * BESIDE, 0) : place], along[place : place + 2 * BESIDE]
+        change = np.log(np.maximum(_known_mean(after, 0), 1e-3) / np.maximum(_known_mean(before, 0), 1e-3))
+        told = np.isfinite(change)
+        if told.any() and float(np.median(change[told])) / step.size < LASTS:
+            return False
+    return True
 
 
 def _partly_lit(view: View, index: int, step: Step | RowStep, word: str, least: float) -> Finding:
