@@ -7,6 +7,8 @@ from dataclasses import replace
 import bgars
 import numpy as np
 import pytest
+from bgars.checks.gains import check_gains
+from bgars.checks.view import make_view
 from bgars.records.plain_arrays import every_pixel
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
@@ -127,3 +129,15 @@ def test_a_veil_shows_where_a_ball_faces_away_from_a_lamp(share: float) -> None:
         found = bgars.check(bgars.Capture(images, rig, mask, saturation=255.0)).told
         assert [each.kind for each in found] == wanted
     assert found[0].value == pytest.approx(share, rel=0.3)
+
+
+@pytest.mark.parametrize(("scatter", "images"), [(0.06, []), (0.02, [2])])
+def test_a_lamp_is_off_all_over_the_image_alike(scatter: float, images: list[int]) -> None:
+    """What highlights add scatters over the tiles of a shiny part, however small that leaves the error of their mean."""
+    view = make_view(part("dish"))
+
+    def measure(lights: Array) -> tuple[Array, Array, float]:
+        gain = np.where(np.arange(8) == 2, 0.83, 1.0) / np.linalg.norm(lights, axis=1)
+        return gain, np.full(8, scatter / 8.0), 64.0
+
+    assert [each.image for each in check_gains(view, measure, view.lights)[0]] == images
