@@ -133,7 +133,7 @@ def test_a_veil_shows_where_a_ball_faces_away_from_a_lamp(share: float) -> None:
 
 @pytest.mark.parametrize(("scatter", "images"), [(0.06, []), (0.02, [2])])
 def test_a_lamp_is_off_all_over_the_image_alike(scatter: float, images: list[int]) -> None:
-    """What highlights add scatters over the tiles of a shiny part, however small that leaves the error of their mean."""
+    """What highlights add scatters over the tiles of a shiny part, however well their mean is known."""
     view = make_view(part("dish"))
 
     def measure(lights: Array) -> tuple[Array, Array, float]:
