@@ -51,6 +51,10 @@ DIFFERS = 0.3
 OF_PROMISE = 0.2
 """Share of the promised difference to its neighbour (variance) that is left of an image under the neighbour's light;
 noise alone, of image and promise, leaves a half and more."""
+DEEP = 1.0
+"""Natural logarithm of a step beyond which light from neighbours says how deep it is; highlights make none so deep."""
+END = 0.1
+"""Share of the rows, at either end, where a single step is not believed: shadows of the last rim lie there."""
 SHADED = 0.03
 """Relative standard deviation by which the lights shade a band that tells them apart."""
 BRIGHT = 3.0
@@ -88,6 +92,7 @@ def check_half_lit(view: View) -> list[Finding]:
 
 def _stays(view: View, index: int, step: Step | RowStep, word: str) -> bool:
     """Whether a step is left whichever other image is not asked: a highlight in one promises the others too much."""
+    least = LASTS * min(abs(step.size), DEEP)
     for other in range(len(view.lights)):
         if other == index:
             continue
@@ -95,10 +100,12 @@ def _stays(view: View, index: int, step: Step | RowStep, word: str) -> bool:
         along = np.where(view.use, ratio, np.nan)
         along = along if word == "row" else along.T
         place = round(step.place * len(along))
-        before, after = along[max(place - 2 * BESIDE, 0) : place], along[place : place + 2 * BESIDE]
+        # The rows beside its place hold some of both.
+        before = along[max(place - 2 * BESIDE, 0) : max(place - BESIDE // 2, 1)]
+        after = along[place + BESIDE // 2 : place + 2 * BESIDE]
         change = np.log(np.maximum(_known_mean(after, 0), 1e-3) / np.maximum(_known_mean(before, 0), 1e-3))
         told = np.isfinite(change)
-        if told.any() and float(np.median(change[told])) / step.size < LASTS:
+        if told.any() and float(np.median(change[told])) * np.sign(step.size) < least:
             return False
     return True
 
@@ -152,6 +159,7 @@ def _steps(ratio: Array, use: Mask) -> list[Step]:
         found = Step(0.0, 0.0, 0.0)
         sizes = np.nan_to_num(np.abs(own))
         clear = (sizes >= max(STEP, STANDS_OUT * spread)) & (sizes > OF_OTHERS * largest)
+        clear &= np.abs((np.arange(len(clear)) + BESIDE) / count - 0.5) < 0.5 - END
         # Of the clearest first: shading and shadows make steps, too, which do not run through or do not last.
         for place in np.flatnonzero(clear)[np.argsort(-sizes[clear])][:TRIED]:
             size = float(own[place])
