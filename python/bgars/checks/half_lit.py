@@ -85,12 +85,12 @@ def check_half_lit(view: View) -> list[Finding]:
     late = _late(view)
     for along, use, word in () if late else axes:
         clear = clear_step(along, use)
-        if clear is not None and _stays(view, *clear, word):
+        if clear is not None:
             return [_partly_lit(view, *clear, word, CLEAR_STEP)]
     return late
 
 
-def _stays(view: View, index: int, step: Step | RowStep, word: str) -> bool:
+def _stays(view: View, index: int, step: Step, word: str) -> bool:
     """Whether a step is left whichever other image is not asked: a highlight in one promises the others too much."""
     least = LASTS * min(abs(step.size), DEEP)
     for other in range(len(view.lights)):
