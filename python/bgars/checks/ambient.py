@@ -41,17 +41,19 @@ SHADOWED = 0.6
 """Of what the other lights promise: less is shadow."""
 FACES = 0.3
 """Of the lit level: a promise of less is no evidence."""
+AWAY = 0.05
+"""Of the lit level: so far below nothing is a promise that is no error of the lights that make it."""
 LIT_QUANTILE = 0.6
 """Of the lights of a pixel: most light it."""
 DROPPED = 4
 """One light in so many, the brightest ones, may be a highlight."""
 MIN_SHARE = 0.01
 """Shadowed places, of all pairs of place and light: fewer are slips of the promise."""
-VEILS = (0.5, 0.7)
+VEILS = (0.2, 0.35, 0.5, 0.6, 0.7)
 """Of the lit level: under so much ambient light shadows are no longer dark. They are found once it is taken away, and
 must hold more than that."""
-NEVER_DARK = 0.3
-"""Of the lit level: where one place in a hundred is darker, there is no such veil."""
+NEVER_DARK = 0.6
+"""Of what is tried as a veil: where one place in a hundred is darker, there is none."""
 CASTS = 0.5
 """Sine between the usual light and the axis, at least: where lights stand steeper, nothing need be dark."""
 NEARLY = 0.9
@@ -71,9 +73,12 @@ class ShadowFloor(NamedTuple):
     places: int
 
 
-def shadow_floor(capture: Capture, lights: Array) -> ShadowFloor | None:
-    """Return what is left in the deepest cast shadows; None where there are none."""
-    gains = capture.rig.intensities.astype(np.float32)
+def shadow_floor(capture: Capture, lights: Array, strengths: Array | float = 1.0) -> ShadowFloor | None:
+    """Return what is left in the deepest cast shadows; None where there are none.
+
+    `strengths`: of the lamps, times the stated ones.
+    """
+    gains = (capture.rig.intensities * strengths).astype(np.float32)
     if len(gains) != len(lights):
         return None
     places = []
@@ -91,7 +96,9 @@ def shadow_floor(capture: Capture, lights: Array) -> ShadowFloor | None:
     found = _floor(places, lights, gains, 0.0)
     darkest = np.percentile(np.concatenate([(levels / usual).ravel() for levels, usual in places]), LOW_PERCENT)
     casts = float(np.median(np.hypot(lights[:, 0], lights[:, 1]))) > CASTS
-    for veil in VEILS if casts and darkest > NEVER_DARK else ():
+    for veil in VEILS if casts else ():
+        if darkest < NEVER_DARK * veil:
+            break
         strong = _floor(places, lights, gains, veil)
         if strong is not None and strong.floor > max(veil * strong.lit, found.floor if found else 0.0):
             return strong
@@ -150,13 +157,16 @@ def _in_shadow(levels: Floats, usual: Floats, lights: Array) -> Mask:
     solved = np.abs(np.linalg.det(matrix)) > SOLVABLE
     matrix[~solved] = np.eye(3)
     promise = np.einsum("lk,nk->ln", lights, np.linalg.solve(matrix, right[..., None])[..., 0])
-    shadowed: Mask = solved & ~keep & (levels < SHADOWED * promise) & (promise > FACES * usual) & (levels < usual)
+    cast = (levels < SHADOWED * promise) & (promise > FACES * usual)
+    # What faces away from a lamp is promised less than nothing, and is as dark as a cast shadow.
+    away = promise < -AWAY * usual
+    shadowed: Mask = solved & ~keep & (cast | away) & (levels < usual)
     return shadowed
 
 
-def check_ambient(capture: Capture, lights: Array) -> list[Finding]:
+def check_ambient(capture: Capture, lights: Array, strengths: Array | float = 1.0) -> list[Finding]:
     """Find light common to all images."""
-    found = shadow_floor(capture, lights)
+    found = shadow_floor(capture, lights, strengths)
     if found is None or found.floor < LEVELS / 255.0 or found.floor < AMBIENT * found.lit:
         return []
     share = found.floor / found.lit

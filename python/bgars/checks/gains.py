@@ -27,6 +27,9 @@ U_TABLE = 0.025
 degree of direction, which changes the light at 45 degrees by as much."""
 OF_OTHERS = 4.0
 """Times the usual deviation of the other lamps: where all are off, it is the table, or the light's fall-off."""
+ALIKE = 5.0
+"""Times the scatter over tiles: a lamp is off all over the image alike. Highlights, of which all tiles of a shiny part
+hold some, scatter by a third of what they add."""
 MOST = 3
 """Lamps that are told, and taken out, one after the other."""
 MIN_LIGHTS = 6
@@ -112,7 +115,9 @@ def check_gains(view: View, measure: Measure, lights: Array) -> tuple[list[Findi
         without = np.where(np.arange(len(lights)) == worst, gain[worst], 1.0)
         left, _, _ = measure(lights * (factors * without)[:, None])
         usual = float(np.median(np.delete(np.abs(np.log(np.maximum(left, 1e-3))), worst)))
-        if off[worst] < OF_OTHERS * usual or off[worst] < critical * float(np.hypot(error[worst], table[worst])):
+        scatter = float(error[worst]) * tiles**0.5
+        limit = max(OF_OTHERS * usual, critical * float(np.hypot(error[worst], table[worst])), ALIKE * scatter)
+        if off[worst] < limit:
             break
         factors[worst] *= gain[worst]
     if (factors != 1.0).sum() >= MOST:

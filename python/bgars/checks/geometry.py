@@ -4,8 +4,9 @@ Three witnesses. *Photometry*: a matt pixel's values are linear in the lights, s
 small under the true table (only tables that are no linear map of the true one, such as two swapped lights, show here).
 *Integrability*: slopes of a surface have no curl; a mirrored or turned table gives slopes that have (the linear maps
 are told apart by this alone). *Saddles*: a mirrored table turns domes and hollows into saddles, which have no curl
-either where they are shallow, but no part is made of saddles alone. All are compared between tables tile by tile over
-the image, so that the error of the comparison comes from the images themselves. A flat field says nothing.
+either where they are shallow; no part is made of several saddles alone, but one may be a single saddle. All are
+compared between tables tile by tile over the image, so that the error of the comparison comes from the images
+themselves. A flat field says nothing.
 
 References
 ----------
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 from bgars.checks.evidence import critical_t, paired_t
 from bgars.checks.hypotheses import Hypothesis, alternatives, reordered
 from bgars.checks.matt_fit import MIN_LIGHTS, STEEP, fit_normals, matt_lights
+from bgars.checks.moments import lit_everywhere
 from bgars.checks.reordered import TRIED, image_order
 from bgars.checks.view import TILES, tile_sums
 
@@ -38,6 +40,12 @@ Mask = NDArray[np.bool_]
 BETTER = 0.8
 """Ratio of misfits from which down on another table counts as better: a fifth of all that does not fit comes from the
 given one. That it is no chance is for the test over tiles to say."""
+OVER_NOISE = 3.0
+"""Times the variance of noise up to which a misfit is noise: images of other brightness have as much more or less of
+it, and a wrong table gives the noisy ones another weight."""
+ONE_SHAPE = 0.5
+"""Share of the variance of slopes that a single bowl, cap or saddle leaves beside a linear change, at most: slopes that
+jump once leave a quarter, those of several bumps nearly all."""
 TINY = 1e-9
 TURNS = 3
 """Usual mistakes, one after the other, that make any turn or mirror of a ring."""
@@ -63,6 +71,8 @@ class Verdict(NamedTuple):
     tiles: float
     losses: tuple[float, float]
     """Of the given table: photometric (relative variance), curl (share of the change of slope)."""
+    only_saddles: bool = False
+    """Whether nothing speaks for the better table but that the part is one saddle under the given one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +90,8 @@ class _Evidence:
     number: NDArray[np.intp]
     """(N,) their tiles."""
     tiles: NDArray[np.intp]
+    floor: float
+    """Photometric misfit up to which noise explains it, summed over these pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +101,8 @@ class _Losses:
     photometric: Array
     curl: Array
     saddle: Array
+    floor: float
+    """Photometric misfit, in all, that says nothing."""
 
 
 def judge_table(view: View) -> Verdict:
@@ -127,7 +141,7 @@ def _judge_order(view: View, table: Array, usual: Verdict) -> Verdict:
     there = weight > 0.0
     ratio = float(other.photometric.sum() / max(given.photometric.sum(), TINY))
     t, count = paired_t((given.photometric - other.photometric)[there] / weight[there], weight[there])
-    if ratio >= BETTER or t < critical_t(count, TRIED):
+    if ratio >= BETTER or t < critical_t(count, TRIED) or given.photometric.sum() <= given.floor:
         return usual
     return Verdict(reordered(view.lights, view.names, table), t, count, usual.losses)
 
@@ -145,8 +159,9 @@ def _judge_usual(view: View) -> Verdict:
     best = int(np.argmax(scores)) if scores else -1
     if best < 0 or scores[best] <= 0.0:
         return Verdict(None, 0.0, 0.0, sizes)
-    t, count, accepted = _compare(given, tried[best][1], len(others))
-    return Verdict(others[best] if accepted else None, t, count, sizes)
+    t, count, accepted, only_saddles = _compare(given, tried[best][1], len(others))
+    only_saddles = only_saddles and _is_one_shape(evidence)
+    return Verdict(others[best] if accepted else None, t, count, sizes, only_saddles)
 
 
 def _evidence(view: View) -> _Evidence | None:
@@ -173,7 +188,19 @@ def _evidence(view: View) -> _Evidence | None:
         trust.reshape(rows, cols),
         tiles.ravel()[chosen],
         tiles,
+        OVER_NOISE * _noise(view) * float(np.maximum(keep.reshape(count, -1)[:, chosen].sum(axis=0) - 3.0, 1.0).sum()),
     )
+
+
+def _noise(view: View) -> float:
+    """Relative variance of noise: what three dimensions leave over of matt pixels, whatever the table."""
+    lit = lit_everywhere(view, view.lights, matt=False)
+    if int(lit.sum()) < MIN_PIXELS:
+        return 0.0
+    values = view.values[:, lit].astype(np.float64)
+    values = values[:, :: max(values.shape[1] // MOST_PIXELS, 1)]
+    left: Array = np.linalg.svd(values / np.maximum(values.mean(axis=0), 1e-9), full_matrices=False)[1][3:]
+    return float(np.square(left).sum() / (len(left) * len(values[0])))
 
 
 def _suspects(evidence: _Evidence, lights: Array) -> list[int]:
@@ -202,9 +229,9 @@ def _losses(evidence: _Evidence, given: Array, lights: Array) -> _Losses:
     photometric = np.asarray(np.bincount(evidence.number, weights=misfit, minlength=count), np.float64)
     if not tilted or abs(np.linalg.det(linear)) < 0.2:  # noqa: PLR2004 - no map of one space onto another
         unknown = np.full(count, np.nan)
-        return _Losses(photometric, unknown, unknown)
+        return _Losses(photometric, unknown, unknown, evidence.floor)
     normal = np.einsum("ij,j...->i...", np.linalg.inv(linear), evidence.normal)
-    return _Losses(photometric, *_bending(normal, evidence))
+    return _Losses(photometric, *_bending(normal, evidence), evidence.floor)
 
 
 def _bending(normal: Array, evidence: _Evidence) -> tuple[Array, Array]:
@@ -226,6 +253,17 @@ def _bending(normal: Array, evidence: _Evidence) -> tuple[Array, Array]:
     return curl, saddle
 
 
+def _is_one_shape(evidence: _Evidence) -> bool:
+    """Whether slopes change one way over the image, as those of a single saddle do; those of bumps go to and fro."""
+    rows, cols = np.nonzero(evidence.solved)
+    place = np.column_stack([np.ones(len(rows)), rows, cols])
+    normal = evidence.normal[:, evidence.solved]
+    slopes = np.clip(-normal[:2] / np.maximum(normal[2], 1e-12), -STEEP, STEEP).T
+    slopes = slopes - slopes.mean(axis=0)
+    left = slopes - place @ np.linalg.lstsq(place, slopes, rcond=None)[0]
+    return bool(np.square(left).sum() < ONE_SHAPE * np.square(slopes).sum())
+
+
 def _right(values: Array) -> Array:
     step = values[:, 1:] - values[:, :-1]
     return 0.5 * (step[1:] + step[:-1])
@@ -244,9 +282,12 @@ def _score(given: _Losses, other: _Losses) -> float:
     return sum(float(np.log((one.sum() + TINY) / (two.sum() + TINY))) for one, two in pairs)
 
 
-def _compare(given: _Losses, other: _Losses, tests: int) -> tuple[float, float, bool]:
-    """Student's t of the witness that speaks most clearly, its tiles, and whether the other table is the better one."""
-    best_t, best_count, accepted, refused = 0.0, 0.0, False, False
+def _compare(given: _Losses, other: _Losses, tests: int) -> tuple[float, float, bool, bool]:
+    """Student's t of the witness that speaks most clearly, its tiles, whether the other table is the better one.
+
+    Last, whether saddles alone say so.
+    """
+    best_t, best_count, accepted, proved, refused = 0.0, 0.0, False, False, False
     witnesses = ((given.photometric, other.photometric), (given.curl, other.curl), (given.saddle, other.saddle))
     for one, two in witnesses:
         if not np.isfinite(two).all():
@@ -257,8 +298,12 @@ def _compare(given: _Losses, other: _Losses, tests: int) -> tuple[float, float, 
             continue
         ratio = float(two.sum() / max(one.sum(), TINY))
         t, count = paired_t((one - two)[there] / weight[there], weight[there])
-        accepted |= ratio < BETTER and t > critical_t(count, tests)
+        if one is given.photometric and one.sum() <= given.floor:
+            continue
+        speaks = ratio < BETTER and t > critical_t(count, tests)
+        accepted |= speaks
+        proved |= speaks and one is not given.saddle
         refused |= one is not given.saddle and t < -critical_t(count)
         if t > best_t:
             best_t, best_count = t, count
-    return best_t, best_count, accepted and not refused
+    return best_t, best_count, accepted and not refused, not proved

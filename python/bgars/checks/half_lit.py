@@ -48,6 +48,13 @@ SAME_LIGHT = 0.06
 """Share of the usual difference between neighbouring lights (variance) that noise leaves under one light."""
 DIFFERS = 0.3
 """Share of the same by which either image must differ from its other neighbour."""
+OF_PROMISE = 0.2
+"""Share of the promised difference to its neighbour (variance) that is left of an image under the neighbour's light;
+noise alone, of image and promise, leaves a half and more."""
+DEEP = 1.0
+"""Natural logarithm of a step beyond which light from neighbours says how deep it is; highlights make none so deep."""
+END = 0.1
+"""Share of the rows, at either end, where a single step is not believed: shadows of the last rim lie there."""
 SHADED = 0.03
 """Relative standard deviation by which the lights shade a band that tells them apart."""
 BRIGHT = 3.0
@@ -72,7 +79,8 @@ def check_half_lit(view: View) -> list[Finding]:
     for along, use, word in axes:
         steps = _steps(along, use)
         index = int(np.argmax([abs(step.size) * (step.score > STANDS_OUT) for step in steps])) if steps else 0
-        if steps and abs(steps[index].size) >= STEP and steps[index].score >= STANDS_OUT:
+        told = steps and abs(steps[index].size) >= STEP and steps[index].score >= STANDS_OUT
+        if told and _stays(view, index, steps[index], word):
             return [_partly_lit(view, index, steps[index], word, STEP)]
     late = _late(view)
     for along, use, word in () if late else axes:
@@ -80,6 +88,26 @@ def check_half_lit(view: View) -> list[Finding]:
         if clear is not None:
             return [_partly_lit(view, *clear, word, CLEAR_STEP)]
     return late
+
+
+def _stays(view: View, index: int, step: Step, word: str) -> bool:
+    """Whether a step is left whichever other image is not asked: a highlight in one promises the others too much."""
+    least = LASTS * min(abs(step.size), DEEP)
+    for other in range(len(view.lights)):
+        if other == index:
+            continue
+        ratio = _of_promised(view.without(other))[index - (other < index)]
+        along = np.where(view.use, ratio, np.nan)
+        along = along if word == "row" else along.T
+        place = round(step.place * len(along))
+        # The rows beside its place hold some of both.
+        before = along[max(place - 2 * BESIDE, 0) : max(place - BESIDE // 2, 1)]
+        after = along[place + BESIDE // 2 : place + 2 * BESIDE]
+        change = np.log(np.maximum(_known_mean(after, 0), 1e-3) / np.maximum(_known_mean(before, 0), 1e-3))
+        told = np.isfinite(change)
+        if told.any() and float(np.median(change[told])) * np.sign(step.size) < least:
+            return False
+    return True
 
 
 def _partly_lit(view: View, index: int, step: Step | RowStep, word: str, least: float) -> Finding:
@@ -131,6 +159,7 @@ def _steps(ratio: Array, use: Mask) -> list[Step]:
         found = Step(0.0, 0.0, 0.0)
         sizes = np.nan_to_num(np.abs(own))
         clear = (sizes >= max(STEP, STANDS_OUT * spread)) & (sizes > OF_OTHERS * largest)
+        clear &= np.abs((np.arange(len(clear)) + BESIDE) / count - 0.5) < 0.5 - END
         # Of the clearest first: shading and shadows make steps, too, which do not run through or do not last.
         for place in np.flatnonzero(clear)[np.argsort(-sizes[clear])][:TRIED]:
             size = float(own[place])
@@ -232,7 +261,8 @@ def _late(view: View) -> list[Finding]:
     count = len(view.values)
     values = np.minimum(view.values / np.maximum(view.mean, np.float32(1e-6)), np.float32(BRIGHT))[:, use]
     rows = view.values.shape[1]
-    band = np.broadcast_to((np.arange(rows) * BANDS // rows)[:, None], use.shape)[use]
+    bands = np.broadcast_to((np.arange(rows) * BANDS // rows)[:, None], use.shape)
+    band, promise = bands[use], promised(view)
 
     def product(first: int, second: int) -> Array:
         return np.asarray(
@@ -260,13 +290,15 @@ def _late(view: View) -> list[Finding]:
             told, rest = shaded & inside, shaded & ~inside
             if told.sum() < MIN_BANDS or rest.sum() < MIN_BANDS or same[rest].mean() > 1.0 - AGREEING:
                 continue
-            if best is None or abs(length) > abs(best[2]):
-                best = (first, second, length)
+            # Shutters run down the rows: rows read late see the next lamp, rows read early the one before.
+            image, neighbour = (second, first) if length > 0 else (first, second)
+            if (best is None or abs(length) > abs(best[2])) and _unlike_promise(
+                view, promise[image], (image, neighbour), use & np.isin(bands, np.flatnonzero(told))
+            ):
+                best = (image, neighbour, length)
     if best is None:
         return []
-    first, second, length = best
-    # Shutters run down the rows: rows read late see the next lamp, rows read early the one before.
-    image, neighbour = (second, first) if length > 0 else (first, second)
+    image, neighbour, length = best
     share = abs(length) / BANDS
     return [
         Finding(
@@ -280,6 +312,23 @@ def _late(view: View) -> list[Finding]:
             unit="of the rows",
         )
     ]
+
+
+def _unlike_promise(view: View, promise: Array, pair: tuple[int, int], there: Mask) -> bool:
+    """Whether an image is nearer to a neighbour than its own light promises: on smooth parts two lights may look alike.
+
+    `promise`: (h, w) what the other images promise the first of the pair. `there`: where it is like the second.
+    """
+    middle = light_median(view.values)
+    there = there & np.isfinite(promise) & (promise > LIT * middle)
+    if int(there.sum()) < BANDS:
+        return False
+    own, other = (view.values[index][there] / middle[there] for index in pair)
+    promised_one = promise[there] / middle[there]
+    seen, wanted = (
+        1.0 - float(each @ other) ** 2 / float(each @ each * (other @ other)) for each in (own, promised_one)
+    )
+    return seen < OF_PROMISE * wanted
 
 
 def _run(same: Mask) -> int:

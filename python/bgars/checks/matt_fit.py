@@ -12,7 +12,7 @@ from bgars.records.light_median import light_median
 if TYPE_CHECKING:
     from bgars.checks.view import View
 
-__all__ = ["MIN_LIGHTS", "STEEP", "MattFit", "fit_normals", "matt_lights", "promised"]
+__all__ = ["COPLANAR", "MIN_LIGHTS", "STEEP", "MattFit", "fit_normals", "matt_lights", "promised"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from bgars.checks.shifts import ImageShifts
     from bgars.records.capture import Capture
 
-__all__ = ["check_motion", "moves"]
+__all__ = ["check_motion", "find_move", "moves", "registered", "told_move"]
 
 Array = NDArray[np.float64]
 Images = NDArray[np.intp]
@@ -68,6 +69,45 @@ def moves(found: ImageShifts, lights: Array) -> Iterator[Move]:
         yield Move(images, shift, error, float(np.median(np.hypot(*free.T))))
 
 
+def find_move(capture: Capture, kept: Images, lights: Array) -> Move | None:
+    """Return the images, of the kept ones, that moved, and by how much; None where none did for certain.
+
+    Parameters
+    ----------
+    capture : Capture
+    kept : (K,) intp
+        Images with light of their own.
+    lights : (K, 3) float64
+        Of these.
+    """
+    if len(lights) < MIN_LIGHTS:
+        return None
+    found = image_shifts(capture, kept)
+    if found is None:
+        return None
+    candidates = list(moves(found, lights))
+    critical = critical_t(len(found.without_px), len(candidates))
+    certain = [
+        move
+        for move in candidates
+        if move.size_px > max(MOVED_PX, critical * move.u_px, OF_OTHERS * max(move.usual_px, EQUAL_PX))
+    ]
+    # A shift that is put where it is not leaves more over.
+    return min(certain, key=lambda move: move.usual_px / move.size_px, default=None)
+
+
+def registered(capture: Capture, kept: Images, move: Move) -> Capture:
+    """The capture with a move undone, to whole pixels; the margin that came in is outside the mask."""
+    right, up = (round(float(each)) for each in move.shift_px)
+    images, mask = capture.images.copy(), capture.mask.copy()
+    for index in kept[move.images]:
+        images[index] = np.roll(images[index], (up, -right), axis=(0, 1))
+    rows, cols = mask.shape
+    mask[: max(up, 0)] = mask[rows - max(-up, 0) :] = False
+    mask[:, cols - max(right, 0) :] = mask[:, : max(-right, 0)] = False
+    return replace(capture, images=images, mask=mask)
+
+
 def check_motion(capture: Capture, kept: Images, lights: Array, names: Sequence[str]) -> list[Finding]:
     """Find an image that moved, or the moment from which on the images lie elsewhere.
 
@@ -79,34 +119,22 @@ def check_motion(capture: Capture, kept: Images, lights: Array, names: Sequence[
     lights, names
         Of these.
     """
-    if len(lights) < MIN_LIGHTS:
-        return []
-    found = image_shifts(capture, kept)
-    if found is None:
-        return []
-    candidates = list(moves(found, lights))
-    critical = critical_t(len(found.without_px), len(candidates))
-    certain = [
-        move
-        for move in candidates
-        if move.size_px > max(MOVED_PX, critical * move.u_px, OF_OTHERS * max(move.usual_px, EQUAL_PX))
-    ]
-    if not certain:
-        return []
-    # A shift that is put where it is not leaves more over.
-    best = min(certain, key=lambda move: move.usual_px / move.size_px)
+    best = find_move(capture, kept, lights)
+    return [] if best is None else [told_move(best, names)]
+
+
+def told_move(best: Move, names: Sequence[str]) -> Finding:
+    """Tell of images that moved."""
     right, up = best.shift_px
     first = int(best.images[0])
     which = names[first] if len(best.images) == 1 else f"each image from {names[first]} on"
-    return [
-        Finding(
-            "motion",
-            "warning",
-            f"{which} is shifted by {best.size_px:.1f} pixels against the others ({right:+.1f} right, {up:+.1f} up)",
-            "fix part and camera, wait until everything stands still, and take the images again",
-            image=first,
-            value=best.size_px,
-            limit=MOVED_PX,
-            unit="px",
-        )
-    ]
+    return Finding(
+        "motion",
+        "warning",
+        f"{which} is shifted by {best.size_px:.1f} pixels against the others ({right:+.1f} right, {up:+.1f} up)",
+        "fix part and camera, wait until everything stands still, and take the images again",
+        image=first,
+        value=best.size_px,
+        limit=MOVED_PX,
+        unit="px",
+    )

@@ -21,7 +21,7 @@ from bgars.records.light_median import light_median
 if TYPE_CHECKING:
     from bgars.checks.view import View
 
-__all__ = ["check_odd_image"]
+__all__ = ["QUARTERS", "TURNS", "check_odd_image", "matt"]
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -93,7 +93,7 @@ def _misfits(view: View) -> Array:
     """(L,) mean square of what each image differs from the promise of the others, over the usual light."""
     promise = promised(view)
     middle = light_median(view.values)
-    known = np.isfinite(promise) & view.use & ~view.clipped & _matt(view.values, middle)
+    known = np.isfinite(promise) & view.use & ~view.clipped & matt(view.values, middle)
     left = np.square((view.values - promise) / np.maximum(middle, 1e-6))
     total = np.where(known, np.minimum(left, 1.0), 0.0).sum(axis=(1, 2))
     return np.asarray(total / np.maximum(known.sum(axis=(1, 2)), 1), np.float64)
@@ -108,7 +108,7 @@ def _surface(others: View) -> _Surface:
     return _Surface(fit.normal.reshape(3, rows, cols), known, light_median(others.values), usual)
 
 
-def _matt(values: Floats, middle: Floats) -> Mask:
+def matt(values: Floats, middle: Floats) -> Mask:
     """Pixels that are neither in shadow nor in a highlight, of which nothing is promised."""
     matt: Mask = (values > SHADOWED * middle) & (values < SHINES * middle)
     return matt
@@ -116,7 +116,7 @@ def _matt(values: Floats, middle: Floats) -> Mask:
 
 def _explains(view: View, surface: _Surface, given: tuple[Floats, Array], other: tuple[Floats, Array]) -> bool:
     """Whether most of the misfit is gone, as far as the other images fit, in all parts of the image."""
-    known = surface.known & _matt(given[0], surface.middle) & _matt(other[0], surface.middle)
+    known = surface.known & matt(given[0], surface.middle) & matt(other[0], surface.middle)
     if int(known.sum()) < MIN_PIXELS:
         return False
     before, after = (
@@ -136,13 +136,13 @@ def _explains(view: View, surface: _Surface, given: tuple[Floats, Array], other:
 def _strength(image: Floats, light: Array, surface: _Surface) -> float:
     """Usual light over the promised one."""
     promise = np.einsum("k,khw->hw", light, surface.normal)
-    known = surface.known & _matt(image, surface.middle) & (promise > SHADOWED * surface.middle)
+    known = surface.known & matt(image, surface.middle) & (promise > SHADOWED * surface.middle)
     return float(np.median(image[known] / promise[known])) if known.any() else 1.0
 
 
 def _seen_light(image: Floats, light: Array, surface: _Surface) -> Array | None:
     """The light that an image was taken under, where the surface tells it and it is another than stated."""
-    known = surface.known & _matt(image, surface.middle)
+    known = surface.known & matt(image, surface.middle)
     if int(known.sum()) < MIN_PIXELS:
         return None
     normal, value = surface.normal[:, known], image[known].astype(np.float64)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bgars.checks.evidence import critical_t, paired_t
+from bgars.checks.matt_fit import MIN_LIGHTS, promised
+from bgars.checks.odd_image import QUARTERS, TURNS, matt
 from bgars.checks.shifts import edge_products
 from bgars.records.findings import Finding
+from bgars.records.light_median import light_median
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,6 +31,10 @@ AS_OTHERS = 0.8
 AS_IT_IS = 0.5
 """Most that it may correlate as it is, of the same: parts that look the same after a turn prove nothing, and an edge
 that moved by its own width still correlates by more than half."""
+CLOSER = 0.8
+"""Of the misfit to the promise of the others: a fifth of it must come from the turn (as `geometry.BETTER`)."""
+MIN_PIXELS = 100
+"""Of which something is promised: fewer are no evidence."""
 PASSES = 2
 TILES = 6
 """Tiles along each axis, whose scatter says how certain the better fit is."""
@@ -48,10 +56,14 @@ def check_orientation(view: View) -> list[Finding]:
     turned = {name: turn(edges) for name, turn in turns}
     use = view.use[PASSES:-PASSES, PASSES:-PASSES]
     good = np.ones(len(view.values), dtype=bool)
+    asked = good.copy()
     found = []
     # One that is turned upsets the comparison of the others: the clearest is told, and left out.
-    while (worst := _worst(edges, turned, use, good)) is not None:
+    while (worst := _worst(edges, turned, use, good, asked)) is not None:
         index, name, value, limit = worst
+        asked[index] = False
+        if not _explained(view, good, index, name):
+            continue
         good[index] = False
         found.append(
             Finding(
@@ -70,7 +82,30 @@ def check_orientation(view: View) -> list[Finding]:
     return found
 
 
-def _worst(edges: Floats, turned: dict[str, Floats], use: Mask, good: Mask) -> tuple[int, str, float, float] | None:
+def _explained(view: View, good: Mask, index: int, name: str) -> bool:
+    """Whether an image turned back is nearer to what the others promise; three promise nothing.
+
+    Shading makes edges, too: a smooth cap under two lights on either side is its own mirror image.
+    """
+    kept = np.flatnonzero(good)
+    if len(kept) < MIN_LIGHTS:
+        return True
+    known = replace(
+        view, values=view.values[kept], clipped=view.clipped[kept], lights=view.lights[kept], names=view.names
+    )
+    promise = promised(known)[np.searchsorted(kept, index)]
+    image, middle = view.values[index], np.maximum(light_median(known.values), np.float32(1e-6))
+    back = dict(TURNS + QUARTERS)[name](image)
+    told = np.isfinite(promise) & view.use & matt(image, middle) & matt(back, middle)
+    if int(told.sum()) < MIN_PIXELS:
+        return False
+    before, after = (np.minimum(np.square((each - promise) / middle), 1.0)[told].sum() for each in (image, back))
+    return bool(after < CLOSER * before)
+
+
+def _worst(
+    edges: Floats, turned: dict[str, Floats], use: Mask, good: Mask, asked: Mask
+) -> tuple[int, str, float, float] | None:
     """The image that gains most by a turn, of those that are certain: which, how, its correlation, and the limit."""
     others = (edges[:, good].sum(axis=1, keepdims=True) - edges) * use
     plain = (edges * others).sum(axis=0)
@@ -79,7 +114,7 @@ def _worst(edges: Floats, turned: dict[str, Floats], use: Mask, good: Mask) -> t
     as_it_is = plain.sum(axis=(1, 2)) / np.maximum(scale, 1e-12)
     tiles = _tiles(plain.shape[1:])
     certain = []
-    for index in np.flatnonzero(good):
+    for index in np.flatnonzero(asked):
         after = {name: float(fit[index].sum() / max(scale[index], 1e-12)) for name, fit in fits.items()}
         best = max(after, key=after.__getitem__)
         usual = float(np.median(as_it_is[good & (np.arange(len(good)) != index)]))

@@ -16,7 +16,7 @@ from bgars.checks.focus import check_focus
 from bgars.checks.gains import check_gains, gains_by_moments, gains_by_promise
 from bgars.checks.half_lit import check_half_lit
 from bgars.checks.moments import lit_everywhere, moments_by
-from bgars.checks.motion import check_motion
+from bgars.checks.motion import check_motion, find_move, registered, told_move
 from bgars.checks.noise import check_drowned, check_noise
 from bgars.checks.noise_levels import noise_curve
 from bgars.checks.odd_image import check_odd_image
@@ -43,6 +43,9 @@ MOST_CLIPPED = 0.5
 LEAST_CONDITIONING = 1e-6
 """27 det(L^T L) / tr(L^T L)^3 of the lights below which no method estimates normals (`MIN_CONDITIONING` of the core);
 1 for three at right angles."""
+MOTION_LOOKS_LIKE = {"duplicate", "order", "orientation", "half-lit", "noise", "response", "lamp-uneven"}
+"""On texture, an image that lies elsewhere differs from what it should be by all but noise, those that moved with it
+by noise alone."""
 FEW_LIT = 200
 """Pixels of the small copy, lit by all lights and matt, below which noise and motion of one image are not judged."""
 
@@ -119,6 +122,25 @@ def _with_file(finding: Finding, capture: Capture) -> Finding:
 
 
 def _between(capture: Capture, view: View, gone: list[int], levels: list[Finding]) -> list[Finding]:
+    """Checks of images against each other; what is gone once an image that moved is put back is the motion's doing."""
+    found = _compared(capture, view, gone, levels)
+    if not found or found == levels or found[0].kind not in MOTION_LOOKS_LIKE:
+        return found
+    kept = np.setdiff1d(np.arange(len(view.lights)), gone)
+    move = find_move(capture, kept, view.lights[kept])
+    if move is None:
+        return found
+    still = registered(capture, kept, move)
+    again = _compared(still, make_view(still).with_lights(view.lights), gone, levels)
+    # A turned image that is shifted as well is no longer found, but is not right either.
+    strict = found[0].kind in {"orientation", "order"}
+    if any(each.kind == found[0].kind or (strict and each.severity != "note") for each in again):
+        return found
+    told = _renumbered([told_move(move, [view.names[index] for index in kept])], kept)
+    return told + [each for each in again if each.kind != "motion"]
+
+
+def _compared(capture: Capture, view: View, gone: list[int], levels: list[Finding]) -> list[Finding]:
     """Checks of images against each other, of those with light. `levels`: what is wrong with all grey levels."""
     alike = check_duplicates(capture, view)
     turned = check_orientation(view)
@@ -131,7 +153,17 @@ def _between(capture: Capture, view: View, gone: list[int], levels: list[Finding
         return levels
     found, lights = check_table(capture, view)
     # A frame that is lit in part upsets all that follows, as it does the comparison of tables.
+    lit = lit_everywhere(view, lights)
+    by_moments = (
+        None if int(lit.sum()) < FEW_LIT else gains_by_moments(moments_by(view, lit, view.tiles, TILES * TILES))
+    )
+    uneven, factors = check_gains(view, by_moments or gains_by_promise(view), lights)
     halves = check_half_lit(view.with_lights(lights))
+    if halves and uneven:
+        # A dim lamp is missing in what its image promises the others, more in some rows than in others.
+        even = replace(view, values=view.values / factors.astype(np.float32)[:, None, None], lights=lights)
+        without = {each.image for each in check_half_lit(even)}
+        halves = [each for each in halves if each.image in without]
     if halves:
         return _renumbered(halves + [each for each in found if each.kind != "order"], kept) + levels
     if not found:
@@ -139,18 +171,25 @@ def _between(capture: Capture, view: View, gone: list[int], levels: list[Finding
         if found:
             return _renumbered(found, kept) + levels
     # All that follows compares grey levels as if they were light.
-    return _renumbered(found, kept) + (levels or _renumbered(_single(capture, view, lights, kept), kept))
+    return _renumbered(found, kept) + (
+        levels or _renumbered(_single(capture, view, lights, kept, (lit, uneven, factors)), kept)
+    )
 
 
-def _single(capture: Capture, view: View, lights: NDArray[np.float64], kept: NDArray[np.intp]) -> list[Finding]:
-    """Checks of single images under the right table."""
-    lit = lit_everywhere(view, lights)
-    found = check_ambient(capture, lights) + check_vignetting(view, lit)
+def _single(
+    capture: Capture,
+    view: View,
+    lights: NDArray[np.float64],
+    kept: NDArray[np.intp],
+    lamps: tuple[NDArray[np.bool_], list[Finding], NDArray[np.float64]],
+) -> list[Finding]:
+    """Checks of single images under the right table. `lamps`: pixels that all reach, uneven ones, their strengths."""
+    lit, uneven, factors = lamps
+    strengths = factors if len(factors) == len(capture.rig) else 1.0
+    found = check_ambient(capture, lights, strengths) + check_vignetting(view.with_lights(lights), lit)
     blurred = check_focus(capture, kept, view.names)
     veiled = any(each.kind == "ambient" for each in found)
     few = int(lit.sum()) < FEW_LIT
-    by_moments = None if few else gains_by_moments(moments_by(view, lit, view.tiles, TILES * TILES))
-    uneven, factors = check_gains(view, by_moments or gains_by_promise(view), lights)
     stated, lights = lights, lights * factors[:, None]
     # A dim lamp bends what its light leaves of the others; a curve stays once the lamps are as they are.
     curved = [] if veiled or not check_response(view, stated) else check_response(view, lights)

@@ -32,7 +32,7 @@ Floats = NDArray[np.float32]
 
 SIDE_PX = 160
 TILE_PX = 64
-REACH_PX = 6
+REACH_PX = 8
 """Largest shift that is looked for, along each axis."""
 PASSES = 4
 """Binomial filters of three pixels: with them gradients rise over the noise of a dim board."""

@@ -46,19 +46,22 @@ def check_table(capture: Capture, view: View) -> tuple[list[Finding], NDArray[np
         The table that the images were taken under, as far as they tell.
     """
     verdict = judge_table(view)
-    lights = view.lights if verdict.better is None else verdict.better.lights
+    lights = view.lights if verdict.better is None or verdict.only_saddles else verdict.better.lights
     shadows = judge_shadows(view.with_lights(lights))
     if shadows.turned:
         shadows = judge_shadows(_without_veil(capture, view.with_lights(lights)))
     findings = []
     if verdict.better is not None:
         cause = _cause(view, verdict.better, shadows)
+        told, advice = cause.told, cause.advice
+        if verdict.only_saddles:
+            told, advice = f"either the part is a saddle, or {told}", f"if it is none, {advice}"
         findings.append(
             Finding(
                 cause.kind,
-                "error",
-                f"{cause.told} (t = {min(verdict.t, 999.0):.0f} over {verdict.tiles:.0f} parts of the image)",
-                cause.advice,
+                "warning" if verdict.only_saddles else "error",
+                f"{told} (t = {min(verdict.t, 999.0):.0f} over {verdict.tiles:.0f} parts of the image)",
+                advice,
                 value=min(verdict.t, 999.0),
                 unit="t",
             )

@@ -155,7 +155,11 @@ def used_scale(capture: Capture, raw: PixelArray) -> float:
 
 
 def _near_gain(capture: Capture, picked: tuple[slice, slice]) -> Floats:
-    """(L, h, w) what undoes the fall-off of near lights over the board."""
+    """(L, h, w) what undoes the fall-off of near lights over the board, and that they shine on it at other angles.
+
+    Light of a pixel is ``n . d / r^3`` with ``d`` from there to the lamp, which is linear in the place: times ``r^3``
+    it is as under a lamp far away, but for a term that lights of one height have in common.
+    """
     rig, pitch = capture.rig, float(capture.pixel_pitch_um or 1.0)
     rows, cols = capture.mask.shape
     x = ((np.arange(cols) + 0.5 - cols / 2) * pitch)[picked[1]]
@@ -166,7 +170,7 @@ def _near_gain(capture: Capture, picked: tuple[slice, slice]) -> Floats:
         return np.ones((1, 1, 1), dtype=np.float32)
     for light in positions:
         square = (light[0] - x[None, :]) ** 2 + (light[1] - y[:, None]) ** 2 + light[2] ** 2
-        gain.append(square / float(light @ light))
+        gain.append((square / float(light @ light)) ** 1.5)
     return np.array(gain, dtype=np.float32)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bgars.checks.evidence import critical_t
+from bgars.checks.matt_fit import MIN_LIGHTS, fit_normals, matt_lights
 from bgars.checks.view import TILES
 from bgars.records.findings import Finding
 
@@ -33,13 +34,13 @@ COVERED = 0.7
 
 def corner_loss(view: View, lit: Mask) -> tuple[float, float, bool]:
     """Share of light lost in the corners, Student's t of it, and whether the loss is round."""
-    mean = view.mean
-    tiles = view.tiles
+    albedo, tiles = _albedo(view), view.tiles
+    lit = lit & (albedo > 0.0)
     level = np.full(TILES * TILES, np.nan)
     for tile in range(TILES * TILES):
         inside = lit & (tiles == tile)
         if inside.sum() >= 8:  # noqa: PLR2004 - a handful of pixels
-            level[tile] = np.log(max(float(np.median(mean[inside])), 1e-6))
+            level[tile] = np.log(max(float(np.median(albedo[inside])), 1e-6))
     known = np.isfinite(level)
     if known.mean() < COVERED:
         return 0.0, 0.0, False
@@ -57,6 +58,17 @@ def corner_loss(view: View, lit: Mask) -> tuple[float, float, bool]:
     if beyond + 2.0 * error_beyond < LASTS * loss:
         return 0.0, 0.0, False
     return 1.0 - float(np.exp(-max(loss, 0.0))), loss / max(error, 1e-9), is_round
+
+
+def _albedo(view: View) -> Array:
+    """(h, w) light of a pixel without its slope, 0 where the lights do not tell it: caps and dishes darken outwards."""
+    count, rows, cols = view.values.shape
+    if count < MIN_LIGHTS:
+        return np.asarray(view.mean, np.float64)
+    fit = fit_normals(
+        view.values.reshape(count, -1).astype(np.float64), matt_lights(view).reshape(count, -1), view.lights
+    )
+    return np.asarray((fit.solved * np.sqrt(np.square(fit.normal).sum(axis=0))).reshape(rows, cols), np.float64)
 
 
 def _round_loss(design: Array, level: Array) -> tuple[float, float, bool]:
