@@ -141,3 +141,12 @@ def test_a_lamp_is_off_all_over_the_image_alike(scatter: float, images: list[int
         return gain, np.full(8, scatter / 8.0), 64.0
 
     assert [each.image for each in check_gains(view, measure, view.lights)[0]] == images
+
+
+@pytest.mark.parametrize(("shape", "texture"), [("cap", 0.15), ("tilted", 0.05), ("saddle", 0.15)])
+def test_the_same_picture_twice_is_told_before_all_else(shape: str, texture: float) -> None:
+    """It also looks as if it had moved, or shown another light."""
+    capture = part(shape, texture)
+    images = capture.images.copy()
+    images[5] = images[4]
+    assert told(replace(capture, images=images))[0] == ("error", "duplicate", 5)

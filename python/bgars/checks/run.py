@@ -28,6 +28,7 @@ from bgars.checks.vignetting import check_vignetting
 from bgars.checks.windows import cut_windows, noise_of
 from bgars.errors import InputError
 from bgars.records.findings import Finding, Findings
+from bgars.records.same_images import same_images
 from bgars.records.whole_capture import need_whole
 
 if TYPE_CHECKING:
@@ -126,14 +127,16 @@ def _between(capture: Capture, view: View, gone: list[int], levels: list[Finding
     found = _compared(capture, view, gone, levels)
     if not found or found == levels or found[0].kind not in MOTION_LOOKS_LIKE:
         return found
+    if same_images(capture.images) is not None:
+        return found  # no motion leaves two images alike to the last bit
     kept = np.setdiff1d(np.arange(len(view.lights)), gone)
     move = find_move(capture, kept, view.lights[kept])
     if move is None:
         return found
     still = registered(capture, kept, move)
     again = _compared(still, make_view(still).with_lights(view.lights), gone, levels)
-    # A turned image that is shifted as well is no longer found, but is not right either.
-    strict = found[0].kind in {"orientation", "order"}
+    # A turned image, or one under another light, that is shifted as well is no longer found, but is not right either.
+    strict = found[0].kind in {"orientation", "order", "duplicate"}
     if any(each.kind == found[0].kind or (strict and each.severity != "note") for each in again):
         return found
     told = _renumbered([told_move(move, [view.names[index] for index in kept])], kept)
