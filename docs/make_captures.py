@@ -57,8 +57,8 @@ def _figures(rows: list[dict[str, Any]]) -> list[str]:
         "given.",
         "Exit code of `bgars check`: 0 without an error, 1 with one, 2 where the capture cannot be read.",
         "",
-        f"Of {len(faulty)} captures with one fault each, {found} are found ({100 * found / len(faulty):.0f} %), and "
-        f"for {named} ({100 * named / len(faulty):.0f} %) the right cause",
+        f"Of {len(faulty)} captures with one fault each, {found} are found ({100 * found / len(faulty):.1f} %), and "
+        f"for {named} ({100 * named / len(faulty):.1f} %) the right cause",
         f"is named first; {alarms} of {len(good)} good captures get a warning or an error.",
         "The captures are simulated arrays and reliefs (seeds from 70000: none was used when the thresholds were",
         f"chosen) and rendered parts (seeds {_seeds(rows)}), each also turned",

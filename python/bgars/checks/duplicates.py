@@ -31,8 +31,10 @@ U_PROMISE = 0.02
 light on slopes of 45 degrees by so much. What is promised must be more than that leaves."""
 MIN_PIXELS = 100
 """Pixels whose surface is known, below which nothing is promised."""
-APART = 0.2
-"""Distance of two directions, of unit vectors, from which on their images differ: 12 degrees."""
+APART = 0.05
+"""Distance of two directions, of unit vectors, below which they may be LEDs of one lamp: 3 degrees."""
+TRIED = 8
+"""Pairs of images, the most alike first, of which the surface is asked: in a dense dome hundreds are alike."""
 SHADED = 0.02
 """Relative standard deviation by which lights shade a part that tells them apart."""
 
@@ -59,7 +61,7 @@ def alike_images(view: View) -> list[tuple[int, int]]:
     if usual < SHADED**2:
         return []
     keep = matt_lights(view)[:, use]
-    alike = [pair for pair in far if differs[pair] < SAME_LIGHT * usual]
+    alike = sorted((pair for pair in far if differs[pair] < SAME_LIGHT * usual), key=differs.__getitem__)[:TRIED]
     share = {pair: _of_expected(values, keep, view.lights, pair) for pair in alike}
     # An image that is not what it should be upsets what is expected of the others: the clearest pair first.
     return sorted((pair for pair in alike if share[pair] < OF_EXPECTED), key=share.__getitem__)
