@@ -93,7 +93,7 @@ def balls() -> Iterator[str]:
             scaled.append(on_axes_deg(found.rig.directions, lights) / found.u_deg[:, None])
         yield row(f"{kind}, own ray tracer", seeds, errors, scaled)
     if MITSUBA.is_dir():
-        judged = {}
+        judged = json.loads(JUDGED.read_text(encoding="utf-8")) if JUDGED.exists() else {}
         for folder in sorted(one for one in MITSUBA.iterdir() if (one / "truth.json").exists()):
             truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
             lights = np.array(truth["lights"])
