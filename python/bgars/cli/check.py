@@ -98,7 +98,7 @@ def check(
         _tell(capture.name, findings)
         if page is not None:
             say()
-            say(f"  {page}  a picture for each finding")
+            say(f"  {page}  {'a picture for each finding' if findings.findings else 'says that nothing was found'}")
     if findings.errors:
         raise typer.Exit(EXIT_WRONG)
 
