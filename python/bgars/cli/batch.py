@@ -130,7 +130,7 @@ def _tell(done: Batch, output: Path) -> None:
     if done.failures:
         say(f"{len(done.failures)} could not be inspected; the next run tries again:")
         for folder, reason in done.failures[:MOST_FAILURES]:
-            say(f"  {folder}: {reason}")
+            say(f"  {reason}" if reason.startswith(f"{folder}: ") else f"  {folder}: {reason}")
         if len(done.failures) > MOST_FAILURES:
             say(f"  ... and {len(done.failures) - MOST_FAILURES} more: bgars query {output} 'select * from failures'")
     say()

@@ -54,6 +54,7 @@ def spc(
     subgroup: Annotated[
         int | None,
         typer.Option(
+            min=1,
             help="Parts of a subgroup, in order; 1: each part is a point, with moving ranges (I-MR). By default "
             f"{DEFAULT_SUBGROUP}, and 1 below {FEW_PARTS} parts.",
             show_default=False,

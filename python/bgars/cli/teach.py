@@ -30,7 +30,7 @@ def teach(
         typer.Argument(metavar="GOLDEN", help="Capture folders of parts that are good.", show_default=False),
     ],
     output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="part.toml", help="Part recipe to write.", show_default=False)
+        Path, typer.Option("--output", "-o", metavar="PART.toml", help="Part recipe to write.", show_default=False)
     ],
     name: Annotated[str, typer.Option(help="Name of the part; the file's name by default.", show_default=False)] = "",
     station: StationOption = None,
@@ -69,6 +69,9 @@ def _check_place(output: Path, *, force: bool) -> None:
     """Raise InputError where writing would replace a file that is not to be replaced: before long work."""
     if not output.exists():
         return
+    if output.is_dir():
+        msg = f"{output}: is a folder; name a file, such as {output / 'part.toml'}"
+        raise InputError(msg)
     if not force:
         msg = f"{output}: exists; --force replaces it"
         raise InputError(msg)
