@@ -58,6 +58,16 @@ def test_a_wrong_word_is_named_and_nothing_is_written(
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["file.txt", "folder"]
 
 
+def test_a_bridged_part_teaches_no_recipe(tmp_path: Path) -> None:
+    scene = bgars.Scene.ball_array(3, 3, bridges=[bgars.Bridge("C2", "C3", radius_um=100.0)])
+    rig, material = bgars.LightRig.ring(8), bgars.Material(i_d=0.3, i_s=1.0, hardness=40)
+    bgars.write_simulation(*bgars.simulate(scene, rig, material, bgars.Camera()), tmp_path / "golden")
+    run = bgars_command("teach", tmp_path / "golden", "-o", tmp_path / "part.toml")
+    assert run.returncode == 2
+    assert "golden: bridged balls: C2, C3; a golden part has none" in run.stderr
+    assert not (tmp_path / "part.toml").exists()
+
+
 @pytest.mark.parametrize(("ended_by", "code"), [(EOFError, 2), (KeyboardInterrupt, 130)])
 def test_questions_without_an_answer_write_nothing(
     ended_by: type[BaseException], code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -48,6 +48,7 @@ def teach(
     with stage_progress() as report:
         for index, folder in enumerate(golden):
             results.append(bgars.inspect(bgars.read_capture(folder, station=station)))
+            _need_separate_balls(folder, results[-1])
             report("golden", (index + 1) / len(golden))
     taught = learn(results, name or output.stem)
     with atomic_file(output) as place:
@@ -63,6 +64,14 @@ def teach(
     parts = f"{taught.parts} part{'' if taught.parts == 1 else 's'}"
     say(f"balls of {taught.diameter_um:.1f} um, {taught.height_um:.1f} um high, from {parts}.")
     say(f"Written: {output}. Check its limits before you use it.")
+
+
+def _need_separate_balls(folder: Path, result: bgars.PartResult) -> None:
+    """Raise InputError where balls are bridged: that is no layout of a good part."""
+    bridged = [ball.name for ball in result.balls if ball.present and ball.kind == "bridged"]
+    if bridged:
+        msg = f"{folder}: bridged balls: {', '.join(bridged)}; a golden part has none"
+        raise InputError(msg)
 
 
 def _check_place(output: Path, *, force: bool) -> None:
