@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bgars.errors import InputError
+from bgars.records.short import Short
 from bgars.studies.capability import Capability, capability
 from bgars.studies.characteristics import CHARACTERISTICS, Characteristic, part_readings
 from bgars.studies.control_chart import D2, MIN_VALUES, ControlChart, control_chart, individuals_chart
@@ -35,8 +36,8 @@ MOVING_RANGE_DF = 0.6
 """Degrees of freedom a value of a sigma from moving ranges: of m normal values, its relative variance is 0.826 / m."""
 
 
-@dataclass(frozen=True, eq=False)
-class Trend:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trend(Short):
     """One characteristic over time.
 
     Attributes
@@ -85,8 +86,8 @@ class Trend:
     reason: str
 
 
-@dataclass(frozen=True, eq=False)
-class ProcessTrend:
+@dataclass(frozen=True, eq=False, repr=False)
+class ProcessTrend(Short):
     """Trend and capability of a process, from many results.
 
     Attributes
