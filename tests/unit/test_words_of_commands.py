@@ -24,6 +24,7 @@ def test_no_word_of_a_help_text_is_cut_off(path: tuple[str, ...], monkeypatch: p
     monkeypatch.setenv("COLUMNS", "80")
     run = bgars_command(*path, "--help")
     assert "Usage" in run.stdout
+    assert "<bool>" not in run.stdout, "flags take no value"
     assert [line for line in run.stdout.splitlines() if "\N{HORIZONTAL ELLIPSIS}" in line] == []
 
 
