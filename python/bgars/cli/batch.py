@@ -26,6 +26,7 @@ from bgars.cli.options import (
     StationNameOption,
     StoreOption,
 )
+from bgars.errors import InputError
 from bgars.line.batch import Batch, Progress, inspect_many
 from bgars.line.naming import Naming
 from bgars.normals.methods import DEFAULT_METHOD
@@ -93,6 +94,9 @@ def batch(
     Exit code 0: every part passes. 1: a part does not, or could not be inspected. 2: wrong use, or a store that cannot
     be written. 130: interrupted; run it again to continue.
     """
+    if send_images and scheduler is None:
+        msg = "--send-images: goes with --scheduler"
+        raise InputError(msg)
     naming = Naming(serial_from, PartIdentity(lot=lot, station=station_name, operator=operator, round=round_))
     with _progress() as report:
         done = inspect_many(
