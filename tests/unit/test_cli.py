@@ -188,7 +188,7 @@ def test_the_help_of_every_estimator_explains_each_method() -> None:
         for method in ALL_METHODS:
             assert f"{method}: " in told, (name, method)
         assert "Without balls and a material, with fewer than 4 lights" in told
-        assert ": blind. robust-filter: " in told
+        assert ": blind.\n\nrobust-filter: " in told, "each on a line of its own"
     (told,) = [option.help for option in commands["evaluate"].params if option.name == "method"]
     for method in METHODS:
         assert method in told

@@ -107,13 +107,19 @@ def test_any_question_is_charted(tmp_path: Path) -> None:
     run = CliRunner().invoke(app, ["spc", str(store.folder), "--query", sql, "-o", str(tmp_path / "out"), "--json"])
     assert json.loads(run.output)["charts"][0]["characteristic"] == "mean_top_um"
     assert "SN0003" in (tmp_path / "out" / "spc.html").read_text(encoding="utf-8") or run.exit_code == 0
+    with pytest.raises(bgars.InputError, match="must say in which order its rows are charted, such as ORDER BY"):
+        query_charts(store, "select mean_top_um from parts")
+    for option in ("--where=lot = 'x'", "--subgroup=5", "--target=2"):
+        run = CliRunner().invoke(app, ["spc", str(store.folder), "--query", sql, "-o", str(tmp_path / "no"), option])
+        assert f"{option.partition('=')[0]}: does not go with --query" in str(run.exception)
+    assert not (tmp_path / "no").exists()
     with pytest.raises(bgars.InputError, match="must give a column of numbers"):
-        query_charts(store, "select serial from parts")
+        query_charts(store, "select serial from parts order by serial")
     with pytest.raises(bgars.InputError, match="at least 3 rows"):
-        query_charts(store, "select 1.0 as x")
+        query_charts(store, "select 1.0 as x order by x")
     with pytest.raises(
         bgars.InputError, match=r"query: x: must be within -1e\+100 and 1e\+100 to be charted, got 1e\+308"
     ):
-        query_charts(store, "select 1e308 as x from range(4)")
+        query_charts(store, "select 1e308 as x from range(4) order by x")
     with pytest.raises(bgars.InputError, match="values: must be finite"):
         individuals_chart(np.array([1.0, np.nan, 2.0]))

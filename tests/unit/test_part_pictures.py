@@ -10,6 +10,7 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 from bgars.inspection.judge import judge_part
+from bgars.report.figures.histograms import histogram_figure
 from bgars.report.figures.part import thinned
 from bgars.report.figures.process import PictureProcess
 from bgars.report.figures.shadow_outline import shadow_outline_um
@@ -112,3 +113,12 @@ def test_the_process_ends_with_what_started_it() -> None:
         raise RuntimeError
     assert painter._process is not None
     assert painter._process.poll() is not None
+
+
+def test_the_shaded_band_of_histograms_is_explained_where_there_is_one() -> None:
+    recipe = bgars.read_part_recipe(bgars.sample_part_recipe())
+    result, _ = inspected(bgars.Scene.ball_array(5, 5), recipe)
+    legends = histogram_figure(result).legends
+    assert [text.get_text() for text in legends[0].get_texts()] == ["undecided: nearer to a limit than U"]
+    without, _ = inspected(bgars.Scene.ball(600.0, height_um=500.0))
+    assert not histogram_figure(without).legends

@@ -8,6 +8,7 @@ import bgars
 import matplotlib as mpl
 import numpy as np
 import pytest
+from judged_parts import write_results, write_study
 from report_parts import failing
 
 mpl.use("agg")
@@ -68,6 +69,27 @@ def test_records_of_arrays_are_one_line_without_their_numbers() -> None:
     ):
         assert words in repr(record)
         assert len(repr(record)) < 230
+        assert "\n" not in repr(record)
+
+
+def test_records_of_many_parts_are_one_line(tmp_path: Path) -> None:
+    scene = bgars.Scene.ball_array(5, 5)
+    balls, study = (
+        bgars.find_balls(bgars.simulate(scene, bgars.LightRig.ring(4), bgars.Material(), bgars.Camera())[0]),
+        bgars.read_study(write_study(tmp_path / "study", placements=2)),
+    )
+    trend = bgars.process_trend(bgars.read_results([write_results(tmp_path / "results", 40)])[0])
+    for record, words in (
+        (balls, "FoundBalls(balls=25 entries, missing=(), "),
+        (scene, "Scene(balls=25 entries, "),
+        (bgars.read_scene("one-ball"), "SimulationSetup(scene=Scene(...), "),
+        (study, "runs=18 entries"),
+        (bgars.gauge_rr(study), "GaugeStudy(study=Study(...), "),
+        (trend, "ProcessTrend("),
+        (trend.trends[0], "Trend(characteristic="),
+    ):
+        assert words in repr(record), repr(record)
+        assert len(repr(record)) < 800
         assert "\n" not in repr(record)
 
 

@@ -115,6 +115,8 @@ def test_a_jump_is_a_signal_and_nothing_passes(tmp_path: Path) -> None:
     found = bgars.process_trend(results)
     assert top_of(found).verdict == "undecided"
     assert "not in control" in top_of(found).reason
+    reasons = [trend.reason for trend in (*found.trends, *bgars.process_trend(results, subgroup=1).trends)]
+    assert not any("1 signals" in reason or "mean of part" in reason for reason in reasons), "a single part has a value"
     assert found.verdict == "undecided"
     assert top_of(found).sigma_within < top_of(found).sigma_overall
 

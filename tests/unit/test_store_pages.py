@@ -46,6 +46,22 @@ def test_a_part_gets_its_page_with_photograph_and_identity(tmp_path: Path) -> No
     assert "holds other images now" in run(tmp_path / "store", "SN1")["warnings"][0]
 
 
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("SN0001 --lot L0", "--lot: is for the overview, without SERIAL"),
+        ("SN0001 --pages", "--pages: is for the overview, without SERIAL"),
+        ("--round 1", "--round: needs SERIAL"),
+        ("--recipe-name x", "--recipe-name: needs SERIAL"),
+    ],
+)
+def test_an_option_that_would_be_ignored_is_refused(words: str, told: str, tmp_path: Path) -> None:
+    store = filled_store(tmp_path / "store", 2)
+    with pytest.raises(bgars.InputError, match=told):
+        run(store.folder, *words.split())
+    assert not (store.folder / "pages").exists()
+
+
 def test_the_overview_counts_and_links(tmp_path: Path) -> None:
     store = filled_store(tmp_path / "store", 8)
     facts = lot_facts(store)

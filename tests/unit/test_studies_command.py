@@ -189,6 +189,7 @@ def test_grr_refuses_what_is_no_study_by_name_and_leaves_nothing(name: str, tmp_
         (["grr", "empty"], "empty: must be a result, a capture, or hold folders of them"),
         (["grr", "study/part1/place1/1"], "is a single run"),
         (["grr", "study", "--recipe", "p.toml"], "holds a finished result, which brings its own recipe"),
+        (["grr", "study", "--method", "blind"], "--method: goes with captures; study holds finished results"),
         (["grr", "study", "--references", "none.csv"], "none.csv: no such file"),
         (["grr", "study", "--references", "heading.csv"], "heading.csv: line 1: must be part,ball,characteristic"),
         (["grr", "study", "--references", "name.csv"], "name.csv: line 2: characteristic must be one of diameter_um"),
@@ -203,6 +204,7 @@ def test_grr_refuses_what_is_no_study_by_name_and_leaves_nothing(name: str, tmp_
         (["spc", "study/part1/place1", "--subgroup", "5"], "results: must be at least 10 (2 subgroups of 5), got 3"),
         (["spc", "study/part1/place1", "study/part1/place1/1"], "is given more than once"),
         (["spc", "study/part1/place1", "--subgroup", "-1"], "subgroup: must be 1 or more parts, got -1"),
+        (["spc", "study/part1/place1", "--subgroup", "0"], "subgroup: must be 1 or more parts, got 0"),
         (["spc", "name.csv"], "name.csv: is not valid JSON"),
     ],
 )

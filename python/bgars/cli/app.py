@@ -81,9 +81,9 @@ def demo(
         "bgars-demo"
     ),
     parts: Annotated[
-        int | None, typer.Option(min=4, help="Number of parts of the line; 50 by default.", show_default=False)
+        int | None, typer.Option(min=4, help="line: number of parts; 50 by default.", show_default=False)
     ] = None,
-    no_open: Annotated[bool, typer.Option("--no-open", help="Do not open the page of the lot.")] = False,
+    no_open: Annotated[bool, typer.Option("--no-open", help="line: do not open the page of the lot.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Reconstruct the sample solder ball that comes with bgars, or simulate a station on a line.
@@ -96,6 +96,9 @@ def demo(
 
         demo_line(output, parts=parts, opens=not no_open, as_json=as_json)
         return
+    if parts is not None or no_open:
+        msg = f"{'--no-open' if parts is None else '--parts'}: goes with 'bgars demo line' only"
+        raise bgars.InputError(msg)
     folder = bgars.sample_capture()
     _need_places(folder, output)
     with picture_process(OVERVIEW) as painter:

@@ -26,6 +26,7 @@ from bgars.cli.options import (
     StationNameOption,
     StoreOption,
 )
+from bgars.errors import InputError
 from bgars.line.batch import Batch, Progress, inspect_many
 from bgars.line.naming import Naming
 from bgars.normals.methods import DEFAULT_METHOD
@@ -93,6 +94,9 @@ def batch(
     Exit code 0: every part passes. 1: a part does not, or could not be inspected. 2: wrong use, or a store that cannot
     be written. 130: interrupted; run it again to continue.
     """
+    if send_images and scheduler is None:
+        msg = "--send-images: goes with --scheduler"
+        raise InputError(msg)
     naming = Naming(serial_from, PartIdentity(lot=lot, station=station_name, operator=operator, round=round_))
     with _progress() as report:
         done = inspect_many(
@@ -120,7 +124,7 @@ def batch(
 def _tell(done: Batch, output: Path) -> None:
     verdicts = ", ".join(f"{count} {verdict}" for verdict, count in done.verdicts.items())
     rate = f", {60 * done.inspected / done.seconds:.1f} parts per minute" if done.inspected and done.seconds > 0 else ""
-    say(f"{done.inspected} parts inspected: {verdicts} ({done.seconds:.1f} s{rate})")
+    say(f"{done.inspected} part{'' if done.inspected == 1 else 's'} inspected: {verdicts} ({done.seconds:.1f} s{rate})")
     if done.known:
         say(f"{done.known} were in the store already and were skipped")
     for note in done.notes[:MOST_FAILURES]:
@@ -130,7 +134,7 @@ def _tell(done: Batch, output: Path) -> None:
     if done.failures:
         say(f"{len(done.failures)} could not be inspected; the next run tries again:")
         for folder, reason in done.failures[:MOST_FAILURES]:
-            say(f"  {folder}: {reason}")
+            say(f"  {reason}" if reason.startswith(f"{folder}: ") else f"  {folder}: {reason}")
         if len(done.failures) > MOST_FAILURES:
             say(f"  ... and {len(done.failures) - MOST_FAILURES} more: bgars query {output} 'select * from failures'")
     say()

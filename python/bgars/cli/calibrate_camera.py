@@ -99,7 +99,7 @@ def response(
 def scale(
     folders: Annotated[
         list[Path],
-        typer.Argument(metavar="FOLDERS...", help="Grid where parts lie; or at several heights.", show_default=False),
+        typer.Argument(metavar="FOLDER", help="Grid where parts lie; or at several heights.", show_default=False),
     ],
     output: OutputOption,
     pitch_mm: Annotated[

@@ -38,7 +38,7 @@ OutputOption = Annotated[
     typer.Option(
         "--output",
         "-o",
-        metavar="station.toml",
+        metavar="STATION.toml",
         help="Station file; created, or its section of this calibration replaced. station.html is written beside it.",
         show_default=False,
     ),
@@ -65,7 +65,7 @@ InViewOption = Annotated[
 RecipeOption = Annotated[
     Path | None,
     typer.Option(
-        metavar="part.toml", help="With --sphere balls: layout of the part, and usual roundness of its balls.",
+        metavar="PART.toml", help="With --sphere balls: layout of the part, and usual roundness of its balls.",
         show_default=False,
     ),
 ]  # fmt: skip

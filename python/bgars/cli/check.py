@@ -13,7 +13,7 @@ from bgars.checks.response import DOUBT
 from bgars.cli.calibrate_station import OutlineOption
 from bgars.cli.camera_option import CameraOption
 from bgars.cli.console import print_json, say
-from bgars.cli.drift import LogOption, drift
+from bgars.cli.drift import drift
 from bgars.errors import CaptureWarning, InputError
 from bgars.io.atomic import FolderNames, atomic_file, atomic_folder
 from bgars.io.given_paths import need_folder, need_output
@@ -54,7 +54,7 @@ def check(
     station: Annotated[
         Path | None,
         typer.Option(
-            metavar="station.toml",
+            metavar="STATION.toml",
             help="Compare with the calibration of this station: FOLDER shows its reference again.",
             show_default=False,
         ),
@@ -62,7 +62,10 @@ def check(
     outline: OutlineOption = None,
     camera: CameraOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
-    log_line: LogOption = False,
+    log_line: Annotated[
+        bool,
+        typer.Option("--log", help="With --station: print one line of key=value pairs for a log instead of text."),
+    ] = False,
 ) -> None:
     """Check whether images and lights belong together, and find other faults of a capture, before it is measured.
 
@@ -98,7 +101,7 @@ def check(
         _tell(capture.name, findings)
         if page is not None:
             say()
-            say(f"  {page}  a picture for each finding")
+            say(f"  {page}  {'a picture for each finding' if findings.findings else 'says that nothing was found'}")
     if findings.errors:
         raise typer.Exit(EXIT_WRONG)
 

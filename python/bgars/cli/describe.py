@@ -29,7 +29,7 @@ def register(app: typer.Typer) -> None:
 def info(folder: FolderArgument, channel: ChannelChoice = None, as_json: JsonOption = False) -> None:
     """Describe a capture: images, lights, scale, clipped pixels.
 
-    What 'bgars check' finds in it is told besides.
+    Also says what 'bgars check' finds in it.
     """
     capture = bgars.read_capture(folder, channel=channel)
     facts = describe(capture)

@@ -29,7 +29,7 @@ from bgars.station.drift import COMPARED
 if TYPE_CHECKING:
     from bgars.records.remark import Remark
 
-__all__ = ["LogOption", "drift", "register"]
+__all__ = ["drift", "register"]
 
 EXIT_MOVED = 1
 LARGEST = {
@@ -41,8 +41,6 @@ LARGEST = {
 }
 """Keys of the log line, and the codes whose largest change they hold."""
 
-LogOption = Annotated[bool, typer.Option("--log", help="Print one line of key=value pairs for a log instead of text.")]
-
 
 def register(group: typer.Typer) -> None:
     """Add the command to the group ``calibrate``."""
@@ -51,7 +49,7 @@ def register(group: typer.Typer) -> None:
 
 def drift(
     folder: FolderArgument,
-    station: Annotated[Path, typer.Option(metavar="station.toml", help="The station.", show_default=False)],
+    station: Annotated[Path, typer.Option(metavar="STATION.toml", help="The station.", show_default=False)],
     reference: Annotated[
         Literal["mirror", "matt", "flat"] | None,
         typer.Option(help="Reference in view; by default the kind of ball of the calibration.", show_default=False),
@@ -59,7 +57,9 @@ def drift(
     outline: OutlineOption = None,
     camera: CameraOption = None,
     as_json: JsonOption = False,
-    log_line: LogOption = False,
+    log_line: Annotated[
+        bool, typer.Option("--log", help="Print one line of key=value pairs for a log instead of text.")
+    ] = False,
 ) -> None:
     """Say what moved since the calibration, on a new capture of its reference.
 

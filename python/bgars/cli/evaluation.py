@@ -16,8 +16,13 @@ ALL_MEASURED, HALF = 0.9995, 0.5
 
 def choice_in_words(normals: dict[str, Any]) -> str:
     """Whether a field's normals can be trusted and why, then what was used."""
-    share = normals["measured_share"]
-    if share >= ALL_MEASURED:
+    share, on_balls = normals["measured_share"], normals["measured_share_on_balls"]
+    if share >= HALF and on_balls is not None and on_balls < HALF:
+        trust = (
+            f"Trust the surface beside the balls: the images determine {100 * share:.1f} % of the normals, but only "
+            f"{100 * on_balls:.1f} % of those on balls; the others are filled in, and marked."
+        )
+    elif share >= ALL_MEASURED:
         trust = "Trust: the images determine every normal."
     elif share >= HALF:
         trust = f"Trust: the images determine {100 * share:.1f} % of the normals; the others are filled in, and marked."

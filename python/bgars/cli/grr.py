@@ -92,6 +92,9 @@ def grr(
     with stage_progress() as report, atomic_folder(output, NAMES) as place:
         known = None if references is None else bgars.read_references(references)
         study = bgars.read_study(folder, recipe, method=method, progress=lambda fraction: report("runs", fraction))
+        if not study.inspected and method != DEFAULT_METHOD:
+            msg = f"--method: goes with captures; {folder} holds finished results"
+            raise InputError(msg)
         found = bgars.gauge_rr(study, known)
         (place / "grr.html").write_text(grr_page(found), encoding="utf-8")
         (place / "grr.json").write_text(_json(found), encoding="utf-8")

@@ -36,20 +36,22 @@ def init(
     station: Annotated[
         Path | None,
         typer.Option(
-            metavar="station.toml", help="Calibrated station, with lights, scale and more.", show_default=False
+            metavar="STATION.toml", help="Calibrated station, with lights, scale and more.", show_default=False
         ),
     ] = None,
     ring: Annotated[
         str | None,
         typer.Option(
-            metavar="COUNT,ELEVATION[,AZIMUTH0]",
-            help="Lights of a ring in equal steps: count, elevation and first azimuth in degrees, such as 8,45.",
+            metavar="COUNT,ELEVATION",
+            help="Lights of a ring in equal steps: count, elevation and, if it is not 0, first azimuth, in degrees, "
+            "such as 8,45 or 8,45,22.5.",
             show_default=False,
         ),
     ] = None,
-    pitch_um: Annotated[
+    pixel_pitch_um: Annotated[
         float | None, typer.Option(metavar="UM", help="Size of a pixel on the board, in um.", show_default=False)
     ] = None,
+    pitch_um: Annotated[float | None, typer.Option(hidden=True, help="Former name of --pixel-pitch-um.")] = None,
     dark: Annotated[
         str | None, typer.Option(metavar="IMAGE", help="Image with all lights off.", show_default=False)
     ] = None,
@@ -59,6 +61,7 @@ def init(
 
     Exit code 2 where a capture.toml is there already, or nothing says where the lights are.
     """
+    pixel_pitch_um = pitch_um if pixel_pitch_um is None else pixel_pitch_um
     place = need_folder(folder) / RECIPE_NAME
     if place.exists() and not force:
         msg = f"{place}: exists; --force replaces it"
@@ -71,13 +74,13 @@ def init(
                 lambda text: _checked(text, folder),
                 "8,45",
             )
-        if station is None and pitch_um is None:
+        if station is None and pixel_pitch_um is None:
             question = "Size of a pixel on the board in um (empty: not known)"
-            pitch_um = _asked(question, lambda text: _above_0(text) if text else None)
+            pixel_pitch_um = _asked(question, lambda text: _above_0(text) if text else None)
     if (station is None) == (ring is None):
         msg = "--station or --ring: give one of them, to say where the lights are"
         raise InputError(msg)
-    lines = [] if pitch_um is None else [f"pixel_pitch_um = {pitch_um!r}"]
+    lines = [] if pixel_pitch_um is None else [f"pixel_pitch_um = {pixel_pitch_um!r}"]
     if dark is not None:
         need_file(folder / dark)
         lines.append(f"dark = {json.dumps(dark)}")
@@ -86,7 +89,7 @@ def init(
         _need_scale(station, pitch_um)
         lines.append(f"station = {json.dumps(str(station.resolve()))}")
     if ring is not None:
-        lines += ["", "[lights]", f"ring = {_ring(_checked(ring, folder))}"]
+        lines += [*([""] if lines else []), "[lights]", f"ring = {_ring(_checked(ring, folder))}"]
     with atomic_file(place) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
         try:
@@ -106,7 +109,14 @@ def _asked(question: str, read: Callable[[str], T], default: str = "") -> T:
         except BgarsError as error:
             raise typer.BadParameter(str(error)) from None
 
-    found: T = typer.prompt(question, default=default, show_default=bool(default), value_proc=once)
+    try:
+        found: T = typer.prompt(question, default=default, show_default=bool(default), value_proc=once)
+    except typer.Abort as end:
+        if isinstance(end.__context__, KeyboardInterrupt):
+            raise KeyboardInterrupt from None
+        say()  # ends the line of the question
+        msg = "no answer: nothing was written"
+        raise InputError(msg) from None
     return found
 
 
@@ -154,7 +164,10 @@ def _above_0(text: str) -> float:
 
 def _ring(text: str) -> str:
     """The ring as an inline table."""
-    values = [_number(part) for part in text.split(",")]
+    try:
+        values = [_number(part) for part in text.split(",")]
+    except InputError:
+        values = []
     names = ("count", "elevation_deg", "azimuth0_deg")
     if not 1 < len(values) <= len(names) or not all(map(math.isfinite, values)) or values[0] != int(values[0]):
         msg = f"--ring: must be COUNT,ELEVATION or COUNT,ELEVATION,AZIMUTH0, got {text!r}"

@@ -23,6 +23,7 @@ from bgars.cli.options import (
     LotOption,
     MethodOption,
     OperatorOption,
+    RecipeOption,
     RoundOption,
     StationNameOption,
     StationOption,
@@ -67,16 +68,7 @@ def inspect(
             "--output", "-o", metavar="OUT", help="Folder for the results; created if missing.", show_default=False
         ),
     ],
-    recipe: Annotated[
-        Path | None,
-        typer.Option(
-            "--recipe",
-            "-r",
-            metavar="PART.toml",
-            help="Layout and limits of the part (docs/inspection.md).",
-            show_default=False,
-        ),
-    ] = None,
+    recipe: RecipeOption = None,
     method: MethodOption = DEFAULT_METHOD,
     station: StationOption = None,
     serial: Annotated[

@@ -62,6 +62,11 @@ class LazyGroup(CarefulGroup):
         for name, (module, line) in LAZY_COMMANDS.items():
             self.commands[name] = _Listed(name, help=line, module=module)
 
+    def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
+        """Show the options of completion, which typer adds last, as the flags that they are."""
+        _show_flags(self)
+        super().format_help(ctx, formatter)
+
 
 class _Listed(TyperCommand):
     """A command's name and line; it becomes the command itself where arguments are parsed or completed."""
@@ -97,11 +102,15 @@ def _with_added_methods(command: Any) -> None:  # noqa: ANN401
     command.format_help = format_help
 
 
-def _reflow(command: Any) -> None:  # noqa: ANN401
-    """Join the lines of each paragraph of the help, which the terminal's width then breaks; flags take no value."""
+def _show_flags(command: Any) -> None:  # noqa: ANN401
     for option in getattr(command, "params", ()):
         if getattr(option, "is_flag", False):
             option.metavar = ""  # else <bool>, as if they took one
+
+
+def _reflow(command: Any) -> None:  # noqa: ANN401
+    """Join the lines of each paragraph of the help, which the terminal's width then breaks; flags take no value."""
+    _show_flags(command)
     own_help = command.get_help_option
 
     def help_option(context: Any) -> Any:  # noqa: ANN401

@@ -54,7 +54,7 @@ def _place(name: Method) -> tuple[bool, int]:
     return not TABLE[name].is_compared, -list(TABLE).index(name)
 
 
-METHOD_HELP = " ".join(f"{name}: {TABLE[name].summary}" for name in sorted(TABLE, key=_place))
+METHOD_HELP = "\n\n".join(f"{name}: {TABLE[name].summary}" for name in sorted(TABLE, key=_place))
 METHOD_METAVAR = "METHOD"
 METHOD_ARGUMENTS: dict[str, Any] = {"parser": method_name, "metavar": METHOD_METAVAR, "autocompletion": _completed}
 MethodOption = Annotated[Method, typer.Option("--method", "-m", help=METHOD_HELP, **METHOD_ARGUMENTS)]
@@ -95,14 +95,14 @@ SerialFrom = Annotated[
     typer.Option(
         metavar="PATTERN",
         help="Source of serial numbers: a pattern for the folder's name with {serial}, {lot}, {substrate}, "
-        "{position}, {station}, {operator}, {round}, such as '{lot}/{serial}_{position}'; or 'code', the "
+        "{position}, {station}, {operator}, {round}, such as '{lot}/{serial}'; or 'code', the "
         r"DataMatrix or QR code in the images. A \[part] table in capture.toml takes precedence.",
     ),
 ]
 StationOption = Annotated[
     Path | None,
     typer.Option(
-        metavar="station.toml",
+        metavar="STATION.toml",
         help="Calibrated station (docs/station.md), whose lights, response, flat field and scale are used.",
         show_default=False,
     ),

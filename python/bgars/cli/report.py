@@ -88,6 +88,7 @@ def report(
     Exit code 0: the page was written, whatever the verdict. 2: there is no result, or it is not one.
     """
     if is_store(result):
+        _need_use(serial, {"--lot": lot, "--pages": pages or None}, {"--round": round_, "--recipe-name": recipe_name})
         _report_store(open_store(result), serial, output, lot, round_, recipe_name, pages=pages, as_json=as_json)
         return
     if serial is not None or lot is not None or round_ is not None or recipe_name is not None or pages:
@@ -104,6 +105,15 @@ def report(
     say(f"{page}: open it in a browser")
     for warning in source.warnings:
         say(f"warning: {warning}")
+
+
+def _need_use(serial: str | None, of_overview: dict[str, object], of_part: dict[str, object]) -> None:
+    """Raise InputError where an option would be ignored: those of the overview with SERIAL, those of a part without."""
+    unused, rule = (of_part, "needs SERIAL") if serial is None else (of_overview, "is for the overview, without SERIAL")
+    name = next((name for name, given in unused.items() if given is not None), None)
+    if name is not None:
+        msg = f"{name}: {rule}"
+        raise InputError(msg)
 
 
 def _report_store(

@@ -77,7 +77,8 @@ def spc(
         str,
         typer.Option(
             metavar="SQL",
-            help="Chart the numbers of this query of a store instead (I-MR); its other columns are labels.",
+            help="Chart the numbers of this query of a store instead (I-MR); its other columns are labels; "
+            "ORDER BY gives their order.",
             show_default=False,
         ),
     ] = "",
@@ -94,6 +95,10 @@ def spc(
     need_output(output, *results)
     rules = parse_rules(nelson)
     if query:
+        unused = {"--where": bool(where), "--subgroup": subgroup is not None, "--target": target != TARGET}
+        if ignored := next((name for name, given in unused.items() if given), None):
+            msg = f"{ignored}: does not go with --query, whose chart is of single values without limits"
+            raise InputError(msg)
         _chart_query(results, query, output, rules, zone_rules=western_electric, as_json=as_json)
         return
     with stage_progress() as report, atomic_folder(output, NAMES) as place:
@@ -102,7 +107,7 @@ def spc(
         )
         found = bgars.process_trend(
             ordered,
-            subgroup=subgroup or (DEFAULT_SUBGROUP if len(ordered) >= FEW_PARTS else 1),
+            subgroup=(DEFAULT_SUBGROUP if len(ordered) >= FEW_PARTS else 1) if subgroup is None else subgroup,
             target=target,
             zone_rules=western_electric,
             nelson=rules,

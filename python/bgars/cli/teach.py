@@ -30,7 +30,7 @@ def teach(
         typer.Argument(metavar="GOLDEN", help="Capture folders of parts that are good.", show_default=False),
     ],
     output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="part.toml", help="Part recipe to write.", show_default=False)
+        Path, typer.Option("--output", "-o", metavar="PART.toml", help="Part recipe to write.", show_default=False)
     ],
     name: Annotated[str, typer.Option(help="Name of the part; the file's name by default.", show_default=False)] = "",
     station: StationOption = None,
@@ -48,6 +48,7 @@ def teach(
     with stage_progress() as report:
         for index, folder in enumerate(golden):
             results.append(bgars.inspect(bgars.read_capture(folder, station=station)))
+            _need_separate_balls(folder, results[-1])
             report("golden", (index + 1) / len(golden))
     taught = learn(results, name or output.stem)
     with atomic_file(output) as place:
@@ -65,10 +66,21 @@ def teach(
     say(f"Written: {output}. Check its limits before you use it.")
 
 
+def _need_separate_balls(folder: Path, result: bgars.PartResult) -> None:
+    """Raise InputError where balls are bridged: that is no layout of a good part."""
+    bridged = [ball.name for ball in result.balls if ball.present and ball.kind == "bridged"]
+    if bridged:
+        msg = f"{folder}: bridged balls: {', '.join(bridged)}; a golden part has none"
+        raise InputError(msg)
+
+
 def _check_place(output: Path, *, force: bool) -> None:
     """Raise InputError where writing would replace a file that is not to be replaced: before long work."""
     if not output.exists():
         return
+    if output.is_dir():
+        msg = f"{output}: is a folder; name a file, such as {output / 'part.toml'}"
+        raise InputError(msg)
     if not force:
         msg = f"{output}: exists; --force replaces it"
         raise InputError(msg)

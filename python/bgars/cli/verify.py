@@ -39,13 +39,13 @@ def verify(
     known: Annotated[
         Path,
         typer.Option(
-            metavar="known.csv",
+            metavar="KNOWN.csv",
             help="CSV table of calibrated sizes: name, height_um, diameter_um, u_um.",
             show_default=False,
         ),
     ],
     station: Annotated[
-        Path, typer.Option(metavar="station.toml", help="Station file; the result is added to it.", show_default=False)
+        Path, typer.Option(metavar="STATION.toml", help="Station file; the result is added to it.", show_default=False)
     ],
     recipe: Annotated[
         Path | None,

@@ -70,7 +70,10 @@ class FolderCamera:
     def grab(self, light: int) -> NDArray[Any]:
         """Return the image of a light: as capture.toml in the folder lists them, else in the order of their numbers."""
         if not 0 <= light < len(self.files):
-            msg = f"light: must be 0 to {len(self.files) - 1}, got {light}"
+            msg = (
+                f"light: must be 0 to {len(self.files) - 1}, as {self.files[0].parent} holds {len(self.files)} images, "
+                f"got {light}"
+            )
             raise InputError(msg)
         return np.asarray(iio.imread(self.files[light]))
 

@@ -29,7 +29,7 @@ def watched(folder: Path) -> Iterator[None]:
         It is no folder that can be written.
     """
     if not folder.is_dir():
-        msg = f"{folder}: no such folder"
+        msg = f"{folder}: is not a folder" if folder.exists() else f"{folder}: no such folder"
         raise FileFormatError(msg)
     try:
         lock = (folder / LOCK).open("a+b")

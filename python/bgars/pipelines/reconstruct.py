@@ -12,6 +12,7 @@ from bgars.normals.methods import DEFAULT_METHOD, Method
 from bgars.normals.noise_floor import without_background
 from bgars.pipelines.check import checked_beside, tell_before
 from bgars.pipelines.normals import estimate_normals
+from bgars.records.circle_pixels import inside_circles
 from bgars.records.scalar_checks import check_progress, thread_count
 from bgars.records.whole_capture import need_whole
 from bgars.surface.flatten import Bow, Flatten, find_bow, flattened
@@ -83,10 +84,20 @@ def summarise_field(field: NormalField) -> dict[str, Any]:
         "choice": field.method_reason,  # its old name, for one release
         "valid_pixels": valid,
         "measured_share": float((field.is_measured & field.mask).sum() / valid) if valid else 0.0,
+        "measured_share_on_balls": _share_on_balls(field),
         "mean_confidence": float(field.confidence[field.mask].mean()) if field.mask.any() else 0.0,
         "mean_lights_kept": float(field.lights_kept[field.mask].mean()) if field.mask.any() else 0.0,
         "reflectance": None if field.reflectance is None else summarise_fit(field.reflectance),
     }
+
+
+def _share_on_balls(field: NormalField) -> float | None:
+    """Share of the valid normals on balls that are measured; None where no balls are known."""
+    fit = field.reflectance
+    if fit is None or not fit.accepted or not fit.circles_px:
+        return None
+    on_balls = field.mask & inside_circles(fit.circles_px, field.mask.shape)
+    return float((field.is_measured & on_balls).sum() / on_balls.sum()) if on_balls.any() else None
 
 
 def summarise_fit(fit: ReflectanceFit) -> dict[str, Any]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from bgars.records.short import Short
+
 __all__ = ["BallKind", "FoundBall", "FoundBalls"]
 
 BallKind = Literal["ball", "extra", "bridged"]
@@ -41,8 +43,8 @@ class FoundBall:
     kind: BallKind = "ball"
 
 
-@dataclass(frozen=True)
-class FoundBalls:
+@dataclass(frozen=True, repr=False)
+class FoundBalls(Short):
     """The balls of an image and their lattice.
 
     Attributes

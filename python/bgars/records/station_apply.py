@@ -33,6 +33,17 @@ def with_station(capture: Capture, station: Station) -> Capture:
     With a flat field the images are float32 ratios to the flat board, times what a light at the image centre gives
     there; clipped pixels stay clipped. With a lens that distorts they are resampled without its distortion.
 
+    Parameters
+    ----------
+    capture : Capture
+        (L, H, W) images, one per light of the station, in its order.
+    station : Station
+        From :func:`bgars.read_station`; what it does not know is left as the capture has it.
+
+    Returns
+    -------
+    Capture
+
     Raises
     ------
     InputError

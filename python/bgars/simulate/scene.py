@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bgars.records.short import Short
 from bgars.simulate.array import Jitter, array_balls
 from bgars.simulate.balls import Ball, Bridge
 from bgars.simulate.board import Board
@@ -23,8 +24,8 @@ __all__ = ["Scene"]
 MAX_BALLS = 32_767
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
+@dataclass(frozen=True, eq=False, repr=False)
+class Scene(Short):
     """What the camera looks at; make one with :meth:`plane`, :meth:`hemisphere`, :meth:`ball` or :meth:`ball_array`.
 
     Attributes

@@ -9,6 +9,7 @@ import numpy as np
 
 from bgars.records.pixels import BoolArray, FloatArray
 from bgars.records.renamed import renamed
+from bgars.records.short import Short
 from bgars.records.truth import Truth
 from bgars.simulate.coplanarity import PlaneTruth, regression_plane, seating_plane
 
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
 __all__ = ["BallTruth", "SimulatedTruth", "SimulationSetup", "ball_table", "coplanarities"]
 
 
-@dataclass(frozen=True, eq=False)
-class SimulationSetup:
+@dataclass(frozen=True, eq=False, repr=False)
+class SimulationSetup(Short):
     """Everything that determines a simulated capture, to the bit.
 
     Attributes

@@ -241,7 +241,8 @@ def open_store(folder: str | PathLike[str], *, create: bool = False) -> Store:
             msg = f"{folder}: is not a store of bgars: it holds no {MARK}"
             raise FileFormatError(msg)
         if folder.exists() and not _is_free(folder) and not mark.is_file():
-            msg = f"{folder}: must be a store, an empty folder, or a new name; it holds other files"
+            why = "it holds other files" if folder.is_dir() else "it is a file"
+            msg = f"{folder}: must be a store, an empty folder, or a new name; {why}"
             raise InputError(msg)
         heading = {"format": FORMAT, "format_version": FORMAT_VERSION, "tables": sorted(TABLES)}
         write_durably(mark, json.dumps(heading, indent=2).encode() + b"\n")

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from bgars.errors import InputError
+from bgars.records.short import Short
 from bgars.studies.accuracy import TYPICAL_RUNS, Accuracy, accuracy_figures
 from bgars.studies.characteristics import CHARACTERISTICS, TITLES
 from bgars.studies.gauge import GaugeFigures, gauge_figures
@@ -25,8 +26,8 @@ FORMAT_VERSION = 1
 FEW_MEASURANDS, FEW_PLACEMENTS, FEW_DF = 10, 3, 20
 
 
-@dataclass(frozen=True, eq=False)
-class GaugeStudy:
+@dataclass(frozen=True, eq=False, repr=False)
+class GaugeStudy(Short):
     """What a gauge study found.
 
     Attributes

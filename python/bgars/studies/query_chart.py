@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -61,13 +62,17 @@ def query_charts(
     Raises
     ------
     InputError
-        A question that DuckDB refuses, or an answer without numbers or with fewer than 3 rows.
+        A question that DuckDB refuses or that has no ORDER BY, or an answer without numbers or with fewer than 3 rows.
 
     Examples
     --------
     ``query_charts(store, "select serial, warpage_um from parts order by sequence")``
     """
     rows = store.query(sql).to_pylist()
+    if not re.search(r"\border\s+by\b", sql, re.IGNORECASE):
+        # Moving ranges are of neighbours: without an order the database returns other ones each time.
+        msg = f"query: must say in which order its rows are charted, such as ORDER BY sequence, got {sql!r}"
+        raise InputError(msg)
     if len(rows) < MIN_VALUES:
         msg = f"query: must give at least {MIN_VALUES} rows to be charted, got {len(rows)}"
         raise InputError(msg)

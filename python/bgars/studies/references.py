@@ -31,6 +31,16 @@ def read_references(path: str | PathLike[str]) -> References:
 
     References are in the unit that the characteristic names; the ball is empty for a characteristic of the part.
 
+    Parameters
+    ----------
+    path : path
+        CSV in UTF-8; its first line is ``part,ball,characteristic,reference``.
+
+    Returns
+    -------
+    dict of (str, str, str) to float
+        Reference by part, ball ("" = the part) and characteristic, for :func:`bgars.gauge_rr`.
+
     Raises
     ------
     FileFormatError

@@ -37,7 +37,7 @@ def trend_figure(trend: Trend | QueryChart, labels: Sequence[str] = ()) -> Figur
     top, bottom = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [3, 2]})
     chart = trend.chart
     unit = f" ({trend.unit})" if trend.unit else ""
-    above, below = ("mean", "std. deviation") if chart.size > 1 else ("part", "moving range")
+    above, below = ("mean", "std. deviation") if chart.size > 1 else ("value", "moving range")
     _chart(top, chart.means, (chart.low, chart.centre, chart.high), above + unit)
     _chart(bottom, chart.spreads, (chart.spread_low, chart.spread_centre, chart.spread_high), below + unit)
     for name, axes, values in (("mean", top, chart.means), ("spread", bottom, chart.spreads)):

@@ -16,6 +16,7 @@ from bgars.normals.methods import DEFAULT_METHOD, Method
 from bgars.pipelines.inspect import inspect
 from bgars.records.part_recipe import PartRecipe
 from bgars.records.scalar_checks import check_progress
+from bgars.records.short import Short
 from bgars.studies.alike import check_alike
 
 if TYPE_CHECKING:
@@ -54,8 +55,8 @@ class Run:
     result: PartResult
 
 
-@dataclass(frozen=True)
-class Study:
+@dataclass(frozen=True, repr=False)
+class Study(Short):
     """A balanced crossed design: every part in every placement, equally often.
 
     Attributes

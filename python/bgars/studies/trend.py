@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bgars.errors import InputError
+from bgars.records.short import Short
 from bgars.studies.capability import Capability, capability
 from bgars.studies.characteristics import CHARACTERISTICS, Characteristic, part_readings
 from bgars.studies.control_chart import D2, MIN_VALUES, ControlChart, control_chart, individuals_chart
@@ -30,12 +31,13 @@ DEFAULT_SUBGROUP = 5
 TARGET = 1.33
 TYPICAL_SUBGROUPS = 25
 MIN_SUBGROUPS = 2
+SINGLE_CHARTS = {"mean": "value", "spread": "moving range"}
 MOVING_RANGE_DF = 0.6
 """Degrees of freedom a value of a sigma from moving ranges: of m normal values, its relative variance is 0.826 / m."""
 
 
-@dataclass(frozen=True, eq=False)
-class Trend:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trend(Short):
     """One characteristic over time.
 
     Attributes
@@ -84,8 +86,8 @@ class Trend:
     reason: str
 
 
-@dataclass(frozen=True, eq=False)
-class ProcessTrend:
+@dataclass(frozen=True, eq=False, repr=False)
+class ProcessTrend(Short):
     """Trend and capability of a process, from many results.
 
     Attributes
@@ -329,10 +331,11 @@ def _judged(
         doubts.append("check the readings")
     if chart.signals:
         first = chart.signals[0]
+        several = f"{len(chart.signals)} signals; first: " if len(chart.signals) > 1 else ""
+        name, what = (first.chart, "subgroup") if chart.size > 1 else (SINGLE_CHARTS[first.chart], "part")
         doubts.append(
-            f"not in control ({len(chart.signals)} signals; first: {first.chart} of "
-            f"{'subgroup' if chart.size > 1 else 'part'} {first.subgroup + 1}: "
-            f"{first.rule}), so that no index holds for the parts to come"
+            f"not in control ({several}{name} of {what} {first.subgroup + 1}: {first.rule}), "
+            "so that no index holds for the parts to come"
         )
     if left_out:
         doubts.append(f"not measured in every part: {', '.join(left_out[:8])}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -109,6 +110,9 @@ def _find(recipe: str | PathLike[str]) -> Path:
     if len(path.parts) == 1 and named.is_file():
         return named
     msg = f"{recipe}: is neither a recipe file (.toml, .json) nor one of {', '.join(named_recipes())}"
+    nearest = difflib.get_close_matches(path.name, named_recipes(), n=1)
+    if nearest:
+        msg = f"{msg}; did you mean {nearest[0]}?"
     raise FileFormatError(msg)
 
 

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from bgars.report.figures.style import VERDICT_COLORS, new_figure, part_title
@@ -22,6 +23,7 @@ __all__ = ["histogram_figure"]
 BAR = "#0072B2"
 COVERAGE_FACTOR = 2.0
 LEAST_SPAN_UM = 1.0
+SHADED = "undecided: nearer to a limit than U"
 PANELS = (
     ("true_position_um", "true_position_um", "u_true_position_um", "true position (µm)"),
     ("diameter_um", "diameter_um", "u_diameter_um", "diameter (µm)"),
@@ -47,6 +49,9 @@ def histogram_figure(result: PartResult) -> Figure:
             u_um = result.u_seating_coplanarity_um
         _panel(axes, known, limits, u_um, label)
         axes.set_title(_title(known, len(values) - len(known), bridged), fontsize=10)
+    shaded = [handle for axes in panels for handle in axes.get_legend_handles_labels()[0]]
+    if shaded:
+        figure.legend(handles=shaded[:1], loc="upper left", borderaxespad=0.6)
     return figure
 
 
@@ -79,15 +84,20 @@ def _panel(
         if math.isfinite(u_um):
             half = COVERAGE_FACTOR * u_um
             color = VERDICT_COLORS["undecided"]
-            axes.axvspan(edge - half, edge + half, color=color, alpha=0.35, linewidth=0, zorder=3.5)
+            band = axes.axvspan(edge - half, edge + half, color=color, alpha=0.35, linewidth=0, zorder=3.5)
+            band.set_label(SHADED)
         axes.annotate(
-            f" limit {edge:g}",
+            f"limit {edge:g}",
             (edge, 1.0),
             xycoords=("data", "axes fraction"),
+            xytext=(-4 if edge == edges[-1] else 4, 0),
+            textcoords="offset points",
             ha="right" if edge == edges[-1] else "left",
             va="top",
             fontsize=9,
             color=VERDICT_COLORS["fail"],
+            path_effects=[withStroke(linewidth=3, foreground="white")],
+            zorder=5,
         )
     if not edges:
         axes.annotate("no limit given", (0.98, 0.97), xycoords="axes fraction", ha="right", va="top", color="0.4")
