@@ -42,7 +42,8 @@ SHADOWED = 0.6
 FACES = 0.3
 """Of the lit level: a promise of less is no evidence."""
 AWAY = 0.05
-"""Of the lit level: so far below nothing is a promise that is no error of the lights that make it."""
+"""Of the lit level: so far below nothing is a promise that is no error of the lights that make it, of which a degree
+changes light at 45 degrees by 0.025."""
 LIT_QUANTILE = 0.6
 """Of the lights of a pixel: most light it."""
 DROPPED = 4

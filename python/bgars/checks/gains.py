@@ -28,8 +28,8 @@ degree of direction, which changes the light at 45 degrees by as much."""
 OF_OTHERS = 4.0
 """Times the usual deviation of the other lamps: where all are off, it is the table, or the light's fall-off."""
 ALIKE = 5.0
-"""Times the scatter over tiles: a lamp is off all over the image alike. Highlights, of which all tiles of a shiny part
-hold some, scatter by a third of what they add."""
+"""Times the scatter over tiles: a lamp is off all over the image alike. Chosen on a few captures: lamps that were off
+had 11 and more, highlights of balls and coins 1.4 to 7.8, few above 5."""
 MOST = 3
 """Lamps that are told, and taken out, one after the other."""
 MIN_LIGHTS = 6
