@@ -91,7 +91,7 @@ def test_wrong_use_gets_one_line(tmp_path: Path) -> None:
     for name, words in {"x": "must be folder:PATH", "no_such:Thing": "cannot be imported"}.items():
         with pytest.raises(bgars.InputError, match=words):
             camera_of(name)
-    with pytest.raises(bgars.InputError, match="light: must be 0 to 7, as .* holds 8 images, got 8"):
+    with pytest.raises(bgars.InputError, match=r"light: must be 0 to 7, as .* holds 8 images, got 8"):
         FolderCamera(bgars.sample_capture()).grab(8)
 
 
