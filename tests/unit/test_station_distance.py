@@ -46,6 +46,7 @@ def test_two_heights_tell_the_distance_the_pitch_at_the_board_and_the_tilt(dista
     told = next(one for one in said if one.code == "distance")
     u_mm = float(told.message.split("(u ")[1].split(" mm")[0])
     assert scale.camera_distance_mm is not None
+    assert (f"by {scale.tilt_deg:.2f} deg" in said[-1].message) == (tilt_deg != 0.0)
     assert abs(scale.camera_distance_mm - distance_mm) < 3.0 * u_mm < 0.1 * distance_mm
 
 

@@ -92,13 +92,17 @@ def calibrate_scale(
     u_grid = UNKNOWN_PITCH_U if u_pitch_um is None else u_pitch_um / pitch_um
     scale, said = with_distance([fit for fit, _ in fits], heights, u_grid, names[0])
     lowest = int(np.argmin(np.abs(heights)))
-    tilt_deg = fit_grid(grids[lowest][0], pitch_um, u_pitch_um, size_px=size_px, distance_mm=scale.camera_distance_mm)[
-        0
-    ].tilt_deg
-    return replace(scale, tilt_deg=tilt_deg, size_px=size_px), (
-        *(remark for _, found in fits for remark in found),
-        *said,
+    again, tilts = fit_grid(
+        grids[lowest][0],
+        pitch_um,
+        u_pitch_um,
+        size_px=size_px,
+        name=names[lowest],
+        distance_mm=scale.camera_distance_mm,
     )
+    findings = [remark for _, found in fits for remark in found if remark.code != "tilt"]
+    findings += [*said, *(remark for remark in tilts if remark.code == "tilt")]
+    return replace(scale, tilt_deg=again.tilt_deg, size_px=size_px), tuple(findings)
 
 
 def _grid_of(capture: Capture, target: Target) -> tuple[Array, tuple[int, int]]:
