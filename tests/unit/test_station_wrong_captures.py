@@ -197,3 +197,11 @@ def test_a_printed_grid_is_no_board() -> None:
     dots = np.where(np.hypot(rows % 30 - 15.0, cols % 30 - 15.0) < 7.0, 0.25, 1.0)
     with pytest.raises(bgars.CalibrationError, match="no smooth map fits the board: a place is off by"):
         bgars.calibrate_flat(board_with(dots))
+
+
+@pytest.mark.parametrize("part", ["lights", "flat"])
+def test_an_empty_folder_is_said_to_lack_images(tmp_path: Path, part: str) -> None:
+    (tmp_path / "empty").mkdir()
+    run = bgars_command("calibrate", part, tmp_path / "empty", "-o", tmp_path / "station.toml")
+    assert run.code == 2
+    assert "empty: 0 images (none found), one per light is needed, 3 or more; seen: nothing at all" in run.stderr

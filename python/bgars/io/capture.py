@@ -158,7 +158,7 @@ def read_unlit(folder: str | PathLike[str], *, channel: ChannelName | None = Non
     if (count := len(recipe.images or listing.images)) in {1, 2}:
         msg = f"{folder}: {count} image{'s'[: count - 1]}, 3 are needed or more; of a grid, copies will do"
         raise InputError(msg)
-    lights = _by_order(LightRig.ring(max(count, 3)), str(folder))
+    lights = _by_order(LightRig.ring(max(count, 3)), str(folder) if count else "")
     capture = _load_chosen(folder, recipe, lights, listing, None, channel, MAX_MEGAPIXELS, None, notes)
     _tell(folder, notes)
     return capture

@@ -80,8 +80,9 @@ def choose_images(
     below = _one_folder_down(folder, recipe, listing, count, notes) if not images else None
     if below is not None:
         return below
+    needed = f"but {lights.source} gives {count} lights" if lights.source else "one per light is needed, 3 or more"
     msg = (
-        f"{folder}: {len(images)} images ({some_of(images) or 'none found'}), but {lights.source} gives {count} lights"
+        f"{folder}: {len(images)} images ({some_of(images) or 'none found'}), {needed}"
         f"; seen: {listing.in_words(without_images=bool(images))}{_unread(listing, count)}"
     )
     raise InputError(msg)
