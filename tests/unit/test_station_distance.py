@@ -50,6 +50,14 @@ def test_two_heights_tell_the_distance_the_pitch_at_the_board_and_the_tilt(dista
     assert abs(scale.camera_distance_mm - distance_mm) < 3.0 * u_mm < 0.1 * distance_mm
 
 
+@pytest.mark.parametrize("off_um", [150.0, -200.0])
+def test_heights_that_are_off_by_a_hundredth_of_their_range_are_in_u(off_um: float) -> None:
+    """The board is not among them: its pitch is what they lead to, 0.3 % off."""
+    shots = [capture(grid(60.0, height, seed=seed)) for seed, height in enumerate((1000.0, 21000.0))]
+    scale, _ = bgars.calibrate_scale(shots, GRID_UM, heights_um=[1000.0 + off_um, 21000.0 + off_um])
+    assert 0.002 < abs(scale.pixel_pitch_um / PITCH_UM - 1.0) < 2.0 * scale.pixel_pitch_u_um / PITCH_UM < 0.02
+
+
 def test_a_telecentric_lens_is_told_and_too_little_height_tells_nothing() -> None:
     far = [capture(grid(np.inf, 0.0, seed=seed)) for seed in (1, 2)]
     scale, said = bgars.calibrate_scale(far, GRID_UM, heights_um=[0.0, 10000.0])

@@ -22,16 +22,7 @@ if TYPE_CHECKING:
 
     from bgars.records.ball_result import BallResult
 
-__all__ = [
-    "ABSENT",
-    "VERDICT_COLORS",
-    "ShownCapture",
-    "ShownField",
-    "ShownHeight",
-    "ShownPart",
-    "counted",
-    "facts_table",
-]
+__all__ = ["ABSENT", "VERDICT_COLORS", "ShownCapture", "ShownField", "ShownHeight", "ShownPart", "counted"]
 
 VERDICT_COLORS = {"pass": "#56B4E9", "fail": "#D55E00", "undecided": "#E69F00"}
 """Okabe and Ito, Color universal design, 2008: told apart by colour-blind readers."""

@@ -26,7 +26,7 @@ __all__ = ["checked_heights", "with_distance"]
 Array = NDArray[np.float64]
 
 HEIGHT_SHARE = 0.01
-"""Standard uncertainty of the heights that are stated, of their range: shims and stages."""
+"""Standard uncertainty of heights, of their range: shims and stages. Height 0, where parts lie, is exact."""
 SCALE_SHARE = 2e-5
 """Standard uncertainty of a scale against that at another height beside what its points scatter: 0.01 of 500 pixels, by
 which focus and light move the dots that are found."""
@@ -83,14 +83,17 @@ def with_distance(
     pitch = np.array([scale.pixel_pitch_um for scale in scales])
     u_all = np.array([scale.pixel_pitch_u_um for scale in scales])
     u_own = np.sqrt(np.maximum(np.square(u_all) - np.square(u_grid * pitch), 0.0) + np.square(SCALE_SHARE * pitch))
-    design = np.column_stack([np.ones_like(heights_um), -heights_um]) / u_own[:, None]
-    covariance = np.linalg.inv(design.T @ design)
-    at_zero, slope = covariance @ design.T @ (pitch / u_own)
-    off = np.abs(design @ [at_zero, slope] - pitch / u_own).max() / math.sqrt(max(len(pitch) - 2, 1))
-    per_mm = 1000.0 * float(slope / at_zero)
-    u_per_mm = math.hypot(1000.0 * math.sqrt(float(covariance[1, 1])) / at_zero, HEIGHT_SHARE * per_mm) * max(off, 1.0)
+    u_height = HEIGHT_SHARE * np.ptp(heights_um) * (heights_um != 0.0)
+    at_zero, slope = float(pitch.mean()), 0.0
+    for _ in range(2):  # the first time without the heights, which move sizes by as much as these grow with height
+        u = np.hypot(u_own, slope * u_height)
+        design = np.column_stack([np.ones_like(heights_um), -heights_um]) / u[:, None]
+        covariance = np.linalg.inv(design.T @ design)
+        at_zero, slope = (float(value) for value in covariance @ design.T @ (pitch / u))
+    off = np.abs(design @ [at_zero, slope] - pitch / u).max() / math.sqrt(max(len(pitch) - 2, 1))
+    u_zero, u_slope = np.sqrt(np.diag(covariance)) * max(float(off), 1.0)
+    per_mm, u_per_mm = 1000.0 * slope / at_zero, 1000.0 * float(u_slope) / at_zero
     span_mm = float(np.ptp(heights_um)) / 1000.0
-    u_zero = math.hypot(math.sqrt(float(covariance[0, 0])) * max(off, 1.0), u_grid * at_zero)
     reference = scales[int(np.argmin(np.abs(heights_um)))]
     distance_mm, remark = _judged(per_mm, u_per_mm, span_mm, name)
     findings = [remark]
@@ -99,8 +102,8 @@ def with_distance(
         findings.append(Remark("doubt", words, "heights", float(off), MISFIT))
     return replace(
         reference,
-        pixel_pitch_um=float(at_zero),
-        pixel_pitch_u_um=float(u_zero),
+        pixel_pitch_um=at_zero,
+        pixel_pitch_u_um=math.hypot(float(u_zero), u_grid * at_zero),
         camera_distance_mm=distance_mm,
     ), tuple(findings)
 

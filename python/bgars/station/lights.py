@@ -45,7 +45,6 @@ UNSURE_DEG = 2.0
 """Standard uncertainty of a direction that is worth a word."""
 FAR_DEG = 15.0
 """Turn of a light against the rig that the capture brings, from which on the order of the images is doubted."""
-
 ONE_PLACE_DEG, ONE_PLACE_SIGMAS = (0.2, 1.0), 3.0
 """Two lamps this near each other are one that was fired twice: within three standard uncertainties, but not below the
 width of the smallest LED, 1 mm at 300 mm, nor above what two housings need, 5 mm."""

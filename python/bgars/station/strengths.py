@@ -86,7 +86,7 @@ def repeatable(u: Array, by: str, balls: int) -> Array:
 
 def _farther(circle_px: Array, solution: LightSolution) -> Array:
     """(L,) square of the distance of each light from a ball, over that from the origin: 1 of distant lights."""
-    ways = solution.directions - solution.nearness[:, None] * np.array([circle_px[0], circle_px[1], circle_px[2]])
+    ways = solution.directions - solution.nearness[:, None] * circle_px
     square: Array = np.square(ways).sum(axis=1)
     return square
 
