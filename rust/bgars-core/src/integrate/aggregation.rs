@@ -54,7 +54,7 @@ pub(super) fn aggregate(fine: &impl Adjacency) -> (Graph, Aggregates) {
     let rows: Vec<RowOfBlocks> = (0..grid.height).into_par_iter().map(|row| aggregates_of(fine, row)).collect();
     let (parents, starts) = number(fine, &rows);
     let row_parts: Vec<([Part; 2], [Members; 2])> =
-        (0..grid.height).into_par_iter().map(|row| coarse_row(fine, row, &rows[row], &parents)).collect();
+        rows.into_par_iter().enumerate().map(|(row, blocks)| coarse_row(fine, row, &blocks, &parents)).collect();
     let mut parts = COLOURS.map(|colour| Part {
         rows: starts.iter().map(|start| start[colour as usize]).collect(),
         starts: vec![0],
