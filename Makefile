@@ -4,6 +4,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 # Modules are compiled when they are first imported; of the packages that are installed, most modules never are.
 export PIP_NO_COMPILE := 1
+# And kept: hundreds of processes begin in the tests, and each would compile numpy and scipy again, four times its work.
+unexport PYTHONDONTWRITEBYTECODE
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
 .PHONY: demo docs wheel api test test-rust test-python data lint lint-rust lint-python format accuracy inspection reality reality-scenes bilateral station station-balls simulator experiments method shape-page check-faults kills line watch-station schema constants studies performance bench fuzz clean

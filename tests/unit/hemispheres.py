@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import bgars
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +28,13 @@ def hemisphere(
 
 def anchored(capture: bgars.Capture, radius_px: float = RADIUS_PX, **options: object) -> bgars.NormalField:
     return bgars.estimate_normals(capture, anchors=[[0.0, 0.0, radius_px]], **options)
+
+
+@cache
+def plain() -> tuple[bgars.Capture, bgars.SimulatedTruth, bgars.NormalField]:
+    """The hemisphere of every default, and its normals."""
+    capture, truth = hemisphere()
+    return capture, truth, anchored(capture)
 
 
 def judged(truth: bgars.SimulatedTruth) -> NDArray[np.bool_]:

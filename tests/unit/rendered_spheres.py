@@ -96,49 +96,48 @@ def render(
     step = (np.arange(samples) + 0.5) / samples
     cols = (np.arange(width)[:, None] + step).ravel() - width / 2.0
     rows = height / 2.0 - (np.arange(height)[:, None] + step).ravel()
-    x, y = np.meshgrid(cols, rows)
     cx, cy, radius = ball
-    centre = np.array([cx, cy, radius])
-    inside = (x - cx) ** 2 + (y - cy) ** 2 < radius**2
-    rise = np.sqrt(np.maximum(radius**2 - (x - cx) ** 2 - (y - cy) ** 2, 0.0))
-    points = np.stack([x, y, np.where(inside, radius + rise, 0.0)], axis=-1)
-    normals = np.where(inside[..., None], (points - centre) / radius, [0.0, 0.0, 1.0])
-    mirrored = np.stack(
-        [2 * normals[..., 2] * normals[..., 0], 2 * normals[..., 2] * normals[..., 1], 2 * normals[..., 2] ** 2 - 1],
-        axis=-1,
-    )
+    inside = np.add.outer((rows - cy) ** 2, (cols - cx) ** 2) < radius**2
+    at_row, at_col = np.nonzero(inside)
+    # Rays are rows of these, of the ball's and of the board's alone: no ray is computed for both.
+    ball_x, ball_y = cols[at_col], rows[at_row]
+    rise = np.sqrt(np.maximum(radius**2 - (ball_x - cx) ** 2 - (ball_y - cy) ** 2, 0.0))
+    normals = (ball_x - cx) / radius, (ball_y - cy) / radius, rise / radius
+    row, col = np.nonzero(~inside)
+    board_x, board_y = cols[col], rows[row]
     rng = np.random.default_rng(seed)
     images = []
     power = np.ones(len(lights)) if intensities is None else intensities
     for index, light in enumerate(lights):
 
-        def to_light(at: Array, light: Array = light) -> tuple[Array, Array]:
-            if not near:
-                return np.broadcast_to(light, at.shape), np.ones(at.shape[:-1])
-            way = light - at
-            distance = np.linalg.norm(way, axis=-1)
-            return way / distance[..., None], (np.linalg.norm(light) / distance) ** 2
+        def to_light(x: Array, y: Array, z: Array, light: Array = light) -> tuple[Array, Array, Array, Array]:
+            ways = (light[0] - x, light[1] - y, light[2] - z) if near else np.split(light, 3)
+            distance = np.sqrt(ways[0] ** 2 + ways[1] ** 2 + ways[2] ** 2) if near else np.ones(1)
+            fall = (np.linalg.norm(light) / distance) ** 2 if near else distance
+            return ways[0] / distance, ways[1] / distance, ways[2] / distance, fall
 
-        def board_level(at: Array, index: int = index) -> Array:
-            way, fall = to_light(at)
-            toward = np.sum((centre - at) * way, axis=-1)
-            miss = np.linalg.norm(centre - at - toward[..., None] * way, axis=-1)
-            lit = ~((toward > 0) & (miss < radius))
-            return board * (room + power[index] * fall * way[..., 2] * lit)
+        def board_level(x: Array, y: Array, index: int = index) -> Array:
+            way_x, way_y, way_z, fall = to_light(x, y, np.zeros(1))
+            toward = (cx - x) * way_x + (cy - y) * way_y + radius * way_z
+            miss_x, miss_y, miss_z = cx - x - toward * way_x, cy - y - toward * way_y, radius - toward * way_z
+            lit = ~((toward > 0) & (np.sqrt(miss_x**2 + miss_y**2 + miss_z**2) < radius))
+            level: Array = board * (room + power[index] * fall * way_z * lit)
+            return level
 
-        way, fall = to_light(points)
         if kind == "mirror":
-            seen = np.full(inside.shape, room)
-            down = inside & (mirrored[..., 2] < -1e-3)
-            reach = np.where(down, -points[..., 2] / np.where(down, mirrored[..., 2], -1.0), 0.0)
-            ground = points + reach[..., None] * mirrored
-            ground[..., 2] = 0.0
-            seen = np.where(down, board_level(ground), seen)
-            share = 0.6 if refraction is None else mirrored_share(normals[..., 2], refraction)
-            level = np.where(inside, share * seen, board_level(points * [1, 1, 0]))
+            seen = np.full(len(rise), room)
+            normal_x, normal_y, normal_z = normals
+            down = 2 * normal_z**2 - 1 < -1e-3
+            reach = -(radius + rise[down]) / (2 * normal_z[down] ** 2 - 1)
+            slope = reach * 2 * normal_z[down]
+            seen[down] = board_level(ball_x[down] + slope * normal_x[down], ball_y[down] + slope * normal_y[down])
+            on_ball = (0.6 if refraction is None else mirrored_share(normal_z, refraction)) * seen
         else:
-            shade = albedo * (room + power[index] * fall * np.maximum(np.sum(normals * way, axis=-1), 0.0))
-            level = np.where(inside, shade, board_level(points * [1, 1, 0]))
+            way_x, way_y, way_z, fall = to_light(ball_x, ball_y, radius + rise)
+            cosine = normals[0] * way_x + normals[1] * way_y + normals[2] * way_z
+            on_ball = albedo * (room + power[index] * fall * np.maximum(cosine, 0.0))
+        level = np.zeros(inside.shape)
+        level[inside], level[~inside] = on_ball, board_level(board_x, board_y)
         picture = level.reshape(height, samples, width, samples).mean(axis=(1, 3))
         if kind == "mirror":
             add_lamp(picture, light, ball, lamp_deg, 0.6 * (lamp_level * power[index] - room), near)

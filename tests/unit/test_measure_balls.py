@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from bgars.inspection import check_shadows, measure_balls
 from bgars.records.found_balls import FoundBalls
+from bgars.records.measured_balls import BallMeasurement
 from measured_captures import array, errors, photograph, rms, sixteen_balls, wrong_rig
 from numpy.typing import NDArray
 from shared_work import shared
@@ -19,11 +20,18 @@ def part() -> tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]:
     return sixteen_balls()
 
 
+@pytest.fixture(scope="module")
+def measured_part(part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]) -> tuple[BallMeasurement, list[float]]:
+    """Balls of the part, measured by one thread, and the progress that was told."""
+    said: list[float] = []
+    return measure_balls(part[0], part[2], threads=1, progress=said.append), said
+
+
 def test_balls_are_measured_to_a_fraction_of_a_micrometre(
-    part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls],
+    part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls], measured_part: tuple[BallMeasurement, list[float]]
 ) -> None:
-    capture, truth, found = part
-    measured = measure_balls(capture, found)
+    _, truth, found = part
+    measured, _ = measured_part
     assert [ball.name for ball in measured.balls] == [ball.name for ball in found.balls]
     assert all(ball.reasons == () and ball.lights_used == 8 for ball in measured.balls)
     assert max(rms(errors(measured, truth, name)) for name in ("x_um", "y_um")) < 0.2
@@ -32,22 +40,19 @@ def test_balls_are_measured_to_a_fraction_of_a_micrometre(
     assert 0.0 < measured.shadow_residual_rms < 0.1
 
 
-def test_lights_that_are_right_stay_where_they_are(
-    part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls],
+def test_lights_that_are_right_stay_where_they_are(measured_part: tuple[BallMeasurement, list[float]]) -> None:
+    assert measured_part[0].light_change_deg.max() < 0.02
+
+
+def test_result_does_not_depend_on_threads(
+    part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls], measured_part: tuple[BallMeasurement, list[float]]
 ) -> None:
     capture, _, found = part
-    assert measure_balls(capture, found).light_change_deg.max() < 0.02
+    assert repr(measured_part[0].balls) == repr(measure_balls(capture, found, threads=3).balls)
 
 
-def test_result_does_not_depend_on_threads(part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]) -> None:
-    capture, _, found = part
-    one, three = (measure_balls(capture, found, threads=count) for count in (1, 3))
-    assert repr(one.balls) == repr(three.balls)
-
-
-def test_progress_grows_to_1(part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]) -> None:
-    said: list[float] = []
-    measure_balls(part[0], part[2], progress=said.append)
+def test_progress_grows_to_1(measured_part: tuple[BallMeasurement, list[float]]) -> None:
+    _, said = measured_part
     assert said == sorted(said)
     assert said[-1] == 1.0
 
@@ -256,9 +261,11 @@ def test_no_balls_no_numbers(part: tuple[bgars.Capture, bgars.SimulatedTruth, Fo
     assert np.isnan(measured.shadow_residual_rms)
 
 
-def test_a_sound_capture_has_no_warnings(part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls]) -> None:
+def test_a_sound_capture_has_no_warnings(
+    part: tuple[bgars.Capture, bgars.SimulatedTruth, FoundBalls], measured_part: tuple[BallMeasurement, list[float]]
+) -> None:
     assert check_shadows(part[0], part[2]) == ()
-    assert measure_balls(part[0], part[2]).warnings == ()
+    assert measured_part[0].warnings == ()
 
 
 @pytest.mark.parametrize("elevation_deg", [22.0, 65.0])

@@ -20,6 +20,7 @@ from hemispheres import (
     hemisphere,
     judged,
     mean_deg,
+    plain,
 )
 from shared_work import shared
 
@@ -71,8 +72,8 @@ def test_ambient_light_and_gains_of_the_lights_are_fitted() -> None:
 
 
 def test_the_height_of_a_hemisphere_is_right_to_hundredths_of_a_pixel() -> None:
-    capture, truth = hemisphere()
-    height = bgars.integrate_normals(filled_normals(anchored(capture).normals), mask=truth.mask).height_px
+    _, truth, field = plain()
+    height = bgars.integrate_normals(filled_normals(field.normals), mask=truth.mask).height_px
     assert (height - truth.height_px)[truth.mask].std() <= 0.05
 
 
@@ -117,8 +118,7 @@ def test_odd_balls_are_reported(odd_array: tuple[bgars.Capture, bgars.SimulatedT
 
 
 def test_anchors_may_be_circles_a_mask_or_found_balls() -> None:
-    capture, truth = hemisphere()
-    circle = anchored(capture)
+    capture, truth, circle = plain()
     found = bgars.find_balls(capture)
     for anchors, words in ((truth.mask, "1 ball given"), (found, "1 ball given"), (None, "1 ball found")):
         field = bgars.estimate_normals(capture, anchors=anchors)
@@ -129,7 +129,7 @@ def test_anchors_may_be_circles_a_mask_or_found_balls() -> None:
 
 
 def test_a_material_is_used_again_on_noisier_and_on_odd_parts() -> None:
-    fit = anchored(hemisphere()[0]).reflectance
+    fit = plain()[2].reflectance
     assert fit is not None
     capture, truth = hemisphere(read_noise_levels=2.0, seed=5)
     field = anchored(capture, material=fit.material)
@@ -144,8 +144,8 @@ def test_a_material_is_used_again_on_noisier_and_on_odd_parts() -> None:
 
 
 def test_a_material_without_balls_is_used_where_it_explains_the_pixel() -> None:
-    capture, truth = hemisphere()
-    fit = anchored(capture).reflectance
+    capture, truth, fitted = plain()
+    fit = fitted.reflectance
     assert fit is not None
     field = bgars.estimate_normals(capture, anchors=np.zeros((0, 3)), material=fit.material)
     assert field.method_reason.startswith(
@@ -175,7 +175,7 @@ def choice_of(case: str) -> bgars.NormalField:
         return anchored(replace(capture, images=noise))
     if case == "asked":
         return bgars.estimate_normals(capture, method="lambertian")
-    return anchored(capture)
+    return anchored(capture) if case == "3 lights" else plain()[2]
 
 
 @pytest.mark.parametrize(
@@ -274,8 +274,8 @@ def test_without_diffuse_light_pixels_between_the_highlights_are_not_measured() 
 
 
 def test_the_board_is_left_to_the_robust_filter() -> None:
-    capture, truth = hemisphere()
-    field, robust = anchored(capture), bgars.estimate_normals(capture, method="robust-filter")
+    capture, truth, field = plain()
+    robust = bgars.estimate_normals(capture, method="robust-filter")
     np.testing.assert_array_equal(field.normals[~truth.mask], robust.normals[~truth.mask])
 
 

@@ -42,9 +42,11 @@ def board_light(normals: Array, direction: Array) -> Array:
     along = toward @ direction
     shadowed = (along > 0) & (np.sum(toward**2, axis=1) - along**2 < 1.0)
     few = _hemisphere()
-    way = board[~shadowed][None] - (few + np.array([0.0, 0.0, 1.0]))[:, None]
-    square = np.sum(way**2, axis=2)
-    cosines = np.maximum(np.einsum("npc,nc->np", way, few), 0.0) * -way[..., 2] / square**2
+    seen = board[~shadowed]
+    # From unit vectors above the middle of the ball to points of the board, of which z is 0.
+    turned = few @ seen.T
+    square = np.sum(seen**2, axis=1) - 2.0 * turned + 2.0 * (1.0 + few[:, 2:])
+    cosines = np.maximum(turned - 1.0 - few[:, 2:], 0.0) * (1.0 + few[:, 2:]) / square**2
     light = cosines @ areas[~shadowed] / math.pi
     terms, *_ = np.linalg.lstsq(_powers(few), light, rcond=None)
     found: Array = _powers(normals) @ terms

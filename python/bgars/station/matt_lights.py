@@ -182,8 +182,15 @@ def _fit(normals: Array, values: Array, used: NDArray[np.bool_], noise: float) -
             level = floor + _mean_of_cut(level - floor, cut)
         return np.append((values - level) / spread, p[4] / (BOARD_SHARE * scale))
 
+    def slopes(p: Array) -> Array:
+        shade = normals @ p[:3]
+        rows = np.column_stack([normals * (shade > 0.0)[:, None], np.ones(len(values)), below])
+        if cut > 0.0:  # the mean of what noise cuts rises with the level by the share that is not cut
+            rows *= ndtr((np.maximum(shade, 0.0) + p[3] + p[4] * below - floor) / cut)[:, None]
+        return np.vstack([rows / -spread, [0.0, 0.0, 0.0, 0.0, 1.0 / (BOARD_SHARE * scale)]])
+
     start = np.array([*first, 0.0, 0.0])
-    fit = least_squares(residuals, start, loss="soft_l1", max_nfev=60)
+    fit = least_squares(residuals, start, slopes, loss="soft_l1", max_nfev=60)
     off = np.abs(fit.fun[:-1]) * spread
     return fit.x[:3], abs(float(fit.x[4])), float(np.sqrt(np.mean(np.minimum(off, 4.0 * np.median(off) + noise) ** 2)))
 
