@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from bgars.errors import FileFormatError, InputError
 from bgars.io.result_file import RESULT_NAME, parse_result
 from bgars.line.cfx import to_cfx
-from bgars.line.credentials import credentials, split_address
+from bgars.line.credentials import credentials, holds_user, split_address
 from bgars.line.notify import message
 from bgars.store.append import write_durably
 
@@ -62,7 +62,7 @@ class Mqtt:
         if parts.query or parts.fragment or url.endswith(("#", "?")) or "+" in parts.path:
             msg = "mqtt: a topic to send to must be without +, # and ?"
             raise InputError(msg)
-        if parts.username or parts.password:
+        if holds_user(parts):
             msg = f"mqtt: user and password go into {USER} and {PASSWORD}, not into the address, which comes into logs"
             raise InputError(msg)
         self.host, self.is_secure, self.topic = parts.hostname, parts.scheme == "mqtts", parts.path.strip("/")
