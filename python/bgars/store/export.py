@@ -48,15 +48,21 @@ def export(folder: Path, url: str) -> dict[str, int]:
         The database refuses; what was complete stays.
     """
     alchemy = _need_sqlalchemy()
+    address = _address(alchemy, url)
+    shown = _shown(address)
     try:
-        engine = alchemy.create_engine(url)
+        engine = alchemy.create_engine(address)
     except (alchemy.exc.ArgumentError, alchemy.exc.NoSuchModuleError, ImportError) as error:
-        msg = f"{_hidden(url)}: is not a database that can be reached from here ({_first_line(error)})"
+        msg = f"{shown}: is not a database that can be reached from here ({_first_line(error)})"
         raise InputError(msg) from None
     try:
         return _copy(alchemy, engine, folder)
+    except alchemy.exc.IntegrityError as error:
+        why = "another export writes at the same time, or rows were changed there; run it again"
+        msg = f"{shown}: {why} ({_first_line(error)})"
+        raise FileFormatError(msg) from None
     except alchemy.exc.SQLAlchemyError as error:
-        msg = f"{_hidden(url)}: {_first_line(error)}"
+        msg = f"{shown}: {_first_line(error)}"
         raise FileFormatError(msg) from None
     finally:
         engine.dispose()
@@ -156,9 +162,14 @@ def _insert(connection: Any, table: Any, rows: Any) -> int:  # noqa: ANN401 - as
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 - a cell
-    """Lists become one text: not every database has them. Days become text, as the store's folders have them."""
+    """Lists become one text: not every database has them. Days become text, as the store's folders have them.
+
+    Nor has every database the character NUL, which an error of somebody's library may hold.
+    """
     if isinstance(value, list):
-        return "; ".join(value)
+        value = "; ".join(value)
+    if isinstance(value, str):
+        return value.replace("\0", "\ufffd")
     return value.isoformat() if type(value).__name__ == "date" else value
 
 
@@ -174,13 +185,24 @@ def _need_sqlalchemy() -> Any:  # noqa: ANN401 - a module
         raise InputError(msg) from None
 
 
-def _hidden(url: str) -> str:
-    """The URL without a password, which must not come into a log."""
-    head, at, tail = url.rpartition("@")
-    if not at:
-        return url
-    scheme, separator, user = head.partition("://")
-    return f"{scheme}{separator}{user.split(':')[0]}@{tail}"
+def _address(alchemy: Any, url: str) -> Any:  # noqa: ANN401 - SQLAlchemy's URL
+    """Take a URL apart; what is said of a wrong one does not hold it, as there may be a password in it."""
+    try:
+        address = alchemy.engine.make_url(url)
+    except (alchemy.exc.ArgumentError, ValueError):
+        address = None
+    if address is None or "@" in (address.host or ""):
+        msg = (
+            "url: must be as SQLAlchemy takes it, like sqlite:///parts.db or postgresql+psycopg://user@host:5432/name "
+            "(in a password @ is written %40, : %3A, / %2F and % %25)"
+        )
+        raise InputError(msg)
+    return address
+
+
+def _shown(address: Any) -> str:  # noqa: ANN401 - as above
+    """The URL without password and options, which must not come into a log."""
+    return str(address._replace(password=None, query={}))
 
 
 def _first_line(error: Exception) -> str:
