@@ -133,16 +133,19 @@ def test_a_process_that_is_killed_costs_nothing(tmp_path: Path) -> None:
     assert len(kept(store)) == 5
 
 
-def test_ctrl_c_is_clean(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("ended_by", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_end_by_ctrl_c_or_sigterm_is_clean(tmp_path: Path, ended_by: signal.Signals, code: int) -> None:
     captures(tmp_path / "in", *(f"A{n}" for n in range(6)))
     store = tmp_path / "store"
     running = start_batch(tmp_path / "go", tmp_path / "in", "-o", store, "--processes", 2)
     wait_for_parts(store, 1)
-    running.send_signal(signal.SIGINT)
+    running.send_signal(ended_by)
     (tmp_path / "go").touch()
     _, err = running.communicate(timeout=120)
-    assert running.returncode == 130
+    assert running.returncode == code
     assert "Traceback" not in err
+    assert "leaked" not in err
+    assert err.endswith("interrupted; nothing half-written stays behind\n")
     assert 1 <= len(kept(store)) < 6
 
 

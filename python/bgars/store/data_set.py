@@ -237,7 +237,7 @@ def open_store(folder: str | PathLike[str], *, create: bool = False) -> Store:
     >>> len(store.known())
     0
     """
-    need_pyarrow()
+    need_pyarrow("store")  # whose DuckDB the next command wants
     folder = Path(folder)
     mark = folder / MARK
     if not mark.is_file():
