@@ -10,8 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import bgars
+import duckdb
 import pytest
 from bgars.cli.app import app
+from bgars.store import query as queries
+from bgars.store.query import connect
 from stored_parts import filled_store, part
 from typer.testing import CliRunner
 
@@ -146,6 +149,24 @@ def test_no_question_writes_into_the_store(store: bgars.Store, sql: str) -> None
 )
 def test_questions_that_read_in_other_words_are_answered(store: bgars.Store, sql: str) -> None:
     assert store.query(sql).num_rows >= 1
+
+
+def mebibytes(told: str) -> float:
+    size, unit = told.split()
+    return float(size) * {"MiB": 1.0, "GiB": 1024.0, "TiB": 1024.0**2}[unit]
+
+
+def test_a_question_does_not_take_the_memory_of_the_machine(
+    store: bgars.Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own, all_of_it = (
+        mebibytes(ask("select current_setting('memory_limit') as size").to_arrow_table()["size"][0].as_py())
+        for ask in (connect(store.folder).sql, duckdb.connect().sql)
+    )
+    assert own == pytest.approx(all_of_it / 4, rel=0.05), "to the digits that DuckDB prints"
+    monkeypatch.setattr(queries, "SHARE", 1e-3)
+    with pytest.raises(bgars.InputError, match=r"query: Out of Memory Error: .*; a query may take a fifth of"):
+        store.query("select range(1e9::bigint)")  # 8 GB, asked for at once
 
 
 def test_what_rework_mended_and_what_it_did_not(tmp_path: Path) -> None:
