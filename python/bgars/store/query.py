@@ -16,10 +16,6 @@ __all__ = ["VIEWS", "connect", "need_duckdb", "query"]
 
 TRIES = 5
 """A compaction may take files away between the listing and the reading; the next listing has what replaced them."""
-SHARE = 0.25
-"""Of the 80 % of the machine's memory that DuckDB takes by itself. It counts neither copies of long lists nor the
-answer that it hands over: with them, queries took up to 2.9 times what was allowed (range(n), n = 3e7 to 1e8, at 477 MiB).
-"""
 LOST = ("No files found", "Cannot open file", "No such file")
 VIEWS = {
     "parts": "the latest inspection of each part and round; round = 1, 2, ... counts new images of a serial number",
@@ -96,8 +92,7 @@ def query(folder: Path, sql: str) -> Any:  # noqa: ANN401 - pyarrow has no types
                 return _answer(connection, sql)
         except duckdb.OutOfMemoryException as error:
             told = str(error).strip().splitlines()[0]
-            share = "a query may take a fifth of the machine's memory"
-            msg = f"query: {told}; {share}: ask for fewer rows and columns, or for sums"
+            msg = f"query: {told}; ask for fewer rows and columns, or for sums"
             raise InputError(msg) from error
         except duckdb.Error as error:
             is_file = isinstance(error, duckdb.IOException)
@@ -131,8 +126,6 @@ def connect(folder: Path) -> Any:  # noqa: ANN401 - duckdb's connection
     connection = need_duckdb().connect(":memory:")
     connection.execute("SET TimeZone = 'UTC'")
     connection.execute("SET autoinstall_known_extensions = false")
-    size, unit = connection.execute("SELECT current_setting('memory_limit')").fetchall()[0][0].split()
-    connection.execute(f"SET memory_limit = '{SHARE * float(size):.3f}{unit}'")
     sources = {table: _source(connection, folder, table) for table in TABLES}
     connection.execute(PARTS.format(**sources))
     for name in ("balls", "checks", "budgets"):
