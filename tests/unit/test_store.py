@@ -17,6 +17,7 @@ from pathlib import Path
 import bgars
 import pytest
 from bgars.store import append, part_key
+from bgars.store import export as export_module
 from bgars.store.schema import OLD_NAMES, TABLES, arrow_schema
 from pyarrow import parquet
 from stored_parts import filled_store, part
@@ -273,6 +274,23 @@ def test_an_address_of_a_database_is_checked_and_its_password_never_told(tmp_pat
     with pytest.raises(bgars.InputError, match=words) as refused:
         filled_store(tmp_path / "store", 1).export(url)
     assert not any(piece in str(refused.value) for piece in ("SEC", "RET"))
+
+
+def test_an_export_of_many_parts_looks_into_the_store_no_more_often(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, looks = filled_store(tmp_path / "store", 7), []
+    asked = export_module.query
+    monkeypatch.setattr(export_module, "query", lambda *given: looks.append(given) or asked(*given))
+    tables = {}
+    for block in (2, 100):
+        monkeypatch.setattr(export_module, "BLOCK_PARTS", block)
+        looks.clear()
+        assert store.export(f"sqlite:///{tmp_path / f'{block}.db'}")["bgars_parts"] == 7
+        with closing(sqlite3.connect(tmp_path / f"{block}.db")) as base:
+            tables[block] = len(looks), base.execute("select * from bgars_balls order by part_key, name").fetchall()
+    assert tables[2] == tables[100]
+    assert len(tables[2][1]) == 42
 
 
 def test_an_export_leaves_the_failures_of_another_store(tmp_path: Path) -> None:

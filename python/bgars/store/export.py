@@ -10,11 +10,14 @@ from bgars.store.query import query
 from bgars.store.schema import OLD_NAMES, TABLES
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
 __all__ = ["export"]
 
 BLOCK_PARTS = 100
+READ_PARTS = 2000
+"""Of 100 balls each they take some 100 MB."""
 PREFIX = "bgars_"
 OWN_COLUMNS = {"day": "text", "recipe": "text"}
 KEYS = {
@@ -81,13 +84,10 @@ def _copy(alchemy: Any, engine: Any, folder: Path) -> dict[str, int]:  # noqa: A
     keys = query(folder, "select part_key from parts order by sequence")["part_key"].to_pylist()
     fresh = [key for key in keys if key not in there]
     added = dict.fromkeys((f"{PREFIX}{name}" for name in TABLES), 0)
-    for start in range(0, len(fresh), BLOCK_PARTS):
-        block = ", ".join(f"'{key}'" for key in fresh[start : start + BLOCK_PARTS])
+    for rows in _blocks(folder, fresh, tables):
         with engine.begin() as connection:
-            for name in ("parts", "balls", "checks", "budgets"):
-                names = [column.name for column in tables[name].columns if column.name != "row_id"]
-                sql = f"select {', '.join(_name(each) for each in names)} from {name} where part_key in ({block})"
-                added[f"{PREFIX}{name}"] += _insert(connection, tables[name], query(folder, sql))
+            for name, of_block in rows.items():
+                added[f"{PREFIX}{name}"] += _insert(connection, tables[name], of_block)
     # Failures are few and may go: those of this store, and not of another one, are copied as they are now.
     own = query(folder, "select part_key from failures_taken")["part_key"].to_pylist()
     with engine.begin() as connection:
@@ -98,6 +98,23 @@ def _copy(alchemy: Any, engine: Any, folder: Path) -> dict[str, int]:  # noqa: A
         rows = query(folder, f"select {every} from failures")
         added[f"{PREFIX}failures"] += _insert(connection, tables["failures"], rows)
     return added
+
+
+def _blocks(folder: Path, keys: list[str], tables: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Rows of the tables, of so many parts as are written at once; every look into a store opens all of its files."""
+    pyarrow, compute = (importlib.import_module(name) for name in ("pyarrow", "pyarrow.compute"))
+    for first in range(0, len(keys), READ_PARTS):
+        read, rows = keys[first : first + READ_PARTS], {}
+        asked = ", ".join(f"'{key}'" for key in read)
+        for name in ("parts", "balls", "checks", "budgets"):
+            names = ", ".join(_name(column.name) for column in tables[name].columns if column.name != "row_id")
+            rows[name] = query(folder, f"select {names} from {name} where part_key in ({asked})")
+        for start in range(0, len(read), BLOCK_PARTS):
+            block = read[start : start + BLOCK_PARTS]
+            yield {
+                name: table.filter(compute.is_in(table["part_key"], value_set=pyarrow.array(block)))
+                for name, table in rows.items()
+            }
 
 
 def _remove(engine: Any, tables: dict[str, Any], keys: list[str]) -> None:  # noqa: ANN401 - as above
