@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 __all__ = ["Mqtt", "Sender"]
 
 ACK_S = 10.0
-BLOCK_PARTS = 50
+BLOCK_PARTS = 500
+"""Results of 100 balls take some 50 MB; every look into a store opens all of its files."""
 LATE_NS = 3_600 * 10**9
 """A part may come into the store after one of a higher number: so far back it is looked for."""
 LONGEST_NAME = 255
