@@ -1,7 +1,7 @@
 """A small AMQP 1.0 broker of a single process, made with qpid-proton's reactor: it takes messages and keeps them.
 
-It speaks the real protocol over real sockets, with TLS where a certificate is given, and can be killed and started
-again at its port.
+A node of the name ``REJECTED``, ``RELEASED`` or ``MODIFIED`` answers so. It speaks the real protocol over real sockets,
+with TLS where a certificate is given, and can be killed and started again at its port.
 """
 
 from __future__ import annotations
@@ -35,12 +35,15 @@ class Broker(MessagingHandler):
 
     def on_message(self, event):
         message, address = event.message, event.link.remote_target.address
+        answer = getattr(event.delivery, address, event.delivery.ACCEPTED)  # REJECTED, RELEASED, MODIFIED as nodes
+        event.delivery.update(answer)
+        event.delivery.settle()
         with open(kept, "a", encoding="utf-8") as file:
             told = [address, bytes(message.body).decode(), message.properties, message.content_type, message.durable]
             file.write(json.dumps(told) + chr(10))
 
 
-Container(Broker()).run()
+Container(Broker(auto_accept=False)).run()
 """
 
 

@@ -71,7 +71,7 @@ def test_a_field_of_others_has_unit_normals_or_none_and_the_pitch(capture: bgars
     given[200:, 0] = np.nan
     hidden = np.broadcast_to(given.sum(axis=2, keepdims=True) == 0, given.shape)
     for made in (a_field(shape, given), np.ma.masked_array(np.where(hidden, [1, 0, 0], given), mask=hidden)):
-        bgars.register_method("sloppy", lambda _, made=made: made)
+        bgars.register_method("sloppy", lambda _, made=made: made, replace=True)
         field = bgars.estimate_normals(capture, method="sloppy")
         assert field.mask.sum() == (shape[0] - 100) * shape[1] - (shape[0] - 200)
         assert np.allclose(field.normals[field.mask], [0, 0, 1])
@@ -139,7 +139,12 @@ def test_an_unknown_name_is_answered_with_all_names(capture: bgars.Capture) -> N
     bgars.register_method("upward", upward)
     with pytest.raises(bgars.InputError, match="reflectance, blind, upward; got 'upwards'"):
         bgars.estimate_normals(capture, method="upwards")
-    bgars.register_method("upward", lambda _: np.zeros((3, 3, 3)))
+    bgars.register_method("upward", upward)
+    with pytest.raises(
+        bgars.InputError, match="name: upward is the name of another function; replace=True replaces it"
+    ):
+        bgars.register_method("upward", lambda _: np.zeros((3, 3, 3)))
+    bgars.register_method("upward", lambda _: np.zeros((3, 3, 3)), replace=True)
     with pytest.raises(bgars.InputError, match=r"method: normals must be numbers of shape .* got float64"):
         bgars.estimate_normals(capture, method="upward")
 

@@ -117,6 +117,10 @@ def test_tls_needs_an_authority_that_is_trusted(tmp_path: Path, monkeypatch: pyt
     finally:
         broker.kill()
     assert [json.loads(row[1])["serial"] for row in broker.got] == ["SN0000"]
+    (tmp_path / "empty.pem").write_text("no certificate")
+    monkeypatch.setenv(amqp.CA_FILE, str(tmp_path / "empty.pem"))
+    with pytest.raises(bgars.InputError, match=r"BGARS_AMQP_CA_FILE: .*empty.pem: must hold certificates"):
+        Amqp(url)
     monkeypatch.setenv(amqp.CA_FILE, str(tmp_path / "gone.pem"))
     with pytest.raises(bgars.InputError, match="BGARS_AMQP_CA_FILE: no such file"):
         Amqp(url)
@@ -128,12 +132,28 @@ def test_tls_needs_an_authority_that_is_trusted(tmp_path: Path, monkeypatch: pyt
         ("http://x/y", "must be amqp://HOST/NODE"),
         ("amqp://host", "must be amqp://HOST/NODE"),
         ("amqp://ada:secret@host/results", "go into BGARS_AMQP_USER"),
+        ("amqp://ada:secret#1@host/results", "is no address"),
+        ("amqp://ada:s/secret@host/results", "is no address"),
+        ("amqp://ada:12/secret@host/results", "go into BGARS_AMQP_USER"),
+        ("amqp://host/results?secret=1", "must be without # and"),
+        ("amqp://host:99999/results", "a port of 1 to 65535"),
     ],
 )
 def test_addresses_are_checked_and_hold_no_password(url: str, words: str) -> None:
     with pytest.raises(bgars.InputError, match=words) as caught:
         Amqp(url)
     assert "secret" not in str(caught.value)
+
+
+@pytest.mark.parametrize("answer", ["REJECTED", "RELEASED", "MODIFIED"])
+def test_what_the_broker_did_not_take_was_not_sent(tmp_path: Path, broker: AmqpBroker, answer: str) -> None:
+    store = filled_store(tmp_path / "store", 1)
+    url = f"amqp://127.0.0.1:{broker.port}/{answer}"
+    for _ in range(2):
+        words = rf"did not take a message, its answer is {answer}; is {answer} full\?; 0 results sent"
+        with pytest.raises(bgars.FileFormatError, match=words):
+            Sender(store, Amqp(url)).run(follow=False)
+    assert not (store.folder / "sent").exists()
 
 
 def test_a_node_may_begin_with_a_slash() -> None:

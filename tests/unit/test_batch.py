@@ -11,6 +11,8 @@ import time
 from pathlib import Path
 
 import bgars
+import imageio.v3 as iio
+import numpy as np
 import patient_batch
 import pytest
 from bgars.cli.app import app
@@ -133,16 +135,19 @@ def test_a_process_that_is_killed_costs_nothing(tmp_path: Path) -> None:
     assert len(kept(store)) == 5
 
 
-def test_ctrl_c_is_clean(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("ended_by", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_end_by_ctrl_c_or_sigterm_is_clean(tmp_path: Path, ended_by: signal.Signals, code: int) -> None:
     captures(tmp_path / "in", *(f"A{n}" for n in range(6)))
     store = tmp_path / "store"
     running = start_batch(tmp_path / "go", tmp_path / "in", "-o", store, "--processes", 2)
     wait_for_parts(store, 1)
-    running.send_signal(signal.SIGINT)
+    running.send_signal(ended_by)
     (tmp_path / "go").touch()
     _, err = running.communicate(timeout=120)
-    assert running.returncode == 130
+    assert running.returncode == code
     assert "Traceback" not in err
+    assert "leaked" not in err
+    assert err.endswith("interrupted; nothing half-written stays behind\n")
     assert 1 <= len(kept(store)) < 6
 
 
@@ -202,22 +207,38 @@ def test_the_side_file_goes_before_the_name(tmp_path: Path) -> None:
     assert ",SN99,L3,folder," in csv[1]
 
 
-def test_the_serial_number_is_read_from_a_code_in_the_images(tmp_path: Path) -> None:
+def with_codes(folder: Path, *codes: tuple[str, str, int]) -> bgars.Capture:
+    """The sample with codes (text, kind, column) at its upper edge."""
     reader = pytest.importorskip("zxingcpp")
-    iio = pytest.importorskip("imageio.v3")
-    import numpy as np  # noqa: PLC0415
-
-    folder = copy_capture(tmp_path / "part")
-    code = np.asarray(reader.create_barcode("SN-4711", reader.BarcodeFormat.DataMatrix).to_image(scale=3))
+    copy_capture(folder)
     for path in sorted(folder.glob("light_*.png")):
         image = iio.imread(path)
-        image[: code.shape[0], : code.shape[1]] = code // 2
+        for text, kind, col in codes:
+            code = np.asarray(reader.create_barcode(text, getattr(reader.BarcodeFormat, kind)).to_image(scale=3))
+            image[: code.shape[0], col : col + code.shape[1]] = (code // 2)[:, : image.shape[1] - col]
         iio.imwrite(path, image)
-    naming = bgars.Naming("code")
-    capture = bgars.read_capture(folder)
-    assert naming.of_capture(folder, capture, "") == "SN-4711"
+    return bgars.read_capture(folder)
+
+
+def test_a_code_in_the_images_is_the_serial_number(tmp_path: Path) -> None:
+    naming, one = bgars.Naming("code"), ("SN-4711", "DataMatrix", 0)
+    for name, codes in (("one", (one,)), ("twice", (one, ("SN-4711", "QRCode", 120)))):
+        assert naming.of_capture(tmp_path / name, with_codes(tmp_path / name, *codes), "") == "SN-4711"
     with pytest.raises(bgars.InputError, match="no DataMatrix or QR code can be read"):
-        naming.of_capture(folder, bgars.read_capture(bgars.sample_capture()), "")
+        naming.of_capture(tmp_path, bgars.read_capture(bgars.sample_capture()), "")
+
+
+def test_codes_that_differ_are_no_serial_number(tmp_path: Path) -> None:
+    capture = with_codes(tmp_path / "part", ("SN-4712", "DataMatrix", 0), ("SN-4711", "DataMatrix", 120))
+    with pytest.raises(bgars.InputError, match=r"part: its images show several codes.*: 'SN-4711', 'SN-4712'"):
+        bgars.Naming("code").of_capture(tmp_path / "part", capture, "")
+    assert bgars.Naming("code").of_capture(tmp_path / "part", capture, "SN-1") == "SN-1", "capture.toml names it"
+
+
+def test_a_bar_code_is_no_serial_number(tmp_path: Path) -> None:
+    capture = with_codes(tmp_path / "part", ("12", "ITF", 0))
+    with pytest.raises(bgars.InputError, match="no DataMatrix or QR code can be read"):
+        bgars.Naming("code").of_capture(tmp_path / "part", capture, "")
 
 
 def test_the_command_says_what_it_did(tmp_path: Path) -> None:

@@ -7,23 +7,25 @@ import sys
 from pathlib import Path
 
 import bgars
+import pytest
 
 WITHOUT = """
 import sys
 class Absent:
     def find_spec(self, name, *_):
-        if name.partition(".")[0] in {"matplotlib", "plotly"}:
+        if name.partition(".")[0] in ABSENT:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name.partition(".")[0])
 sys.meta_path.insert(0, Absent())
 import importlib.util
 found = importlib.util.find_spec
-importlib.util.find_spec = lambda name, *a: None if name in {"matplotlib", "plotly"} else found(name, *a)
+importlib.util.find_spec = lambda name, *a: None if name in ABSENT else found(name, *a)
 """
 
 
-def run_without(code: str) -> subprocess.CompletedProcess[str]:
-    """Run code where matplotlib and plotly are not installed."""
-    return subprocess.run([sys.executable, "-c", WITHOUT + code], capture_output=True, text=True, check=False)
+def run_without(code: str, *packages: str) -> subprocess.CompletedProcess[str]:
+    """Run code where some packages, by default matplotlib and plotly, are not installed."""
+    absent = f"ABSENT = {set(packages or ('matplotlib', 'plotly'))!r}"
+    return subprocess.run([sys.executable, "-c", absent + WITHOUT + code], capture_output=True, text=True, check=False)
 
 
 def command(*arguments: object) -> str:
@@ -52,3 +54,30 @@ def test_what_cannot_do_without_says_what_to_install(tmp_path: Path) -> None:
     assert run.stderr.strip() == "error: this command needs matplotlib: pip install 'bgars[report]'"
     run = run_without("import bgars\nbgars.write_overview")
     assert "bgars.write_overview needs matplotlib: pip install 'bgars[report]'" in run.stderr
+
+
+STORE = "store: needs pyarrow, which is not installed; install it with: pip install 'bgars[store]'"
+MQTT, AMQP = ("--mqtt", "mqtt://host/topic"), ("--amqp", "amqp://host/queue")
+
+
+@pytest.mark.parametrize(
+    ("absent", "arguments", "told"),
+    [
+        ("pyarrow", ("query", "{store}", "select 1"), STORE),
+        ("pyarrow", ("batch", bgars.sample_capture(), "-o", "{store}"), STORE),
+        ("pyarrow", ("store", "export", "{store}", "sqlite://"), STORE),
+        ("duckdb", ("query", "{store}", "select 1"), "pip install 'bgars[store]'"),
+        ("sqlalchemy", ("store", "export", "{store}", "sqlite://"), "pip install 'bgars[sql]'"),
+        ("paho", ("send", "{store}", *MQTT), "pip install 'bgars[mqtt]'"),
+        ("proton", ("send", "{store}", *AMQP), "pip install 'bgars[amqp]'"),
+        ("zxingcpp", ("batch", bgars.sample_capture(), "-o", "{store}", "--serial-from", "code"), "bgars[codes]'"),
+    ],
+)
+def test_a_command_of_the_line_names_its_extra_in_one_line(
+    tmp_path: Path, absent: str, arguments: tuple[str, ...], told: str
+) -> None:
+    bgars.open_store(tmp_path / "store", create=True)
+    run = run_without(command(*(str(each).format(store=tmp_path / "store") for each in arguments)), absent)
+    assert (run.returncode, run.stdout) == (2, "")
+    assert told in run.stderr
+    assert run.stderr.count("\n") == 1

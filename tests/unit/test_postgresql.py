@@ -10,8 +10,10 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
+import bgars
 import pytest
 from stored_parts import filled_store, part
 
@@ -101,3 +103,29 @@ def test_postgresql_gets_every_new_part_once(server: str, tmp_path: Path) -> Non
     engine.dispose()
     assert [tuple(row) for row in rows] == [("SN0003", "fail", "missing"), ("SN0005", "fail", "missing")]
     assert tops == 28
+
+
+def test_postgresql_gets_any_text_and_two_exports_at_once_add_no_part_twice(server: str, tmp_path: Path) -> None:
+    store = bgars.open_store(tmp_path / "store", create=True)
+    serial = "SN-\u00e9\u4e2d\U0001f600-'q\""
+    store.append(replace(part(6), serial=serial))
+    store.append_failure("/c/y", "a library said \0 and 'so'", serial="SN8")
+    assert store.export(server)["bgars_parts"] == 1
+    engine = sqlalchemy.create_engine(server)
+    with engine.connect() as connection:
+        every = connection.execute(sqlalchemy.text("select serial from bgars_parts")).scalars().all()
+        reason = connection.execute(sqlalchemy.text("select reason from bgars_failures where serial = 'SN8'")).scalar()
+    assert serial in every
+    assert reason == "a library said \ufffd and 'so'"
+    # What another export added since this one looked: here a ball of a part that is not there yet.
+    store.append(part(7))
+    key = store.query("select part_key from parts where serial = 'SN0007'")["part_key"][0].as_py()
+    with engine.begin() as connection:
+        connection.execute(sqlalchemy.text(f"insert into bgars_balls (part_key, name) values ('{key}', 'A1')"))
+    with pytest.raises(bgars.FileFormatError, match="another export writes at the same time"):
+        store.export(server)
+    with engine.begin() as connection:
+        assert connection.execute(sqlalchemy.text("select count(*) from bgars_parts")).scalar() == len(every)
+        connection.execute(sqlalchemy.text(f"delete from bgars_balls where part_key = '{key}'"))
+    engine.dispose()
+    assert store.export(server)["bgars_parts"] == 1

@@ -6,6 +6,8 @@ import csv
 import io
 import json
 import re
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -146,6 +148,26 @@ def test_no_question_writes_into_the_store(store: bgars.Store, sql: str) -> None
 )
 def test_questions_that_read_in_other_words_are_answered(store: bgars.Store, sql: str) -> None:
     assert store.query(sql).num_rows >= 1
+
+
+WITH_4_GB = """
+import os
+from bgars.cli import main, query
+query.SHARE = 4e9 / os.sysconf("SC_PHYS_PAGES") / os.sysconf("SC_PAGE_SIZE")
+main()
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory of a process is not bounded there")
+def test_a_query_does_not_take_the_memory_of_the_machine(store: bgars.Store) -> None:
+    asked = [sys.executable, "-c", WITH_4_GB, "query", str(store.folder)]
+    few, lists = (
+        subprocess.run([*asked, sql], capture_output=True, text=True, check=False)
+        for sql in ("select count(*) from balls", "select range(1e9::bigint)")  # 8 GB, asked for at once
+    )
+    assert few.returncode == 0, few.stderr
+    assert (lists.returncode, lists.stdout, lists.stderr.count("\n")) == (2, "", 1)
+    assert "ask for fewer rows and columns, or for sums" in lists.stderr
 
 
 def test_what_rework_mended_and_what_it_did_not(tmp_path: Path) -> None:

@@ -132,6 +132,10 @@ def test_rabbitmq_has_every_result_after_a_power_cut(
     with pytest.raises(bgars.FileFormatError, match=r"0 results sent, the others wait") as caught:
         Sender(store, Amqp(url), is_cfx=True).run(follow=False)
     assert "wrong" not in str(caught.value)
+    monkeypatch.delenv(amqp.USER)
+    with pytest.raises(bgars.FileFormatError, match=r"\(the broker wants a user: BGARS_AMQP_USER"):
+        Sender(store, Amqp(url), is_cfx=True).run(follow=False)
+    monkeypatch.setenv(amqp.USER, "ada")
     monkeypatch.setenv(amqp.PASSWORD, "s3cret")
     sender = Sender(store, Amqp(url), is_cfx=True)
     assert sender.step() == 2

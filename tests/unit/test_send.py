@@ -8,6 +8,7 @@ import socket
 import subprocess
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import bgars
@@ -193,3 +194,13 @@ def wait_until(holds: object) -> None:
     while not holds():
         assert time.monotonic() < deadline
         time.sleep(0.02)
+
+
+def test_an_outbox_of_many_parts_is_read_at_once(tmp_path: Path) -> None:
+    store = filled_store(tmp_path / "store", 1)
+    for number in range(1, 60):
+        own = (("a.png", f"{number:064x}"),)
+        store.append(replace(part(0), serial=f"SN{number:04d}", files=own))
+    sender = Sender(store, channel := Channel())
+    assert sender.step() == 60
+    assert channel.got == [f"SN{number:04d}" for number in range(60)]

@@ -17,6 +17,7 @@ from pathlib import Path
 import bgars
 import pytest
 from bgars.store import append, part_key
+from bgars.store import export as export_module
 from bgars.store.schema import OLD_NAMES, TABLES, arrow_schema
 from pyarrow import parquet
 from stored_parts import filled_store, part
@@ -240,6 +241,9 @@ def test_a_result_needs_its_time(tmp_path: Path) -> None:
     store = bgars.open_store(tmp_path / "store", create=True)
     with pytest.raises(bgars.InputError, match="needs the time of inspection"):
         store.append(replace(part(0), inspected_utc=""))
+    with pytest.raises(bgars.InputError, match=r"result: S.udc80N: holds characters that are no text"):
+        store.append(replace(part(0), serial="S\udc80N"))
+    assert len(store.query("select * from parts")) == 0
     assert part_key(part(0)) != part_key(part(1))
 
 
@@ -254,6 +258,39 @@ def test_sqlite_gets_every_new_part_once(tmp_path: Path) -> None:
         row = connection.execute("select verdict, defects, day from bgars_parts where serial = 'SN0003'").fetchone()
     connection.close()
     assert row == ("fail", "missing", "2026-01-01")
+
+
+@pytest.mark.parametrize(
+    ("url", "words"),
+    [
+        ("nonsense", "url: must be as SQLAlchemy takes it"),
+        ("postgresql+psycopg://ada:p@SEC:RET@host/x", r"@ is written %40"),
+        ("postgresql+psycopg://ada:SECRET@x@host/x", r"@ is written %40"),
+        ("postgresql+psycopg://ada:SECRET@host:port/x", "url: must be as"),
+        ("none://ada:SECRET@host/x?password=SECRET", r"none://ada@host/x: is not a database that can be reached"),
+    ],
+)
+def test_an_address_of_a_database_is_checked_and_its_password_never_told(tmp_path: Path, url: str, words: str) -> None:
+    with pytest.raises(bgars.InputError, match=words) as refused:
+        filled_store(tmp_path / "store", 1).export(url)
+    assert not any(piece in str(refused.value) for piece in ("SEC", "RET"))
+
+
+def test_an_export_of_many_parts_looks_into_the_store_no_more_often(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, looks = filled_store(tmp_path / "store", 7), []
+    asked = export_module.query
+    monkeypatch.setattr(export_module, "query", lambda *given: looks.append(given) or asked(*given))
+    tables = {}
+    for block in (2, 100):
+        monkeypatch.setattr(export_module, "BLOCK_PARTS", block)
+        looks.clear()
+        assert store.export(f"sqlite:///{tmp_path / f'{block}.db'}")["bgars_parts"] == 7
+        with closing(sqlite3.connect(tmp_path / f"{block}.db")) as base:
+            tables[block] = len(looks), base.execute("select * from bgars_balls order by part_key, name").fetchall()
+    assert tables[2] == tables[100]
+    assert len(tables[2][1]) == 42
 
 
 def test_an_export_leaves_the_failures_of_another_store(tmp_path: Path) -> None:

@@ -267,6 +267,8 @@ def test_results_are_told_to_a_command_a_server_a_file_and_a_plc(inbox: Path, tm
         ({"url": "ftp://x"}, "--post: must be an http"),
         ({"tcp": "plc"}, "--tcp: must be HOST:PORT"),
         ({"command": "a 'b"}, "--on-result: is no command"),
+        ({"command": "no-such-program --fast"}, "--on-result: no-such-program: no such program"),
+        ({"command": str(Path(__file__))}, "test_watch.py: no such program, or it may not be run"),
     ],
 )
 def test_what_cannot_be_told_is_refused_at_the_start(options: dict[str, str], words: str) -> None:

@@ -30,6 +30,7 @@ __all__ = [
     "may_start_processes",
     "notes_to_stderr",
     "open_page",
+    "owns_process",
     "print_json",
     "say",
     "say_files",
@@ -48,10 +49,15 @@ def is_command() -> None:
     _process["is_command"] = True
 
 
+def owns_process() -> bool:
+    """Whether :func:`is_command` was called."""
+    return _process["is_command"]
+
+
 def may_start_processes() -> bool:
     """Whether work may go to a process beside this one: the command's own, on more than one core and thread."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return _process["is_command"] and cores > 1 and os.environ.get("RAYON_NUM_THREADS") != "1"
+    return owns_process() and cores > 1 and os.environ.get("RAYON_NUM_THREADS") != "1"
 
 
 def error_console() -> Console:

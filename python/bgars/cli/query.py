@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import csv
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bgars.cli.console import print_json, say
+from bgars.cli.console import owns_process, print_json, say
 from bgars.cli.options import JsonOption
 from bgars.cli.plain_cells import distinct_names, plain, text_of
 from bgars.errors import InputError
@@ -25,6 +26,8 @@ __all__ = ["register"]
 
 MOST_WIDE = 60
 BLOCK_ROWS = 10_000
+SHARE = 0.75
+"""Of the machine's memory, that a query may take: the rest of the line's programs work there, too."""
 StoreArgument = Annotated[
     Path, typer.Argument(metavar="STORE", help="Store that bgars batch or bgars watch wrote.", show_default=False)
 ]
@@ -68,6 +71,8 @@ def query(
     if not sql:
         _say_tables(opened, as_json=as_json)
         return
+    if owns_process():
+        _bound_memory()
     answer = opened.query(sql)
     names = answer.column_names
     # As Python's objects, an answer takes many times its memory: a part at a time.
@@ -152,6 +157,17 @@ def repair(store: StoreArgument, as_json: JsonOption = False) -> None:
         say("parts are missing: inspect their captures again, with bgars batch")
     if not any(done.values()):
         say(f"{store}: every file is readable")
+
+
+def _bound_memory() -> None:
+    """Let the system refuse what is too much: DuckDB's limit does not count the memory of lists."""
+    if sys.platform == "linux":  # Windows has no such limit, macOS ignores it
+        import resource  # noqa: PLC0415 - of this system
+
+        most = int(SHARE * os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+        now, highest = resource.getrlimit(resource.RLIMIT_AS)
+        lowest = min([each for each in (now, highest, most) if each != resource.RLIM_INFINITY])
+        resource.setrlimit(resource.RLIMIT_AS, (lowest, highest))
 
 
 def _rows(part: Any) -> Iterator[list[Any]]:  # noqa: ANN401 - pyarrow has no types

@@ -135,6 +135,7 @@ def watch(
             need_path(path)
     done, failed = done or inbox / "_done", failed or inbox / "_failed"
     need_outside(inbox, output, done, failed, *(() if rig is None or rig.parent == inbox else (rig,)))
+    notifier = Notifier(on_result, post, result_file, tcp)
     with watched(inbox):
         watching = Watch(
             Inbox(inbox, count=count, trigger=trigger, settle_s=settle, files=files),
@@ -145,7 +146,7 @@ def watch(
             failed,
             method=method,
             naming=Naming(serial_from, PartIdentity(lot=lot, station=station_name, operator=operator)),
-            notifier=Notifier(on_result, post, result_file, tcp),
+            notifier=notifier,
             patience_s=patience,
             poll_s=poll,
             say=_say,

@@ -69,13 +69,13 @@ def write_parquet(result: PartResult, path: str | PathLike[str]) -> None:
         parquet.write_table(table, temporary)
 
 
-def need_pyarrow() -> tuple[Any, Any]:
-    """Return pyarrow and its Parquet module, or say how to get them."""
+def need_pyarrow(extra: str = "parquet") -> tuple[Any, Any]:
+    """Return pyarrow and its Parquet module, or say how to get them: by the extra that holds what else is needed."""
     try:
         import pyarrow  # noqa: PLC0415 - an extra
         from pyarrow import parquet  # noqa: PLC0415
     except ImportError:
-        msg = "parquet: needs pyarrow, which is not installed; install it with: pip install 'bgars[parquet]'"
+        msg = f"{extra}: needs pyarrow, which is not installed; install it with: pip install 'bgars[{extra}]'"
         raise InputError(msg) from None
     return pyarrow, parquet
 

@@ -11,7 +11,7 @@ from typing import Any
 from urllib.parse import unquote
 
 from bgars.errors import InputError
-from bgars.line.credentials import credentials, split_address
+from bgars.line.credentials import credentials, holds_user, split_address
 
 __all__ = ["Amqp"]
 
@@ -41,8 +41,11 @@ class Amqp:
         if parts.scheme not in {"amqp", "amqps"} or not parts.hostname or not parts.path.strip("/"):
             msg = "amqp: must be amqp://HOST/NODE or amqps://HOST/NODE"
             raise InputError(msg)
-        if parts.username or parts.password:
+        if holds_user(parts):
             msg = f"amqp: user and password go into {USER} and {PASSWORD}, not into the address, which comes into logs"
+            raise InputError(msg)
+        if parts.query or parts.fragment or url.endswith(("#", "?")):
+            msg = "amqp: a node's name must be without # and ? (%23 and %3F stand for them)"
             raise InputError(msg)
         self.host, self.is_secure = parts.hostname, parts.scheme == "amqps"
         self.node = unquote(parts.path[1:])
@@ -55,6 +58,7 @@ class Amqp:
         if self._ca_file and not Path(self._ca_file).is_file():
             msg = f"{CA_FILE}: no such file: {self._ca_file}"
             raise InputError(msg)
+        self._domain = self._tls() if self.is_secure else None
         self._connection: Any = None
         self._sender: Any = None
 
@@ -88,9 +92,13 @@ class Amqp:
 
     def _send(self, text: str) -> None:
         try:
-            self._sender.send(self._message(text), timeout=ACK_S)
+            delivery = self._sender.send(self._message(text), timeout=ACK_S, error_states=[])
         except self._errors() as error:
             raise OSError(_told(error)) from None
+        if delivery.remote_state != delivery.ACCEPTED:  # rejected, released, modified, or settled without a word
+            answer = getattr(delivery.remote_state, "name", delivery.remote_state)
+            msg = f"the broker did not take a message, its answer is {answer}; is {self.node} full?"
+            raise OSError(msg)
 
     def _message(self, text: str) -> Any:  # noqa: ANN401 - proton's message
         """A durable message; that of IPC-CFX has the properties by which its endpoints choose (IPC-2591)."""
@@ -113,22 +121,36 @@ class Amqp:
         scheme = "amqps" if self.is_secure else "amqp"
         host = f"[{self.host}]" if ":" in self.host else self.host
         options: dict[str, Any] = {"timeout": ACK_S}
-        if self.is_secure:
-            domain = self._proton.SSLDomain(self._proton.SSLDomain.MODE_CLIENT)
-            if self._ca_file:
-                domain.set_trusted_ca_db(self._ca_file)
-            domain.set_peer_authentication(self._proton.SSLDomain.VERIFY_PEER_NAME)
-            options["ssl_domain"] = domain
+        if self._domain is not None:
+            options["ssl_domain"] = self._domain
         if self._user:
             # PLAIN over a bare connection is what amqp:// with a password asks for.
             options |= {"user": self._user, "password": self._password, "allow_insecure_mechs": True}
             options["allowed_mechs"] = "PLAIN"  # else a broker that takes anybody would get no user
         try:
             self._connection = self._proton.utils.BlockingConnection(f"{scheme}://{host}:{self.port}", **options)
-            self._sender = self._connection.create_sender(self.node, options=self._durable())
+            # A name of its own: proton's changes at each try, and so would what is said of it.
+            self._sender = self._connection.create_sender(self.node, name="bgars", options=self._durable())
         except self._errors() as error:
             self.close()
-            raise OSError(_told(error)) from None
+            hint = "" if self._user or "SASL" not in str(error) else f" (the broker wants a user: {USER}, {PASSWORD})"
+            raise OSError(f"{_told(error)}{hint}") from None
+
+    def _tls(self) -> Any:  # noqa: ANN401 - proton's SSLDomain
+        ssl = self._proton.SSLDomain
+        try:
+            domain = ssl(ssl.MODE_CLIENT)
+        except self._proton.SSLUnavailable:
+            msg = "amqp: python-qpid-proton was built without TLS; docs/line.md says what to install before it"
+            raise InputError(msg) from None
+        try:
+            if self._ca_file:
+                domain.set_trusted_ca_db(self._ca_file)
+        except self._proton.SSLException:
+            msg = f"{CA_FILE}: {self._ca_file}: must hold certificates, as PEM"
+            raise InputError(msg) from None
+        domain.set_peer_authentication(ssl.VERIFY_PEER_NAME)
+        return domain
 
     def _durable(self) -> Any:  # noqa: ANN401 - proton's option of a link
         """Ask for a queue that outlives the broker, where the broker makes it now: RabbitMQ's default does not."""
@@ -143,7 +165,7 @@ class Amqp:
         return Durable()
 
     def _errors(self) -> tuple[type[Exception], ...]:
-        return self._proton.ProtonException, self._proton.utils.SendException, OSError
+        return self._proton.ProtonException, OSError
 
 
 def _told(error: Exception) -> str:

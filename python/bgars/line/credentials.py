@@ -8,7 +8,7 @@ from urllib.parse import SplitResult, urlsplit
 
 from bgars.errors import InputError
 
-__all__ = ["credentials", "split_address"]
+__all__ = ["credentials", "holds_user", "split_address"]
 
 
 def credentials(user: str, password: str) -> tuple[str, str]:
@@ -43,7 +43,19 @@ def split_address(url: str, name: str) -> SplitResult:
     try:
         parts = urlsplit(url)
         _ = parts.port  # looked at when it is asked for
-    except ValueError as error:
-        msg = f"{name}: is no address ({error})"
+    except ValueError:
+        # What urllib says holds pieces of the address, such as a password before an @.
+        msg = f"{name}: is no address: must be SCHEME://HOST[:PORT]/..., with a port of 1 to 65535"
         raise InputError(msg) from None
     return parts
+
+
+def holds_user(parts: SplitResult) -> bool:
+    """Whether there is a user or a password in an address: also one with / in it, which then looks like port and path.
+
+    Examples
+    --------
+    >>> holds_user(split_address("amqp://ada:12/34@host/results", "amqp"))
+    True
+    """
+    return parts.username is not None or (parts.port is not None and "@" in parts.path)

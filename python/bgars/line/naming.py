@@ -111,15 +111,19 @@ class Naming:
         Raises
         ------
         InputError
-            The images show no code that can be read.
+            The images show no code that can be read, or several that differ.
         """
         if self.pattern != CODE or serial:
             return serial
-        text = _read_code(capture)
-        if not text:
+        texts = _read_code(capture)
+        if not texts:
             msg = f"{folder}: no DataMatrix or QR code can be read in its images"
             raise InputError(msg)
-        return _printable(folder, text)
+        if len(texts) > 1:
+            told = ", ".join(repr(text) for text in sorted(texts))
+            msg = f"{folder}: its images show several codes, and which one is the serial number is not known: {told}"
+            raise InputError(msg)
+        return _printable(folder, texts[0])
 
     def _expression(self, many: str = SHORT) -> re.Pattern[str]:
         """The pattern as a regular expression; every name once, each as short, or as long, as it can be."""
@@ -192,17 +196,22 @@ def _recipe(folder: Path) -> CaptureRecipe | None:
     return read_recipe(path) if path.is_file() else None
 
 
-def _read_code(capture: Capture) -> str:
-    """The first code in any of the images, or in their mean, which has no cast shadow of full depth."""
+def _read_code(capture: Capture) -> list[str]:
+    """The different codes in the images' mean, which has no cast shadow of full depth; else in the first that has any.
+
+    Bar codes are left out: rows of balls look like short ones.
+    """
     reader = _need_reader()
+    kinds = reader.barcode_formats_from_str("DataMatrix|QRCode|MicroQRCode")
     images = [np.asarray(image, dtype=np.float32) for image in capture.images]
     for image in [np.mean(images, axis=0), *images]:
         top = float(np.percentile(image, 99.5))
         grey = np.clip(image * (255.0 / max(top, 1e-9)), 0, 255).astype(np.uint8)
-        for found in reader.read_barcodes(np.ascontiguousarray(grey)):
-            if found.text:
-                return " ".join(str(found.text).split())
-    return ""
+        found = reader.read_barcodes(np.ascontiguousarray(grey), formats=kinds)
+        texts = [" ".join(str(each.text).split()) for each in found if each.text]
+        if texts:
+            return list(dict.fromkeys(texts))
+    return []
 
 
 def _need_reader() -> Any:  # noqa: ANN401 - a module

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shlex
+import shutil
 import socket
 import subprocess
 import urllib.request
@@ -75,6 +76,9 @@ class Notifier:
                 raise InputError(msg) from None
             if not words or not words[0]:
                 msg = f"--on-result: must name a program, got {self.command!r}"
+                raise InputError(msg)
+            if shutil.which(words[0]) is None:
+                msg = f"--on-result: {words[0]}: no such program, or it may not be run"
                 raise InputError(msg)
 
     def send(self, values: dict[str, Any], line: str) -> list[str]:

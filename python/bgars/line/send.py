@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from bgars.errors import FileFormatError, InputError
 from bgars.io.result_file import RESULT_NAME, parse_result
 from bgars.line.cfx import to_cfx
-from bgars.line.credentials import credentials, split_address
+from bgars.line.credentials import credentials, holds_user, split_address
 from bgars.line.notify import message
 from bgars.store.append import write_durably
 
@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 __all__ = ["Mqtt", "Sender"]
 
 ACK_S = 10.0
-BLOCK_PARTS = 50
+BLOCK_PARTS = 500
+"""Results of 100 balls take some 50 MB; every look into a store opens all of its files."""
 LATE_NS = 3_600 * 10**9
 """A part may come into the store after one of a higher number: so far back it is looked for."""
 LONGEST_NAME = 255
@@ -62,7 +63,7 @@ class Mqtt:
         if parts.query or parts.fragment or url.endswith(("#", "?")) or "+" in parts.path:
             msg = "mqtt: a topic to send to must be without +, # and ?"
             raise InputError(msg)
-        if parts.username or parts.password:
+        if holds_user(parts):
             msg = f"mqtt: user and password go into {USER} and {PASSWORD}, not into the address, which comes into logs"
             raise InputError(msg)
         self.host, self.is_secure, self.topic = parts.hostname, parts.scheme == "mqtts", parts.path.strip("/")

@@ -90,7 +90,7 @@ DEFAULT_METHOD: Method = "reflectance"
 _registered: dict[str, Callable[..., Any]] = {}
 
 
-def register_method(name: str, function: Callable[..., Any]) -> None:
+def register_method(name: str, function: Callable[..., Any], *, replace: bool = False) -> None:
     """Add a method to :func:`bgars.estimate_normals`, and so to all that is given a method's name, in this process.
 
     A package that is to be known to the command line, and to the worker processes of ``bgars batch``, names its
@@ -100,17 +100,19 @@ def register_method(name: str, function: Callable[..., Any]) -> None:
     Parameters
     ----------
     name : str
-        Lower-case letters, digits and hyphens; not a method of bgars. A name that was registered before is replaced.
+        Lower-case letters, digits and hyphens; not a method of bgars.
     function : callable
         Called with the :class:`bgars.Capture`, and with those of `mask` ((H, W) bool or None), `threshold`, `anchors`,
         `material`, `keep_sets`, `out`, `threads` and `progress` that its signature names: what the caller did not give
         has the function's default, else None. Returns a :class:`bgars.NormalField`, or an array (H, W, 3) of normals,
         NaN or zero where there is none.
+    replace : bool
+        A name that was registered before is given to this function; else only the same function may have it again.
 
     Raises
     ------
     InputError
-        Another name, or something that cannot be called.
+        Another name, one that another function has, or something that cannot be called.
 
     Examples
     --------
@@ -131,6 +133,9 @@ def register_method(name: str, function: Callable[..., Any]) -> None:
     given: object = function
     if not callable(given):
         msg = f"function: must be callable, got {type(function).__name__}"
+        raise InputError(msg)
+    if not replace and _registered.get(name, function) is not function:
+        msg = f"name: {name} is the name of another function; replace=True replaces it"
         raise InputError(msg)
     _registered[name] = function
 

@@ -87,7 +87,7 @@ class Store:
         FileFormatError
             It cannot be written; nothing was added then.
         InputError
-            No time of inspection.
+            No time of inspection, or a text that is none.
         """
         key = part_key(result)
         result = self.numbered(result)
@@ -97,7 +97,11 @@ class Store:
         folder = encodable(capture_folder)
         rows = result_rows(result, sequence=self._next_sequence(), capture_folder=folder, seconds=seconds)
         place = partition(result.inspected_utc[:10], result.name if result.recipe is not None else "")
-        append_rows(self.folder, place, f"p-{key[:40]}", rows)
+        try:
+            append_rows(self.folder, place, f"p-{key[:40]}", rows)
+        except UnicodeEncodeError as error:  # half of a pair, which JSON may hold
+            msg = f"result: {encodable(result.serial)}: holds characters that are no text ({error})"
+            raise InputError(msg) from None
         self._parts().add(self.folder / "parts" / place / f"p-{key[:40]}.parquet", rows["parts"][0])
         return True
 
@@ -233,7 +237,7 @@ def open_store(folder: str | PathLike[str], *, create: bool = False) -> Store:
     >>> len(store.known())
     0
     """
-    need_pyarrow()
+    need_pyarrow("store")  # whose DuckDB the next command wants
     folder = Path(folder)
     mark = folder / MARK
     if not mark.is_file():

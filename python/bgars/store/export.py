@@ -10,11 +10,14 @@ from bgars.store.query import query
 from bgars.store.schema import OLD_NAMES, TABLES
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
 __all__ = ["export"]
 
 BLOCK_PARTS = 100
+READ_PARTS = 2000
+"""Of 100 balls each they take some 100 MB."""
 PREFIX = "bgars_"
 OWN_COLUMNS = {"day": "text", "recipe": "text"}
 KEYS = {
@@ -48,15 +51,21 @@ def export(folder: Path, url: str) -> dict[str, int]:
         The database refuses; what was complete stays.
     """
     alchemy = _need_sqlalchemy()
+    address = _address(alchemy, url)
+    shown = _shown(address)
     try:
-        engine = alchemy.create_engine(url)
+        engine = alchemy.create_engine(address)
     except (alchemy.exc.ArgumentError, alchemy.exc.NoSuchModuleError, ImportError) as error:
-        msg = f"{_hidden(url)}: is not a database that can be reached from here ({_first_line(error)})"
+        msg = f"{shown}: is not a database that can be reached from here ({_first_line(error)})"
         raise InputError(msg) from None
     try:
         return _copy(alchemy, engine, folder)
+    except alchemy.exc.IntegrityError as error:
+        why = "another export writes at the same time, or rows were changed there; run it again"
+        msg = f"{shown}: {why} ({_first_line(error)})"
+        raise FileFormatError(msg) from None
     except alchemy.exc.SQLAlchemyError as error:
-        msg = f"{_hidden(url)}: {_first_line(error)}"
+        msg = f"{shown}: {_first_line(error)}"
         raise FileFormatError(msg) from None
     finally:
         engine.dispose()
@@ -75,13 +84,10 @@ def _copy(alchemy: Any, engine: Any, folder: Path) -> dict[str, int]:  # noqa: A
     keys = query(folder, "select part_key from parts order by sequence")["part_key"].to_pylist()
     fresh = [key for key in keys if key not in there]
     added = dict.fromkeys((f"{PREFIX}{name}" for name in TABLES), 0)
-    for start in range(0, len(fresh), BLOCK_PARTS):
-        block = ", ".join(f"'{key}'" for key in fresh[start : start + BLOCK_PARTS])
+    for rows in _blocks(folder, fresh, tables):
         with engine.begin() as connection:
-            for name in ("parts", "balls", "checks", "budgets"):
-                names = [column.name for column in tables[name].columns if column.name != "row_id"]
-                sql = f"select {', '.join(_name(each) for each in names)} from {name} where part_key in ({block})"
-                added[f"{PREFIX}{name}"] += _insert(connection, tables[name], query(folder, sql))
+            for name, of_block in rows.items():
+                added[f"{PREFIX}{name}"] += _insert(connection, tables[name], of_block)
     # Failures are few and may go: those of this store, and not of another one, are copied as they are now.
     own = query(folder, "select part_key from failures_taken")["part_key"].to_pylist()
     with engine.begin() as connection:
@@ -92,6 +98,23 @@ def _copy(alchemy: Any, engine: Any, folder: Path) -> dict[str, int]:  # noqa: A
         rows = query(folder, f"select {every} from failures")
         added[f"{PREFIX}failures"] += _insert(connection, tables["failures"], rows)
     return added
+
+
+def _blocks(folder: Path, keys: list[str], tables: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Rows of the tables, of so many parts as are written at once; every look into a store opens all of its files."""
+    pyarrow, compute = (importlib.import_module(name) for name in ("pyarrow", "pyarrow.compute"))
+    for first in range(0, len(keys), READ_PARTS):
+        read, rows = keys[first : first + READ_PARTS], {}
+        asked = ", ".join(f"'{key}'" for key in read)
+        for name in ("parts", "balls", "checks", "budgets"):
+            names = ", ".join(_name(column.name) for column in tables[name].columns if column.name != "row_id")
+            rows[name] = query(folder, f"select {names} from {name} where part_key in ({asked})")
+        for start in range(0, len(read), BLOCK_PARTS):
+            block = read[start : start + BLOCK_PARTS]
+            yield {
+                name: table.filter(compute.is_in(table["part_key"], value_set=pyarrow.array(block)))
+                for name, table in rows.items()
+            }
 
 
 def _remove(engine: Any, tables: dict[str, Any], keys: list[str]) -> None:  # noqa: ANN401 - as above
@@ -156,9 +179,14 @@ def _insert(connection: Any, table: Any, rows: Any) -> int:  # noqa: ANN401 - as
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 - a cell
-    """Lists become one text: not every database has them. Days become text, as the store's folders have them."""
+    """Lists become one text: not every database has them. Days become text, as the store's folders have them.
+
+    Nor has every database the character NUL, which an error of somebody's library may hold.
+    """
     if isinstance(value, list):
-        return "; ".join(value)
+        value = "; ".join(value)
+    if isinstance(value, str):
+        return value.replace("\0", "\ufffd")
     return value.isoformat() if type(value).__name__ == "date" else value
 
 
@@ -174,13 +202,24 @@ def _need_sqlalchemy() -> Any:  # noqa: ANN401 - a module
         raise InputError(msg) from None
 
 
-def _hidden(url: str) -> str:
-    """The URL without a password, which must not come into a log."""
-    head, at, tail = url.rpartition("@")
-    if not at:
-        return url
-    scheme, separator, user = head.partition("://")
-    return f"{scheme}{separator}{user.split(':')[0]}@{tail}"
+def _address(alchemy: Any, url: str) -> Any:  # noqa: ANN401 - SQLAlchemy's URL
+    """Take a URL apart; what is said of a wrong one does not hold it, as there may be a password in it."""
+    try:
+        address = alchemy.engine.make_url(url)
+    except (alchemy.exc.ArgumentError, ValueError):
+        address = None
+    if address is None or "@" in (address.host or ""):
+        msg = (
+            "url: must be as SQLAlchemy takes it, like sqlite:///parts.db or postgresql+psycopg://user@host:5432/name "
+            "(in a password @ is written %40, : %3A, / %2F and % %25)"
+        )
+        raise InputError(msg)
+    return address
+
+
+def _shown(address: Any) -> str:  # noqa: ANN401 - as above
+    """The URL without password and options, which must not come into a log."""
+    return str(address._replace(password=None, query={}))
 
 
 def _first_line(error: Exception) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -88,7 +89,11 @@ def query(folder: Path, sql: str) -> Any:  # noqa: ANN401 - pyarrow has no types
         try:
             with connect(folder) as connection:
                 need_reading(connection, sql)
-                return connection.sql(sql).to_arrow_table()
+                return _answer(connection, sql)
+        except duckdb.OutOfMemoryException as error:
+            told = str(error).strip().splitlines()[0]
+            msg = f"query: {told}; ask for fewer rows and columns, or for sums"
+            raise InputError(msg) from error
         except duckdb.Error as error:
             is_file = isinstance(error, duckdb.IOException)
             if is_file and attempt + 1 < TRIES and any(word in str(error) for word in LOST):
@@ -103,6 +108,17 @@ def query(folder: Path, sql: str) -> Any:  # noqa: ANN401 - pyarrow has no types
             raise InputError(msg) from error
     msg = f"{folder}: files of the store go while they are read; try again"
     raise FileFormatError(msg)
+
+
+def _answer(connection: Any, sql: str) -> Any:  # noqa: ANN401 - as above
+    """Ask beside this thread, which so hears every signal: DuckDB hears Ctrl-C only, and raises an error of its own."""
+    with ThreadPoolExecutor(1) as beside:
+        asked = beside.submit(lambda: connection.sql(sql).to_arrow_table())
+        try:
+            return asked.result()
+        except KeyboardInterrupt:
+            connection.interrupt()
+            raise
 
 
 def connect(folder: Path) -> Any:  # noqa: ANN401 - duckdb's connection
