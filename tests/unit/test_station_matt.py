@@ -6,7 +6,7 @@ import bgars
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from rendered_spheres import ring, unit
+from rendered_spheres import render, ring, unit
 from test_station_lights import capture_of, off_deg
 
 LIGHTS = ring(4, 45.0)
@@ -50,3 +50,21 @@ def test_noise_that_is_cut_at_black_does_not_lift_the_shadow(black: float) -> No
     images = matt_ball(1e7, black, (8.3, -5.7, 60.0), seed=3)
     found = bgars.calibrate_lights(capture_of(images, camera_distance_mm=np.inf, black_level=black), sphere="matt")
     assert off_deg(found.rig.directions, LIGHTS).mean() < 0.08
+
+
+@pytest.mark.parametrize("elevation_deg", [30.0, 60.0])
+def test_a_lamp_a_hundred_radii_away_is_not_seen_lower(elevation_deg: float) -> None:
+    """Taken as infinitely far, it is by 1.2 degrees: the part of the ball that turns to it is nearer to it."""
+    lights = ring(3, elevation_deg)
+    images = render(
+        1e4 * lights + np.array([7.3, -4.6, 100.0]),
+        ball=(7.3, -4.6, 100.0), size=(260, 260), kind="matt", board=0.05, samples=2, near=True, seed=4,
+    )  # fmt: skip
+    capture = bgars.Capture(
+        images=images, rig=bgars.LightRig.ring(3), mask=np.ones((260, 260), np.bool_), saturation=255.0,
+        camera_distance_mm=np.inf,
+    )  # fmt: skip
+    found = bgars.calibrate_lights(capture, sphere="matt")
+    off = np.degrees(2 * np.arcsin(np.linalg.norm(found.rig.directions - lights, axis=1) / 2))
+    assert off.max() < 0.25
+    assert (off < 3 * np.sqrt(2) * found.u_deg).all()

@@ -8,13 +8,14 @@ from typing import Annotated
 import typer
 
 import bgars
-from bgars.cli.console import print_json, say, stage_progress
+from bgars.cli.console import print_json, say, stage_progress, warn
 from bgars.cli.options import StationOption
 from bgars.cli.station_output import need_different
 from bgars.errors import InputError
+from bgars.inspection.judge import OWN_PITCH
 from bgars.io.atomic import atomic_file
+from bgars.station.teach import compact_names, teach_text
 from bgars.station.teach import teach as learn
-from bgars.station.teach import teach_text
 
 __all__ = ["register"]
 
@@ -34,13 +35,14 @@ def teach(
     ],
     name: Annotated[str, typer.Option(help="Name of the part; the file's name by default.", show_default=False)] = "",
     station: StationOption = None,
+    accept_doubts: Annotated[bool, typer.Option("--accept-doubts", help="Learn although a ball is in doubt.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing recipe.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")] = False,
 ) -> None:
     """Write a part recipe from golden parts: layout, empty places, nominal sizes, and limits by a rule the file states.
 
     The limits are what these parts keep with a margin; limits from a drawing are better. Exit code 2 where the parts
-    differ.
+    differ, or one is in doubt: a ball unlike its fellows, or a missing one.
     """
     _check_place(output, force=force)
     need_different(golden, "every part must have images of its own")
@@ -49,20 +51,26 @@ def teach(
         for index, folder in enumerate(golden):
             results.append(bgars.inspect(bgars.read_capture(folder, station=station)))
             _need_separate_balls(folder, results[-1])
+            for words in results[-1].warnings:
+                if words != OWN_PITCH:
+                    warn(f"{folder}: {words}")
             report("golden", (index + 1) / len(golden))
-    taught = learn(results, name or output.stem)
+    taught = learn(results, name or output.stem, accept_doubts=accept_doubts)
     with atomic_file(output) as place:
         place.write_text(teach_text(taught), encoding="utf-8")
         recipe = bgars.read_part_recipe(place)
     if as_json:
         print_json({**recipe.to_dict(), "file": str(output), "parts": taught.parts})
         return
+    empty = ", ".join(compact_names(taught.depopulated, taught.rows, taught.cols))
     say(
-        f"{taught.name}: {taught.rows} x {taught.cols} places, {len(taught.depopulated)} of them empty, pitch "
-        f"{taught.pitch_um:.1f} um,"
+        f"{taught.name}: {taught.rows} x {taught.cols} places, {len(taught.depopulated)} of them empty"
+        f"{f' ({empty})' if empty else ''}, pitch {taught.pitch_um:.1f} um,"
     )
     parts = f"{taught.parts} part{'' if taught.parts == 1 else 's'}"
     say(f"balls of {taught.diameter_um:.1f} um, {taught.height_um:.1f} um high, from {parts}.")
+    for words in taught.doubts:
+        say(f"Accepted although in doubt: {words}")
     say(f"Written: {output}. Check its limits before you use it.")
 
 

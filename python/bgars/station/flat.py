@@ -120,7 +120,10 @@ def calibrate_flat(capture: Capture) -> tuple[FlatField, tuple[Remark, ...]]:
             "corners that the lens cuts off; photograph a plain board, or mask what is none"
         )
         raise CalibrationError(msg)
-    return flat, tuple(_findings(capture, left, worst, least))
+    spare = max(len(x) - rows.shape[1], 1)
+    scatter = np.array(np.sqrt((weights * (means - fitted) ** 2).sum(axis=1) / spare), dtype=np.float64)
+    inverse = np.array(np.linalg.pinv((rows * weights[:, None]).T @ rows), dtype=np.float64)
+    return flat, tuple(_findings(capture, left, worst, least) + _unsure(capture, flat, inverse, scatter, step))
 
 
 def falloff_findings(flat: FlatField, lights: LightCalibration, pitch_um: float) -> list[Remark]:
@@ -216,6 +219,28 @@ def _degree(means: Array, weights: Array, x: Array, y: Array, noise: Array) -> i
         if error < BETTER**2 * best:
             best, chosen = error, degree
     return chosen
+
+
+def _unsure(capture: Capture, flat: FlatField, inverse: Array, scatter: Array, step: int) -> list[Remark]:
+    """Name maps that a place, mostly a dark corner, is known to badly: twice the standard uncertainty of the fit."""
+    height, width = flat.size_px
+    at = np.ix_(np.unique([*range(0, height, step), height - 1]), np.unique([*range(0, width, step), width - 1]))
+    row, col = (each[capture.mask[at]] for each in np.broadcast_arrays(*at))
+    rows = _rows((col + 0.5) / width * 2.0 - 1.0, 1.0 - (row + 0.5) / height * 2.0, flat.degree)
+    # The scatter of a pixel, were it alone; the inverse counts the pixels of each block.
+    usual = np.sqrt(np.einsum("ij,jk,ik->i", rows, inverse, rows))
+    u = np.maximum(scatter, np.finfo(float).tiny)[:, None] * usual / np.abs(flat.coefficients @ rows.T)
+    found = []
+    for light in np.flatnonzero(2.0 * u.max(axis=1) > LARGEST):
+        place = int(u[light].argmax())
+        share = 2.0 * float(u[light, place])
+        message = (
+            f"{capture.name}: {light_name(int(light), capture.files)}: the map is known to {100 * share:.0f} % only at "
+            f"column {col[place]}, row {row[place]} (limit {100 * LARGEST:g} %): too dark there, or a lamp too near "
+            "for a smooth map; expose longer, or move the lamp away"
+        )
+        found.append(Remark("doubt", message, "flat-unsure", share, LARGEST, "", int(light)))
+    return found
 
 
 def _findings(capture: Capture, left: Array, worst: Array, least: float) -> list[Remark]:

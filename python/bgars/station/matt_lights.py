@@ -41,7 +41,9 @@ LEAST_LEVEL = 12.0
 """Grey levels of 255 of the brightest point from which on there is shading."""
 BOARD_SHARE = 0.5
 """Spread of what the board reflects, of the ball's level, before it is measured in the attached shadow."""
-UNEVEN = 0.1
+NEAR_RADII = 0.02
+"""Spread of a ball's radius over the distance of a lamp: 10 mm at 500 mm; a ball of 2 mm has a tenth of it."""
+UNEVEN = 0.05
 """Part of the board's light that one side has more of than its shadow says: the ball shines on the board, too."""
 LEAST_SHADOW, CUT_SHARE = 30, 0.02
 """Pixels of an attached shadow, and their share at the least grey level, from which on noise is cut there: fewer move
@@ -164,6 +166,8 @@ def _fit(normals: Array, values: Array, used: NDArray[np.bool_], noise: float) -
     """Strength times direction, level of the board's light, and the root mean square residual.
 
     The board reflects onto a ball what an endless plane does on which the ball rests, and throws its shadow.
+    A lamp stands at some distance, 1 / q radii: what the ball turns to it is nearer to it, and the rest sees less of
+    it. Left out, that tilts all lights of a ball by 120 degrees times q toward the board.
     """
     normals, values = normals[used], values[used]
     scale = max(float(values.max()), 1.0)
@@ -176,22 +180,38 @@ def _fit(normals: Array, values: Array, used: NDArray[np.bool_], noise: float) -
     floor = float(values.min())
     cut = _noise_at(floor, values[normals @ toward < 0.0], noise)
 
+    def lit_by(p: Array) -> tuple[Array, Array]:
+        """The lamp's light, and its slopes by its strength times direction and by the radius over its distance."""
+        strength = float(np.linalg.norm(p[:3]))
+        toward, near = p[:3] / strength, p[5]
+        cosine = normals @ toward
+        # Toward the lamp are l - q n, in units of its distance: Lambert's cosine over the square of its length.
+        square = 1.0 - 2.0 * near * cosine + near**2
+        turned = np.maximum(cosine - near, 0.0)
+        law = turned / square**1.5
+        by_cosine = (turned > 0.0) / square**1.5 + 3.0 * near * turned / square**2.5
+        by_near = strength * (3.0 * turned**2 / square**2.5 - (turned > 0.0) / square**1.5)
+        by_vector = law[:, None] * toward + by_cosine[:, None] * (normals - cosine[:, None] * toward)
+        return strength * law, np.column_stack([by_vector, by_near])
+
     def residuals(p: Array) -> Array:
-        level = np.maximum(normals @ p[:3], 0.0) + p[3] + p[4] * below
+        level = lit_by(p)[0] + p[3] + p[4] * below
         if cut > 0.0:
             level = floor + _mean_of_cut(level - floor, cut)
-        return np.append((values - level) / spread, p[4] / (BOARD_SHARE * scale))
+        return np.append((values - level) / spread, [p[4] / (BOARD_SHARE * scale), p[5] / NEAR_RADII])
 
     def slopes(p: Array) -> Array:
-        shade = normals @ p[:3]
-        rows = np.column_stack([normals * (shade > 0.0)[:, None], np.ones(len(values)), below])
+        light, by_lamp = lit_by(p)
+        rows = np.column_stack([by_lamp[:, :3], np.ones(len(values)), below, by_lamp[:, 3]])
         if cut > 0.0:  # the mean of what noise cuts rises with the level by the share that is not cut
-            rows *= ndtr((np.maximum(shade, 0.0) + p[3] + p[4] * below - floor) / cut)[:, None]
-        return np.vstack([rows / -spread, [0.0, 0.0, 0.0, 0.0, 1.0 / (BOARD_SHARE * scale)]])
+            rows *= ndtr((light + p[3] + p[4] * below - floor) / cut)[:, None]
+        priors = np.zeros((2, 6))
+        priors[0, 4], priors[1, 5] = 1.0 / (BOARD_SHARE * scale), 1.0 / NEAR_RADII
+        return np.vstack([rows / -spread, priors])
 
-    start = np.array([*first, 0.0, 0.0])
+    start = np.array([*first, 0.0, 0.0, 0.0])
     fit = least_squares(residuals, start, slopes, loss="soft_l1", max_nfev=60)
-    off = np.abs(fit.fun[:-1]) * spread
+    off = np.abs(fit.fun[:-2]) * spread
     return fit.x[:3], abs(float(fit.x[4])), float(np.sqrt(np.mean(np.minimum(off, 4.0 * np.median(off) + noise) ** 2)))
 
 

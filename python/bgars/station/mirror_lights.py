@@ -124,6 +124,7 @@ def highlights_on(capture: Capture, levels: Levels, outline: Outline, camera_px:
             continue
         places[index], covariances[index] = (fit.x_px, fit.y_px), fit.covariance_px2
         lamp_deg[index], flux[index] = fit.lamp_deg, fit.flux
+    covariances[np.isfinite(flux)] += _drawn_to_pixels(places[np.isfinite(flux)], still.shape) * np.eye(2)
     for index, spot in spots.items():
         if spot.second_share > SECOND_SHARE:
             # Either may be the lamp.
@@ -143,11 +144,38 @@ def _place_small(
     # Where no lens and no disc explain the pixels, all of them that come near are weighed instead.
     explained = (fitted.misfits < POOR_FIT) & (np.hypot(*(fitted.places_px - starts).T) < MOVED_PX)
     return [
-        one._replace(place_px=place, covariance_px2=covariance) if good else one
+        _weighed(one, place, covariance) if good else one
         for one, place, covariance, good in zip(
             placed, fitted.places_px, fitted.covariances_px2, explained, strict=True
         )
     ]
+
+
+def _weighed(one: SmallSpot, place: Array, covariance: Array) -> SmallSpot:
+    """Mean and covariance of a place that is either that of the best fit or that of all discs, by their precision.
+
+    A fit that hardly tells the size of the disc from the blur takes its covariance at one of many places that explain
+    the pixels: far too large where nothing holds it, too small where another minimum is as deep.
+    """
+    share = np.trace(one.covariance_px2) / (np.trace(covariance) + np.trace(one.covariance_px2))
+    apart = place - one.place_px
+    return one._replace(
+        place_px=share * place + (1.0 - share) * one.place_px,
+        covariance_px2=share * covariance
+        + (1.0 - share) * one.covariance_px2
+        + share * (1.0 - share) * np.outer(apart, apart),
+    )
+
+
+def _drawn_to_pixels(places_px: Array, shape: tuple[int, int]) -> float:
+    """Variance (px^2) of centroids of spots that are too small for the pixels, where their own places show it.
+
+    A spot of which the pixels see the share P at one cycle a pixel has its centroid drawn toward the middle of its
+    pixel by P / pi sin(2 pi x), x from there; P is then the mean of cos(2 pi x) over highlights, which lie anywhere.
+    """
+    middles = places_px + np.array([shape[1] / 2.0 - 0.5, shape[0] / 2.0 - 0.5])
+    share = max(float(np.mean(np.cos(2.0 * np.pi * middles))), 0.0) if middles.size else 0.0
+    return share**2 / (2.0 * np.pi**2)
 
 
 def together(findings: list[Remark], name: str, count: int) -> list[Remark]:

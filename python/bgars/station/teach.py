@@ -11,6 +11,7 @@ import numpy as np
 
 from bgars.errors import CalibrationError, InputError
 from bgars.records.ball_names import ball_name
+from bgars.station.golden import FLOOR_SHARE, SIGMAS, limits_of, odd_empty_places, unlike_their_fellows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,12 +20,10 @@ if TYPE_CHECKING:
 
 __all__ = ["Taught", "compact_names", "teach", "teach_text"]
 
-SIGMAS = 4.0
-"""Limits lie so many standard deviations of the golden balls, and of their uncertainty, from the nominal value."""
-FLOOR_SHARE = 0.05
-"""And no closer than this share of it."""
 POSITION_SHARE = 0.1
 """Limit of true position, of the pitch, where the golden balls keep it with room."""
+MOST_NAMES = 6
+"""Places and doubts that a message names."""
 
 
 @dataclass(frozen=True)
@@ -40,21 +39,25 @@ class Taught:
     height_um: float
     limits: dict[str, float | tuple[float, float]]
     parts: int
+    doubts: tuple[str, ...] = ()
 
 
-def teach(results: Sequence[PartResult], name: str) -> Taught:
+def teach(results: Sequence[PartResult], name: str, *, accept_doubts: bool = False) -> Taught:
     """Learn a recipe from inspections of golden parts without a recipe.
 
     The rule: nominal = median over all balls of all parts; limits = nominal +- the larger of 4 sqrt(s^2 + u^2) and 5 %
     of it, with s the robust spread of the balls and u their median standard uncertainty. True position, coplanarity and
     warpage: the largest golden reading plus 4 u, true position at least a tenth of the pitch.
 
+    A ball that these limits do not hold, that is off its place, missing where the layout's symmetry has one, or in
+    doubt by its inspection, is no model: such parts are refused unless `accept_doubts`.
+
     Raises
     ------
     InputError
         No part, or parts whose layouts differ.
     CalibrationError
-        Fewer than 4 balls measured.
+        Fewer than 4 balls measured, or parts in doubt.
     """
     if not results:
         msg = "GOLDEN: must be one part or more, got none"
@@ -62,13 +65,27 @@ def teach(results: Sequence[PartResult], name: str) -> Taught:
     layouts = [_layout(result) for result in results]
     for result, layout in zip(results, layouts, strict=True):
         if layout != layouts[0]:
+            differ = [ball_name(row, col) for row, col in sorted(layout ^ layouts[0])]
+            shown = ", ".join(differ[:MOST_NAMES]) + (", ..." if len(differ) > MOST_NAMES else "")
             msg = (
                 f"{result.name}: {len(layout)} balls on other places than {results[0].name} "
-                f"({len(layouts[0])}): not the same part"
+                f"({len(layouts[0])}): {shown}: not the same part, or one of them is not good"
             )
             raise InputError(msg)
     places = layouts[0]
     rows, cols = max(row for row, _ in places) + 1, max(col for _, col in places) + 1
+    doubts = unlike_their_fellows(results)
+    if len(results) == 1:
+        # Of two parts neither has lost the ball of the same place by accident.
+        odd = odd_empty_places(places, rows, cols)
+        doubts += [f"{place}: no ball, though its mirror images in the layout have one" for place in odd]
+    if doubts and not accept_doubts:
+        shown = "; ".join(doubts[:MOST_NAMES]) + (
+            f"; and {len(doubts) - MOST_NAMES} more" if doubts[MOST_NAMES:] else ""
+        )
+        parts, advice = ("a part", "give two parts or more") if len(results) == 1 else ("parts", "leave those out")
+        msg = f"{results[0].name}: {parts} in doubt: {shown}; {advice}, or --accept-doubts if they are good"
+        raise CalibrationError(msg)
     empty = tuple(ball_name(row, col) for row in range(rows) for col in range(cols) if (row, col) not in places)
     balls = [ball for result in results for ball in result.balls if ball.present]
     diameter, diameter_range = _range([ball.diameter_um for ball in balls], [ball.u_diameter_um for ball in balls])
@@ -86,7 +103,7 @@ def teach(results: Sequence[PartResult], name: str) -> Taught:
         most = _most([getattr(result, key) for result in results], [getattr(result, f"u_{key}") for result in results])
         if most is not None:
             limits[key] = most
-    return Taught(name, rows, cols, pitch, empty, diameter, height, limits, len(results))
+    return Taught(name, rows, cols, pitch, empty, diameter, height, limits, len(results), tuple(doubts))
 
 
 def teach_text(taught: Taught) -> str:
@@ -96,6 +113,7 @@ def teach_text(taught: Taught) -> str:
         f"# and {100 * FLOOR_SHARE:.0f} %; position, coplanarity and warpage: the largest golden reading + 4 u, "
         f"position {100 * POSITION_SHARE:.0f} % of the",
         "# pitch at least. Put the drawing's limits here.",
+        *(f"# Accepted although in doubt: {words}" for words in taught.doubts),
         f"name = {json.dumps(taught.name)}",
         f"rows = {taught.rows}",
         f"cols = {taught.cols}",
@@ -146,14 +164,11 @@ def _layout(result: PartResult) -> set[tuple[int, int]]:
 
 
 def _range(values: list[float], us: list[float]) -> tuple[float, tuple[float, float]]:
-    known = np.array([value for value in values if value is not None and math.isfinite(value)])
-    u = np.array([value for value in us if value is not None and math.isfinite(value)])
-    if len(known) < 4:  # noqa: PLR2004
-        msg = f"only {len(known)} balls were measured, 4 are needed"
+    count = sum(math.isfinite(value) for value in values)
+    if count < 4:  # noqa: PLR2004
+        msg = f"only {count} balls were measured, 4 are needed"
         raise CalibrationError(msg)
-    nominal = float(np.median(known))
-    spread = 1.4826 * float(np.median(np.abs(known - nominal)))
-    half = max(SIGMAS * math.hypot(spread, float(np.median(u)) if len(u) else 0.0), FLOOR_SHARE * nominal)
+    nominal, half = limits_of(values, us)
     return nominal, (max(nominal - half, 0.0), nominal + half)
 
 
