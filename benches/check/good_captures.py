@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -36,6 +36,7 @@ CHOSEN_ON = "chosen"
 JUDGED_ON = "judged"
 SIMULATED = 42
 RELIEFS = 36
+DOMES = 20
 
 
 def captures(which: str) -> Iterator[tuple[str, bgars.Capture]]:
@@ -46,6 +47,8 @@ def captures(which: str) -> Iterator[tuple[str, bgars.Capture]]:
         yield f"array {seed}", array(seed)
     for seed in range(start, start + RELIEFS):
         yield f"relief {seed}", relief(seed)
+    for seed in range(start, start + DOMES):
+        yield f"dome {seed}", array(seed, _dome)
     for folder in rendered(which):
         if deviations(folder) & set(FAULTY):
             continue
@@ -70,8 +73,8 @@ def deviations(folder: Path) -> set[str]:
     return set(json.loads((folder / "scene.json").read_text(encoding="utf-8"))["deviations"])
 
 
-def array(seed: int) -> bgars.Capture:
-    """A simulated array of balls on a board."""
+def array(seed: int, lights: Callable[[np.random.Generator], bgars.LightRig] | None = None) -> bgars.Capture:
+    """A simulated array of balls on a board, under an even ring or other lights."""
     random = np.random.default_rng(seed)
     rows, cols = random.integers(2, 6, 2)
     texture = bgars.Texture(
@@ -107,13 +110,30 @@ def array(seed: int) -> bgars.Capture:
         blur_px=float(random.uniform(0.4, 0.9)),
     )
     camera = replace(camera, read_noise_levels=camera.read_noise_levels * camera.full_scale / 255.0)
-    rig = bgars.LightRig.ring(
+    rig = (_ring if lights is None else lights)(random)
+    capture, _ = bgars.simulate(scene, rig, material, camera, seed=seed, threads=1)
+    return _mislaid(capture, random, 0.7, 0.02)
+
+
+def _ring(random: np.random.Generator) -> bgars.LightRig:
+    return bgars.LightRig.ring(
         int(random.choice([6, 8, 8, 8, 12])),
         elevation_deg=float(random.uniform(38, 62)),
         azimuth0_deg=float(random.choice([0.0, 0.0, 22.5])),
     )
-    capture, _ = bgars.simulate(scene, rig, material, camera, seed=seed, threads=1)
-    return _mislaid(capture, random, 0.7, 0.02)
+
+
+def _dome(random: np.random.Generator) -> bgars.LightRig:
+    """Lights anywhere between 24 and 76 degrees of elevation, 12 degrees apart at least."""
+    count = int(random.choice([8, 9, 10, 12, 16, 20]))
+    directions: list[NDArray[np.float64]] = []
+    while len(directions) < count:
+        azimuth, height = float(random.uniform(0.0, 2.0 * np.pi)), float(random.uniform(0.4, 0.97))
+        flat = (1.0 - height**2) ** 0.5
+        light = np.array([flat * np.cos(azimuth), flat * np.sin(azimuth), height])
+        if all(light @ other < np.cos(np.radians(12.0)) for other in directions):
+            directions.append(light)
+    return bgars.LightRig.from_directions(np.array(directions))
 
 
 def relief(seed: int) -> bgars.Capture:

@@ -105,6 +105,14 @@ def test_transparent_pixels_are_outside(tmp_path: Path, kind: type) -> None:
     np.testing.assert_array_equal(capture.mask, MASK > 0)
 
 
+def test_a_channel_of_unstated_meaning_is_no_opacity(tmp_path: Path) -> None:
+    write_directions(tmp_path)
+    for name, image in zip(names_of("a{}.tif"), levels(8), strict=True):
+        pixels = np.dstack([image] * 3 + [image.max() - image])
+        tifffile.imwrite(tmp_path / name, pixels, photometric="rgb", extrasamples=["unspecified"])
+    assert reads_right(tmp_path, "unstated meaning is not used").mask.all()
+
+
 @pytest.mark.parametrize(
     ("names", "words"),
     [

@@ -40,8 +40,13 @@ def angle_lines(first: np.ndarray, second: np.ndarray, named: bool = False) -> s
         ("azimuth,elevation\n" + angle_lines(np.radians(AZIMUTHS_DEG), np.full(8, np.radians(50.0))), "radians"),
         ("image,azimuth_deg,elevation_deg\n" + angle_lines(AZIMUTHS_DEG, np.full(8, 50.0), named=True), "degrees"),
         ("Slant (deg),Tilt (deg)\n" + angle_lines(np.full(8, 40.0), AZIMUTHS_DEG), "counter-clockwise"),
+        (
+            "azimuth,elevation,file\n"
+            + "".join(f"{azimuth},50,img_{index}.png\n" for index, azimuth in enumerate(AZIMUTHS_DEG)),
+            "degrees",
+        ),
     ],
-    ids=["degrees", "radians", "named", "slant and tilt"],
+    ids=["degrees", "radians", "named", "slant and tilt", "named behind"],
 )
 def test_angles_are_read_under_a_header_that_names_them(text: str, said: str, folder: Path) -> None:
     (folder / "lights.csv").write_text(text, encoding="utf-8")

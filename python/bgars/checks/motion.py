@@ -29,6 +29,11 @@ OF_OTHERS = 6.0
 """Times the usual shift that is left of the other images, which the shape of highlights and edges makes."""
 EQUAL_PX = 0.02
 """To which images lie alike, at best."""
+AGREES = 0.8
+"""Of the usual agreement of edges, from which on an image has those of the others, which lie elsewhere only where it
+moved. Under a light much lower than the others most edges are its own, of highlights and shadows, ..."""
+TOWARDS_DEG = 45.0
+"""... and lie towards it: nearer to its azimuth than this such a shift is none."""
 MIN_LIGHTS = 6
 """Of fewer, what is left over does not tell which image has moved."""
 
@@ -50,7 +55,9 @@ class Move(NamedTuple):
 def moves(found: ImageShifts, lights: Array) -> Iterator[Move]:
     """Each image, and all from each image on, as if these had moved and nothing else.
 
-    Gradients of shading are not where those of albedo are: that shifts all images in proportion to their lights.
+    Gradients of shading are not where those of albedo are: that shifts all images in proportion to their lights. Of an
+    image whose light stands apart from the others this is known worse: what is usual is that of a light of the ring
+    (whose leverage is 3 / L), and grows with the standard error of the shift.
     """
     count = len(lights)
     usual_model = np.column_stack([np.ones(count), lights[:, :2]])
@@ -65,8 +72,10 @@ def moves(found: ImageShifts, lights: Array) -> Iterator[Move]:
         spread = np.square(found.without_px.transpose(0, 2, 1) @ solve[-1] - shift).sum(axis=1)
         error = float(np.sqrt((tiles - 1) / tiles * spread.sum()))
         left = found.place_px - usual_model @ (solve[:3] @ found.place_px) - moved[:, None] * shift
-        free = left if len(images) > 1 else np.delete(left, images, axis=0)
-        yield Move(images, shift, error, float(np.median(np.hypot(*free.T))))
+        alone = len(images) == 1
+        free = np.delete(left, images, axis=0) if alone else left
+        apart = float(np.linalg.norm(solve[-1])) * (1.0 - 3.0 / count) ** 0.5 if alone else 1.0
+        yield Move(images, shift, error, apart * float(np.median(np.hypot(*free.T))))
 
 
 def find_move(capture: Capture, kept: Images, lights: Array) -> Move | None:
@@ -91,9 +100,17 @@ def find_move(capture: Capture, kept: Images, lights: Array) -> Move | None:
         move
         for move in candidates
         if move.size_px > max(MOVED_PX, critical * move.u_px, OF_OTHERS * max(move.usual_px, EQUAL_PX))
+        and not _follows(move, found.agreement, lights)
     ]
     # A shift that is put where it is not leaves more over.
     return min(certain, key=lambda move: move.usual_px / move.size_px, default=None)
+
+
+def _follows(move: Move, agreement: Array, lights: Array) -> bool:
+    """Whether one image's edges lie towards its light, and are not those of the others."""
+    light = lights[move.images[0], :2]
+    towards = float(move.shift_px @ light) > np.cos(np.radians(TOWARDS_DEG)) * move.size_px * float(np.hypot(*light))
+    return len(move.images) == 1 and bool(agreement[move.images[0]] < AGREES) and towards
 
 
 def registered(capture: Capture, kept: Images, move: Move) -> Capture:

@@ -43,6 +43,12 @@ MIN_PIXELS = 300
 SHADOWED, SHINES = 0.15, 2.0
 """Of the pixel's median: darker is taken as shadow (as `matt_fit.SHADOWED`), brighter as a highlight."""
 ROUNDS = 5
+ABOVE = np.array([0.0, 0.0, 1.0])
+LOW = float(np.sin(np.radians(45.0)))
+"""Height of a light below which what balls reflect comes from above it: seen were lights at 27 to 39 degrees."""
+REFLECTED = 0.28
+"""Of the usual light, root mean square, that light reflected by balls leaves at most: it left 0.15 to 0.25 where images
+seemed to be taken under higher lights, and a wrong direction 0.31 to 0.52."""
 TURNS: tuple[tuple[str, Callable[[Floats], Floats]], ...] = (
     ("turned by 180 degrees", lambda image: image[::-1, ::-1]),
     ("mirrored left to right", lambda image: image[:, ::-1]),
@@ -81,10 +87,7 @@ def check_odd_image(view: View) -> list[Finding]:
     turns = TURNS + (QUARTERS if image.shape[0] == image.shape[1] else ())
     turned = [name for name, turn in turns if _explains(view, surface, (image, light), (turn(image), light))]
     seen = _seen_light(image, light, surface)
-    # A lamp that is only dimmer stands where it should.
-    if seen is not None and not _explains(
-        view, surface, (image, light * _strength(image, light, surface)), (image, seen)
-    ):
+    if seen is not None and not _explains(view, surface, (image, _lifted(image, light, surface)), (image, seen)):
         seen = None
     return _told(view, index, turned, seen)
 
@@ -119,10 +122,7 @@ def _explains(view: View, surface: _Surface, given: tuple[Floats, Array], other:
     known = surface.known & matt(given[0], surface.middle) & matt(other[0], surface.middle)
     if int(known.sum()) < MIN_PIXELS:
         return False
-    before, after = (
-        np.minimum(np.square((image - np.einsum("k,khw->hw", light, surface.normal)) / surface.middle.clip(1e-6)), 1.0)
-        for image, light in (given, other)
-    )
+    before, after = (_left(image, light, surface) for image, light in (given, other))
     mean = float(after[known].mean())
     if mean > BETTER * float(before[known].mean()) or mean > AS_OTHERS * max(surface.usual, EQUAL):
         return False
@@ -133,11 +133,24 @@ def _explains(view: View, surface: _Surface, given: tuple[Floats, Array], other:
     return t > critical_t(min(tiles, TILES * TILES), len(view.lights) * (len(TURNS) + len(QUARTERS) + 1))
 
 
-def _strength(image: Floats, light: Array, surface: _Surface) -> float:
-    """Usual light over the promised one."""
-    promise = np.einsum("k,khw->hw", light, surface.normal)
-    known = surface.known & matt(image, surface.middle) & (promise > SHADOWED * surface.middle)
-    return float(np.median(image[known] / promise[known])) if known.any() else 1.0
+def _left(image: Floats, light: Array, surface: _Surface) -> Array:
+    """(h, w) square of what an image differs from a surface under a light, over the usual light."""
+    told = np.einsum("k,khw->hw", light, surface.normal)
+    left: Array = np.minimum(np.square((image - told) / surface.middle.clip(1e-6)), 1.0)
+    return left
+
+
+def _lifted(image: Floats, light: Array, surface: _Surface) -> Array:
+    """The light of a lamp that stands where it should, of any strength, with what it throws from above.
+
+    A low lamp lights the sides of shiny balls, and these the board and each other.
+    """
+    known = surface.known & matt(image, surface.middle)
+    alone = _fitted(image, surface, known, light[None])
+    if light[2] > LOW or float(_left(image, light, surface)[known].mean()) > REFLECTED**2:
+        return alone
+    both = _fitted(image, surface, known, np.array([light, ABOVE]))
+    return both if both[2] * np.hypot(*light[:2]) > light[2] * np.hypot(*both[:2]) else alone
 
 
 def _seen_light(image: Floats, light: Array, surface: _Surface) -> Array | None:
@@ -145,23 +158,30 @@ def _seen_light(image: Floats, light: Array, surface: _Surface) -> Array | None:
     known = surface.known & matt(image, surface.middle)
     if int(known.sum()) < MIN_PIXELS:
         return None
-    normal, value = surface.normal[:, known], image[known].astype(np.float64)
+    normal = surface.normal[:, known]
     slopes = np.cov(normal[:2] / np.maximum(normal[2], 1e-9))
     if float(np.linalg.eigvalsh(slopes)[0]) < SLOPES**2:
         return None
-    weight = 1.0 / np.maximum(surface.middle[known].astype(np.float64), 1e-6) ** 2
-    trust = np.ones_like(weight)
-    found = light
-    for _ in range(ROUNDS):
-        both = weight * trust
-        product, right = np.einsum("in,n,jn->ij", normal, both, normal), np.einsum("in,n->i", normal, both * value)
-        found = np.linalg.solve(product, right)
-        left = np.square(value - np.einsum("in,i->n", normal, found)) * weight
-        trust = 1.0 / (1.0 + left / max(float(np.median(left)), EQUAL)) ** 2
+    found = _fitted(image, surface, known, np.eye(3))
     length = float(np.linalg.norm(found))
     if not found[2] > 0.0 or float(found @ light) > np.cos(np.radians(MOVED_DEG)) * length:
         return None
-    return np.asarray(found, np.float64)
+    return found
+
+
+def _fitted(image: Floats, surface: _Surface, known: Mask, span: Array) -> Array:
+    """The light, a sum of the (K, 3) vectors of `span`, that explains an image best; what does not fit counts less."""
+    shares, value = span @ surface.normal[:, known], image[known].astype(np.float64)
+    weight = 1.0 / np.maximum(surface.middle[known].astype(np.float64), 1e-6) ** 2
+    trust = np.ones_like(weight)
+    found = np.zeros(len(span))
+    for _ in range(ROUNDS):
+        both = weight * trust
+        product, right = np.einsum("in,n,jn->ij", shares, both, shares), np.einsum("in,n->i", shares, both * value)
+        found = np.linalg.lstsq(product, right, rcond=None)[0]
+        left = np.square(value - np.einsum("in,i->n", shares, found)) * weight
+        trust = 1.0 / (1.0 + left / max(float(np.median(left)), EQUAL)) ** 2
+    return np.asarray(found @ span, np.float64)
 
 
 def _told(view: View, index: int, turned: list[str], seen: Array | None) -> list[Finding]:

@@ -47,6 +47,8 @@ class ImageShifts(NamedTuple):
     place_px: Array
     without_px: Array
     """(T, L, 2)"""
+    agreement: Array
+    """(L,) how well the edges agree at that place, of the median of the images."""
 
 
 def image_shifts(capture: Capture, kept: NDArray[np.intp]) -> ImageShifts | None:
@@ -64,7 +66,9 @@ def image_shifts(capture: Capture, kept: NDArray[np.intp]) -> ImageShifts | None
     if len(surfaces) < MIN_TILES:
         return None
     total = surfaces.sum(axis=0)
-    return ImageShifts(_peaks(total), np.array([_peaks(total - each) for each in surfaces]))
+    height = total.max(axis=(1, 2))
+    without = np.array([_peaks(total - each) for each in surfaces])
+    return ImageShifts(_peaks(total), without, height / max(float(np.median(height)), 1e-12))
 
 
 def _surfaces(patch: Patch, levels: Floats) -> Iterator[Array]:

@@ -305,6 +305,8 @@ def _turn(images: PixelArray, headers: Headers, notes: list[str]) -> PixelArray:
 def _mask(folder: Path, recipe: CaptureRecipe, images: PixelArray, headers: Headers, notes: list[str]) -> BoolArray:
     """The mask of the recipe, else what no image declares transparent."""
     shape = (images.shape[1], images.shape[2])
+    if headers.with_extra:
+        notes.append(f"a further channel of unstated meaning is not used ({headers.with_extra[0].name})")
     if recipe.mask is not None:
         return read_mask(folder / recipe.mask, shape, notes)
     opaque = opaque_everywhere(headers.with_alpha, headers.orientation)

@@ -29,11 +29,14 @@ class Headers(NamedTuple):
         Why the values may not be linear in light, as the beginning of a sentence; "" where no header speaks against it.
     with_alpha : tuple of Path
         Files with an opacity.
+    with_extra : tuple of Path
+        Files with a further channel that is none, and is not read.
     """
 
     orientation: int
     doubt: str
     with_alpha: tuple[Path, ...]
+    with_extra: tuple[Path, ...]
 
 
 def read_headers(paths: Sequence[Path], *, stack: bool) -> Headers:
@@ -70,4 +73,5 @@ def read_headers(paths: Sequence[Path], *, stack: bool) -> Headers:
     ]
     doubt = f"{doubted[0]} is hardly ever linear in light" if doubted else ""
     with_alpha = tuple(path for path, tag in zip(paths, tags, strict=True) if tag.alpha)
-    return Headers(tags[0].orientation, doubt, with_alpha)
+    with_extra = tuple(path for path, tag in zip(paths, tags, strict=True) if tag.extra)
+    return Headers(tags[0].orientation, doubt, with_alpha, with_extra)

@@ -20,6 +20,8 @@ __all__ = ["ImageTags", "read_tags", "upright"]
 
 UPRIGHT = 1
 ORIENTATION, SUBFILE, EXTRA_SAMPLES, PROFILE = 274, 254, 338, 34675
+OPACITY = (1, 2)
+"""Kinds of a further channel that are one, associated or not; 0 is unspecified (TIFF 6.0, section 18)."""
 BITS, PHOTOMETRIC = 258, 262
 WHITE_IS_ZERO = 0
 REDUCED = 1
@@ -54,6 +56,8 @@ class ImageTags(NamedTuple):
         A pixel is one bit, and 0 means white (TIFF).
     gamma : float
         Exponent with which samples were made from light (PNG, chunk gAMA); 1 where the file names none.
+    extra : bool
+        The file has a further channel that it does not call opacity (TIFF), such as near infrared.
     """
 
     orientation: int = UPRIGHT
@@ -63,6 +67,7 @@ class ImageTags(NamedTuple):
     profile: bool = False
     white_bits: bool = False
     gamma: float = 1.0
+    extra: bool = False
 
 
 def read_tags(path: Path, kind: ImageFormat) -> ImageTags:
@@ -102,7 +107,9 @@ def _tiff_tags(file: BinaryIO) -> ImageTags:
     orientation, count = _valid(first.get(ORIENTATION, UPRIGHT)), max(len(full), 1)
     preview_first = bool(pages) and first is not pages[0]
     white_bits = first.get(PHOTOMETRIC) == WHITE_IS_ZERO and first.get(BITS, 1) == 1
-    return ImageTags(orientation, count, EXTRA_SAMPLES in first, preview_first, PROFILE in first, white_bits)
+    further = first.get(EXTRA_SAMPLES)
+    is_opacity, is_other = further in OPACITY, further is not None and further not in OPACITY
+    return ImageTags(orientation, count, is_opacity, preview_first, PROFILE in first, white_bits, extra=is_other)
 
 
 def _directories(file: BinaryIO, only_first: bool = False) -> Iterator[dict[int, int]]:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bgars.errors import FileFormatError
-from bgars.files.light_formats.columns import Row, by_number, data_lines, find_style, parse_row
-from bgars.files.light_formats.headed import INDICES, SORTED, axes_of
+from bgars.files.image_endings import are_image_names
+from bgars.files.light_formats.columns import Row, Style, as_number, by_number, data_lines, find_style, parse_row
+from bgars.files.light_formats.headed import INDICES, SORTED, axes_of, fields_of
 from bgars.files.light_formats.table import MAX_LIGHTS, LightTable, checked_vectors
 from bgars.files.safe_files import read_text
 
@@ -50,7 +51,9 @@ def read_angle_table(path: Path) -> LightTable | None:
         msg = f"{path}: {len(lines)} lines are more than a capture may have lights (at most {MAX_LIGHTS})"
         raise FileFormatError(msg)
     style = find_style(lines[1:], ANGLES)
-    rows = [parse_row(line.text, style) for line in lines[1:]]
+    rows = _files_last([fields_of(line.text, style) for line in lines[1:]], names, style)
+    if rows is None:
+        rows = [parse_row(line.text, style) for line in lines[1:]]
     notes: list[str] = []
     if len(names) == ANGLES + 1 and names[0] in INDICES:
         names, rows = angles, _by_index(rows, notes)
@@ -74,6 +77,20 @@ def read_angle_table(path: Path) -> LightTable | None:
     files = tuple(row.name for row in rows if row is not None) if len(names) > ANGLES else ()
     note = f"{angles[0]} and {angles[1]} taken in {'radians' if is_radian else 'degrees'}, {_way(angles)}"
     return LightTable(checked_vectors(vectors, path, files), files=files, notes=(note, *notes))
+
+
+def _files_last(fields: list[list[str]], names: list[str], style: Style) -> list[Row | None] | None:
+    """Rows whose column of images stands behind an angle; None for others."""
+    place = next((place for place, name in enumerate(names) if not _kind(name)), 0)
+    if not place or len(names) != ANGLES + 1 or any(len(each) != len(names) for each in fields):
+        return None
+    if not are_image_names([each[place] for each in fields]):
+        return None
+    rows: list[Row | None] = []
+    for each in fields:
+        numbers = [as_number(field, style) for at, field in enumerate(each) if at != place]
+        rows.append(Row(each[place], tuple(number for number in numbers if number is not None)))
+    return rows
 
 
 def _by_index(rows: list[Row | None], notes: list[str]) -> list[Row | None]:
