@@ -143,7 +143,7 @@ class Broker:
         self.process = subprocess.Popen(self.command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         self.listener = client.Client(client.CallbackAPIVersion.VERSION2)
         self.listener.on_message = lambda _client, _data, message: self.got.append(json.loads(message.payload))
-        deadline = time.monotonic() + 30
+        deadline = time.monotonic() + 120
         while True:
             try:
                 self.listener.connect("127.0.0.1", self.port)

@@ -123,7 +123,7 @@ def test_what_stays_incomplete_or_unreadable_is_moved_with_its_reason(inbox: Pat
     made = watch(inbox, patience_s=0.2)
     made.step()
     assert names(inbox, "_failed/*/*") == [], "a copy may still be under way"
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + 120
     while len(names(inbox, "_failed/*/*")) < 2 and time.monotonic() < deadline:
         made.step()
         time.sleep(0.05)
