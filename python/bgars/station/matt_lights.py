@@ -43,6 +43,12 @@ BOARD_SHARE = 0.5
 """Spread of what the board reflects, of the ball's level, before it is measured in the attached shadow."""
 NEAR_RADII = 0.02
 """Spread of a ball's radius over the distance of a lamp: 10 mm at 500 mm; a ball of 2 mm has a tenth of it."""
+ALIKE = 0.2
+"""Spread of the distances of a rig's lamps, over their middle."""
+LEAST_NEAR = 1e-4
+"""And of that ratio at least: it tilts a light by 0.01 degrees."""
+TILT = math.radians(120.0)
+"""By so many times the ratio a light is tilted toward the board where the ratio is left out."""
 UNEVEN = 0.05
 """Part of the board's light that one side has more of than its shadow says: the ball shines on the board, too."""
 LEAST_SHADOW, CUT_SHARE = 30, 0.02
@@ -50,6 +56,26 @@ LEAST_SHADOW, CUT_SHARE = 30, 0.02
 its mean by less than a hundredth of the noise."""
 POLYNOMIAL = 4
 STEP_RAD = 1e-4
+
+
+class _Near(NamedTuple):
+    """What is known of the ball's radius over the distance of a lamp: mean, its error, and spread around it."""
+
+    mean: float = 0.0
+    error: float = 0.0
+    spread: float = NEAR_RADII
+
+
+NOT_KNOWN = _Near()
+
+
+class _Fit(NamedTuple):
+    """Strength times direction, level of the board's light, root mean square residual, radius over distance."""
+
+    vector: Array
+    board: float
+    residual: float
+    near: float
 
 
 class SeenShading(NamedTuple):
@@ -77,6 +103,7 @@ def shading_on(capture: Capture, levels: Levels, outline: Outline, camera_px: fl
     own, jacobians = np.zeros((count, 2, 2)), np.zeros((count, 3, 3))
     points, index = _pixels(levels.images.shape[1:], outline)
     normals = _normals(points, outline.circle_px, camera_px)
+    near = _nearness(normals, levels, index)
     for light, image in enumerate(levels.images):
         name = light_name(light, capture.files)
         values = image.ravel()[index]
@@ -94,7 +121,7 @@ def shading_on(capture: Capture, levels: Levels, outline: Outline, camera_px: fl
                 "expose shorter"
             )
             raise CalibrationError(msg)
-        vector, board, residual = _fit(normals, values, used, levels.noise)
+        vector, board, residual, _ = _fit(normals, values, used, levels.noise, near)
         strength = float(np.linalg.norm(vector))
         if vector[2] <= 0:
             msg = (
@@ -103,8 +130,10 @@ def shading_on(capture: Capture, levels: Levels, outline: Outline, camera_px: fl
             )
             raise CalibrationError(msg)
         direction = vector / strength
-        own[light], jacobians[light] = _spread(points, values, used, outline, levels.noise, direction, camera_px)
-        own[light] += (UNEVEN * board / strength) ** 2 * np.eye(2)
+        own[light], jacobians[light] = _spread(points, values, used, outline, levels.noise, direction, camera_px, near)
+        own[light] += (UNEVEN * board / strength) ** 2 * np.eye(2) + np.diag(
+            [0.0, TILT**2 * (near.error**2 + near.spread**2)]
+        )
         if residual > EXPLAINED * levels.noise:
             # Two laws that explain the ball as badly: the truth is as likely nearer to either of them.
             general, left = _monotone(normals, values, used, direction)
@@ -140,8 +169,8 @@ def shading_misfit(levels: Levels, outline: Outline) -> float:
     left = 0.0
     for image in levels.images[:3]:
         values = image.ravel()[index]
-        *_, residual = _fit(_normals(points, outline.circle_px), values, values < levels.clip, levels.noise)
-        left = max(left, residual / max(float(np.percentile(values, 99.0)), 1.0))
+        fit = _fit(_normals(points, outline.circle_px), values, values < levels.clip, levels.noise)
+        left = max(left, fit.residual / max(float(np.percentile(values, 99.0)), 1.0))
     return left
 
 
@@ -162,8 +191,17 @@ def _normals(points: Array, circle: Array, camera_px: float = math.inf) -> Array
     return normals
 
 
-def _fit(normals: Array, values: Array, used: NDArray[np.bool_], noise: float) -> tuple[Array, float, float]:
-    """Strength times direction, level of the board's light, and the root mean square residual.
+def _nearness(normals: Array, levels: Levels, index: NDArray[np.intp]) -> _Near:
+    """What the lights together tell of their distance: one alone mistakes for it what is not Lambert's law."""
+    seen = [image.ravel()[index] for image in levels.images]
+    ratios = np.array([_fit(normals, values, values < levels.clip, levels.noise).near for values in seen])
+    middle = max(float(np.median(ratios)), 0.0)
+    error = 1.2533 * 1.4826 * float(np.median(np.abs(ratios - np.median(ratios)))) / math.sqrt(len(ratios))
+    return _Near(middle, error, max(ALIKE * middle, LEAST_NEAR))
+
+
+def _fit(normals: Array, values: Array, used: NDArray[np.bool_], noise: float, prior: _Near = NOT_KNOWN) -> _Fit:
+    """Fit a light to the shading.
 
     The board reflects onto a ball what an endless plane does on which the ball rests, and throws its shadow.
     A lamp stands at some distance, 1 / q radii: what the ball turns to it is nearer to it, and the rest sees less of
@@ -198,7 +236,7 @@ def _fit(normals: Array, values: Array, used: NDArray[np.bool_], noise: float) -
         level = lit_by(p)[0] + p[3] + p[4] * below
         if cut > 0.0:
             level = floor + _mean_of_cut(level - floor, cut)
-        return np.append((values - level) / spread, [p[4] / (BOARD_SHARE * scale), p[5] / NEAR_RADII])
+        return np.append((values - level) / spread, [p[4] / (BOARD_SHARE * scale), (p[5] - prior.mean) / prior.spread])
 
     def slopes(p: Array) -> Array:
         light, by_lamp = lit_by(p)
@@ -206,13 +244,14 @@ def _fit(normals: Array, values: Array, used: NDArray[np.bool_], noise: float) -
         if cut > 0.0:  # the mean of what noise cuts rises with the level by the share that is not cut
             rows *= ndtr((light + p[3] + p[4] * below - floor) / cut)[:, None]
         priors = np.zeros((2, 6))
-        priors[0, 4], priors[1, 5] = 1.0 / (BOARD_SHARE * scale), 1.0 / NEAR_RADII
+        priors[0, 4], priors[1, 5] = 1.0 / (BOARD_SHARE * scale), 1.0 / prior.spread
         return np.vstack([rows / -spread, priors])
 
-    start = np.array([*first, 0.0, 0.0, 0.0])
+    start = np.array([*first, 0.0, 0.0, prior.mean])
     fit = least_squares(residuals, start, slopes, loss="soft_l1", max_nfev=60)
     off = np.abs(fit.fun[:-2]) * spread
-    return fit.x[:3], abs(float(fit.x[4])), float(np.sqrt(np.mean(np.minimum(off, 4.0 * np.median(off) + noise) ** 2)))
+    residual = float(np.sqrt(np.mean(np.minimum(off, 4.0 * np.median(off) + noise) ** 2)))
+    return _Fit(fit.x[:3], abs(float(fit.x[4])), residual, float(fit.x[5]))
 
 
 def _noise_at(floor: float, shadow: Array, noise: float) -> float:
@@ -262,6 +301,7 @@ def _spread(
     noise: float,
     direction: Array,
     camera_px: float,
+    near: _Near,
 ) -> tuple[Array, Array]:
     """Covariance (2, 2) of two turns by leaving out sectors; change (3, 3) of the direction by the outline, per px."""
     circle = outline.circle_px
@@ -269,7 +309,7 @@ def _spread(
     sector = ((np.arctan2(*(points - circle[:2]).T[::-1]) / (2 * math.pi) + 0.5) * SECTORS).astype(int) % SECTORS
     tries = []
     for part in range(SECTORS):
-        vector, *_ = _fit(normals, values, used & (sector != part), noise)
+        vector = _fit(normals, values, used & (sector != part), noise, near).vector
         tries.append(vector / np.linalg.norm(vector))
     off = np.array(tries) - np.mean(tries, axis=0)
     covariance = (SECTORS - 1) / SECTORS * off.T @ off
@@ -277,8 +317,8 @@ def _spread(
     columns = []
     step = 0.5
     for axis in np.eye(3):
-        ahead, *_ = _fit(_normals(points, circle + step * axis, camera_px), values, used, noise)
-        behind, *_ = _fit(_normals(points, circle - step * axis, camera_px), values, used, noise)
+        ahead = _fit(_normals(points, circle + step * axis, camera_px), values, used, noise, near).vector
+        behind = _fit(_normals(points, circle - step * axis, camera_px), values, used, noise, near).vector
         columns.append((ahead / np.linalg.norm(ahead) - behind / np.linalg.norm(behind)) / (2 * step))
     return across @ covariance @ across.T + STEP_RAD**2 * np.eye(2), np.column_stack(columns)
 
