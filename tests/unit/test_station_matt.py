@@ -68,3 +68,27 @@ def test_a_lamp_a_hundred_radii_away_is_not_seen_lower(elevation_deg: float) -> 
     off = np.degrees(2 * np.arcsin(np.linalg.norm(found.rig.directions - lights, axis=1) / 2))
     assert off.max() < 0.25
     assert (off < 3 * np.sqrt(2) * found.u_deg).all()
+
+
+@pytest.mark.parametrize(("level", "words"), [(0.0, "too dark on the ball"), (255.0, "overexposed")])
+def test_an_image_without_shading_is_refused_by_name(level: float, words: str) -> None:
+    images = matt_ball(1e7, 0.0, (8.3, -5.7, 60.0), seed=3)
+    images[2] = np.where(images[2] > 0, level, 0).astype(np.uint8)
+    with pytest.raises(bgars.CalibrationError, match=f"light 2.*{words}"):
+        bgars.calibrate_lights(capture_of(images, camera_distance_mm=np.inf), sphere="matt", outline=[8.3, -5.7, 60.0])
+
+
+def test_lamps_at_unlike_distances_are_within_their_uncertainty() -> None:
+    """The lamps of a ball share one distance; 80 to 125 radii are within the spread that is reckoned with."""
+    lights = ring(5, 45.0)
+    images = render(
+        1e4 * lights * np.array([[0.8], [0.9], [1.0], [1.1], [1.25]]) + np.array([7.3, -4.6, 100.0]),
+        ball=(7.3, -4.6, 100.0), size=(260, 260), kind="matt", board=0.05, samples=2, near=True, seed=5,
+    )  # fmt: skip
+    capture = bgars.Capture(
+        images=images, rig=bgars.LightRig.ring(5), mask=np.ones((260, 260), np.bool_), saturation=255.0,
+        camera_distance_mm=np.inf,
+    )  # fmt: skip
+    found = bgars.calibrate_lights(capture, sphere="matt")
+    off = np.degrees(2 * np.arcsin(np.linalg.norm(found.rig.directions - lights, axis=1) / 2))
+    assert (off < 2 * np.sqrt(2) * found.u_deg).all()

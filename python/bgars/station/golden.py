@@ -26,6 +26,8 @@ FLOOR_SHARE = 0.05
 """And no closer than this share of it; of the pitch where positions are compared."""
 RADIAL_SIGMAS = 4.4
 """A distance from a place (Rayleigh) exceeds this as seldom as a normal number exceeds `SIGMAS`: once in 16,000."""
+SIZES = {"diameter": "diameter_um", "height": "top_um"}
+"""What is compared between balls."""
 LEAST_BALLS = 4
 """Of a grid that shows which ball is off."""
 ROUNDS = 30
@@ -51,9 +53,13 @@ def limits_of(values_um: Sequence[float], us_um: Sequence[float]) -> tuple[float
 def unlike_their_fellows(results: Sequence[PartResult]) -> list[str]:
     """Name each ball that the limits taught by all balls together do not hold, or that its inspection doubts."""
     balls = [ball for result in results for ball in result.balls if ball.present]
+    limits = {
+        words: (key, limits_of([getattr(one, key) for one in balls], [getattr(one, f"u_{key}") for one in balls]))
+        for words, key in SIZES.items()
+    }
     found = []
     for result in results:
-        odd = {ball.name: _odd_sizes(ball, balls) for ball in result.balls if ball.present}
+        odd = {ball.name: _odd_sizes(ball, limits) for ball in result.balls if ball.present}
         for ball in result.balls:
             if ball.present:
                 # Only a recipe has limits: that none are given is no fault of the ball.
@@ -86,14 +92,13 @@ def odd_empty_places(places: set[tuple[int, int]], rows: int, cols: int) -> list
     return odd
 
 
-def _odd_sizes(ball: BallResult, balls: Sequence[BallResult]) -> list[str]:
+def _odd_sizes(ball: BallResult, limits: dict[str, tuple[str, tuple[float, float]]]) -> list[str]:
     found = []
-    for words, key in (("diameter", "diameter_um"), ("height", "top_um")):
+    for words, (key, (nominal, room)) in limits.items():
         value = getattr(ball, key)
         if not math.isfinite(value):
             found.append(f"its {words} was not measured")
             continue
-        nominal, room = limits_of([getattr(one, key) for one in balls], [getattr(one, f"u_{key}") for one in balls])
         if abs(value - nominal) > room:
             found.append(f"its {words} of {value:.1f} um is unlike that of the others ({nominal:.1f} +- {room:.1f} um)")
     return found

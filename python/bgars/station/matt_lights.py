@@ -103,24 +103,14 @@ def shading_on(capture: Capture, levels: Levels, outline: Outline, camera_px: fl
     own, jacobians = np.zeros((count, 2, 2)), np.zeros((count, 3, 3))
     points, index = _pixels(levels.images.shape[1:], outline)
     normals = _normals(points, outline.circle_px, camera_px)
+    for light, image in enumerate(levels.images):
+        _need_shading(f"{capture.name}: {light_name(light, capture.files)}", image.ravel()[index], levels.clip)
     near = _nearness(normals, levels, index)
     for light, image in enumerate(levels.images):
         name = light_name(light, capture.files)
         values = image.ravel()[index]
         used = values < levels.clip
         peak = float(np.percentile(values, 99.0))
-        if peak < LEAST_LEVEL:
-            msg = (
-                f"{capture.name}: {name}: too dark on the ball ({peak:.1f} of 255 at its brightest, "
-                f"{LEAST_LEVEL:g} is least)"
-            )
-            raise CalibrationError(msg)
-        if 1.0 - used.mean() > SATURATED_SHARE:
-            msg = (
-                f"{capture.name}: {name}: overexposed: {100 * (1 - used.mean()):.0f} % of the ball is clipped; "
-                "expose shorter"
-            )
-            raise CalibrationError(msg)
         vector, board, residual, _ = _fit(normals, values, used, levels.noise, near)
         strength = float(np.linalg.norm(vector))
         if vector[2] <= 0:
@@ -191,11 +181,24 @@ def _normals(points: Array, circle: Array, camera_px: float = math.inf) -> Array
     return normals
 
 
+def _need_shading(name: str, values: Array, clip: float) -> None:
+    """Refuse an image that shows no shading on the ball."""
+    peak = float(np.percentile(values, 99.0))
+    if peak < LEAST_LEVEL:
+        msg = f"{name}: too dark on the ball ({peak:.1f} of 255 at its brightest, {LEAST_LEVEL:g} is least)"
+        raise CalibrationError(msg)
+    clipped = float((values >= clip).mean())
+    if clipped > SATURATED_SHARE:
+        msg = f"{name}: overexposed: {100 * clipped:.0f} % of the ball is clipped; expose shorter"
+        raise CalibrationError(msg)
+
+
 def _nearness(normals: Array, levels: Levels, index: NDArray[np.intp]) -> _Near:
     """What the lights together tell of their distance: one alone mistakes for it what is not Lambert's law."""
     seen = [image.ravel()[index] for image in levels.images]
     ratios = np.array([_fit(normals, values, values < levels.clip, levels.noise).near for values in seen])
     middle = max(float(np.median(ratios)), 0.0)
+    # Standard error of a median, from the median absolute deviation.
     error = 1.2533 * 1.4826 * float(np.median(np.abs(ratios - np.median(ratios)))) / math.sqrt(len(ratios))
     return _Near(middle, error, max(ALIKE * middle, LEAST_NEAR))
 
