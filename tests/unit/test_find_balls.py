@@ -7,8 +7,10 @@ from dataclasses import replace
 import bgars
 import numpy as np
 import pytest
+from bgars.balls.circles import _without_overlaps
 from bgars.balls.highlights import highlight_circles
 from bgars.balls.levels import Levels
+from bgars.balls.rim_scan import CoarseCircles, seen_by_most
 from bgars.records import ball_names
 from bgars.simulate import ball_name
 
@@ -192,3 +194,20 @@ def test_the_result_does_not_depend_on_threads() -> None:
 
 def test_names_are_those_of_the_simulator() -> None:
     assert all(ball_names.ball_name(row, col) == ball_name(row + 1, col + 1) for row in range(60) for col in range(3))
+
+
+def test_ends_of_shadows_around_a_ball_are_no_ball() -> None:
+    """Shadows of a ring of lights end on a circle, as sharp and as complete as the ball's own outline."""
+    y, x = np.mgrid[:160, :160] - 79.5
+    ball = np.hypot(x, y) < 26.0
+    images = np.full((8, 160, 160), 100.0, np.float32)
+    for image, angle in zip(images, np.radians(np.arange(8) * 45.0), strict=True):
+        image[np.hypot(x - 16.0 * np.cos(angle), y - 16.0 * np.sin(angle)) < 26.0] = 2.0
+        image[ball] = 55.0 - 25.0 * ((x * np.cos(angle) + y * np.sin(angle)) / 26.0)[ball]
+    images += np.random.default_rng(0).normal(0.0, 4.0, images.shape).astype(np.float32)
+    middle, size = np.full(2, 79.5), np.array([26.0, 42.0])
+    circles = CoarseCircles(middle, middle, size, np.array([0.95, 0.94]), np.ones(2))
+    assert _without_overlaps(circles, seen_by_most(images, circles)).radius_px.tolist() == [26.0]
+    # Of a larger ball, an edge inside it that most lights show less is a part.
+    larger = np.where(np.hypot(x, y) < 42.0, np.where(ball, 45.0, 35.0), np.full((8, 1, 1), 100.0)).astype(np.float32)
+    assert _without_overlaps(circles, seen_by_most(larger, circles)).radius_px.tolist() == [42.0]

@@ -109,6 +109,9 @@ def test_a_place_that_is_not_seen_to_be_empty_is_undecided(good: tuple[FoundBall
     result = judge_part(few, replace(measurement, balls=measurement.balls[:-1], shared_um={}), RECIPE)
     assert result.verdict == ball_of(result, last.name).verdict == "undecided"
     assert any("not clear" in reason and last.name in reason for reason in result.reasons)
+    # What stands there may be the lowest of all.
+    open_ = {check.name for check in result.checks if check.verdict == "undecided"}
+    assert open_ == {"seating_coplanarity_um", "regression_coplanarity_um"}
 
 
 def test_a_pixel_pitch_of_unknown_uncertainty_proves_no_pitch(good: tuple[FoundBalls, BallMeasurement]) -> None:

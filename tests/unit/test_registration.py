@@ -6,6 +6,7 @@ import bgars
 import numpy as np
 import pytest
 from bgars.balls.registration import register
+from bgars.inspection.on_grid import like_turn_deg
 
 PIXEL_UM = 10.0
 
@@ -29,13 +30,35 @@ def test_a_part_without_symmetry_is_found_at_any_turn(turn_deg: float) -> None:
     assert abs((np.degrees(fit.angle_rad) - turn_deg + 180.0) % 360.0 - 180.0) < 1.0
 
 
-@pytest.mark.parametrize(("turn_deg", "expected_deg"), [(40.0, 40.0), (50.0, -40.0), (91.0, 1.0), (179.0, -1.0)])
+@pytest.mark.parametrize(
+    ("turn_deg", "expected_deg"),
+    [(40.0, 40.0), (-44.6, -44.6), (44.6, 44.6), (50.0, -40.0), (91.0, 1.0), (179.0, -1.0)],
+)
 def test_of_equal_turns_the_smallest_is_taken(turn_deg: float, expected_deg: float) -> None:
     layout = bgars.BallLayout(rows=5, cols=5, pitch_um=800.0)
     balls = part(layout, turn_deg)
     fit = register(balls.real, balls.imag, layout, PIXEL_UM)
     assert np.degrees(fit.angle_rad) == pytest.approx(expected_deg, abs=0.8)
     assert sorted(fit.ball.tolist()) == list(range(25))
+
+
+@pytest.mark.parametrize(
+    ("rows", "cols", "depopulated", "turn_deg", "other_deg"),
+    [
+        (4, 4, (), 44.0, -46.0),
+        (4, 4, (), -35.5, None),
+        (4, 4, ("B2", "B3", "C2", "C3"), -41.0, 49.0),
+        (4, 4, ("A1",), 44.0, None),
+        (3, 5, (), 44.0, None),
+        (3, 5, (), 88.0, -92.0),
+        (1, 8, (), -89.0, 91.0),
+    ],
+)
+def test_a_turn_by_which_balls_may_be_named_as_well_is_known(
+    rows: int, cols: int, depopulated: tuple[str, ...], turn_deg: float, other_deg: float | None
+) -> None:
+    recipe = bgars.PartRecipe("turned", bgars.BallLayout(rows, cols, 800.0, depopulated))
+    assert like_turn_deg(recipe, turn_deg) == other_deg
 
 
 def test_missing_and_foreign_balls_do_not_turn_a_part() -> None:

@@ -13,7 +13,7 @@ from bgars.balls.mask_blobs import round_blobs
 from bgars.balls.outward import outward_centres, slope_field
 from bgars.balls.rim_fit import Circles
 from bgars.balls.rim_pixels import sector_count
-from bgars.balls.rim_scan import CoarseCircles, scan_rims
+from bgars.balls.rim_scan import CoarseCircles, scan_rims, seen_by_most
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
     from bgars.balls.levels import Levels
     from bgars.records.pixels import BoolArray, FloatArray
+
+    Slopes = tuple[FloatArray, FloatArray]
 
 __all__ = [
     "MIN_SHARE",
@@ -50,6 +52,8 @@ OUTER_STRENGTH_OF_HIGHLIGHTS = 0.35  # the same, around the small rims of highli
 HIGHLIGHT_RATIO = 2.5
 """A rim around another one wins from such a fraction of its strength on: highlights make strong rims inside balls, the
 smaller the more likely."""
+OUTER_SEEN = 0.35
+"""Of the edge that most lights show of a rim inside: ends of shadows have a fifth, silhouettes half and more."""
 MIN_SUPPORT = 0.5  # of sectors of the fitted rim
 MIN_SUPPORT_IN_MASK = 0.85
 """A mask says that there is an object: round parts of it are no balls."""
@@ -90,7 +94,7 @@ class Detection(NamedTuple):
     """
 
     circles: Circles
-    slopes: tuple[FloatArray, FloatArray]
+    slopes: Slopes
     brightest: FloatArray
     reduced: FloatArray
     factor: int
@@ -148,9 +152,7 @@ def unfitted(coarse: CoarseCircles, factor: int, sectors: int) -> Circles:
     return Circles(row, col, radius_px, u_px, u_px, coarse.share + 0.0, offsets)
 
 
-def _blobs_that_are_balls(
-    levels: Levels, slopes: tuple[FloatArray, FloatArray], reduced: FloatArray, factor: int
-) -> Circles:
+def _blobs_that_are_balls(levels: Levels, slopes: Slopes, reduced: FloatArray, factor: int) -> Circles:
     """Round blobs of the mask whose inside slopes outward everywhere or mirrors the lights, as circles."""
     blobs = round_blobs(levels.capture.mask)
     row, col = ((column + 0.5) / factor - 0.5 for column in blobs[:2])
@@ -174,22 +176,20 @@ def _blobs_that_are_balls(
     )
 
 
-def _coarse_circles(
-    levels: Levels, reduced: FloatArray, slopes: tuple[FloatArray, FloatArray], mask: BoolArray | None
-) -> CoarseCircles:
+def _coarse_circles(levels: Levels, reduced: FloatArray, slopes: Slopes, mask: BoolArray | None) -> CoarseCircles:
     """Circles to a pixel or two, in reduced pixels."""
     threads = levels.threads
     centres = np.array(outward_centres(*slopes)).reshape(-1, 4)
     centres = centres[_best_of_place(centres)]
     coarse = scan_rims(reduced, *centres[:, :3].T, threads=threads)
-    coarse = _accepted(levels, coarse, slopes, MIN_SHARE, MIN_STRENGTH)
+    coarse = _accepted(levels, reduced, coarse, slopes, MIN_SHARE, MIN_STRENGTH)
     if len(coarse.row) > 1:
         usual_px = float(np.median(coarse.radius_px))
         rest = centres[_outside(centres, coarse)]
         scale_px = np.full(len(rest), usual_px)
         more = scan_rims(reduced, rest[:, 0], rest[:, 1], scale_px, span=LIKE_OTHERS, rims=1, threads=threads)
         more = _take(more, np.abs(np.log(more.radius_px / usual_px)) < np.log(LIKE_OTHERS[1]))
-        more = _accepted(levels, more, slopes, MIN_SHARE_LIKE_OTHERS, MIN_STRENGTH_LIKE_OTHERS)
+        more = _accepted(levels, reduced, more, slopes, MIN_SHARE_LIKE_OTHERS, MIN_STRENGTH_LIKE_OTHERS)
         coarse = _merged(coarse, more, usual_px)
     coarse = _with_shining(coarse, _shining(levels, reduced, centres, slopes))
     if mask is not None:
@@ -197,9 +197,7 @@ def _coarse_circles(
     return coarse
 
 
-def _shining(
-    levels: Levels, reduced: FloatArray, centres: NDArray[np.float64], slopes: tuple[FloatArray, FloatArray]
-) -> CoarseCircles:
+def _shining(levels: Levels, reduced: FloatArray, centres: NDArray[np.float64], slopes: Slopes) -> CoarseCircles:
     """Circles of like highlights, in reduced pixels; none where fewer than a population has them."""
     shine = shining_circles(levels, reduced, *centres[:, :3].T)
     factor = levels.height // reduced.shape[1]
@@ -237,7 +235,12 @@ def _covered(coarse: CoarseCircles, mask: BoolArray) -> NDArray[np.float64]:
 
 
 def _accepted(
-    levels: Levels, coarse: CoarseCircles, slopes: tuple[FloatArray, FloatArray], share: float, strength: float
+    levels: Levels,
+    reduced: FloatArray,
+    coarse: CoarseCircles,
+    slopes: Slopes,
+    share: float,
+    strength: float,
 ) -> CoarseCircles:
     """Circles with a rim all around, whose inside slopes outward, one per place."""
     coarse = _take(
@@ -245,10 +248,10 @@ def _accepted(
         (coarse.share >= share) & (coarse.strength >= strength) & (coarse.radius_px >= SMALLEST_RADIUS_PX),
     )
     coarse = _take(coarse, _slopes_outward(levels, coarse, slopes))
-    return _without_overlaps(coarse)
+    return _without_overlaps(coarse, seen_by_most(reduced, coarse, levels.threads))
 
 
-def _slopes_outward(levels: Levels, coarse: CoarseCircles, slopes: tuple[FloatArray, FloatArray]) -> NDArray[np.bool_]:
+def _slopes_outward(levels: Levels, coarse: CoarseCircles, slopes: Slopes) -> NDArray[np.bool_]:
     """Whether the inside of each circle slopes outward: enough, or everywhere where it is clipped."""
     outward, alignment = inside(coarse, slopes)
     good: NDArray[np.bool_] = (outward >= MIN_OUTWARD) & (alignment >= MIN_ALIGNMENT)
@@ -264,9 +267,7 @@ def _slopes_outward(levels: Levels, coarse: CoarseCircles, slopes: tuple[FloatAr
     return good
 
 
-def inside(
-    coarse: CoarseCircles, slopes: tuple[FloatArray, FloatArray]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def inside(coarse: CoarseCircles, slopes: Slopes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Mean outward slope inside each circle, and its fraction of the mean slope: 2/3 and 1 for a sphere."""
     radii = np.sqrt((np.arange(12) + 0.5) / 12)
     angles = np.arange(24) * (2 * np.pi / 24)
@@ -320,8 +321,11 @@ def _merged(coarse: CoarseCircles, more: CoarseCircles, usual_px: float) -> Coar
     return CoarseCircles(*(np.concatenate(pair) for pair in zip(kept, _take(more, free), strict=True)))
 
 
-def _without_overlaps(coarse: CoarseCircles) -> CoarseCircles:
-    """Keep the outer one of nested circles, and of those that run into each other the one with the stronger rim."""
+def _without_overlaps(coarse: CoarseCircles, seen: NDArray[np.float64]) -> CoarseCircles:
+    """Keep the outer one of nested circles, and of those that run into each other the one with the stronger rim.
+
+    `seen`: their edges that most lights show.
+    """
     distance = np.hypot(coarse.row[:, None] - coarse.row, coarse.col[:, None] - coarse.col)
     radius = coarse.radius_px
     nested = (radius > 1.15 * radius[:, None]) & (distance < 0.35 * radius)
@@ -331,6 +335,7 @@ def _without_overlaps(coarse: CoarseCircles) -> CoarseCircles:
     nested &= ~np.any(crossing, axis=1)
     needed = np.where(radius > HIGHLIGHT_RATIO * radius[:, None], OUTER_STRENGTH_OF_HIGHLIGHTS, OUTER_STRENGTH)
     nested &= coarse.strength >= needed * coarse.strength[:, None]
+    nested &= seen >= OUTER_SEEN * seen[:, None]
     inner = np.any(nested, axis=1)
     coarse = _take(coarse, ~inner)
     keep: list[int] = []

@@ -188,8 +188,8 @@ def _vote(points: Points, nominal: Points, reach: float) -> tuple[complex, compl
             place, ball = _pairs(placed, points, reach * abs(turn))
             hits = len(np.unique(ball[np.unique(place, return_index=True)[1]]))
             right = abs(abs(turn) - 1.0) <= WRONG_SCALE
-            degrees = abs(round(math.degrees(float(np.angle(turn)))))
-            score = (float(hits), float(right), -float(degrees), -float(round(abs(shift) / reach)))
+            degrees = abs(round(math.degrees(float(np.angle(turn))), 1))
+            score = (float(hits), float(right), -degrees, -float(round(abs(shift) / reach)))
             if score > best[0]:
                 best = (score, turn, shift)
     return best[1], best[2]

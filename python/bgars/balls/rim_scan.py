@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.floating]
 
-__all__ = ["CoarseCircles", "scan_rims"]
+__all__ = ["CoarseCircles", "scan_rims", "seen_by_most"]
 
 DIRECTIONS = 24
 RADII = 48
@@ -28,6 +28,8 @@ SIDE = 4
 """Radii between a rim and what must be smoother than it."""
 DARK_LEVELS = 0.3
 """Grey levels added before the square root, which evens out the noise."""
+SOME, MOST = 3 / 8, 5 / 8
+"""Shares of the lights: that show a rim for certain, and that show no ends of shadows."""
 
 
 class CoarseCircles(NamedTuple):
@@ -72,15 +74,10 @@ def scan_rims(
     """
     if not len(row):
         return CoarseCircles(*(np.zeros(0) for _ in range(5)))
-    roots = np.sqrt(np.maximum(image, 0.0) + np.float32(DARK_LEVELS))
-    rank = max(1, round(len(roots) * 3 / 8))
+    roots = _roots(image)
 
     def edges(row: Array, col: Array, radii: Array) -> FloatArray:
-        """(N, A, radii) changes of sqrt(level) from ring to ring."""
-        centres = np.stack([row, col], axis=1).astype(np.float64)
-        return _bgars.ring_edges(
-            roots, centres, np.asarray(radii, np.float64), directions=DIRECTIONS, rank=rank, threads=threads
-        )
+        return _edges(roots, row, col, radii, SOME, threads)
 
     angle = (np.arange(DIRECTIONS) + 0.5) * (2 * math.pi / DIRECTIONS)
     radii = scale_px[:, None] * np.geomspace(span[0], span[1], RADII)
@@ -116,6 +113,38 @@ def scan_rims(
         radius_px,
         np.quantile(rim - beside, 0.25, axis=1),
         share,
+    )
+
+
+def seen_by_most(image: FloatArray, circles: CoarseCircles, threads: int | None = None) -> NDArray[np.float64]:
+    """(N,) edges of circles that most lights show, the lower quartile over directions: small where shadows end.
+
+    Parameters
+    ----------
+    image : (L, H, W) float32
+        Linear grey levels of 255.
+    circles : CoarseCircles
+    threads : int, optional
+    """
+    if not len(circles.row):
+        return np.zeros(0)
+    radii = circles.radius_px[:, None] * AROUND_RIM[RIM_BINS]
+    edge = _edges(_roots(image), circles.row, circles.col, radii, MOST, threads)
+    seen: NDArray[np.float64] = np.quantile(edge.max(axis=2), 0.25, axis=1)
+    return seen
+
+
+def _roots(image: FloatArray) -> FloatArray:
+    roots: FloatArray = np.sqrt(np.maximum(image, 0.0) + np.float32(DARK_LEVELS))
+    return roots
+
+
+def _edges(roots: FloatArray, row: Array, col: Array, radii: Array, share: float, threads: int | None) -> FloatArray:
+    """(N, A, radii) changes of sqrt(level) from ring to ring that a share of the lights shows."""
+    rank = max(1, round(len(roots) * share))
+    centres = np.stack([row, col], axis=1).astype(np.float64)
+    return _bgars.ring_edges(
+        roots, centres, np.asarray(radii, np.float64), directions=DIRECTIONS, rank=rank, threads=threads
     )
 
 

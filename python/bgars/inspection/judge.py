@@ -15,7 +15,7 @@ from bgars.inspection.judge_ball import Position, judge_ball
 from bgars.inspection.judge_part import part_checks, part_reasons
 from bgars.inspection.lens_scale import PIXEL_PITCH
 from bgars.inspection.odd_sizes import odd_sizes
-from bgars.inspection.on_grid import finite_centres, is_seen, lay_grid, true_positions
+from bgars.inspection.on_grid import finite_centres, is_seen, lay_grid, like_turn_deg, true_positions
 from bgars.inspection.places import Slot, match_balls
 from bgars.inspection.position import GridFit
 from bgars.inspection.to_scale import lens_scale, to_scale
@@ -114,7 +114,7 @@ def judge_part(
     unmeasured = [
         names[slot.name]
         for index, slot in enumerate(slots)
-        if slot.found and slot.kind != "extra" and index not in rows
+        if (slot.found or slot.unclear) and slot.kind != "extra" and index not in rows
     ]
     checks = part_checks(coplanarity, (pitch_um, u_pitch_um), (warpage_um, u_warpage_um), limits, unmeasured=unmeasured)
     bridges = tuple((names.get(one, one), names.get(two, two)) for one, two in found.bridges)
@@ -194,6 +194,13 @@ def _own_warnings(
     count = len(coplanarity.seating)
     if count >= MIN_ROCKING and _rocks(coplanarity):
         warnings.append(f"the part can rock between {count} seating planes; the worst is judged")
+    turn_deg = None if recipe is None or fit is None else math.degrees(fit.angle_rad)
+    other_deg = None if recipe is None or turn_deg is None else like_turn_deg(recipe, turn_deg)
+    if other_deg is not None:
+        warnings.append(
+            f"the part is turned by {turn_deg:.1f} degrees, and its layout looks the same at {other_deg:.1f}: the balls "
+            "are named by the smaller turn; lay the part within 40 degrees, or names may be those of other balls"
+        )
     return warnings
 
 

@@ -19,10 +19,14 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["finite_centres", "is_seen", "lay_grid", "true_positions"]
+__all__ = ["finite_centres", "is_seen", "lay_grid", "like_turn_deg", "true_positions"]
 
 SEEN_SHARE = 0.5
 """Of the places of a part: with fewer balls than that the finder, or the set-up, has failed."""
+NEARLY_AS_FAR_DEG = 10.0
+"""A turn that is as likely as one larger by this: parts lie in their trays, or before a camera, to a few degrees."""
+SAME_PLACE = 0.05
+"""Of the usual distance of places: a layout whose places are off by less after a turn looks the same."""
 MIN_GRID = 3
 """Balls that fix a grid's shift and turn and leave something."""
 
@@ -52,6 +56,31 @@ def lay_grid(slots: tuple[Slot, ...], recipe: PartRecipe | None) -> tuple[GridFi
             if slot.nominal is not None:
                 places_um[index] = fit.place(np.array(slot.nominal))
     return fit, places_um
+
+
+def like_turn_deg(recipe: PartRecipe, turn_deg: float) -> float | None:
+    """Another turn (degrees) by which the balls are on their places, nearly as small as the one that names them.
+
+    Examples
+    --------
+    >>> from bgars import BallLayout, PartRecipe
+    >>> recipe = PartRecipe("demo", BallLayout(rows=4, cols=4, pitch_um=800.0))
+    >>> like_turn_deg(recipe, 44.0), like_turn_deg(recipe, 30.0)
+    (-46.0, None)
+    """
+    places = np.array([place.x_um + 1j * place.y_um for place in recipe.image_layout.places()])
+    places -= (places.real.min() + places.real.max() + 1j * (places.imag.min() + places.imag.max())) / 2.0
+    for quarters in (1, 2, 3):
+        other_deg = (turn_deg + 90.0 * quarters + 180.0) % 360.0 - 180.0
+        if abs(other_deg) < abs(turn_deg) + NEARLY_AS_FAR_DEG and _looks_the_same(places, 1j**quarters):
+            return other_deg
+    return None
+
+
+def _looks_the_same(places: NDArray[np.complex128], turn: complex) -> bool:
+    """Whether a turn puts places, which are around 0, on places."""
+    reach = SAME_PLACE * max(float(np.ptp(places.real)), float(np.ptp(places.imag))) / math.sqrt(len(places))
+    return all(float(np.abs(places - place * turn).min()) <= reach for place in places)
 
 
 def is_seen(slots: tuple[Slot, ...]) -> bool:

@@ -4,7 +4,8 @@ To first order an ellipsoid is a sphere plus ``R n^T E n`` along its normal n, w
 are the radius and q; two are tilts, ``2 n_x n_z`` and ``2 n_y n_z``, two are ovalities, ``n_x^2 - n_y^2`` and
 ``2 n_x n_y``. A tilted ball throws nearly the shadows of an upright one that stands aside, so that it has small
 residuals and a wrong place. With everything else held, the score test of Rao (1948) has the four numbers that a ball
-would have, and their covariance, without a fit; a ball whose numbers are far from those of the others gets its own.
+would have, and their covariance, without a fit; a ball whose numbers are far from those of the others gets its own,
+and so does one whose q is: what is not round in one way is seldom so in that way alone.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from bgars.inspection.bundle import honest_weights, relief_variances, robust_wei
 from bgars.inspection.bundle_model import EdgeModel, State, linearise_edges
 from bgars.inspection.bundle_normal import Priors, normal_equations
 from bgars.inspection.misfit import scatter_factors
-from bgars.inspection.population import FREE, MEDIAN_CHI_SQUARE, MIN_POPULATION
+from bgars.inspection.population import FREE, LIMITS, MEDIAN_CHI_SQUARE, MIN_POPULATION
 from bgars.inspection.shadow_model import BALL_TERMS
 
 if TYPE_CHECKING:
@@ -59,6 +60,8 @@ def free_shapes(
 ) -> tuple[Solution, NDArray[np.bool_]]:
     """Fit balls that are unlike the others again, each with tilt and ovality of its own; what is shared stays.
 
+    These are balls whose tilt and ovality are far from those of the others, or whose q may be (`priors.u_q`).
+
     Parameters
     ----------
     solution : Solution
@@ -80,6 +83,7 @@ def free_shapes(
     known = np.isfinite(edges.u_px)
     variance = np.where(known, edges.u_px**2 + solution.excess_px**2, 1.0)
     odd = _unlike(solution, edges, priors, near, np.where(known, solution.weight / variance, 0.0))
+    odd |= priors.u_q > LIMITS[1]
     if not odd.any():
         return solution, odd
     own = _fitted(solution.state, edges, priors, odd, variance, near, redescend)
