@@ -34,13 +34,17 @@ def test_a_tight_prior_hides_no_flat_ball_from_faint_shadows(u_prior: float) -> 
 
 
 def test_what_shadows_do_not_tell_is_between_and_round_ones_stay_round() -> None:
-    u_q = [float(priors_after(-z * 0.037, 0.037, LIMITS[0])[3]) for z in (1.0, 2.0, 2.7, 3.2)]
-    # Chances by hand: 1 % beforehand, the normal densities of both kinds at that q; below 5 % it is not in U.
-    density = {z: np.exp(-0.5 * z**2 * np.array([1.0, 1.0 / (1.0 + (ODD_SPREAD / 0.037) ** 2)])) for z in (2.7, 3.2)}
-    for z, got in zip((2.7, 3.2), u_q[2:], strict=True):
-        odd = 0.01 * density[z][1] / np.hypot(1.0, ODD_SPREAD / 0.037)
-        assert got == pytest.approx(ODD_SPREAD * np.sqrt(odd / (odd + 0.99 * density[z][0])), rel=0.15)
-    assert u_q[0] == u_q[1] < LIMITS[1] < u_q[2] < u_q[3] < FREE
+    u_shadow = 0.037
+    u_q = {z: float(priors_after(-z * u_shadow, u_shadow, LIMITS[0])[3]) for z in (1.0, 2.0, 2.9, 3.3)}
+    scatter = u_q[1.0]
+    for z in (2.9, 3.3):
+        # Bayes by hand: one ball in a hundred, both normal densities; what is less likely than 5 % is not in U.
+        round_u, odd_u = np.hypot(u_shadow, scatter), np.hypot(u_shadow, ODD_SPREAD)
+        as_round = 0.99 / round_u * np.exp(-0.5 * (z * u_shadow / round_u) ** 2)
+        as_odd = 0.01 / odd_u * np.exp(-0.5 * (z * u_shadow / odd_u) ** 2)
+        chance = as_odd / (as_odd + as_round)
+        assert u_q[z] == pytest.approx(np.sqrt(chance * ODD_SPREAD**2 + (1.0 - chance) * scatter**2), rel=0.01)
+    assert max(scatter, u_q[2.0]) <= LIMITS[1] < u_q[2.9] < u_q[3.3] < FREE
 
 
 def test_sharp_shadows_leave_nothing_between() -> None:
