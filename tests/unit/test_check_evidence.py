@@ -71,8 +71,9 @@ def told(capture: bgars.Capture) -> list[tuple[str, str, int | None]]:
         (lambda levels: np.random.default_rng(0).uniform(0.0, 255.0, levels.shape), "noise"),
         (lambda levels: np.random.default_rng(1).normal(100.0, 60.0, levels.shape), "noise"),
         (lambda levels: levels + np.random.default_rng(0).normal(0.0, 25.0, levels.shape), "noise"),
+        (lambda levels: 0.03 * levels + np.random.default_rng(0).normal(2.0, 1.5, levels.shape), "dark"),
     ],
-    ids=["one image", "black", "uniform noise", "normal noise", "drowned"],
+    ids=["one image", "black", "uniform noise", "normal noise", "drowned", "drowned in the dark"],
 )
 def test_a_capture_without_information_is_refused(ball: bgars.Capture, change: object, kind: str) -> None:
     nothing = changed(ball, change)  # type: ignore[arg-type]

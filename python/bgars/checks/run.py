@@ -92,8 +92,10 @@ def check_capture(capture: Capture) -> Findings:
     found += few
     curve = noise_curve(capture)
     drowned = check_drowned(curve)
-    if any(each.severity == "error" for each in drowned):
-        return Findings.of(found + drowned)  # nor what is noise
+    if any(each.severity == "error" for each in drowned):  # nor what is noise
+        # In dark images noise is what darkness leaves, and more light the remedy.
+        lost = [replace(each, severity="error") if each.kind == "dark" else each for each in found]
+        return Findings.of(lost if dark else lost + drowned)
     if not drowned:
         drowned = check_noise_of_levels(capture, curve)
     gone = [each.image for each in found if each.kind == "lamp-dead" and each.image is not None]
