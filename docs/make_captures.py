@@ -60,7 +60,7 @@ def _figures(rows: list[dict[str, Any]]) -> list[str]:
         f"Of {len(faulty)} captures with one fault each, {found} are found ({100 * found / len(faulty):.1f} %), and "
         f"for {named} ({100 * named / len(faulty):.1f} %) the right cause",
         f"is named first; {alarms} of {len(good)} good captures get a warning or an error.",
-        "The captures are simulated arrays, under rings and lights anywhere on a dome, and reliefs (seeds from 70000:",
+        "The captures are simulated arrays, under rings and lights anywhere on a dome, and reliefs (seeds from 90000:",
         f"none was used when the thresholds were chosen) and rendered parts (seeds {_seeds(rows)}), each also turned",
         "(`make check-faults`). Three faults need",
         "cast shadows to show, and are only put there: ambient light, a veil, and a half turn of the table.",

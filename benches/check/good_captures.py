@@ -42,7 +42,7 @@ DOMES = 20
 def captures(which: str) -> Iterator[tuple[str, bgars.Capture]]:
     """Yield names and captures: a hundred, other ones for choosing thresholds than for judging."""
     judged = which == JUDGED_ON
-    start = 70_000 if judged else 1000
+    start = 90_000 if judged else 1000
     for seed in range(start, start + SIMULATED):
         yield f"array {seed}", array(seed)
     for seed in range(start, start + RELIEFS):

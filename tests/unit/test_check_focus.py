@@ -1,11 +1,14 @@
-"""Blurred images where noise hides the detail: what of the fine band is noise, and how large the blur is."""
+"""Blurred and noisy images, where noise hides detail, and detail noise."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from bgars import Capture, LightRig
 from bgars.checks import focus
+from bgars.checks.noise_levels import own_noise
 from bgars.checks.patches import cut_patches
 from bgars.records.plain_arrays import every_pixel
 from scipy.ndimage import gaussian_filter
@@ -55,3 +58,18 @@ def test_noise_of_a_band_is_that_of_its_filters() -> None:
         cut = high - low
         band = smooth[low][:, cut:-cut, cut:-cut] - smooth[high]
         assert band.var() == pytest.approx(focus._noise_passed(low, high), rel=0.03)
+
+
+def test_noise_of_an_image_is_its_own_whatever_moved_or_is_brighter() -> None:
+    capture = textured(0.0, 3)
+    images = np.minimum(capture.images, 125).astype(np.float64)
+    images[1] = np.roll(images[1], (2, 3), axis=(0, 1))
+    images[2] = gaussian_filter(images[2], 1.5)
+    images[4] *= 2.0
+    images[6] += np.random.default_rng(6).normal(0.0, 8.0, images[6].shape)
+    changed = replace(capture, images=np.rint(images).astype(np.uint8))
+    noise = own_noise(changed, np.arange(8)) / np.median(own_noise(changed, np.arange(8)))
+    assert np.argmax(noise) == 6
+    assert noise[6] == pytest.approx(np.hypot(8.0, NOISE) / NOISE, rel=0.2)
+    assert np.delete(noise, [2, 6]) == pytest.approx(1.0, abs=0.1)
+    assert noise[2] < 0.5

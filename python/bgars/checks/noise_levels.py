@@ -28,7 +28,7 @@ from bgars.checks.patches import cut_patches
 if TYPE_CHECKING:
     from bgars.records.capture import Capture
 
-__all__ = ["FALLS", "NoiseCurve", "noise_curve", "noise_falls", "noise_share"]
+__all__ = ["FALLS", "NoiseCurve", "noise_curve", "noise_falls", "noise_share", "own_noise"]
 
 Floats = NDArray[np.float32]
 
@@ -85,6 +85,28 @@ def noise_curve(capture: Capture) -> NoiseCurve | None:
     if not near or sum(each.size for each in near) < MIN_SAMPLES:
         return None
     return _binned(np.concatenate(near), np.concatenate(far), np.concatenate(levels))
+
+
+def own_noise(capture: Capture, kept: NDArray[np.intp]) -> NDArray[np.float64]:
+    """(K,) noise and finest detail of single images, of full scale, as if all were as bright as the usual one.
+
+    Whatever moved or was turned, an image has as much of it as the others. Detail goes with brightness, and noise less.
+    """
+    near: list[Floats] = []
+    levels: list[Floats] = []
+    for patch in cut_patches(capture):
+        if min(patch.inside.shape) < 3:  # noqa: PLR2004 - the filter is 3 x 3
+            continue
+        usable = patch.inside[1:-1, 1:-1] & ~_touched(patch.clipped[kept]).any(axis=0)
+        near.append(np.abs(_summed(patch.levels[kept] / np.float32(6.0), -2.0))[:, usable])
+        levels.append(patch.levels[kept][:, 1:-1, 1:-1][:, usable])
+    if not near or sum(each.shape[1] for each in near) < MIN_SAMPLES:
+        return np.zeros(len(kept))
+    size = np.sqrt([_variance(each) for each in np.concatenate(near, axis=1)])
+    level = np.median(np.concatenate(levels, axis=1), axis=1)
+    brighter = level / max(float(np.median(level)), 1e-9)
+    found: NDArray[np.float64] = size / np.maximum(brighter, 1.0)
+    return found
 
 
 def noise_share(curve: NoiseCurve) -> float:

@@ -18,7 +18,7 @@ from bgars.checks.half_lit import check_half_lit
 from bgars.checks.moments import lit_everywhere, moments_by
 from bgars.checks.motion import check_motion, find_move, registered, told_move
 from bgars.checks.noise import check_drowned, check_noise
-from bgars.checks.noise_levels import noise_curve
+from bgars.checks.noise_levels import noise_curve, own_noise
 from bgars.checks.odd_image import check_odd_image
 from bgars.checks.orientation import check_orientation
 from bgars.checks.response import check_format, check_noise_of_levels, check_response
@@ -203,8 +203,9 @@ def _single(
     found += uneven
     if few:
         return found + blurred
-    # A blurred image looks shifted, and less noisy; a shifted one is as sharp as the others.
-    moved = blurred or check_motion(capture, kept, lights, view.names)
+    # A blurred image looks shifted, and less noisy; a noisy one may look shifted; a shifted one is as sharp as others.
+    odd = blurred or check_noise(own_noise(capture, kept), np.inf, view.names)
+    moved = odd or check_motion(capture, kept, lights, view.names)
     windows = None if moved or len(kept) != len(capture.rig) else cut_windows(capture, view)
     if windows is None:
         return found + moved

@@ -198,7 +198,7 @@ def _own_warnings(
     other_deg = None if recipe is None or turn_deg is None else like_turn_deg(recipe, turn_deg)
     if other_deg is not None:
         warnings.append(
-            f"the part is turned by {turn_deg:.1f} degrees, and its layout looks the same at {other_deg:.1f}: the balls "
+            f"the part is turned by {turn_deg:.1f} degrees, and its layout looks the same at {other_deg:.1f}: balls "
             "are named by the smaller turn; lay the part within 40 degrees, or names may be those of other balls"
         )
     return warnings
