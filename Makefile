@@ -49,7 +49,7 @@ accuracy: data $(VENV)/.installed ## Rewrite the tables of docs/accuracy.md (nee
 inspection: data $(VENV)/.installed ## Rewrite the inspection tables of docs/accuracy.md (needs BGARS_DATA)
 	$(BIN)/python docs/make_inspection_accuracy.py
 
-SEEDS ?= 1001-1100
+SEEDS ?= 5001-5100
 reality-scenes: $(VENV)/.installed ## Render SEEDS into benches/reality/scenes (10 to 60 s per seed; needs an LLVM, see benches/reality)
 	$(BIN)/python -m pip install --quiet --requirement benches/reality/requirements.txt
 	$(BIN)/python benches/reality/make_scenes.py $(SEEDS)
