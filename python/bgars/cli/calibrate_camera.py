@@ -13,11 +13,12 @@ import typer
 import bgars
 from bgars.cli.calibrate_station import JsonOption, OutputOption, said_values
 from bgars.cli.console import print_json, say
-from bgars.cli.station_output import existing_station, keep_part, tell_findings
+from bgars.cli.station_output import existing_station, keep_part, need_different, tell_findings
 from bgars.errors import InputError
 from bgars.io.capture import read_unlit
 from bgars.records.remark import Remark
 from bgars.station import response_from_bracket, response_from_sums, srgb_response
+from bgars.station.scale import GRID_AGAIN
 
 if TYPE_CHECKING:
     from bgars.records.response_curve import ResponseCurve
@@ -124,6 +125,7 @@ def scale(
 
     With the grid at two known heights or more, also how far the camera is, or that it is telecentric.
     """
+    need_different(folders, GRID_AGAIN)
     existing_station(output, *folders)
     u_um = None if u_pitch_mm is None else 1000.0 * u_pitch_mm
     if len(folders) > 1 and heights_mm is None:

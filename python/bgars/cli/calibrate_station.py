@@ -17,6 +17,7 @@ from bgars.errors import InputError
 from bgars.io.capture import read_unlit
 from bgars.report.figures.station_balls import write_balls
 from bgars.station.flat import falloff_findings
+from bgars.station.lights import BALL_AGAIN
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,8 +31,6 @@ __all__ = [
     "FolderArgument", "JsonOption", "OutlineOption", "OutputOption", "circles_of", "raw_capture", "register",
     "said_values",
 ]  # fmt: skip
-
-BALL_AGAIN = "photograph the ball once for each of its places"
 
 OutputOption = Annotated[
     Path,
@@ -89,7 +88,9 @@ NearOption = Annotated[
 DiameterOption = Annotated[
     float | None,
     typer.Option(
-        metavar="MM", help="Diameter of the ball, in mm: gives the scale if capture.toml has none.", show_default=False
+        metavar="MM",
+        help="Diameter of the ball, in mm: gives the scale where neither the station nor capture.toml has one.",
+        show_default=False,
     ),
 ]
 

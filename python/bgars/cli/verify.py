@@ -15,6 +15,7 @@ from bgars.cli.console import print_json, say, stage_progress, utc_now
 from bgars.cli.station_output import need_different, need_places, shown_severity, write_pages
 from bgars.errors import InputError
 from bgars.io.station_file import read_station
+from bgars.records.same_images import refuse_seen
 from bgars.station.verify import READINGS, read_known
 from bgars.station.verify import verify as compare
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["register"]
 
 EXIT_BROKEN = 1
+PART_AGAIN = "take the part out and put it back in between"
 
 
 def register(app: typer.Typer) -> None:
@@ -66,14 +68,17 @@ def verify(
     if mpe_um is not None and not (math.isfinite(mpe_um) and mpe_um > 0):
         msg = f"--mpe-um: must be finite and above 0, got {mpe_um:g}"
         raise InputError(msg)
-    need_different(folders, "take the part out and put it back in between")
+    need_different(folders, PART_AGAIN)
     sizes = read_known(known)
     kept = read_station(station)
     need_places(station)
     results = []
+    seen: dict[str, str] = {}
     with stage_progress() as report:
         for index, folder in enumerate(folders):
-            results.append(bgars.inspect(bgars.read_capture(folder, station=kept), recipe))
+            capture = bgars.read_capture(folder, station=kept)
+            refuse_seen(capture, seen, PART_AGAIN)
+            results.append(bgars.inspect(capture, recipe))
             report("known part", (index + 1) / len(folders))
     found: list[Verification] = []
     said: list[Remark] = []
