@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +13,8 @@ import bgars
 import imageio.v3 as iio
 import numpy as np
 import pytest
+from bgars.station.ball_diameter import need_diameter_of_scale
+from bgars.station.believable import need_believable
 from rendered_spheres import render, ring
 from test_calibrate import bgars_command
 from test_station_lights import capture_of
@@ -46,8 +50,13 @@ def test_a_diameter_that_the_scale_contradicts_is_refused(ball: bgars.Capture) -
         bgars.InputError, match=r"stated as 20 mm, but is (2|2\.0\d*|1\.99\d*) mm .* by the scale of 20"
     ):
         bgars.calibrate_lights(scaled, diameter_um=20_000.0)
-    # A calliper's 2.01 mm is no contradiction.
-    bgars.calibrate_lights(scaled, diameter_um=2010.0)
+    outline = SimpleNamespace(circle_px=np.array([3.0, 2.0, 50.0]), radius_px=50.0, u_px=np.full(3, 0.1))
+    seen = SimpleNamespace(
+        balls=[SimpleNamespace(capture=scaled, outline=outline, u_outline_px=None)], camera_px=math.inf
+    )
+    need_diameter_of_scale(seen, 2010.0)  # by a calliper
+    with pytest.raises(bgars.InputError, match=r"stated as 2.04 mm, but is 2 mm \(u 0.0041 mm\)"):
+        need_diameter_of_scale(seen, 2040.0)
 
 
 def test_the_same_pictures_in_two_folders_are_refused(
@@ -67,3 +76,39 @@ def test_the_same_pictures_in_two_folders_are_refused(
         run = bgars_command(*arguments)
         assert run.code == 2
         assert "copy/light0.png is the same picture as ball/light0.png" in run.stderr
+
+
+@pytest.mark.parametrize(
+    ("sphere", "elevation_deg", "u_deg", "words"),
+    [
+        ("matt", 45.0, 12.0, "(elevation 45 deg, u 12 deg): is it a mirror ball (sphere mirror)"),
+        ("mirror", -3.0, 1.0, "(elevation -3 deg, u 1 deg): is it a matt ball (sphere matt)"),
+        ("mirror", 45.0, math.nan, "(elevation 45 deg, u nan deg)"),
+        ("mirror", 3.0, 9.9, ""),
+    ],
+)
+def test_lights_that_are_nonsense_are_refused_with_the_likely_cause(
+    ball: bgars.Capture, sphere: str, elevation_deg: float, u_deg: float, words: str
+) -> None:
+    directions = np.array([*LIGHTS[:3], *ring(1, elevation_deg)])
+    solution = SimpleNamespace(directions=directions, u_deg=np.array([0.1, 0.1, 0.1, u_deg]), reduced_chi_square=1.0)
+    if not words:
+        need_believable(solution, [ball], sphere, [])
+        return
+    with pytest.raises(
+        bgars.CalibrationError, match=re.escape(f"not known to 10 deg: light 3 (counted from 0) {words}")
+    ):
+        need_believable(solution, [ball], sphere, [])
+
+
+def test_folders_in_different_orders_are_refused(ball: bgars.Capture) -> None:
+    solution = SimpleNamespace(directions=LIGHTS, u_deg=np.full(4, 90.0), reduced_chi_square=1e5)
+    with pytest.raises(bgars.CalibrationError, match="are the images of all folders in the same order"):
+        need_believable(solution, [ball, ball], "mirror", [])
+
+
+def test_a_direction_of_which_a_finding_says_why_it_is_open_is_kept(ball: bgars.Capture) -> None:
+    solution = SimpleNamespace(directions=LIGHTS, u_deg=np.array([0.1, 60.0, 0.1, 0.1]), reduced_chi_square=1.0)
+    need_believable(solution, [ball], "mirror", [bgars.Remark("doubt", "two", "two-highlights", light=1)])
+    with pytest.raises(bgars.CalibrationError, match=r"light 1 \(counted from 0\) \(elevation 48 deg, u 60 deg\)"):
+        need_believable(solution, [ball], "mirror", [bgars.Remark("doubt", "two", "two-highlights", light=2)])

@@ -77,7 +77,8 @@ def calibrate_lights(
     Raises
     ------
     CalibrationError
-        No ball, a ball that is cut off or overexposed, a light whose highlight is on no ball; too few shadows.
+        No ball, a ball that is cut off or overexposed, a light whose highlight is on no ball; a direction at or below
+        the board, or with an uncertainty beyond 10 degrees; too few shadows.
     InputError
         Captures with different numbers of images, an outline of a wrong shape, an argument that does not go with
         `sphere`.

@@ -20,6 +20,7 @@ from bgars.records.same_images import refuse_repeated, refuse_shared
 from bgars.records.scalar_checks import check_pitch
 from bgars.records.whole_capture import need_whole
 from bgars.station.ball_diameter import need_diameter_of_scale
+from bgars.station.believable import need_believable
 from bgars.station.light_bundle import solve_lights
 from bgars.station.mirror_lights import together
 from bgars.station.observe import observe, outlines_a_capture
@@ -70,7 +71,8 @@ def calibrate_lights(
     Raises
     ------
     CalibrationError
-        No ball, a ball that is cut off or overexposed, a light whose highlight is on no ball.
+        No ball, a ball that is cut off or overexposed, a light whose highlight is on no ball, or a direction at or
+        below the board, or with an uncertainty beyond 10 degrees.
     InputError
         Captures with different numbers of images, the same image twice, an outline of a wrong shape, or a diameter
         that the scale contradicts.
@@ -98,6 +100,7 @@ def calibrate_lights(
         need_diameter_of_scale(seen, diameter_um)
     balls, findings = seen.balls, seen.findings
     solution, pitch_um = _solve(captures, seen, scaling_um, near, findings)
+    need_believable(solution, captures, sphere, findings)
     shone = solution if places_px is None else _placed(solution, places_px)
     strengths = strengths_of(sphere, captures, seen, shone, findings)
     rig = _rig(solution, pitch_um, strengths.relative)
