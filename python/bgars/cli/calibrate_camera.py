@@ -85,7 +85,7 @@ def response(
                 capture.images[0], capture.images[1], capture.images[2], full, dark=dark
             )
     findings = (*findings, *_made_before(known, curve))
-    keep_part(output, {"response": curve}, findings)
+    findings = keep_part(output, {"response": curve}, findings)
     if as_json:
         values = {"levels": curve.levels.tolist(), "radiances": curve.radiances.tolist(), "gamma": curve.gamma}
         print_json({**values, "nonlinearity": curve.nonlinearity, **said_values(findings), "file": str(output)})
@@ -136,7 +136,7 @@ def scale(
     found, findings = bgars.calibrate_scale(
         grids, 1000.0 * pitch_mm, target=target, u_pitch_um=u_um, heights_um=heights_um
     )
-    keep_part(output, {"scale": found}, findings)
+    findings = keep_part(output, {"scale": found}, findings)
     if as_json:
         is_telecentric = found.camera_distance_mm is not None and math.isinf(found.camera_distance_mm)
         values = {"pixel_pitch_um": found.pixel_pitch_um, "pixel_pitch_u_um": found.pixel_pitch_u_um}

@@ -122,13 +122,17 @@ def lights(
     read = bgars.read_capture if sphere == "balls" else read_unlit
     captures = [seen_by(raw_capture(folder, known, read), camera) for folder in folders]
     found = _calibrate_lights(captures, sphere, outline, near, diameter_mm, recipe)
-    write_balls(captures, found, output.with_suffix(".balls.svg"))
-    keep_part(output, {"lights": found}, found.findings)
+    said = keep_part(
+        output,
+        {"lights": found},
+        found.findings,
+        draw=lambda: write_balls(captures, found, output.with_suffix(".balls.svg")),
+    )
     if as_json:
-        print_json({"bgars": bgars.__version__, **lights_values(found), "file": str(output)})
+        print_json({"bgars": bgars.__version__, **lights_values(found), **said_values(said), "file": str(output)})
         return
     tell_lights(found)
-    tell_findings(found.findings, output)
+    tell_findings(said, output)
 
 
 def flat(folder: FolderArgument, output: OutputOption, as_json: JsonOption = False) -> None:
@@ -141,7 +145,7 @@ def flat(folder: FolderArgument, output: OutputOption, as_json: JsonOption = Fal
     found, findings = bgars.calibrate_flat(raw_capture(folder, replace(known, scale=None)))
     if known.lights is not None and known.scale is not None:
         findings = (*findings, *falloff_findings(found, known.lights, known.scale.pixel_pitch_um))
-    keep_part(output, {"flat": found}, findings)
+    findings = keep_part(output, {"flat": found}, findings)
     if as_json:
         print_json({"degree": found.degree, "residual": found.residual, **said_values(findings), "file": str(output)})
         return
@@ -201,18 +205,21 @@ def station(
             if known.scale is not None:
                 findings += falloff_findings(parts["flat"], found, known.scale.pixel_pitch_um)
         report("flat", 1.0)
-    write_balls(captures, found, output.with_suffix(".balls.svg"))
-    keep_part(output, parts, tuple(findings), name=name)
+    told = keep_part(
+        output,
+        parts,
+        tuple(findings),
+        name=name,
+        draw=lambda: write_balls(captures, found, output.with_suffix(".balls.svg")),
+    )
     if as_json:
-        print_json(
-            {"bgars": bgars.__version__, **lights_values(found), **said_values(tuple(findings)), "file": str(output)}
-        )
+        print_json({"bgars": bgars.__version__, **lights_values(found), **said_values(told), "file": str(output)})
         return
     tell_lights(found)
     if "scale" in parts:
         scale = parts["scale"]
         say(f"A pixel is {scale.pixel_pitch_um:.4f} um (u {scale.pixel_pitch_u_um:.2g} um).")
-    tell_findings(tuple(findings), output)
+    tell_findings(told, output)
 
 
 def _calibrate_lights(

@@ -11,13 +11,14 @@ from bgars.errors import FileFormatError, InputError
 from bgars.io.own_files import need_new_or_own
 from bgars.io.recipe import RECIPE_NAME
 from bgars.io.station_file import is_station_file, read_station, write_station
+from bgars.records.remark import Remark
 from bgars.report.html.station_page import write_station_page
+from bgars.station.agreement import AGREEMENT, agreement
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
     from pathlib import Path
 
-    from bgars.records.remark import Remark
     from bgars.records.station import Station
 
 __all__ = [
@@ -28,7 +29,8 @@ SECTIONS = {
     "flat": ("flat-structure", "evenness", "falloff", "flat-before-response"),
     "response": ("linear", "not-linear", "response-structure", "black-level"),
     "scale": ("grid", "distortion", "tilt"),
-    "verified": ("mpe", "mpe-open", "bias-", "slope-", "unread-"),
+    "verified": ("mpe", "mpe-open", "bias-", "slope-", "unread-", "outdated", "few-captures"),
+    "whole": (AGREEMENT,),
 }
 """How the codes of findings begin, by section of the station file; all others are of the lights."""
 
@@ -81,10 +83,37 @@ def need_different(folders: Iterable[Path], what: str) -> None:
         seen.add(place)
 
 
-def keep_part(output: Path, parts: dict[str, Any], findings: tuple[Remark, ...], name: str | None = None) -> None:
-    """Write the station with its new parts, and its page; what was found of the old ones goes."""
+def keep_part(
+    output: Path,
+    parts: dict[str, Any],
+    findings: tuple[Remark, ...],
+    name: str | None = None,
+    draw: Callable[[], object] | None = None,
+) -> tuple[Remark, ...]:
+    """Write the station with its new parts, and its page; what was found of the old ones goes.
+
+    Returns the findings and what the station as a whole adds to them. `draw` writes the pictures of the page, once it
+    is sure that the parts fit together.
+
+    Raises
+    ------
+    CalibrationError
+        Parts that do not fit together; nothing is written then.
+    """
     known = existing_station(output)
-    write_pages(replace(known, **parts, calibrated_utc=utc_now(), name=name or known.name), parts, findings, output)
+    station = replace(known, **parts, calibrated_utc=utc_now(), name=name or known.name)
+    findings = (*findings, *agreement(station))
+    if known.verified:
+        message = (
+            f"the comparison with a part of known sizes of {known.verified_utc} was that of the station before, and is "
+            "dropped: verify it again"
+        )
+        findings = (*findings, Remark("note", message, "outdated"))
+        station = replace(station, verified=(), verified_utc="")
+    if draw is not None:
+        draw()
+    write_pages(station, [*parts, "verified", "whole"], findings, output)
+    return findings
 
 
 def write_pages(station: Station, parts: Iterable[str], findings: tuple[Remark, ...], output: Path) -> None:

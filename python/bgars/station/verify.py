@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from bgars.records.part_result import PartResult
 
-__all__ = ["Known", "read_known", "verify"]
+__all__ = ["Known", "counted", "read_known", "verify"]
 
 Quantity = Literal["height", "diameter"]
 READINGS: dict[Quantity, str] = {"height": "top_um", "diameter": "diameter_um"}
@@ -167,6 +167,11 @@ def verify(
     return found, (*_judge(found, names, error, u_known), *_unread(unread, found))
 
 
+def counted(count: int, what: str) -> str:
+    """Return a number and its noun."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
 def _unread(names: list[str], found: Verification) -> list[Remark]:
     """Say which balls of the table have no reading: a limit is kept by every ball, or not shown to be kept."""
     if not names:
@@ -196,7 +201,7 @@ def _judge(found: Verification, names: np.ndarray, error: np.ndarray, u_known: n
     said: list[Remark] = []
     what = found.quantity
     unstated = list(dict.fromkeys(names[np.isnan(u_known)].tolist()))
-    of_these = f"u_um of {len(unstated)} balls is not in the table ({', '.join(unstated[:6])})"
+    of_these = f"u_um of {counted(len(unstated), 'ball')} is not in the table ({', '.join(unstated[:6])})"
     if found.mpe_um is not None:
         # Each error has the room that the certificate of its own ball leaves it.
         room = found.mpe_um - COVERAGE * u_known
@@ -204,7 +209,14 @@ def _judge(found: Verification, names: np.ndarray, error: np.ndarray, u_known: n
         words = f"{what}: largest error {found.largest_um:.2f} um, permissible {found.mpe_um:.2f} um"
         if broken:
             said.append(
-                Remark("fail", f"{words}: {broken} readings beyond it", "mpe", found.largest_um, found.mpe_um, "um")
+                Remark(
+                    "fail",
+                    f"{words}: {counted(broken, 'reading')} beyond it",
+                    "mpe",
+                    found.largest_um,
+                    found.mpe_um,
+                    "um",
+                )
             )
         elif is_open.any():
             worst = int(np.nanargmax(np.abs(error) - room))
