@@ -28,7 +28,7 @@ __all__ = [
 SECTIONS = {
     "flat": ("flat-structure", "evenness", "falloff", "flat-before-response"),
     "response": ("linear", "not-linear", "response-structure", "black-level"),
-    "scale": ("grid", "distortion", "tilt"),
+    "scale": ("grid", "distortion", "tilt", "distance", "heights", "not-square"),
     "verified": ("mpe", "mpe-open", "bias-", "slope-", "unread-", "outdated", "few-captures"),
     "whole": (AGREEMENT,),
 }
