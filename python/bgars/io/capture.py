@@ -134,10 +134,15 @@ def read_capture(
 
 
 def read_unlit(folder: str | PathLike[str], *, channel: ChannelName | None = None) -> Capture:
-    """Read the images of a folder whose lights are not known yet; an even ring at 45 degrees stands in for them.
+    """Read the images of a folder whose lights are not known yet, of a ball, a board or a grid.
 
     As :func:`read_capture` in all else, but that the only image called dark is taken as the dark frame where nothing
-    is described. Where the folder does describe lights, these are read.
+    is described. Where the folder does describe lights, these are read; else an even ring at 45 degrees stands in.
+
+    Raises
+    ------
+    InputError, FileFormatError
+        One or two images, or what :func:`read_capture` refuses.
     """
     folder = need_folder(folder)
     notes: list[str] = []

@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -21,7 +22,7 @@ from bgars.records.station import Verification
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from pathlib import Path
+    from os import PathLike
 
     from bgars.records.part_result import PartResult
 
@@ -42,7 +43,7 @@ class Known(NamedTuple):
     u_um: float
 
 
-def read_known(path: Path) -> dict[str, Known]:
+def read_known(path: str | PathLike[str]) -> dict[str, Known]:
     """Read a table of calibrated sizes: CSV with columns name, height_um, diameter_um, u_um; name and one size or more.
 
     Raises
@@ -52,6 +53,7 @@ def read_known(path: Path) -> dict[str, Known]:
     InputError
         A value that is no number above 0, more values than columns, or a name that comes twice.
     """
+    path = Path(path)
     try:
         table = csv.DictReader(io.StringIO(read_text(path).content, newline=""))
         lines = list(table)
