@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,6 +13,9 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 from bgars.records.light_calibration import BallView
+from bgars.report.figures.station_balls import balls_svg
+from bgars.report.html.station_page import write_station_page
+from bgars.station import srgb_response
 from rendered_spheres import render, ring
 from test_calibrate import bgars_command
 
@@ -58,3 +62,36 @@ def test_a_board_among_the_balls_is_asked_about(folder: Path, tmp_path: Path) ->
     run = bgars_command("check", folder / "board", "--station", tmp_path / "station.toml")
     assert run.code == 2
     assert "is it a board (bgars calibrate drift --reference flat), or a part" in run.stderr
+
+
+def test_the_page_shows_axes_whole_discs_and_whose_findings_they_are(folder: Path, tmp_path: Path) -> None:
+    known = bgars.read_station(folder / "station.toml")
+    assert known.lights is not None
+    unsure = replace(known.lights, u_deg=np.full(4, 1.0))
+    findings = tuple(
+        bgars.Remark(severity, words, code)
+        for severity, words, code in (
+            ("note", "on the grid", "grid"), ("doubt", "two lamps", "two-highlights"), ("doubt", "bent", "grid-unit"),
+        )
+    )  # fmt: skip
+    station = replace(known, lights=unsure, response=srgb_response(), findings=findings)
+    write_station_page(station, tmp_path / "station.html")
+    page = (tmp_path / "station.html").read_text(encoding="utf-8")
+    assert all("viewBox" in one for one in re.findall("<svg[^>]*>", page))
+    assert "grey level (% of full scale)" in page
+    assert "light (% of full scale)" in page
+    # Discs of 20 u would overlap, and leave the picture.
+    assert "shaded: 5 u" in page
+    assert max(float(size) for size in re.findall(r'r="([\d.]+)" fill="#4477aa55"', page)) < 24.0
+    last = page[page.index("<h2>Findings") :]
+    order = ["<h3>Lights", "two lamps", "<h3>Scale", "bent", "on the grid"]
+    assert [last.index(words) for words in order] == sorted(last.index(words) for words in order)
+    assert "swipe" not in page
+
+
+def test_pictures_of_balls_shrink_as_a_whole(folder: Path) -> None:
+    capture = bgars.read_unlit(folder / "ball1")
+    lights = bgars.read_station(folder / "station.toml").lights
+    assert lights is not None
+    drawing = balls_svg([capture], replace(lights, balls=(replace(lights.balls[0], capture="ball1"),) * 2))
+    assert 'viewBox="0 0 720 380"' in drawing

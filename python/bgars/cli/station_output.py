@@ -12,8 +12,9 @@ from bgars.io.own_files import need_new_or_own
 from bgars.io.recipe import RECIPE_NAME
 from bgars.io.station_file import is_station_file, read_station, write_station
 from bgars.records.remark import Remark
+from bgars.records.station_sections import section_of
 from bgars.report.html.station_page import write_station_page
-from bgars.station.agreement import AGREEMENT, agreement
+from bgars.station.agreement import agreement
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -24,15 +25,6 @@ if TYPE_CHECKING:
 __all__ = [
     "existing_station", "keep_part", "need_different", "need_places", "shown_severity", "tell_findings", "write_pages",
 ]  # fmt: skip
-
-SECTIONS = {
-    "flat": ("flat-structure", "evenness", "falloff", "flat-before-response"),
-    "response": ("linear", "not-linear", "response-structure", "black-level"),
-    "scale": ("grid", "distortion", "tilt", "distance", "heights", "not-square"),
-    "verified": ("mpe", "mpe-open", "bias-", "slope-", "unread-", "outdated", "few-captures"),
-    "whole": (AGREEMENT,),
-}
-"""How the codes of findings begin, by section of the station file; all others are of the lights."""
 
 
 def existing_station(path: Path, *inputs: Path | None) -> Station:
@@ -119,7 +111,7 @@ def keep_part(
 def write_pages(station: Station, parts: Iterable[str], findings: tuple[Remark, ...], output: Path) -> None:
     """Write a station and its page, with new findings in place of those of the same parts."""
     codes, new = {finding.code for finding in findings}, set(parts)
-    kept = [one for one in station.findings if one.code not in codes and _section(one.code) not in new]
+    kept = [one for one in station.findings if one.code not in codes and section_of(one.code) not in new]
     station = replace(station, findings=(*kept, *findings))
     write_station(station, output)
     write_station_page(station, output.with_suffix(".html"))
@@ -135,7 +127,3 @@ def tell_findings(findings: tuple[Remark, ...], output: Path) -> None:
     for finding in findings:
         say(f"{shown_severity(finding)}: {finding.message}")
     say(f"Written: {output}, and its page {output.with_suffix('.html')}")
-
-
-def _section(code: str) -> str:
-    return next((name for name, starts in SECTIONS.items() if code.startswith(starts)), "lights")

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from bgars.errors import CalibrationError
 from bgars.records.remark import Remark
 from bgars.records.station_apply import flat_intensities
+from bgars.records.station_sections import WHOLE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,12 +21,10 @@ if TYPE_CHECKING:
     from bgars.records.light_calibration import LightCalibration
     from bgars.records.station import Station
 
-__all__ = ["AGREEMENT", "agreement"]
+__all__ = ["agreement"]
 
 Array = NDArray[np.float64]
 
-AGREEMENT = "sections-"
-"""How the codes of these findings begin."""
 SIGMAS, LEAST = 3.0, 0.1
 """A level that is off by more than both contradicts; a lamp that lost some per cent with age is no contradiction."""
 WARM = 0.02
@@ -76,7 +75,7 @@ def _sizes(station: Station) -> list[Remark]:
         f"sections of different image sizes ({words}): captures of one size do not fit all of them; use one binning "
         "and region of interest, and calibrate the others again"
     )
-    return [Remark("doubt", message, f"{AGREEMENT}size")]
+    return [Remark("doubt", message, f"{WHOLE}size")]
 
 
 def _strengths(name: str, lights: LightCalibration, flat: FlatField) -> list[Remark]:
@@ -112,7 +111,7 @@ def _strengths(name: str, lights: LightCalibration, flat: FlatField) -> list[Rem
         f"others, as on the ball (limit {100 * limits[worst]:.0f} %): a lamp or its current was changed in between, or "
         "the images are in another order; calibrate lights and flat field anew"
     )
-    return [Remark("doubt", message, f"{AGREEMENT}strength", float(off[worst]), float(limits[worst]), "", worst)]
+    return [Remark("doubt", message, f"{WHOLE}strength", float(off[worst]), float(limits[worst]), "", worst)]
 
 
 def _without_tilt(off: Array, u: Array, slopes: Array) -> Array:
