@@ -9,6 +9,7 @@ from .errors import FileFormatError as FileFormatError
 from .errors import InputError as InputError
 from .errors import UnsupportedImageError as UnsupportedImageError
 from .io.capture import read_capture as read_capture
+from .io.capture import read_unlit as read_unlit
 from .io.formats import write_normals as write_normals
 from .io.formats import write_points as write_points
 from .io.height import read_height as read_height

@@ -95,7 +95,7 @@ def test_an_impossible_uncertainty_of_the_grid_leaves_the_station_as_it_is(
     before = place.read_bytes()
     run = bgars_command("calibrate", "scale", grid, "-o", place, "--pitch-mm", "0.5", "--u-pitch-mm", wrong)
     assert (run.code, place.read_bytes()) == (2, before)
-    assert "u_pitch_um: must be 0 or more, and below the pitch of 500" in run.stderr
+    assert "--u-pitch-mm: must be 0 or more, and below the pitch of 0.5" in run.stderr
 
 
 def test_one_image_of_a_grid_is_too_few_and_says_so(tmp_path: Path) -> None:

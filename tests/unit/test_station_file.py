@@ -58,11 +58,16 @@ def test_a_station_comes_back_as_it_was(tmp_path: Path) -> None:
         ("[lights]", "[lights]\ndirection = 1", "unknown key 'lights.direction'; the nearest known key is"),
         ("version = 1", "version = 2", "version"),
         ("u_own_deg = [", "u_own_deg = [0.1, ", "u_own_deg: must have one entry for each of the 6 lights, got 7"),
+        ("degree = 2", "degree = 3", "flat.degree: must be .* 6 coefficients each .* got 3"),
+        ("distortion = 0.0", "distortion = 5", "scale.distortion: .* less than 0.33, got 5"),
+        ('sphere = "mirror"', 'sphere = "mirorr"', "lights.sphere: .* got 'mirorr'"),
     ],
 )
 def test_a_wrong_station_is_refused_in_one_line(tmp_path: Path, old: str, new: str, words: str) -> None:
     path = tmp_path / "station.toml"
-    bgars.write_station(station(), path)
+    flat = FlatField(np.ones((6, 6)), 2, (4, 4))
+    bgars.write_station(station(flat=flat, scale=bgars.Scale(3.4, 0.002)), path)
+    assert old in path.read_text(encoding="utf-8")
     path.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
     with pytest.raises(bgars.BgarsError, match=words) as caught:
         bgars.read_station(path)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from bgars.station import response_from_bracket, response_from_sums
 from bgars.station.levels import linear_levels
+from bgars.station.response import SEGMENTS, _doubts
 from numpy.typing import NDArray
 from test_calibrate import bgars_command
 from test_station_lights import capture_of
@@ -98,3 +99,19 @@ def test_what_no_curve_explains_is_doubted() -> None:
     curve, findings = response_from_bracket(shots, TIMES, 255.0)
     assert "response-structure" in {one.code for one in findings if one.severity == "doubt"}
     assert curve.u_radiance > 0.01
+
+
+@pytest.mark.parametrize(("order", "name"), [((2, 0, 1), "a"), ((1, 2, 0), "b")])
+def test_sums_in_another_order_are_refused(order: tuple[int, ...], name: str) -> None:
+    """Gamma 0.05, and 'linear within 84 %'."""
+    a, b = (
+        light * np.random.default_rng(8).uniform(0.3, 0.45, (80, 100)) for light in (np.ones(100), np.ones((80, 1)))
+    )
+    images = [np.rint(255.0 * each) for each in (a, 0.8 * b, a + 0.8 * b)]
+    with pytest.raises(bgars.CalibrationError, match=f"no brighter than that of light {name}: give them as a, b, both"):
+        response_from_sums(*(images[at] for at in order), 255.0)
+
+
+def test_a_curve_that_explains_nothing_is_refused() -> None:
+    with pytest.raises(bgars.CalibrationError, match=r"no curve explains the levels: up to 30\.0 %"):
+        _doubts(np.ones(SEGMENTS), np.ones((10, 3)), 0.3, 0.0)

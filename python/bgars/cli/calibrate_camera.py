@@ -13,11 +13,13 @@ import typer
 import bgars
 from bgars.cli.calibrate_station import JsonOption, OutputOption, said_values
 from bgars.cli.console import print_json, say
-from bgars.cli.station_output import existing_station, keep_part, tell_findings
+from bgars.cli.measured_scale import measured_scale, numbers
+from bgars.cli.station_output import existing_station, keep_part, need_different, tell_findings
 from bgars.errors import InputError
 from bgars.io.capture import read_unlit
 from bgars.records.remark import Remark
 from bgars.station import response_from_bracket, response_from_sums, srgb_response
+from bgars.station.scale import GRID_AGAIN
 
 if TYPE_CHECKING:
     from bgars.records.response_curve import ResponseCurve
@@ -74,7 +76,7 @@ def response(
         above = f" above the black level of {dark:g}" if dark > 0 else ""
         if exposures is not None:
             curve, findings = response_from_bracket(
-                list(capture.images), _numbers(exposures, "--exposures"), full, dark=dark
+                list(capture.images), numbers(exposures, "--exposures"), full, dark=dark
             )
         else:
             if len(capture.images) != SUMS:
@@ -84,7 +86,7 @@ def response(
                 capture.images[0], capture.images[1], capture.images[2], full, dark=dark
             )
     findings = (*findings, *_made_before(known, curve))
-    keep_part(output, {"response": curve}, findings)
+    findings = keep_part(output, {"response": curve}, findings)
     if as_json:
         values = {"levels": curve.levels.tolist(), "radiances": curve.radiances.tolist(), "gamma": curve.gamma}
         print_json({**values, "nonlinearity": curve.nonlinearity, **said_values(findings), "file": str(output)})
@@ -124,17 +126,12 @@ def scale(
 
     With the grid at two known heights or more, also how far the camera is, or that it is telecentric.
     """
-    existing_station(output, *folders)
-    u_um = None if u_pitch_mm is None else 1000.0 * u_pitch_mm
-    if len(folders) > 1 and heights_mm is None:
-        msg = f"--heights-mm: needed with several folders ({len(folders)}): the height of the grid in each"
-        raise InputError(msg)
-    heights_um = None if heights_mm is None else [1000.0 * height for height in _numbers(heights_mm, "--heights-mm")]
-    grids = [read_unlit(folder) for folder in folders]
-    found, findings = bgars.calibrate_scale(
-        grids, 1000.0 * pitch_mm, target=target, u_pitch_um=u_um, heights_um=heights_um
+    need_different(folders, GRID_AGAIN)
+    known = existing_station(output, *folders)
+    found, findings = measured_scale(
+        known, folders, ("--pitch-mm", pitch_mm), ("--heights-mm", heights_mm), target, u_pitch_mm
     )
-    keep_part(output, {"scale": found}, findings)
+    findings = keep_part(output, {"scale": found}, findings)
     if as_json:
         is_telecentric = found.camera_distance_mm is not None and math.isinf(found.camera_distance_mm)
         values = {"pixel_pitch_um": found.pixel_pitch_um, "pixel_pitch_u_um": found.pixel_pitch_u_um}
@@ -167,11 +164,3 @@ def _made_before(known: Station, curve: ResponseCurve) -> list[Remark]:
     if known.lights is not None and known.lights.sphere == "matt":
         found.append(Remark("doubt", f"what a matt ball showed of the lights {again}", "lights-before-response"))
     return found
-
-
-def _numbers(text: str, option: str) -> list[float]:
-    try:
-        return [float(value) for value in text.split(",")]
-    except ValueError:
-        msg = f"{option}: must be numbers with commas between, got {text!r}"
-        raise InputError(msg) from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -12,11 +13,14 @@ import bgars
 from bgars.cli.calibrated_lights import lights_values, said_values, tell_lights
 from bgars.cli.camera_option import CameraOption, seen_by
 from bgars.cli.console import print_json, say, stage_progress
+from bgars.cli.measured_scale import measured_scale
 from bgars.cli.station_output import existing_station, keep_part, need_different, tell_findings
 from bgars.errors import InputError
 from bgars.io.capture import read_unlit
 from bgars.report.figures.station_balls import write_balls
 from bgars.station.flat import falloff_findings
+from bgars.station.lights import BALL_AGAIN
+from bgars.station.scale import GRID_AGAIN
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,8 +34,6 @@ __all__ = [
     "FolderArgument", "JsonOption", "OutlineOption", "OutputOption", "circles_of", "raw_capture", "register",
     "said_values",
 ]  # fmt: skip
-
-BALL_AGAIN = "photograph the ball once for each of its places"
 
 OutputOption = Annotated[
     Path,
@@ -89,7 +91,9 @@ NearOption = Annotated[
 DiameterOption = Annotated[
     float | None,
     typer.Option(
-        metavar="MM", help="Diameter of the ball, in mm: gives the scale if capture.toml has none.", show_default=False
+        metavar="MM",
+        help="Diameter of the ball, in mm: gives the scale where neither the station nor capture.toml has one.",
+        show_default=False,
     ),
 ]
 
@@ -121,13 +125,17 @@ def lights(
     read = bgars.read_capture if sphere == "balls" else read_unlit
     captures = [seen_by(raw_capture(folder, known, read), camera) for folder in folders]
     found = _calibrate_lights(captures, sphere, outline, near, diameter_mm, recipe)
-    write_balls(captures, found, output.with_suffix(".balls.svg"))
-    keep_part(output, {"lights": found}, found.findings)
+    said = keep_part(
+        output,
+        {"lights": found},
+        found.findings,
+        draw=lambda: write_balls(captures, found, output.with_suffix(".balls.svg")),
+    )
     if as_json:
-        print_json({"bgars": bgars.__version__, **lights_values(found), "file": str(output)})
+        print_json({"bgars": bgars.__version__, **lights_values(found), **said_values(said), "file": str(output)})
         return
     tell_lights(found)
-    tell_findings(found.findings, output)
+    tell_findings(said, output)
 
 
 def flat(folder: FolderArgument, output: OutputOption, as_json: JsonOption = False) -> None:
@@ -140,7 +148,7 @@ def flat(folder: FolderArgument, output: OutputOption, as_json: JsonOption = Fal
     found, findings = bgars.calibrate_flat(raw_capture(folder, replace(known, scale=None)))
     if known.lights is not None and known.scale is not None:
         findings = (*findings, *falloff_findings(found, known.lights, known.scale.pixel_pitch_um))
-    keep_part(output, {"flat": found}, findings)
+    findings = keep_part(output, {"flat": found}, findings)
     if as_json:
         print_json({"degree": found.degree, "residual": found.residual, **said_values(findings), "file": str(output)})
         return
@@ -162,30 +170,52 @@ def station(
         Path | None, typer.Option(metavar="FOLDER", help="Flat board under each light.", show_default=False)
     ] = None,
     grid: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Grid of dots, or a chessboard.", show_default=False)
+        list[Path] | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Grid of dots, or a chessboard, where parts lie; given twice or more: at the heights of --heights-mm.",
+            show_default=False,
+        ),
     ] = None,
     grid_pitch_mm: Annotated[
         float | None, typer.Option(metavar="MM", help="Pitch of the grid.", show_default=False)
     ] = None,
+    heights_mm: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MM,MM,...",
+            help="Height of the grid above the board in each --grid: gives the distance of the camera.",
+            show_default=False,
+        ),
+    ] = None,
     target: Annotated[Literal["dots", "chessboard"], typer.Option(help="Kind of the grid.")] = "dots",
     camera: CameraOption = None,
-    name: Annotated[str, typer.Option(help="Name of the station.")] = "station",
+    name: Annotated[
+        str | None, typer.Option(help="Name of the station; by default the one it has.", show_default=False)
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Calibrate scale from a grid, lights from a ball, evenness from a board, in one run.
 
     A response that station.toml has is used: calibrate it first.
     """
-    if (grid is None) != (grid_pitch_mm is None):
+    grids = grid or []
+    if bool(grids) != (grid_pitch_mm is not None):
         msg = "--grid and --grid-pitch-mm: give both or none"
         raise InputError(msg)
+    if heights_mm is not None and not grids:
+        msg = "--heights-mm: goes with --grid only"
+        raise InputError(msg)
     need_different(folders, BALL_AGAIN)
-    known = existing_station(output, *folders, board, grid)
+    need_different(grids, GRID_AGAIN)
+    known = existing_station(output, *folders, board, *grids)
     parts: dict[str, Any] = {}
     findings: list[Remark] = []
     with stage_progress() as report:
-        if grid is not None and grid_pitch_mm is not None:
-            parts["scale"], said = bgars.calibrate_scale(read_unlit(grid), 1000.0 * grid_pitch_mm, target=target)
+        if grid_pitch_mm is not None:
+            parts["scale"], said = measured_scale(
+                known, grids, ("--grid-pitch-mm", grid_pitch_mm), ("--heights-mm", heights_mm), target
+            )
             findings += said
             known = replace(known, scale=parts["scale"])
         report("scale", 1.0)
@@ -200,18 +230,21 @@ def station(
             if known.scale is not None:
                 findings += falloff_findings(parts["flat"], found, known.scale.pixel_pitch_um)
         report("flat", 1.0)
-    write_balls(captures, found, output.with_suffix(".balls.svg"))
-    keep_part(output, parts, tuple(findings), name=name)
+    told = keep_part(
+        output,
+        parts,
+        tuple(findings),
+        name=name,
+        draw=lambda: write_balls(captures, found, output.with_suffix(".balls.svg")),
+    )
     if as_json:
-        print_json(
-            {"bgars": bgars.__version__, **lights_values(found), **said_values(tuple(findings)), "file": str(output)}
-        )
+        print_json({"bgars": bgars.__version__, **lights_values(found), **said_values(told), "file": str(output)})
         return
     tell_lights(found)
     if "scale" in parts:
         scale = parts["scale"]
         say(f"A pixel is {scale.pixel_pitch_um:.4f} um (u {scale.pixel_pitch_u_um:.2g} um).")
-    tell_findings(tuple(findings), output)
+    tell_findings(told, output)
 
 
 def _calibrate_lights(
@@ -222,6 +255,9 @@ def _calibrate_lights(
     diameter_mm: float | None,
     recipe: Path | None = None,
 ) -> LightCalibration:
+    if diameter_mm is not None and not (math.isfinite(diameter_mm) and diameter_mm > 0):
+        msg = f"--diameter-mm: must be finite and above 0, got {diameter_mm:g}"
+        raise InputError(msg)
     circles = circles_of(outline, captures)
     with stage_progress() as report:
         return bgars.calibrate_lights(

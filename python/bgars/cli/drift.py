@@ -20,7 +20,7 @@ from bgars.cli.calibrate_station import (
 from bgars.cli.camera_option import CameraOption, seen_by
 from bgars.cli.console import print_json, say, utc_now
 from bgars.cli.station_output import shown_severity
-from bgars.errors import InputError
+from bgars.errors import CalibrationError, InputError
 from bgars.io.station_file import read_station
 from bgars.records.result_text import log_pairs
 from bgars.station import drift as station_drift
@@ -72,7 +72,16 @@ def drift(
     kind = reference or (known.lights.sphere if known.lights is not None else "flat")
     capture = seen_by(raw_capture(folder, replace(known, scale=None) if kind == "flat" else known), camera)
     circles = circles_of(outline, [capture])
-    found = station_drift(known, capture, reference=reference, outline=None if circles is None else circles[0])
+    try:
+        found = station_drift(known, capture, reference=reference, outline=None if circles is None else circles[0])
+    except CalibrationError as error:
+        if reference is not None or kind == "flat":
+            raise
+        msg = (
+            f"{error}; the folder was read as one of the {kind} ball of the calibration: is it a board (bgars "
+            "calibrate drift --reference flat), or a part, which is no reference (bgars check without --station)?"
+        )
+        raise CalibrationError(msg) from None
     moved = [finding for finding in found if finding.severity == "fail"]
     if as_json:
         print_json({"station": str(station), "moved": len(moved), **said_values(found)})

@@ -11,26 +11,20 @@ from bgars.errors import FileFormatError, InputError
 from bgars.io.own_files import need_new_or_own
 from bgars.io.recipe import RECIPE_NAME
 from bgars.io.station_file import is_station_file, read_station, write_station
+from bgars.records.remark import Remark
+from bgars.records.station_sections import section_of
 from bgars.report.html.station_page import write_station_page
+from bgars.station.agreement import agreement
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
     from pathlib import Path
 
-    from bgars.records.remark import Remark
     from bgars.records.station import Station
 
 __all__ = [
     "existing_station", "keep_part", "need_different", "need_places", "shown_severity", "tell_findings", "write_pages",
 ]  # fmt: skip
-
-SECTIONS = {
-    "flat": ("flat-structure", "evenness", "falloff", "flat-before-response"),
-    "response": ("linear", "not-linear", "response-structure", "black-level"),
-    "scale": ("grid", "distortion", "tilt"),
-    "verified": ("mpe", "mpe-open", "bias-", "slope-", "unread-"),
-}
-"""How the codes of findings begin, by section of the station file; all others are of the lights."""
 
 
 def existing_station(path: Path, *inputs: Path | None) -> Station:
@@ -81,16 +75,43 @@ def need_different(folders: Iterable[Path], what: str) -> None:
         seen.add(place)
 
 
-def keep_part(output: Path, parts: dict[str, Any], findings: tuple[Remark, ...], name: str | None = None) -> None:
-    """Write the station with its new parts, and its page; what was found of the old ones goes."""
+def keep_part(
+    output: Path,
+    parts: dict[str, Any],
+    findings: tuple[Remark, ...],
+    name: str | None = None,
+    draw: Callable[[], object] | None = None,
+) -> tuple[Remark, ...]:
+    """Write the station with its new parts, and its page; what was found of the old ones goes.
+
+    Returns the findings and what the station as a whole adds to them. `draw` writes the pictures of the page, once it
+    is sure that the parts fit together.
+
+    Raises
+    ------
+    CalibrationError
+        Parts that do not fit together; nothing is written then.
+    """
     known = existing_station(output)
-    write_pages(replace(known, **parts, calibrated_utc=utc_now(), name=name or known.name), parts, findings, output)
+    station = replace(known, **parts, calibrated_utc=utc_now(), name=name or known.name)
+    findings = (*findings, *agreement(station))
+    if known.verified:
+        message = (
+            f"the comparison with a part of known sizes of {known.verified_utc} was that of the station before, and is "
+            "dropped: verify it again"
+        )
+        findings = (*findings, Remark("note", message, "outdated"))
+        station = replace(station, verified=(), verified_utc="")
+    if draw is not None:
+        draw()
+    write_pages(station, [*parts, "verified", "whole"], findings, output)
+    return findings
 
 
 def write_pages(station: Station, parts: Iterable[str], findings: tuple[Remark, ...], output: Path) -> None:
     """Write a station and its page, with new findings in place of those of the same parts."""
     codes, new = {finding.code for finding in findings}, set(parts)
-    kept = [one for one in station.findings if one.code not in codes and _section(one.code) not in new]
+    kept = [one for one in station.findings if one.code not in codes and section_of(one.code) not in new]
     station = replace(station, findings=(*kept, *findings))
     write_station(station, output)
     write_station_page(station, output.with_suffix(".html"))
@@ -106,7 +127,3 @@ def tell_findings(findings: tuple[Remark, ...], output: Path) -> None:
     for finding in findings:
         say(f"{shown_severity(finding)}: {finding.message}")
     say(f"Written: {output}, and its page {output.with_suffix('.html')}")
-
-
-def _section(code: str) -> str:
-    return next((name for name, starts in SECTIONS.items() if code.startswith(starts)), "lights")

@@ -14,10 +14,13 @@ from bgars.cli.station_output import need_different
 from bgars.errors import InputError
 from bgars.inspection.judge import OWN_PITCH
 from bgars.io.atomic import atomic_file
+from bgars.records.same_images import refuse_seen
 from bgars.station.teach import compact_names, teach_text
 from bgars.station.teach import teach as learn
 
 __all__ = ["register"]
+
+PART_AGAIN = "every part must have images of its own"
 
 
 def register(app: typer.Typer) -> None:
@@ -45,11 +48,14 @@ def teach(
     differ, or one is in doubt: a ball unlike its fellows, or a missing one.
     """
     _check_place(output, force=force)
-    need_different(golden, "every part must have images of its own")
+    need_different(golden, PART_AGAIN)
     results = []
+    seen: dict[str, str] = {}
     with stage_progress() as report:
         for index, folder in enumerate(golden):
-            results.append(bgars.inspect(bgars.read_capture(folder, station=station)))
+            capture = bgars.read_capture(folder, station=station)
+            refuse_seen(capture, seen, PART_AGAIN)
+            results.append(bgars.inspect(capture))
             _need_separate_balls(folder, results[-1])
             for words in results[-1].warnings:
                 if words != OWN_PITCH:

@@ -15,16 +15,20 @@ from bgars.cli.console import print_json, say, stage_progress, utc_now
 from bgars.cli.station_output import need_different, need_places, shown_severity, write_pages
 from bgars.errors import InputError
 from bgars.io.station_file import read_station
-from bgars.station.verify import READINGS, read_known
+from bgars.records.remark import Remark
+from bgars.records.same_images import refuse_seen
+from bgars.station.verify import READINGS, counted, read_known
 from bgars.station.verify import verify as compare
 
 if TYPE_CHECKING:
-    from bgars.records.remark import Remark
     from bgars.records.station import Verification
 
 __all__ = ["register"]
 
 EXIT_BROKEN = 1
+CAPTURES = 3
+"""Of one part that is taken out and put back in between: fewer say little of how well readings repeat."""
+PART_AGAIN = "take the part out and put it back in between"
 
 
 def register(app: typer.Typer) -> None:
@@ -66,14 +70,17 @@ def verify(
     if mpe_um is not None and not (math.isfinite(mpe_um) and mpe_um > 0):
         msg = f"--mpe-um: must be finite and above 0, got {mpe_um:g}"
         raise InputError(msg)
-    need_different(folders, "take the part out and put it back in between")
+    need_different(folders, PART_AGAIN)
     sizes = read_known(known)
     kept = read_station(station)
     need_places(station)
     results = []
+    seen: dict[str, str] = {}
     with stage_progress() as report:
         for index, folder in enumerate(folders):
-            results.append(bgars.inspect(bgars.read_capture(folder, station=kept), recipe))
+            capture = bgars.read_capture(folder, station=kept)
+            refuse_seen(capture, seen, PART_AGAIN)
+            results.append(bgars.inspect(capture, recipe))
             report("known part", (index + 1) / len(folders))
     found: list[Verification] = []
     said: list[Remark] = []
@@ -82,6 +89,12 @@ def verify(
             one, remarks = compare(results, sizes, quantity=quantity, mpe_um=mpe_um)
             found.append(one)
             said += remarks
+    if len(folders) < CAPTURES:
+        message = (
+            f"{counted(len(folders), 'capture')} of the part: that readings repeat is not shown; take it out, turn it "
+            f"and put it back, {CAPTURES} captures or more"
+        )
+        said.append(Remark("doubt", message, "few-captures", len(folders), CAPTURES))
     new = replace(kept, verified=tuple(found), verified_utc=utc_now())
     write_pages(new, ["verified"], tuple(said), station)
     broken = any(remark.severity == "fail" for remark in said)
@@ -95,9 +108,10 @@ def verify(
                 else f", {1000 * one.slope:+.1f} um per millimetre (u {1000 * one.u_slope:.1f})"
             )
             again = "" if math.isnan(one.repeatability_um) else f", repeats to {one.repeatability_um:.2f} um"
+            u = "" if math.isnan(one.u_bias_um) else f" (u {one.u_bias_um:.2f} um)"
             say(
-                f"{one.quantity}: bias {one.bias_um:+.2f} um (u {one.u_bias_um:.2f} um){slope}{again}; largest error "
-                f"{one.largest_um:.2f} um, {one.balls} balls in {one.captures} captures"
+                f"{one.quantity}: bias {one.bias_um:+.2f} um{u}{slope}{again}; largest error "
+                f"{one.largest_um:.2f} um, {counted(one.balls, 'ball')} in {counted(one.captures, 'capture')}"
             )
         for remark in said:
             say(f"{shown_severity(remark)}: {remark.message}")

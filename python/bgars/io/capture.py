@@ -134,10 +134,15 @@ def read_capture(
 
 
 def read_unlit(folder: str | PathLike[str], *, channel: ChannelName | None = None) -> Capture:
-    """Read the images of a folder whose lights are not known yet; an even ring at 45 degrees stands in for them.
+    """Read the images of a folder whose lights are not known yet, of a ball, a board or a grid.
 
     As :func:`read_capture` in all else, but that the only image called dark is taken as the dark frame where nothing
-    is described. Where the folder does describe lights, these are read.
+    is described. Where the folder does describe lights, these are read; else an even ring at 45 degrees stands in.
+
+    Raises
+    ------
+    InputError, FileFormatError
+        One or two images, or what :func:`read_capture` refuses.
     """
     folder = need_folder(folder)
     notes: list[str] = []
@@ -153,12 +158,12 @@ def read_unlit(folder: str | PathLike[str], *, channel: ChannelName | None = Non
     if recipe.lights is not None:
         return read_capture(folder, channel=channel)
     if recipe.exposures_ms is not None:
-        lights = _by_order(LightRig.ring(max(lights_in_bracket(folder, recipe), 3)), str(folder))
+        lights = _by_order(_stand_in(lights_in_bracket(folder, recipe)), str(folder))
         return _load_bracket(folder, recipe, lights, listing, channel, MAX_MEGAPIXELS, None, notes, None)
     if (count := len(recipe.images or listing.images)) in {1, 2}:
         msg = f"{folder}: {count} image{'s'[: count - 1]}, 3 are needed or more; of a grid, copies will do"
         raise InputError(msg)
-    lights = _by_order(LightRig.ring(max(count, 3)), str(folder) if count else "")
+    lights = _by_order(_stand_in(count), str(folder) if count else "")
     capture = _load_chosen(folder, recipe, lights, listing, None, channel, MAX_MEGAPIXELS, None, notes)
     _tell(folder, notes)
     return capture
@@ -167,6 +172,12 @@ def read_unlit(folder: str | PathLike[str], *, channel: ChannelName | None = Non
 def _tell(folder: Path, notes: list[str]) -> None:
     for note in notes:
         warnings.warn(f"{folder}: {note}", CaptureWarning, stacklevel=3)
+
+
+def _stand_in(count: int) -> LightRig:
+    """Lights of which nothing is known: that they are a ring is no statement to hold against what is found."""
+    rig = LightRig.ring(max(count, 3))
+    return replace(rig, u_deg=np.full(len(rig), 90.0))
 
 
 def _by_order(rig: LightRig, source: str) -> Lights:

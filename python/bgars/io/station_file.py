@@ -162,7 +162,15 @@ def _flat(path: Path, table: FlatTable) -> FlatField:
         msg = f"{path}: flat.file: {file} is not the one that was calibrated (its checksum differs)"
         raise FileFormatError(msg)
     with np.load(file, allow_pickle=False) as archive:
-        return FlatField(archive["coefficients"], table.degree, table.size_px, table.residual)
+        coefficients = archive["coefficients"]
+    terms = (table.degree + 1) * (table.degree + 2) // 2
+    if coefficients.ndim != 2 or coefficients.shape[1] != terms:  # noqa: PLR2004 - lights and terms
+        msg = (
+            f"{path}: flat.degree: must be the degree of the maps in {table.file}, which have "
+            f"{coefficients.shape[-1]} coefficients each (a degree of {table.degree} has {terms}), got {table.degree}"
+        )
+        raise InputError(msg)
+    return FlatField(coefficients, table.degree, table.size_px, table.residual)
 
 
 def write_station(station: Station, path: str | PathLike[str]) -> None:

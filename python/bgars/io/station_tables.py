@@ -17,12 +17,15 @@ Number = Annotated[float, Field(allow_inf_nan=False)]
 Distance = Annotated[float, Field(gt=0)]
 """May be endless."""
 Vector = tuple[Number, Number, Number]
+Distortion = Annotated[float, Field(gt=-0.33, lt=0.33)]
+"""A displacement that grows with the third power of the radius folds the picture from -1/3 on."""
+Side = Annotated[int, Field(gt=0)]
 
 
 class LightsTable(Strict):
     """The ``[lights]`` table."""
 
-    sphere: str = Field("", description="what was in view: mirror, matt or balls")
+    sphere: Literal["", "mirror", "matt", "balls"] = Field("", description="what was in view: mirror, matt or balls")
     directions: list[Vector] | None = Field(None, description="unit vectors from the board to the lights, by image")
     positions_mm: list[Vector] | None = Field(None, description="or positions, origin = image centre on the board")
     intensities: list[Positive] = Field(description="relative intensities, mean 1")
@@ -43,7 +46,7 @@ class LightsTable(Strict):
     level: Positive | None = Field(None, description="mean level of what measured the intensities, of 255")
     level_by: str = Field("", description="what that was: highlights, shading or board")
     pixel_pitch_um: Positive | None = Field(None, description="size of a pixel that positions_mm were measured with")
-    size_px: tuple[int, int] | None = Field(None, description="height and width of the images")
+    size_px: tuple[Side, Side] | None = Field(None, description="height and width of the images")
 
     @model_validator(mode="after")
     def _one_a_light(self) -> LightsTable:
@@ -73,7 +76,7 @@ class FlatTable(Strict):
     file: str = Field(description="coefficients of the gain maps, .npz, relative to station.toml")
     sha256: str = Field(description="checksum of that file")
     degree: Annotated[int, Field(ge=0, le=20)] = Field(description="degree of the polynomials")
-    size_px: tuple[int, int] = Field(description="height and width of the images")
+    size_px: tuple[Side, Side] = Field(description="height and width of the images")
     residual: NotNegative = Field(0.0, description="relative residual of the board's levels")
 
 
@@ -109,11 +112,13 @@ class ScaleTable(Strict):
         None, description="tilt of the grid against the image plane, if the distance of the camera is known"
     )
     rotation_deg: Number = Field(0.0, description="rotation of the grid in the image")
-    distortion: Number = Field(0.0, description="radial displacement at the corner over its distance from the centre")
+    distortion: Distortion = Field(
+        0.0, description="radial displacement at the corner over its distance from the centre"
+    )
     residual_px: NotNegative = Field(0.0, description="root mean square residual of the points of the grid")
     points: int = Field(0, description="number of points of the grid")
     camera_distance_mm: Distance | None = Field(None, description="distance of the camera; inf: telecentric")
-    size_px: tuple[int, int] | None = Field(None, description="height and width of the images it holds for")
+    size_px: tuple[Side, Side] | None = Field(None, description="height and width of the images it holds for")
 
 
 class VerifyTable(Strict):

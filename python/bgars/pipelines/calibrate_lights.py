@@ -62,7 +62,8 @@ def calibrate_lights(
         True: positions in space, which takes two balls or one ball moved. False: directions. By default positions where
         the balls show that directions differ from place to place. Not with "balls": lights are then what the rig says.
     diameter_um : float, optional
-        Diameter of the ball: gives the pixel pitch where the captures state none. Not with "balls".
+        Diameter of the ball: gives the pixel pitch where the captures state none; else it is compared with theirs. Not
+        with "balls".
     recipe : PartRecipe or path, optional
         With "balls": layout of the part, and usual roundness of its balls.
     progress : callable, optional
@@ -76,7 +77,8 @@ def calibrate_lights(
     Raises
     ------
     CalibrationError
-        No ball, a ball that is cut off or overexposed, a light whose highlight is on no ball; too few shadows.
+        No ball, a ball that is cut off or overexposed, a light whose highlight is on no ball; a direction at or below
+        the board, or with an uncertainty beyond 10 degrees; too few shadows.
     InputError
         Captures with different numbers of images, an outline of a wrong shape, an argument that does not go with
         `sphere`.

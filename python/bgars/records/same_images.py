@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,10 +11,12 @@ from bgars.errors import InputError
 from bgars.files.light_names import light_name
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from bgars.records.capture import Capture
     from bgars.records.pixels import PixelArray
 
-__all__ = ["refuse_repeated", "same_images"]
+__all__ = ["refuse_repeated", "refuse_seen", "refuse_shared", "same_images"]
 
 SAMPLE = 50_000
 
@@ -48,3 +51,28 @@ def refuse_repeated(capture: Capture) -> None:
         first, second = (files[each] if files else light_name(each, what="image") for each in same)
         msg = f"{capture.name}: images: {first} and {second} are the same picture; each light needs its own"
         raise InputError(msg)
+
+
+def refuse_shared(captures: Iterable[Capture], advice: str) -> None:
+    """Raise InputError where a picture is in two captures: a copy repeats perfectly, and says nothing new."""
+    seen: dict[str, str] = {}
+    for capture in captures:
+        refuse_seen(capture, seen, advice)
+
+
+def refuse_seen(capture: Capture, seen: dict[str, str], advice: str) -> None:
+    """Raise InputError where a picture, unless it is empty, is one of those `seen`; else add it to these.
+
+    `seen` holds names of pictures by their checksums, which are kept in place of captures.
+    """
+    new: dict[str, str] = {}
+    for index, image in enumerate(capture.images):
+        if image.min() == image.max():
+            continue
+        name = f"{capture.name}/{capture.files[index].name if capture.files else light_name(index, what='image')}"
+        digest = hashlib.sha256(f"{image.shape} {image.dtype}".encode() + image.tobytes()).hexdigest()
+        if digest in seen:
+            msg = f"{name} is the same picture as {seen[digest]}; {advice}"
+            raise InputError(msg)
+        new[digest] = name
+    seen.update(new)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from bgars.records.response_curve import ResponseCurve
     from bgars.records.rig import LightRig
 
-__all__ = ["flat_maps", "legendre_terms", "with_station"]
+__all__ = ["flat_intensities", "flat_maps", "legendre_terms", "with_station"]
 
 Array = NDArray[np.float64]
 
@@ -173,7 +173,7 @@ def _with_flat(capture: Capture, flat: FlatField, name: str) -> Capture:
         images[light] = (linear(values) - dark) / gain
         clipped = values >= capture.saturation
         images[light][clipped] = top
-    rig = _flat_intensities(capture.rig, flat, capture)
+    rig = replace(capture.rig, intensities=flat_intensities(capture.rig, flat))
     return replace(
         capture,
         images=images,
@@ -186,15 +186,15 @@ def _with_flat(capture: Capture, flat: FlatField, name: str) -> Capture:
     )
 
 
-def _flat_intensities(rig: LightRig, flat: FlatField, capture: Capture) -> LightRig:
-    """Intensities as the flat board shows them at the image centre."""
+def flat_intensities(rig: LightRig, flat: FlatField) -> Array:
+    """(L,) intensities, mean 1, as the flat board shows them at the image centre."""
     centre = np.array([0.0])
     terms = np.array([term[0, 0] for term in legendre_terms(centre, centre, flat.degree)])
     levels = flat.coefficients @ terms / np.maximum(rig.directions[:, 2], 0.02)
     if rig.positions_um is not None and rig.intensity_distance_um is not None:
         levels = levels * np.square(np.linalg.norm(rig.positions_um, axis=1) / rig.intensity_distance_um)
-    del capture
-    return replace(rig, intensities=levels / levels.mean())
+    relative: Array = levels / levels.mean()
+    return relative
 
 
 def _modelled(capture: Capture, light: int) -> Array | float:

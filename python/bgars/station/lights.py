@@ -16,9 +16,11 @@ from bgars.records.capture import Capture
 from bgars.records.light_calibration import BallView, LightCalibration
 from bgars.records.remark import Remark
 from bgars.records.rig import LightRig
-from bgars.records.same_images import refuse_repeated
+from bgars.records.same_images import refuse_repeated, refuse_shared
 from bgars.records.scalar_checks import check_pitch
 from bgars.records.whole_capture import need_whole
+from bgars.station.ball_diameter import need_diameter_of_scale
+from bgars.station.believable import need_believable
 from bgars.station.light_bundle import solve_lights
 from bgars.station.mirror_lights import together
 from bgars.station.observe import observe, outlines_a_capture
@@ -36,6 +38,7 @@ __all__ = ["Sphere", "calibrate_lights"]
 Array = NDArray[np.float64]
 Sphere = Literal["mirror", "matt"]
 
+BALL_AGAIN = "photograph the ball once for each of its places"
 MISFIT = 3.0
 """Reduced chi square from which on balls contradict each other."""
 LENS_SHARE = 0.5
@@ -68,14 +71,17 @@ def calibrate_lights(
     Raises
     ------
     CalibrationError
-        No ball, a ball that is cut off or overexposed, a light whose highlight is on no ball.
+        No ball, a ball that is cut off or overexposed, a light whose highlight is on no ball, or a direction at or
+        below the board, or with an uncertainty beyond 10 degrees.
     InputError
-        Captures with different numbers of images, the same image twice, or an outline of a wrong shape.
+        Captures with different numbers of images, the same image twice, an outline of a wrong shape, or a diameter
+        that the scale contradicts.
     """
     captures = [capture] if isinstance(capture, Capture) else list(capture)
     for each in captures:
         need_whole(each)
         refuse_repeated(each)
+    refuse_shared(captures, BALL_AGAIN)
     if sphere not in {"mirror", "matt"}:
         msg = f"sphere: must be 'mirror', 'matt' or 'balls', got {sphere!r}"
         raise InputError(msg)
@@ -87,9 +93,14 @@ def calibrate_lights(
     check_pitch(diameter_um, "diameter_um")
     for each in captures:
         _need_scale_of_camera(each, diameter_um)
-    seen = observe(captures, sphere, outlines_a_capture(captures, outline), diameter_um, progress)
+    # A scale is known better than a diameter, which is then only compared with it.
+    scaling_um = None if all(each.pixel_pitch_um is not None for each in captures) else diameter_um
+    seen = observe(captures, sphere, outlines_a_capture(captures, outline), scaling_um, progress)
+    if diameter_um is not None:
+        need_diameter_of_scale(seen, diameter_um)
     balls, findings = seen.balls, seen.findings
-    solution, pitch_um = _solve(captures, seen, diameter_um, near, findings)
+    solution, pitch_um = _solve(captures, seen, scaling_um, near, findings)
+    need_believable(solution, captures, sphere, findings)
     shone = solution if places_px is None else _placed(solution, places_px)
     strengths = strengths_of(sphere, captures, seen, shone, findings)
     rig = _rig(solution, pitch_um, strengths.relative)

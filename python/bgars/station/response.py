@@ -37,6 +37,7 @@ ASKED = 10.0
 """Fall of chi square for each segment from which on the levels ask for the former: 4, and pairs share images."""
 LINEAR = 0.01
 """Largest distance from a straight line of a camera that counts as linear, of full scale."""
+NONSENSE = 0.2  # of full scale, of levels from their curve: as far off as a camera's gamma is from a straight line
 LEAST_PIXELS = 200
 SURE = 2.0
 """Times the least level, from which on noise of 8 bits moves no pixel across it."""
@@ -76,7 +77,8 @@ def response_from_bracket(
     InputError
         Fewer than two images, or exposures that are not above 0, or all alike.
     CalibrationError
-        Too few pixels that two exposures show well, or images that do not get brighter with the exposure.
+        Too few pixels that two exposures show well, images that do not get brighter with the exposure, or no curve that
+        explains the levels.
 
     References
     ----------
@@ -188,7 +190,7 @@ def response_from_sums(
     Raises
     ------
     CalibrationError
-        Too few pixels between black and clipped.
+        Too few pixels between black and clipped, images in another order, or no curve that explains the levels.
     """
     levels, black = _above((first, second, both), dark, full_scale)
     a, b, c = levels.T
@@ -196,6 +198,10 @@ def response_from_sums(
     if int(good.sum()) < LEAST_PIXELS:
         msg = f"only {int(good.sum())} pixels are well exposed in all three images, {LEAST_PIXELS} are needed"
         raise CalibrationError(msg)
+    for name, alone in (("a", a), ("b", b)):
+        if np.median((c - alone)[good]) <= 0:
+            msg = f"the image of both lights is no brighter than that of light {name}: give them as a, b, both"
+            raise CalibrationError(msg)
     levels = _spread_sample(np.column_stack([c, a, b])[good])
     ramps = [_ramps(levels[:, index]) for index in range(3)]
     weight = levels[:, 1:].min(axis=1)
@@ -303,6 +309,8 @@ def _doubts(slopes: Array, levels: Array, left: float, black: float) -> list[Rem
             f"no curve explains the levels: up to {100 * left:.1f} % of full scale are left, by level: something "
             "moved, the light or an exposure time is not as stated, or there is a black level"
         )
+        if left > NONSENSE:
+            raise CalibrationError(message)
         found.append(Remark("doubt", message, "response-structure", left, LINEAR))
     inside = [((levels > low) & (levels < high)).sum() for low, high in itertools.pairwise(EDGES)]
     seen = np.flatnonzero(np.array(inside) > LEAST_PIXELS)
@@ -334,12 +342,9 @@ def _curve(slopes: Array, u: float, source: str, black: float) -> tuple[Response
             f"line, about gamma {found.gamma:.2f}"
         )
         return found, (Remark("doubt", message, "not-linear", found.nonlinearity, LINEAR),)
-    return found, (
-        Remark(
-            "note",
-            f"the camera is linear within {100 * max(found.nonlinearity, u):.1f} % of full scale",
-            "linear",
-            found.nonlinearity,
-            LINEAR,
-        ),
-    )
+    most = 100 * max(found.nonlinearity, u)
+    if u > SURE * LINEAR:
+        words = f"whether the camera is linear is known to {most:.1f} % of full scale only"
+        return found, (Remark("doubt", words, "linear", found.nonlinearity, LINEAR),)
+    message = f"the camera is linear within {most:.1f} % of full scale"
+    return found, (Remark("note", message, "linear", found.nonlinearity, LINEAR),)

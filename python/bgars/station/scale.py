@@ -12,6 +12,7 @@ from scipy import ndimage
 
 from bgars.errors import CalibrationError, InputError
 from bgars.records.capture import Capture
+from bgars.records.same_images import refuse_shared
 from bgars.station.camera_distance import checked_heights, with_distance
 from bgars.station.grid_fit import LEAST_POINTS, UNKNOWN_PITCH_U, fit_grid
 from bgars.station.levels import linear_levels
@@ -27,6 +28,7 @@ __all__ = ["calibrate_scale"]
 Array = NDArray[np.float64]
 Target = Literal["dots", "chessboard"]
 
+GRID_AGAIN = "photograph the grid once at each of its heights"
 SHARP = 1.5
 """Width of the smoothing before corners are looked for, in pixels."""
 SAME_SIZE = 0.5
@@ -72,6 +74,7 @@ def calibrate_scale(
     """
     captures = [capture] if isinstance(capture, Capture) else list(capture)
     heights = checked_heights(heights_um, len(captures))
+    refuse_shared(captures, GRID_AGAIN)
     if not (math.isfinite(pitch_um) and pitch_um > 0):
         msg = f"pitch_um: must be finite and above 0, got {pitch_um:g}"
         raise InputError(msg)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -21,11 +22,11 @@ from bgars.records.station import Verification
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from pathlib import Path
+    from os import PathLike
 
     from bgars.records.part_result import PartResult
 
-__all__ = ["Known", "read_known", "verify"]
+__all__ = ["Known", "counted", "read_known", "verify"]
 
 Quantity = Literal["height", "diameter"]
 READINGS: dict[Quantity, str] = {"height": "top_um", "diameter": "diameter_um"}
@@ -42,7 +43,7 @@ class Known(NamedTuple):
     u_um: float
 
 
-def read_known(path: Path) -> dict[str, Known]:
+def read_known(path: str | PathLike[str]) -> dict[str, Known]:
     """Read a table of calibrated sizes: CSV with columns name, height_um, diameter_um, u_um; name and one size or more.
 
     Raises
@@ -52,6 +53,7 @@ def read_known(path: Path) -> dict[str, Known]:
     InputError
         A value that is no number above 0, more values than columns, or a name that comes twice.
     """
+    path = Path(path)
     try:
         table = csv.DictReader(io.StringIO(read_text(path).content, newline=""))
         lines = list(table)
@@ -167,6 +169,11 @@ def verify(
     return found, (*_judge(found, names, error, u_known), *_unread(unread, found))
 
 
+def counted(count: int, what: str) -> str:
+    """Return a number and its noun."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
 def _unread(names: list[str], found: Verification) -> list[Remark]:
     """Say which balls of the table have no reading: a limit is kept by every ball, or not shown to be kept."""
     if not names:
@@ -196,7 +203,7 @@ def _judge(found: Verification, names: np.ndarray, error: np.ndarray, u_known: n
     said: list[Remark] = []
     what = found.quantity
     unstated = list(dict.fromkeys(names[np.isnan(u_known)].tolist()))
-    of_these = f"u_um of {len(unstated)} balls is not in the table ({', '.join(unstated[:6])})"
+    of_these = f"u_um of {counted(len(unstated), 'ball')} is not in the table ({', '.join(unstated[:6])})"
     if found.mpe_um is not None:
         # Each error has the room that the certificate of its own ball leaves it.
         room = found.mpe_um - COVERAGE * u_known
@@ -204,7 +211,14 @@ def _judge(found: Verification, names: np.ndarray, error: np.ndarray, u_known: n
         words = f"{what}: largest error {found.largest_um:.2f} um, permissible {found.mpe_um:.2f} um"
         if broken:
             said.append(
-                Remark("fail", f"{words}: {broken} readings beyond it", "mpe", found.largest_um, found.mpe_um, "um")
+                Remark(
+                    "fail",
+                    f"{words}: {counted(broken, 'reading')} beyond it",
+                    "mpe",
+                    found.largest_um,
+                    found.mpe_um,
+                    "um",
+                )
             )
         elif is_open.any():
             worst = int(np.nanargmax(np.abs(error) - room))

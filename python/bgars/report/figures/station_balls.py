@@ -32,9 +32,11 @@ def balls_svg(captures: Sequence[Capture], lights: LightCalibration) -> str:
     shown = lights.balls[:MOST_BALLS]
     columns = min(2, len(shown))
     lines = math.ceil(len(shown) / columns)
+    width, height = columns * SIDE, lines * (SIDE + 20)
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{columns * SIDE}" height="{lines * (SIDE + 20)}" role="img" '
-        'font-family="sans-serif" font-size="11"><title>Balls: outline (red), highlights (yellow, by light)</title>'
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
+        'role="img" font-family="sans-serif" font-size="11">'
+        "<title>Balls: outline (red), highlights (yellow, by light)</title>"
     ]
     by_name = {capture.name: capture for capture in captures}
     for index, ball in enumerate(shown):

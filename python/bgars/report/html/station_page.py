@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bgars.io.atomic import atomic_file
+from bgars.records.station_sections import section_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -26,14 +27,27 @@ __all__ = ["write_station_page"]
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
 h1, h2 { font-weight: 600; } h2 { margin-top: 2.2rem; border-bottom: 1px solid #ccc; }
-.wide { overflow-x: auto; } figure { margin: 1rem 0; }
+.wide { overflow-x: auto; background: linear-gradient(90deg, #fff 1rem, #fff0 2rem) local,
+  linear-gradient(270deg, #fff 1rem, #fff0 2rem) local, linear-gradient(90deg, #0003, #0000 .8rem),
+  linear-gradient(270deg, #0003, #0000 .8rem); } figure { margin: 1rem 0; }
 table { border-collapse: collapse; } td, th { padding: .15rem .7rem; text-align: right; }
 th { border-bottom: 1px solid #888; font-weight: 600; } td:first-child, th:first-child { text-align: left; }
-.doubt, .fail { color: #a33; font-weight: 600; } svg { max-width: 100%; margin: 1rem 2rem 0 0; }
+.doubt, .fail { color: #a33; font-weight: 600; } svg { max-width: 100%; height: auto; }
+figcaption { color: #555; font-size: .85rem; } h3 { font-size: 1rem; margin: 1rem 0 0; }
 .missing { color: #777; }
-@media (max-width: 40rem) { .wide::before { content: "↔ swipe sideways"; color: #777; font-size: .85rem; } }
 """
-SIDE = 300
+TITLES = {
+    "whole": "All sections together",
+    "lights": "Lights",
+    "flat": "Flat field",
+    "response": "Response",
+    "scale": "Scale",
+    "verified": "Verification",
+}
+SIDE, EDGE = 300, 40
+"""Side of a picture, and what is kept free around it for what stands over, and for numbers."""
+SHADED_U, LARGEST_SHADE = (20, 10, 5, 2, 1), 24.0
+"""Standard uncertainties that a disc may show, and the largest radius at which discs of a ring do not overlap."""
 LEAST_RESIDUAL_PX = 0.0005
 """Below it, a residual is 0 as it is shown."""
 
@@ -69,12 +83,7 @@ def write_station_page(station: Station, path: str | PathLike[str]) -> None:
             if station.verified
             else _missing("bgars verify FOLDER... --known known.csv --station station.toml")
         ),
-        "<h2>Findings</h2><ul>",
-        *(
-            f'<li class="{one.severity}">{html.escape(one.severity)}: {html.escape(one.message)}</li>'
-            for one in station.findings
-        ),
-        "</ul>",
+        *_findings(station),
     ]
     page = (
         '<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="generator" content="bgars">'
@@ -83,6 +92,21 @@ def write_station_page(station: Station, path: str | PathLike[str]) -> None:
     )
     with atomic_file(path) as place:
         Path(place).write_text(page, encoding="utf-8")
+
+
+def _findings(station: Station) -> Iterable[str]:
+    """Findings by the calibration that they belong to, those first that want something done."""
+    yield "<h2>Findings</h2>"
+    if not station.findings:
+        yield "<p>None.</p>"
+    for section, title in TITLES.items():
+        found = [one for one in station.findings if section_of(one.code) == section]
+        if not found:
+            continue
+        yield f"<h3>{title}</h3><ul>"
+        for one in sorted(found, key=lambda one: one.severity == "note"):
+            yield f'<li class="{one.severity}">{html.escape(one.severity)}: {html.escape(one.message)}</li>'
+        yield "</ul>"
 
 
 def _missing(command: str) -> list[str]:
@@ -136,11 +160,13 @@ def _balls(pictures: Path) -> Iterable[str]:
 
 
 def _sky(directions: np.ndarray, u_deg: np.ndarray) -> str:
-    """Where the lights are, seen from above; circles of 20 u."""
+    """Where the lights are, seen from above; discs of as many u as leave them apart."""
+    radii = np.radians(u_deg) * SIDE / 2
+    times = next((each for each in SHADED_U if each * radii.max() <= LARGEST_SHADE), SHADED_U[-1])
     marks = []
-    for index, ((x, y, _), u) in enumerate(zip(directions, u_deg, strict=True)):
+    for index, ((x, y, _), radius) in enumerate(zip(directions, radii, strict=True)):
         cx, cy = SIDE / 2 * (1 + 0.92 * x), SIDE / 2 * (1 - 0.92 * y)
-        size = max(20 * math.radians(u) * SIDE / 2, 1.0)
+        size = max(times * float(radius), 1.0)
         marks.append(
             f'<circle cx="{cx:.1f}" cy="{cy:.1f}" r="{size:.1f}" fill="#4477aa55"/><circle cx="{cx:.1f}" '
             f'cy="{cy:.1f}" r="2"/>'
@@ -151,10 +177,17 @@ def _sky(directions: np.ndarray, u_deg: np.ndarray) -> str:
         'fill="none" stroke="#ccc"/>'
         for e in (0, 30, 60)
     )
-    title = "Lights as the camera sees them; rings at elevations of 0, 30 and 60 degrees; shaded: 20 u"
-    sides = f'width="{SIDE}" height="{SIDE}"'
-    drawing = f'<svg {sides} role="img" aria-label="{title}"><title>{title}</title>{rings}{"".join(marks)}</svg>'
-    return f"<figure>{drawing}<figcaption>{title}</figcaption></figure>"
+    title = f"Lights as the camera sees them; rings at elevations of 0, 30 and 60 degrees; shaded: {times} u"
+    return _figure(title, rings + "".join(marks))
+
+
+def _figure(title: str, content: str) -> str:
+    """A drawing of SIDE by SIDE with an edge, and its title below."""
+    side = SIDE + 2 * EDGE
+    return (
+        f'<figure><svg viewBox="{-EDGE} {-EDGE} {side} {side}" width="{side}" height="{side}" role="img" '
+        f'aria-label="{title}"><title>{title}</title>{content}</svg><figcaption>{title}</figcaption></figure>'
+    )
 
 
 def _flat(flat: FlatField) -> Iterable[str]:
@@ -172,12 +205,20 @@ def _response(curve: ResponseCurve) -> Iterable[str]:
     points = " ".join(
         f"{SIDE * x:.1f},{SIDE * (1 - y):.1f}" for x, y in zip(curve.levels, curve.radiances, strict=True)
     )
-    yield (
-        f'<svg width="{SIDE}" height="{SIDE}" role="img"><title>Light over grey level</title>'
-        f'<rect width="{SIDE}" height="{SIDE}" fill="none" stroke="#ccc"/><line x1="0" y1="{SIDE}" x2="{SIDE}" '
-        'y2="0" stroke="#ccc"/>'
-        f'<polyline points="{points}" fill="none" stroke="#4477aa" stroke-width="2"/></svg>'
+    ticks = "".join(
+        f'<path d="M{SIDE * at:g} {SIDE}v5M0 {SIDE * (1 - at):g}h-5" stroke="#888"/>'
+        f'<text x="{SIDE * at:g}" y="{SIDE + 17}" text-anchor="middle">{100 * at:g}</text>'
+        f'<text x="-8" y="{SIDE * (1 - at) + 4:g}" text-anchor="end">{100 * at:g}</text>'
+        for at in (0.0, 0.25, 0.5, 0.75, 1.0)
     )
+    content = (
+        f'<rect width="{SIDE}" height="{SIDE}" fill="none" stroke="#ccc"/><line x1="0" y1="{SIDE}" x2="{SIDE}" '
+        f'y2="0" stroke="#bbb" stroke-dasharray="4"/><g font-size="11" fill="#555">{ticks}'
+        f'<text x="{SIDE / 2:g}" y="{SIDE + 34}" text-anchor="middle">grey level (% of full scale)</text>'
+        f'<text transform="translate(-31,{SIDE / 2:g}) rotate(-90)" text-anchor="middle">light (% of full scale)</text>'
+        f'</g><polyline points="{points}" fill="none" stroke="#4477aa" stroke-width="2"/>'
+    )
+    yield _figure("Light over grey level; dashed: a linear camera", content)
     yield (
         f"<p>By {html.escape(curve.source)}: {100 * curve.nonlinearity:.1f} % off a straight line, gamma about "
         f"{curve.gamma:.2f}; u {100 * curve.u_radiance:.2f} % of full scale.</p>"
