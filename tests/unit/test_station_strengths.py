@@ -29,7 +29,8 @@ def test_neither_ball_nor_shadow_count_as_board(
     ball: tuple[float, float, float], side: int, elevation_deg: float
 ) -> None:
     """The median of the whole image was 40 to 50 % off, with a stated uncertainty of 3 %."""
-    found = bgars.calibrate_lights(capture_of(shot(ball, side, elevation_deg), camera_distance_mm=np.inf))
+    capture = capture_of(shot(ball, side, elevation_deg), camera_distance_mm=np.inf)
+    found = bgars.calibrate_lights(capture, near=False)
     assert {"board-intensities"} == {one.code for one in found.findings}
     np.testing.assert_allclose(found.rig.intensities, RELATIVE, rtol=0.015)
     assert found.u_intensities is not None

@@ -14,6 +14,7 @@ from bgars.errors import CalibrationError
 from bgars.files.light_names import light_name
 from bgars.records.remark import Remark
 from bgars.station.board_light import board_light
+from bgars.station.lamp_distance import TILT
 from bgars.station.mirror import reflected, sphere_of_outline
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from bgars.station.levels import Levels
     from bgars.station.outline import Outline
 
-__all__ = ["SeenShading", "shading_misfit", "shading_on"]
+__all__ = ["Near", "SeenShading", "shading_misfit", "shading_on"]
 
 Array = NDArray[np.float64]
 
@@ -45,10 +46,10 @@ NEAR_RADII = 0.02
 """Spread of a ball's radius over the distance of a lamp: 10 mm at 500 mm; a ball of 2 mm has a tenth of it."""
 ALIKE = 0.2
 """Spread of the distances of a rig's lamps, over their middle."""
+FEW_LIGHTS = 3
+"""Up to so many show no scatter to rely on."""
 LEAST_NEAR = 1e-4
 """And of that ratio at least: it tilts a light by 0.01 degrees."""
-TILT = math.radians(120.0)
-"""By so many times the ratio a light is tilted toward the board where the ratio is left out."""
 UNEVEN = 0.05
 """Part of the board's light that one side has more of than its shadow says: the ball shines on the board, too."""
 LEAST_SHADOW, CUT_SHARE = 30, 0.02
@@ -58,7 +59,7 @@ POLYNOMIAL = 4
 STEP_RAD = 1e-4
 
 
-class _Near(NamedTuple):
+class Near(NamedTuple):
     """What is known of the ball's radius over the distance of a lamp: mean, its error, and spread around it."""
 
     mean: float = 0.0
@@ -66,7 +67,7 @@ class _Near(NamedTuple):
     spread: float = NEAR_RADII
 
 
-NOT_KNOWN = _Near()
+NOT_KNOWN = Near()
 
 
 class _Fit(NamedTuple):
@@ -86,6 +87,8 @@ class SeenShading(NamedTuple):
     outline_jacobians: Array
     strengths: Array
     u_strengths: Array
+    near: Near
+    """Common to all lights; what each is uncertain by beside it is in its own covariance."""
     findings: list[Remark]
 
 
@@ -121,9 +124,9 @@ def shading_on(capture: Capture, levels: Levels, outline: Outline, camera_px: fl
             raise CalibrationError(msg)
         direction = vector / strength
         own[light], jacobians[light] = _spread(points, values, used, outline, levels.noise, direction, camera_px, near)
-        own[light] += (UNEVEN * board / strength) ** 2 * np.eye(2) + np.diag(
-            [0.0, TILT**2 * (near.error**2 + near.spread**2)]
-        )
+        # Of a lamp's own distance the shading is tilted, and the parallax from the ball's middle to the board is wrong.
+        tilt = (TILT + math.hypot(*direction[:2])) * near.spread
+        own[light] += (UNEVEN * board / strength) ** 2 * np.eye(2) + np.diag([0.0, tilt**2])
         if residual > EXPLAINED * levels.noise:
             # Two laws that explain the ball as badly: the truth is as likely nearer to either of them.
             general, left = _monotone(normals, values, used, direction)
@@ -148,7 +151,7 @@ def shading_on(capture: Capture, levels: Levels, outline: Outline, camera_px: fl
                 direction = (direction + general) / np.linalg.norm(direction + general)
         directions[light], strengths[light] = direction, strength
         u_strengths[light] = residual / math.sqrt(max(int(used.sum()) / 50.0, 1.0))
-    return SeenShading(directions, own, jacobians, strengths, u_strengths, findings)
+    return SeenShading(directions, own, jacobians, strengths, u_strengths, near, findings)
 
 
 def shading_misfit(levels: Levels, outline: Outline) -> float:
@@ -193,17 +196,20 @@ def _need_shading(name: str, values: Array, clip: float) -> None:
         raise CalibrationError(msg)
 
 
-def _nearness(normals: Array, levels: Levels, index: NDArray[np.intp]) -> _Near:
+def _nearness(normals: Array, levels: Levels, index: NDArray[np.intp]) -> Near:
     """What the lights together tell of their distance: one alone mistakes for it what is not Lambert's law."""
     seen = [image.ravel()[index] for image in levels.images]
     ratios = np.array([_fit(normals, values, values < levels.clip, levels.noise).near for values in seen])
     middle = max(float(np.median(ratios)), 0.0)
     # Standard error of a median, from the median absolute deviation.
     error = 1.2533 * 1.4826 * float(np.median(np.abs(ratios - np.median(ratios)))) / math.sqrt(len(ratios))
-    return _Near(middle, error, max(ALIKE * middle, LEAST_NEAR))
+    spread = max(ALIKE * middle, LEAST_NEAR)
+    # By what the ratios do not scatter no lamp differs from the others: that part of it is an error of all of them.
+    own = float(np.clip(ratios.std(ddof=1), LEAST_NEAR, spread)) if len(ratios) > FEW_LIGHTS else spread
+    return Near(middle, math.sqrt(error**2 + spread**2 - own**2), own)
 
 
-def _fit(normals: Array, values: Array, used: NDArray[np.bool_], noise: float, prior: _Near = NOT_KNOWN) -> _Fit:
+def _fit(normals: Array, values: Array, used: NDArray[np.bool_], noise: float, prior: Near = NOT_KNOWN) -> _Fit:
     """Fit a light to the shading.
 
     The board reflects onto a ball what an endless plane does on which the ball rests, and throws its shadow.
@@ -304,7 +310,7 @@ def _spread(
     noise: float,
     direction: Array,
     camera_px: float,
-    near: _Near,
+    near: Near,
 ) -> tuple[Array, Array]:
     """Covariance (2, 2) of two turns by leaving out sectors; change (3, 3) of the direction by the outline, per px."""
     circle = outline.circle_px
