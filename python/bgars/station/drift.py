@@ -186,9 +186,7 @@ def _u_strengths(before: LightCalibration, now: LightCalibration) -> list[Array 
     """Uncertainties of the strengths of either, without what is alike in both where one means measured them."""
     is_alike = before.level_by == now.level_by
     return [
-        one.u_intensities
-        if one.u_intensities is None or not is_alike
-        else repeatable(one.u_intensities, one.level_by, len(one.balls))
+        one.u_intensities if one.u_intensities is None or not is_alike else repeatable(one.u_intensities, one.level_by)
         for one in (before, now)
     ]
 
