@@ -80,6 +80,18 @@ def test_an_image_without_shading_is_refused_by_name(level: float, words: str) -
         bgars.calibrate_lights(capture_of(images, camera_distance_mm=np.inf), sphere="matt", outline=[8.3, -5.7, 60.0])
 
 
+def test_images_that_are_not_linear_are_named_and_do_not_tilt_lights_unnoticed() -> None:
+    """Taken for a lamp that does not fall off, a gamma of 1.8 turned lights by 6 degrees, at a u of 0.8."""
+    linear = matt_ball(1e7, 0.0, (8.3, -5.7, 60.0), seed=6).astype(np.float64)
+    images = np.rint(255.0 * (linear / 255.0) ** (1.0 / 1.8)).astype(np.uint8)
+    found = bgars.calibrate_lights(capture_of(images, camera_distance_mm=np.inf), sphere="matt")
+    (doubt,) = (one for one in found.doubts if one.code == "not-linear")
+    assert "the images are not linear (calibrate the response first), or the ball is not matt" in doubt.message
+    assert (off_deg(found.rig.directions, LIGHTS) < 2.0 * np.sqrt(2.0) * found.u_deg).all()
+    plain = bgars.calibrate_lights(capture_of(linear.astype(np.uint8), camera_distance_mm=np.inf), sphere="matt")
+    assert not {"not-linear"} & {one.code for one in plain.findings}
+
+
 def test_lamps_at_unlike_distances_are_within_their_uncertainty() -> None:
     """The lamps of a ball share one distance; 80 to 125 radii are within the spread that is reckoned with."""
     lights = ring(5, 45.0)

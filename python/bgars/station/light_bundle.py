@@ -29,6 +29,10 @@ LEAST_U_RAD = 1e-6
 LENS_SIDES = 0.2
 """One over the distance of a camera of which nothing is stated, standard deviation, in sides of the image: telecentric
 lenses stand at 0, macro lenses at 0.1 to 0.2, ordinary ones at 0.3 to 0.7."""
+ALIKE_SHARE = 0.45
+"""Share of the variance of highlights and outlines that is the same at each place, and so does not fall with their
+number: what the laws of edges and spots leave is alike on balls that are alike. Directions of rendered balls scatter by
+0.038 degrees at one place, and by 0.030, not 0.022, as means of three."""
 ASKED = 4.0
 """Fall of chi square, for each of its parameters, from which on the balls ask for a lens."""
 VIEW_RAD = math.radians(0.3)
@@ -205,7 +209,7 @@ def _solve(
     fitted, left, jacobian = _fitted(residuals, start, scales, rest_of if spare > 0 else len(start))
     directions, nearness, circles = unpack(fitted)
     chi = float(np.square(left).sum() / spare) if spare > 0 else math.nan
-    raised = max(1.0, chi) if spare > 0 else 1.0
+    raised = (max(1.0, chi) if spare > 0 else 1.0) * (1.0 + ALIKE_SHARE * (float(seen.sum(axis=0).mean()) - 1.0))
     normal = jacobian.T @ jacobian
     number = np.arange(len(start))
     whole, stated, far, alone = (
