@@ -88,7 +88,7 @@ def balls() -> Iterator[str]:
         errors, scaled = [], []
         for seed in range(seeds):
             lights, capture = case(seed, kind)
-            found = bgars.calibrate_lights(capture, kind)  # type: ignore[arg-type]
+            found = bgars.calibrate_lights(capture, kind, near=False)  # type: ignore[arg-type]
             errors.append(apart_deg(found.rig.directions, lights))
             scaled.append(on_axes_deg(found.rig.directions, lights) / found.u_deg[:, None])
         yield row(f"{kind}, own ray tracer", seeds, errors, scaled)
@@ -98,7 +98,9 @@ def balls() -> Iterator[str]:
             truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
             lights = np.array(truth["lights"])
             try:
-                found = bgars.calibrate_lights(read_unlit(folder), "matt" if truth["kind"] == "matt" else "mirror")
+                found = bgars.calibrate_lights(
+                    read_unlit(folder), "matt" if truth["kind"] == "matt" else "mirror", near=False
+                )
             except bgars.CalibrationError as error:
                 judged[folder.name] = {"refused": str(error)}
                 continue

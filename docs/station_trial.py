@@ -109,7 +109,7 @@ def calibrated(real: Hardware) -> bgars.Station:
         refraction=CHROME,
     )
     mirror = as_capture(spoiled(ball / 65535.0, real.rng), nominal)
-    lights = bgars.calibrate_lights(bgars.with_station(mirror, seen), "mirror")
+    lights = bgars.calibrate_lights(bgars.with_station(mirror, seen), "mirror", near=False)
     board = 0.6 * (power * real.lights[:, 2] / (power * real.lights[:, 2]).max())[:, None, None] * np.ones(shape)
     flat, _ = bgars.calibrate_flat(
         bgars.with_station(as_capture(spoiled(board, real.rng), nominal), bgars.Station("trial", response=response))

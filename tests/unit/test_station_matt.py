@@ -55,19 +55,21 @@ def test_noise_that_is_cut_at_black_does_not_lift_the_shadow(black: float) -> No
 @pytest.mark.parametrize("elevation_deg", [30.0, 60.0])
 def test_a_lamp_a_hundred_radii_away_is_not_seen_lower(elevation_deg: float) -> None:
     """Taken as infinitely far, it is by 1.2 degrees: the part of the ball that turns to it is nearer to it."""
-    lights = ring(3, elevation_deg)
+    lights = ring(4, elevation_deg)
     images = render(
         1e4 * lights + np.array([7.3, -4.6, 100.0]),
         ball=(7.3, -4.6, 100.0), size=(260, 260), kind="matt", board=0.05, samples=2, near=True, seed=4,
     )  # fmt: skip
     capture = bgars.Capture(
-        images=images, rig=bgars.LightRig.ring(3), mask=np.ones((260, 260), np.bool_), saturation=255.0,
+        images=images, rig=bgars.LightRig.ring(4), mask=np.ones((260, 260), np.bool_), saturation=255.0,
         camera_distance_mm=np.inf,
     )  # fmt: skip
     found = bgars.calibrate_lights(capture, sphere="matt")
-    off = np.degrees(2 * np.arcsin(np.linalg.norm(found.rig.directions - lights, axis=1) / 2))
+    off = off_deg(found.rig.directions, unit(1e4 * lights + np.array([7.3, -4.6, 100.0])))
     assert off.max() < 0.25
     assert (off < 3 * np.sqrt(2) * found.u_deg).all()
+    # Lamps that are alike are known by what they have in common.
+    assert (found.u_own_deg < 0.5 * found.u_common_deg).all()
 
 
 @pytest.mark.parametrize(("level", "words"), [(0.0, "too dark on the ball"), (255.0, "overexposed")])
@@ -76,6 +78,18 @@ def test_an_image_without_shading_is_refused_by_name(level: float, words: str) -
     images[2] = np.where(images[2] > 0, level, 0).astype(np.uint8)
     with pytest.raises(bgars.CalibrationError, match=f"light 2.*{words}"):
         bgars.calibrate_lights(capture_of(images, camera_distance_mm=np.inf), sphere="matt", outline=[8.3, -5.7, 60.0])
+
+
+def test_images_that_are_not_linear_are_named_and_do_not_tilt_lights_unnoticed() -> None:
+    """Taken for a lamp that does not fall off, a gamma of 1.8 turned lights by 6 degrees, at a u of 0.8."""
+    linear = matt_ball(1e7, 0.0, (8.3, -5.7, 60.0), seed=6).astype(np.float64)
+    images = np.rint(255.0 * (linear / 255.0) ** (1.0 / 1.8)).astype(np.uint8)
+    found = bgars.calibrate_lights(capture_of(images, camera_distance_mm=np.inf), sphere="matt")
+    (doubt,) = (one for one in found.doubts if one.code == "not-linear")
+    assert "the images are not linear (calibrate the response first), or the ball is not matt" in doubt.message
+    assert (off_deg(found.rig.directions, LIGHTS) < 2.0 * np.sqrt(2.0) * found.u_deg).all()
+    plain = bgars.calibrate_lights(capture_of(linear.astype(np.uint8), camera_distance_mm=np.inf), sphere="matt")
+    assert not {"not-linear"} & {one.code for one in plain.findings}
 
 
 def test_lamps_at_unlike_distances_are_within_their_uncertainty() -> None:
@@ -90,5 +104,6 @@ def test_lamps_at_unlike_distances_are_within_their_uncertainty() -> None:
         camera_distance_mm=np.inf,
     )  # fmt: skip
     found = bgars.calibrate_lights(capture, sphere="matt")
-    off = np.degrees(2 * np.arcsin(np.linalg.norm(found.rig.directions - lights, axis=1) / 2))
+    true = unit(1e4 * lights * np.array([[0.8], [0.9], [1.0], [1.1], [1.25]]) + np.array([7.3, -4.6, 100.0]))
+    off = off_deg(found.rig.directions, true)
     assert (off < 2 * np.sqrt(2) * found.u_deg).all()

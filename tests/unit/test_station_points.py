@@ -26,7 +26,7 @@ def test_the_uncertainty_of_points_of_light_is_of_the_size_of_their_errors(
         images=images, rig=bgars.LightRig.ring(8), mask=np.ones((260, 260), np.bool_), saturation=255.0,
         camera_distance_mm=np.inf,
     )  # fmt: skip
-    found = bgars.calibrate_lights(capture)
+    found = bgars.calibrate_lights(capture, near=False)
     off = np.degrees(2 * np.arcsin(np.linalg.norm(found.rig.directions - lights, axis=1) / 2))
     # Two axes: the direction is off by sqrt(2) u, root mean square; half and twice that leave room for eight lights.
     expected = np.sqrt(2.0 * np.mean(found.u_deg**2))

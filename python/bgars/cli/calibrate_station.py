@@ -84,7 +84,8 @@ NearOption = Annotated[
     bool | None,
     typer.Option(
         "--near/--distant",
-        help="Positions in mm (two places of the ball or more), or directions; by default the data decide.",
+        help="Positions in mm (two places of the ball or more), or directions of lamps at 100 sides of the image or "
+        "more; by default the data decide.",
         show_default=False,
     ),
 ]

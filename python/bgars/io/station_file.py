@@ -131,6 +131,7 @@ def _lights(table: LightsTable) -> LightCalibration:
         u_own_deg=np.array(table.u_own_deg),
         u_common_deg=np.array(table.u_common_deg),
         u_lens_deg=None if table.u_lens_deg is None else np.array(table.u_lens_deg),
+        u_distance_deg=None if table.u_distance_deg is None else np.array(table.u_distance_deg),
         sphere=table.sphere,
         balls=_balls(table, len(rig)),
         residual_px=table.residual_px,
@@ -225,7 +226,8 @@ def _lights_values(lights: LightCalibration) -> dict[str, Any]:
         "u_deg": lights.u_deg.tolist(),
         "u_own_deg": lights.u_own_deg.tolist(),
         "u_common_deg": lights.u_common_deg.tolist(),
-        "u_lens_deg": lights.u_lens_deg.tolist() if lights.u_lens_deg is not None and lights.u_lens_deg.any() else None,
+        "u_lens_deg": _unless_zero(lights.u_lens_deg),
+        "u_distance_deg": _unless_zero(lights.u_distance_deg),
         "u_positions_mm": None if lights.u_positions_um is None else (lights.u_positions_um / MM).tolist(),
         "u_intensities": None if lights.u_intensities is None else lights.u_intensities.tolist(),
         "lamp_deg": lights.lamp_deg,
@@ -237,6 +239,10 @@ def _lights_values(lights: LightCalibration) -> dict[str, Any]:
         "pixel_pitch_um": lights.pixel_pitch_um,
         "size_px": lights.size_px,
     }
+
+
+def _unless_zero(values: np.ndarray | None) -> list[float] | None:
+    return values.tolist() if values is not None and values.any() else None
 
 
 def _table(name: str, values: dict[str, Any]) -> list[str]:

@@ -31,8 +31,9 @@ class LightsTable(Strict):
     intensities: list[Positive] = Field(description="relative intensities, mean 1")
     u_deg: list[Positive] = Field(description="standard uncertainty of each direction, per axis across it")
     u_own_deg: list[NotNegative] = Field(description="the component of each light alone")
-    u_common_deg: list[NotNegative] = Field(description="the component common to all lights (outlines of the balls)")
+    u_common_deg: list[NotNegative] = Field(description="the component common to all lights (outlines, lens, distance)")
     u_lens_deg: list[NotNegative] | None = Field(None, description="the component of a lens that was not stated")
+    u_distance_deg: list[NotNegative] | None = Field(None, description="the component of the distance of the lamps")
     u_positions_mm: list[Vector] | None = Field(None, description="standard uncertainties of positions_mm")
     u_intensities: list[NotNegative] | None = Field(
         None, description="standard uncertainties of intensities, if measured"
@@ -60,6 +61,7 @@ class LightsTable(Strict):
             "u_own_deg",
             "u_common_deg",
             "u_lens_deg",
+            "u_distance_deg",
             "u_positions_mm",
             "u_intensities",
         ):

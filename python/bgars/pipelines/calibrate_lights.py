@@ -59,8 +59,9 @@ def calibrate_lights(
         captures, one entry a capture. By default the circle is looked for, or taken from a mask that is a disc. Not
         with "balls".
     near : bool, optional
-        True: positions in space, which takes two balls or one ball moved. False: directions. By default positions where
-        the balls show that directions differ from place to place. Not with "balls": lights are then what the rig says.
+        True: positions in space, which takes two balls or one ball moved. False: directions of far lamps. By default
+        positions where the balls show that directions differ from place to place, else directions whose uncertainty
+        holds what the balls do not tell of the lamps' distance. Not with "balls": lights are then what the rig says.
     diameter_um : float, optional
         Diameter of the ball: gives the pixel pitch where the captures state none; else it is compared with theirs. Not
         with "balls".

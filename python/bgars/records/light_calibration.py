@@ -55,9 +55,13 @@ class LightCalibration(Short):
     u_deg : (L,) float64
         Standard uncertainty of each direction, on either of the two axes across it.
     u_own_deg, u_common_deg : (L,) float64
-        Its parts: of each light alone, and what the outlines of the balls move in all of them together.
+        Its parts: of each light alone, and what moves all of them together: outlines of the balls, distance of the
+        lamps.
     u_lens_deg : (L,) float64 or None
         The part of `u_common_deg` that comes from a camera of which nothing was stated.
+    u_distance_deg : (L,) float64 or None
+        The part of `u_common_deg` that comes from the distance of the lamps, from which the ball sees them lower than
+        the board does.
     u_positions_um : (L, 3) float64 or None
         Near lights: standard uncertainty of x, y, z.
     u_intensities : (L,) float64 or None
@@ -98,6 +102,7 @@ class LightCalibration(Short):
     level_by: str = ""
     pixel_pitch_um: float | None = None
     size_px: tuple[int, int] | None = None
+    u_distance_deg: Array | None = None
 
     @property
     def doubts(self) -> tuple[Remark, ...]:

@@ -87,7 +87,9 @@ def board_strengths(capture: Capture, levels: Levels, circles_px: Array, solutio
     u = _spread(off, lit, ((around / (2.0 * math.pi) + 0.5) * SECTORS).astype(int) % SECTORS)
     if u is None:
         return BoardStrengths(None, None, few)
-    tilt = np.radians(solution.u_deg) * np.hypot(*solution.directions[:, :2].T) / solution.directions[:, 2]
+    # What tilts all lights alike leaves their ratios.
+    u_deg = np.sqrt(np.maximum(solution.u_deg**2 - solution.u_distance_deg**2, solution.u_own_deg**2))
+    tilt = np.radians(u_deg) * np.hypot(*solution.directions[:, :2].T) / solution.directions[:, 2]
     return BoardStrengths(np.exp(strengths), np.sqrt(u**2 + tilt**2 + MATT**2))
 
 

@@ -120,12 +120,12 @@ def _of_each(
 ) -> list[Remark]:
     """Compare direction and strength of each light; near ones are at `placed` (L, 3), in pixels of the board."""
     found: list[Remark] = []
-    seen_from, u_parallax_deg = _origins(before, placed, now.balls[0].outline_px)
+    seen_from, u_parallax_deg = _origins(before, placed, now)
     turn_deg = np.degrees(
         2.0 * np.arcsin(np.clip(np.linalg.norm(now.rig.directions - seen_from, axis=1) / 2.0, 0.0, 1.0))
     )
-    # What an unknown lens does to both calibrations is alike, and no drift.
-    u_deg = np.sqrt(_without_lens(before) ** 2 + _without_lens(now) ** 2 + u_parallax_deg**2) * math.sqrt(2.0)
+    # What an unknown lens, or distance of the lamps, does to both calibrations is alike, and no drift.
+    u_deg = np.sqrt(_of_its_own(before) ** 2 + _of_its_own(now) ** 2 + u_parallax_deg**2) * math.sqrt(2.0)
     change = _against_others(now.rig.intensities / before.rig.intensities)
     u_before, u_now = _u_strengths(before, now)
     for index in range(len(before.rig)):
@@ -186,9 +186,7 @@ def _u_strengths(before: LightCalibration, now: LightCalibration) -> list[Array 
     """Uncertainties of the strengths of either, without what is alike in both where one means measured them."""
     is_alike = before.level_by == now.level_by
     return [
-        one.u_intensities
-        if one.u_intensities is None or not is_alike
-        else repeatable(one.u_intensities, one.level_by, len(one.balls))
+        one.u_intensities if one.u_intensities is None or not is_alike else repeatable(one.u_intensities, one.level_by)
         for one in (before, now)
     ]
 
@@ -198,10 +196,10 @@ def _level(change: float, limit: float) -> Remark:
     return Remark("fail" if abs(change) > limit else "note", words, "level", change, limit)
 
 
-def _without_lens(lights: LightCalibration) -> Array:
-    if lights.u_lens_deg is None:
-        return lights.u_deg
-    u_deg: Array = np.sqrt(np.maximum(lights.u_deg**2 - lights.u_lens_deg**2, lights.u_own_deg**2))
+def _of_its_own(lights: LightCalibration) -> Array:
+    """(L,) uncertainties without what another calibration on the same ball is off by as well."""
+    alike = sum(np.square(u) for u in (lights.u_lens_deg, lights.u_distance_deg) if u is not None)
+    u_deg: Array = np.sqrt(np.maximum(lights.u_deg**2 - alike, lights.u_own_deg**2))
     return u_deg
 
 
@@ -212,14 +210,15 @@ def _pitch_of(station: Station, capture: Capture) -> float | None:
     return capture.pixel_pitch_um if station.scale is None else station.scale.pixel_pitch_um
 
 
-def _origins(before: LightCalibration, placed: Array | None, outline_px: Array) -> tuple[Array, Array]:
+def _origins(before: LightCalibration, placed: Array | None, now: LightCalibration) -> tuple[Array, Array]:
     """(L, 3) directions of the station's lights as the ball sees them, (L,) what their distances leave open of these.
 
     The latter in degrees, standard deviations.
     """
-    if placed is None:
-        return before.rig.directions, np.zeros(len(before.rig))
-    x, y, radius = outline_px
+    if placed is None or now.sphere == "matt":  # whose shading shows how far lamps are: directions from the board
+        u_distance_deg = now.u_distance_deg if placed is not None else None
+        return before.rig.directions, np.zeros(len(before.rig)) if u_distance_deg is None else u_distance_deg
+    x, y, radius = now.balls[0].outline_px
     way = placed - np.array([x, y, radius])
     # A light is seen from its highlight, half way between the top of the ball and the light's side of it.
     way = way - 0.5 * radius * (way / np.linalg.norm(way, axis=1, keepdims=True) + [0.0, 0.0, 1.0])

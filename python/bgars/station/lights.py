@@ -21,6 +21,7 @@ from bgars.records.scalar_checks import check_pitch
 from bgars.records.whole_capture import need_whole
 from bgars.station.ball_diameter import need_diameter_of_scale
 from bgars.station.believable import need_believable
+from bgars.station.lamp_distance import LampDistance, learnt_distance, unknown_distance
 from bgars.station.light_bundle import solve_lights
 from bgars.station.mirror_lights import together
 from bgars.station.observe import observe, outlines_a_capture
@@ -42,10 +43,14 @@ BALL_AGAIN = "photograph the ball once for each of its places"
 MISFIT = 3.0
 """Reduced chi square from which on balls contradict each other."""
 LENS_SHARE = 0.5
-"""Share of an uncertainty by an unknown lens that is worth a word."""
+"""Share of an uncertainty by an unknown lens, or unknown distances of lamps, that is worth a word."""
 OFF_SIGMAS = 5.0
+WORTH_DEG = 0.1
+"""Uncertainty of all lights together below which no second photograph is worth its work."""
 UNSURE_DEG = 2.0
 """Standard uncertainty of a direction that is worth a word."""
+UNKNOWN_DEG = 90.0
+"""Uncertainty of lights that stand in for a rig that was not described."""
 FAR_DEG = 15.0
 """Turn of a light against the rig that the capture brings, from which on the order of the images is doubted."""
 ONE_PLACE_DEG, ONE_PLACE_SIGMAS = (0.2, 1.0), 3.0
@@ -85,11 +90,9 @@ def calibrate_lights(
     if sphere not in {"mirror", "matt"}:
         msg = f"sphere: must be 'mirror', 'matt' or 'balls', got {sphere!r}"
         raise InputError(msg)
-    if sphere == "matt":
-        if near:
-            msg = "near: positions of lights need a mirror ball: shading does not say from which point a light is seen"
-            raise InputError(msg)
-        near = False
+    if sphere == "matt" and near:
+        msg = "near: positions of lights need a mirror ball: shading does not say from which point a light is seen"
+        raise InputError(msg)
     check_pitch(diameter_um, "diameter_um")
     for each in captures:
         _need_scale_of_camera(each, diameter_um)
@@ -118,6 +121,7 @@ def calibrate_lights(
         balls=tuple(_views(balls, solution)),
         residual_px=_rms(solution.residuals_px),
         u_lens_deg=solution.u_lens_deg,
+        u_distance_deg=solution.u_distance_deg,
         u_positions_um=_u_positions(solution, pitch_um),
         u_intensities=strengths.u,
         lamp_deg=seen.lamp_deg,
@@ -157,8 +161,12 @@ def _solve(
     u_circles = np.array([ball.outline.u_px for ball in balls])
     # Nothing stated of the camera: it may be an ordinary one.
     unknown = captures[0].camera_distance_mm is None
-    side_px = float(max(captures[0].images.shape[1:])) if unknown else None
-    solution = solve_lights(places, covariances, circles, u_circles, seen.camera_px, near, side_px)
+    longer_px = float(max(captures[0].images.shape[1:]))
+    side_px = longer_px if unknown else None
+    lamps = _lamps(balls, near, captures[0].rig, longer_px)
+    if lamps is not None and lamps.taken is not None:
+        near = False
+    solution = solve_lights(places, covariances, circles, u_circles, seen.camera_px, near, side_px, lamps)
     pitch_um = captures[0].pixel_pitch_um
     if diameter_um is not None:
         pitch_um = float(np.mean([diameter_um / (2.0 * circle[2]) for circle in solution.outlines_px]))
@@ -174,8 +182,18 @@ def _solve(
             "positions"
         )
         findings.append(Remark("doubt", message, "near-without-scale"))
-        solution = solve_lights(places, covariances, circles, u_circles, seen.camera_px, False, side_px)
+        solution = solve_lights(places, covariances, circles, u_circles, seen.camera_px, False, side_px, lamps)
     return solution, pitch_um
+
+
+def _lamps(balls: list[SeenBall], near: bool | None, rig: LightRig, side_px: float) -> LampDistance | None:
+    """What is known of the distance that all lamps have in common; None of lamps that are stated to be distant."""
+    learnt = np.array([[*ball.near[:2], ball.outline.radius_px] for ball in balls if ball.near is not None])
+    if len(learnt):
+        return learnt_distance(learnt[:, 0] / learnt[:, 2], learnt[:, 1] / learnt[:, 2])
+    # A capture that gives its lights as directions states that they are distant, as to every other command.
+    stated = rig.positions_um is None and (rig.u_deg is None or float(np.min(rig.u_deg)) < UNKNOWN_DEG)
+    return None if near is False or (near is None and stated) else unknown_distance(side_px)
 
 
 def _rig(solution: LightSolution, pitch_um: float | None, intensities: Array) -> LightRig:
@@ -226,9 +244,11 @@ def _judge(solution: LightSolution, balls: list[SeenBall], captures: list[Captur
             found.append(
                 Remark("doubt", message, "light-off", float(size[index]), OFF_SIGMAS * usual, "px", int(index))
             )
-    for index in np.flatnonzero(solution.u_deg > UNSURE_DEG):
-        message = f"{light_name(int(index), files)}: its direction is known to {solution.u_deg[index]:.1f} deg only"
-        found.append(Remark("doubt", message, "unsure", float(solution.u_deg[index]), UNSURE_DEG, "deg", int(index)))
+    # What comes from an unknown distance is alike in all lights, and said once.
+    u_deg = np.sqrt(np.maximum(solution.u_deg**2 - solution.u_distance_deg**2, solution.u_own_deg**2))
+    for index in np.flatnonzero(u_deg > UNSURE_DEG):
+        message = f"{light_name(int(index), files)}: its direction is known to {u_deg[index]:.1f} deg only"
+        found.append(Remark("doubt", message, "unsure", float(u_deg[index]), UNSURE_DEG, "deg", int(index)))
     found += _judge_places(solution, files)
     declared = captures[0].rig
     if len(declared) == len(rig) and captures[0].folder is not None and declared.u_deg is None:
@@ -269,8 +289,16 @@ def _judge_places(solution: LightSolution, files: Sequence[Path]) -> list[Remark
 def _judge_lens(solution: LightSolution, balls: list[SeenBall]) -> list[Remark]:
     """What a camera of which nothing is stated does to the result."""
     found: list[Remark] = []
-    u_lens = float(np.median(solution.u_lens_deg))
-    if u_lens > LENS_SHARE * float(np.median(solution.u_deg)):
+    u_lens, u_distance = float(np.median(solution.u_lens_deg)), float(np.median(solution.u_distance_deg))
+    u_rest = float(np.median(np.sqrt(np.maximum(solution.u_deg**2 - solution.u_distance_deg**2, 0.0))))
+    if balls[0].near is None and u_distance > max(LENS_SHARE * float(np.median(solution.u_deg)), WORTH_DEG):
+        message = (
+            f"nothing is known of the lamps' distance, which leaves {u_distance:.2f} deg of the "
+            f"{float(np.median(solution.u_deg)):.2f} deg of uncertainty, alike in all lights (lamps at 10 sides of the "
+            "image); photograph the ball at three places, or state --distant if they stand at 100 sides or more"
+        )
+        found.append(Remark("note", message, "distance-unknown", u_distance, None, "deg"))
+    if u_lens > LENS_SHARE * u_rest:
         message = (
             f"nothing is stated of the camera: a lens that is not telecentric leaves {u_lens:.2f} deg of the "
             f"{float(np.median(solution.u_deg)):.2f} deg of uncertainty; state camera in capture.toml, or --camera"

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from bgars.records.capture import Capture
     from bgars.records.remark import Remark
     from bgars.station.levels import Levels
-    from bgars.station.matt_lights import SeenShading
+    from bgars.station.matt_lights import Near, SeenShading
     from bgars.station.outline import Outline
 
 __all__ = ["Observed", "SeenBall", "observe", "outlines_a_capture"]
@@ -41,6 +41,8 @@ class SeenBall(NamedTuple):
     covariances: Array
     own_deg: Array | None = None
     u_outline_px: Array | None = None
+    near: Near | None = None
+    """Of matt balls: the ball's radius over the distance of the lamps."""
 
 
 class Observed(NamedTuple):
@@ -163,7 +165,7 @@ def _as_highlights(capture: Capture, outline: Outline, shading: SeenShading, cam
         outline.x_px, outline.y_px, outline.radius_px, 1e-6, 1e-6, outline.edge_px, outline.arc, outline.given
     )
     own_deg = np.degrees(np.sqrt(0.5 * np.trace(own, axis1=1, axis2=2)))
-    return SeenBall(capture, fixed, places, covariances, own_deg, outline.u_px)
+    return SeenBall(capture, fixed, places, covariances, own_deg, outline.u_px, shading.near)
 
 
 def _need_all(balls: list[SeenBall], captures: list[Capture]) -> None:

@@ -22,7 +22,9 @@ Array = NDArray[np.float64]
 
 LEAST_U = 0.002
 SHADING_U, HIGHLIGHT_U = 0.01, 0.03
-"""Relative standard uncertainties by a single ball, where no second one shows the scatter."""
+"""Relative standard uncertainties by a single ball: alike on all balls, and what each scatters by at least."""
+OWN_SIGMAS = 2.0
+"""Scatter of one light, of that of all, from which on it counts by itself: a few balls show less by chance."""
 
 
 class Strengths(NamedTuple):
@@ -47,8 +49,8 @@ def strengths_of(
         if np.isfinite(row).all() and (row > 0).all()
     ]
     if usable:
-        single = SHADING_U if sphere == "matt" else HIGHLIGHT_U
-        relative, u = _mean(usable, [np.full(len(row), single if len(usable) == 1 else 0.0) for row in usable])
+        alike, least = (SHADING_U, 0.0) if sphere == "matt" else (0.0, HIGHLIGHT_U)
+        relative, u = _mean(usable, [np.full(len(row), alike) for row in usable], least)
         by = "shading" if sphere == "matt" else "highlights"
         return Strengths(relative, u, float(np.mean(usable)), by)
     boards = []
@@ -73,13 +75,13 @@ def strengths_of(
     return Strengths(np.ones(len(solution.directions)), None, math.nan, "")
 
 
-def repeatable(u: Array, by: str, balls: int) -> Array:
+def repeatable(u: Array, by: str) -> Array:
     """(L,) of uncertainties of strengths the part that another calibration on the same reference would show.
 
     How real boards and balls differ from Lambert's law is alike in both. Of highlights all of it is scatter: it grows
     from the few pixels that a lamp is on the ball.
     """
-    alike = MATT if by == "board" else SHADING_U if by == "shading" and balls == 1 else 0.0
+    alike = {"board": MATT, "shading": SHADING_U}.get(by, 0.0)
     rest: Array = np.sqrt(np.maximum(u**2 - alike**2, LEAST_U**2))
     return rest
 
@@ -91,9 +93,15 @@ def _farther(circle_px: Array, solution: LightSolution) -> Array:
     return square
 
 
-def _mean(rows: list[Array], us: list[Array]) -> tuple[Array, Array]:
-    """Mean of relative strengths, mean 1, with the scatter from ball to ball beside what each is uncertain by."""
+def _mean(rows: list[Array], alike: list[Array], least: float = 0.0) -> tuple[Array, Array]:
+    """Mean of relative strengths, mean 1, with the scatter from ball to ball beside what is alike on all of them.
+
+    Two or three balls show the scatter of one light badly, that of all lights well.
+    """
     each = np.array([row / row.mean() for row in rows])
     mean = each.mean(axis=0)
-    u = np.sqrt(each.var(axis=0) + np.square(us).mean(axis=0))
+    own = each.std(axis=0, ddof=1) if len(each) > 1 else np.zeros(len(mean))
+    usual = max(float(np.sqrt(np.mean(own**2))), least)
+    scatter = np.where(own > OWN_SIGMAS * usual, own, usual)
+    u = np.sqrt(scatter**2 / len(each) + np.square(alike).mean(axis=0))
     return mean / mean.mean(), np.maximum(u, LEAST_U)

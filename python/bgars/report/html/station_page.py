@@ -145,6 +145,9 @@ def _lights(lights: LightCalibration) -> Iterable[str]:
     lens = 0.0 if lights.u_lens_deg is None else float(np.median(lights.u_lens_deg))
     if lens > max(math.sqrt(max(common**2 - lens**2, 0.0)), own):
         limit = "the lens, which is not stated (telecentric, or its distance)"
+    distance = 0.0 if lights.u_distance_deg is None else float(np.median(lights.u_distance_deg))
+    if distance > max(math.sqrt(max(common**2 - distance**2, 0.0)), own):
+        limit = "the distance of the lamps (photograph the ball at three places)"
     # One mirror ball gives each light one highlight: nothing is left over to disagree.
     alone = lights.residual_px < LEAST_RESIDUAL_PX
     residual = "one ball leaves no residual" if alone else f"residual {lights.residual_px:.3f} px"
