@@ -61,7 +61,8 @@ def calibrate_lights(
     near : bool, optional
         True: positions in space, which takes two balls or one ball moved. False: directions of far lamps. By default
         positions where the balls show that directions differ from place to place, else directions whose uncertainty
-        holds what the balls do not tell of the lamps' distance. Not with "balls": lights are then what the rig says.
+        holds what the balls do not tell of the lamps' distance, unless the capture states directions of its lights. Not
+        with "balls": lights are then what the rig says.
     diameter_um : float, optional
         Diameter of the ball: gives the pixel pitch where the captures state none; else it is compared with theirs. Not
         with "balls".
