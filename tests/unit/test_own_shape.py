@@ -105,6 +105,26 @@ def test_balls_that_are_alike_stay_as_they_are() -> None:
         assert free is spheroids
 
 
+def test_a_ball_whose_q_is_odd_gets_its_own_shape_for_less() -> None:
+    """Its tilt is twice as far off as usual: of round balls one in twenty has that, and no shape of its own."""
+    edges, state, outlines = points(45.0, 11, NOISE_PX)
+    angles = np.radians(np.linspace(-60.0, 60.0, edges.x.shape[2]))
+    matrix = ellipsoid(1.0, 1.0, 0.992, 20.0)
+    x, y = edges.x.copy(), edges.y.copy()
+    random = np.random.default_rng(11)
+    for light, vector in enumerate(state.vectors):
+        exact = edge_points(state.balls[ODD, :3], matrix, vector, angles)
+        x[ODD, light], y[ODD, light] = (exact + NOISE_PX * random.standard_normal(exact.shape)).T
+    edges = replace(edges, x=x, y=y)
+    odd = []
+    for u_q in (3e-4, 0.1):
+        priors = point_priors(state, outlines, u_outline_px=0.1, u_q=3e-4, u_elevation_deg=0.05, u_roundness=1e-3)
+        priors.u_q[ODD] = u_q
+        spheroids = solve_bundle(edges, state, False, priors, redescend=3.5)
+        odd.append(np.flatnonzero(free_shapes(spheroids, edges, priors, False, 3.5)[1]).tolist())
+    assert odd == [[], [ODD]]
+
+
 def test_a_round_ball_with_a_shape_of_its_own_is_measured_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
     capture, truth, found = photograph(array(3, 3, 1), bgars.LightRig.ring(8), pitch_um=20.0)
     plain = measure_balls(capture, found).balls[ODD]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bgars
 import numpy as np
 import pytest
@@ -124,7 +126,8 @@ def test_the_distance_of_lamps_that_one_place_does_not_show_counts_in_u() -> Non
     """A ball sees lamps at 12 sides of the image lower than the board does: by 1.8 degrees, at a u of 0.05."""
     lights = ring(4, 48.0)
     images = render(3200.0 * lights, ball=BALL, size=(260, 260), near=True, board=0.1, **{**LENS, "samples": 2})
-    capture = capture_of(images, camera_distance_mm=np.inf)
+    directions = capture_of(images, camera_distance_mm=np.inf)
+    capture = replace(directions, rig=replace(directions.rig, u_deg=np.full(4, 90.0)))  # not described
     found = bgars.calibrate_lights(capture)
     assert off_deg(found.rig.directions, lights).min() > 1.0
     assert (off_deg(found.rig.directions, lights) < 2.0 * np.sqrt(2.0) * found.u_deg).all()
@@ -134,9 +137,10 @@ def test_the_distance_of_lamps_that_one_place_does_not_show_counts_in_u() -> Non
     note = next(one for one in found.findings if one.code == "distance-unknown")
     assert note.severity == "note"
     assert "three places, or state --distant" in note.message
-    stated = bgars.calibrate_lights(capture, near=False)
-    assert (stated.u_deg < 0.1).all()
-    assert not {"distance-unknown"} & {one.code for one in stated.findings}
+    # Lamps that are stated to be distant, or given as directions.
+    for stated in (bgars.calibrate_lights(capture, near=False), bgars.calibrate_lights(directions)):
+        assert (stated.u_deg < 0.1).all()
+        assert not {"distance-unknown"} & {one.code for one in stated.findings}
 
 
 def test_near_lamps_come_out_in_space_from_three_places_of_a_ball() -> None:

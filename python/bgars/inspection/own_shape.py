@@ -5,7 +5,7 @@ are the radius and q; two are tilts, ``2 n_x n_z`` and ``2 n_y n_z``, two are ov
 ``2 n_x n_y``. A tilted ball throws nearly the shadows of an upright one that stands aside, so that it has small
 residuals and a wrong place. With everything else held, the score test of Rao (1948) has the four numbers that a ball
 would have, and their covariance, without a fit; a ball whose numbers are far from those of the others gets its own,
-and so does one whose q is: what is not round in one way is seldom so in that way alone.
+and one whose q is odd does so sooner: what is not round in one way is seldom so in that way alone.
 """
 
 from __future__ import annotations
@@ -39,6 +39,8 @@ Z, RADIUS, Q = 2, 3, 4
 UNLIKE = 20.0
 """Squared distance from the usual shape, in standard deviations, of a ball with one of its own: of balls that are like
 the others one in 2,000 lies farther off (chi-square of four)."""
+UNLIKE_OF_ODD = 7.8
+"""The same of a ball whose q is odd, or may be: of upright ones one in ten lies farther off."""
 NO_ELLIPSOID = 0.25
 """Share of what a ball deviates from a spheroid by which it deviates from an ellipsoid, too, in place and sizes."""
 ROUNDS = 8
@@ -60,7 +62,7 @@ def free_shapes(
 ) -> tuple[Solution, NDArray[np.bool_]]:
     """Fit balls that are unlike the others again, each with tilt and ovality of its own; what is shared stays.
 
-    These are balls whose tilt and ovality are far from those of the others, or whose q may be (`priors.u_q`).
+    These are balls whose tilt and ovality are far from those of the others; less far where q may be (`priors.u_q`).
 
     Parameters
     ----------
@@ -83,7 +85,6 @@ def free_shapes(
     known = np.isfinite(edges.u_px)
     variance = np.where(known, edges.u_px**2 + solution.excess_px**2, 1.0)
     odd = _unlike(solution, edges, priors, near, np.where(known, solution.weight / variance, 0.0))
-    odd |= priors.u_q > LIMITS[1]
     if not odd.any():
         return solution, odd
     own = _fitted(solution.state, edges, priors, odd, variance, near, redescend)
@@ -141,7 +142,8 @@ def _unlike(solution: Solution, edges: Edges, priors: Priors, near: bool, weight
     single = np.einsum("nii->ni", covariance)
     excess = float(np.median(np.square(off) - MEDIAN_CHI_SQUARE * single)) / MEDIAN_CHI_SQUARE
     total = covariance + max(excess, 0.0) * np.eye(OWN_TERMS)
-    unlike: NDArray[np.bool_] = np.einsum("ni,ni->n", off, np.linalg.solve(total, off[..., None])[..., 0]) > UNLIKE
+    distance = np.einsum("ni,ni->n", off, np.linalg.solve(total, off[..., None])[..., 0])
+    unlike: NDArray[np.bool_] = distance > np.where(priors.u_q > LIMITS[1], UNLIKE_OF_ODD, UNLIKE)
     return unlike
 
 
