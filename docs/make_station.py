@@ -98,9 +98,8 @@ def balls() -> Iterator[str]:
             truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
             lights = np.array(truth["lights"])
             try:
-                found = bgars.calibrate_lights(
-                    read_unlit(folder), "matt" if truth["kind"] == "matt" else "mirror", near=False
-                )
+                kind = "matt" if truth["kind"] == "matt" else "mirror"
+                found = bgars.calibrate_lights(read_unlit(folder), kind, near=False)  # type: ignore[arg-type]
             except bgars.CalibrationError as error:
                 judged[folder.name] = {"refused": str(error)}
                 continue

@@ -52,6 +52,16 @@ def test_noise_that_is_cut_at_black_does_not_lift_the_shadow(black: float) -> No
     assert off_deg(found.rig.directions, LIGHTS).mean() < 0.08
 
 
+def test_vignetting_tilts_lights_by_what_the_page_says() -> None:
+    """A limit that docs/station.md states: 20 % at the corners, a ball of half the image in its middle."""
+    images = matt_ball(1e7, 8.0, (0.0, 0.0, 50.0), seed=6) - 8.0
+    along = (np.arange(200) - 99.5) / 100.0
+    spoiled = np.rint(8.0 + images * (1.0 - 0.1 * (along**2 + along[:, None] ** 2))).astype(np.uint8)
+    found = bgars.calibrate_lights(capture_of(spoiled, camera_distance_mm=np.inf, black_level=8.0), sphere="matt")
+    elevation_deg = np.degrees(np.arcsin(found.rig.directions[:, 2]))
+    assert (elevation_deg - 45.0).mean() == pytest.approx(0.5, abs=0.15)
+
+
 @pytest.mark.parametrize("elevation_deg", [30.0, 60.0])
 def test_a_lamp_a_hundred_radii_away_is_not_seen_lower(elevation_deg: float) -> None:
     """Taken as infinitely far, it is by 1.2 degrees: the part of the ball that turns to it is nearer to it."""

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bgars.files.counted import counted
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -193,7 +195,7 @@ def reordered(lights: Array, names: Sequence[str], table: Array) -> Hypothesis:
 
 
 def _images(shift: int) -> str:
-    return f"{abs(shift)} image{'' if abs(shift) == 1 else 's'}"
+    return counted(abs(shift), "image")
 
 
 def _turned(turn_deg: float) -> Array:

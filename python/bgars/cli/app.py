@@ -32,6 +32,7 @@ from bgars.cli.options import (
     ThresholdOption,
 )
 from bgars.cli.run import run
+from bgars.files.counted import counted
 from bgars.normals.methods import DEFAULT_METHOD, METHODS, Method
 
 __all__ = ["main"]
@@ -193,7 +194,7 @@ def reconstruct(
     parts = height["components"]
     say(
         f"{summary['normals']['valid_pixels']} normals, height {low:.1f} to {high:.1f} {height['unit']} in "
-        f"{parts} connected part{'' if parts == 1 else 's'}, {height['iterations']} solver iterations."
+        f"{counted(parts, 'connected part')}, {height['iterations']} solver iterations."
     )
     say(method_line)
     if height["bow"] is not None:

@@ -27,6 +27,7 @@ from bgars.cli.options import (
     StoreOption,
 )
 from bgars.errors import InputError
+from bgars.files.counted import counted
 from bgars.line.batch import Batch, Progress, inspect_many
 from bgars.line.naming import Naming
 from bgars.normals.methods import DEFAULT_METHOD
@@ -124,7 +125,7 @@ def batch(
 def _tell(done: Batch, output: Path) -> None:
     verdicts = ", ".join(f"{count} {verdict}" for verdict, count in done.verdicts.items())
     rate = f", {60 * done.inspected / done.seconds:.1f} parts per minute" if done.inspected and done.seconds > 0 else ""
-    say(f"{done.inspected} part{'' if done.inspected == 1 else 's'} inspected: {verdicts} ({done.seconds:.1f} s{rate})")
+    say(f"{counted(done.inspected, 'part')} inspected: {verdicts} ({done.seconds:.1f} s{rate})")
     if done.known:
         say(f"{done.known} were in the store already and were skipped")
     for note in done.notes[:MOST_FAILURES]:

@@ -12,6 +12,7 @@ from bgars.cli.calibrate_camera import register as register_camera
 from bgars.cli.calibrate_station import register as register_station
 from bgars.cli.console import print_json, say, stage_progress
 from bgars.cli.drift import register as register_drift
+from bgars.files.counted import counted
 from bgars.io.masks import read_mask
 from bgars.io.material_file import material_path
 from bgars.io.own_files import need_new_or_own
@@ -87,7 +88,7 @@ def material(
         summary = {"bgars": bgars.__version__, "capture": capture.name, **summarise_fit(fit)}
         print_json({**summary, "explains": words, "file": str(output)})
         return
-    say(f"{capture.name}: material fitted on {balls} ball{'s' if balls != 1 else ''} under {len(capture.rig)} lights.")
+    say(f"{capture.name}: material fitted on {counted(balls, 'ball')} under {len(capture.rig)} lights.")
     for line in _table(fit.material):
         say(f"  {line}")
     say(f"It explains the balls {words} (loss {fit.loss:.3f}).")

@@ -15,6 +15,7 @@ from bgars.cli.camera_option import CameraOption
 from bgars.cli.console import print_json, say
 from bgars.cli.drift import drift
 from bgars.errors import CaptureWarning, InputError
+from bgars.files.counted import counted
 from bgars.io.atomic import FolderNames, atomic_file, atomic_folder
 from bgars.io.given_paths import need_folder, need_output
 from bgars.io.own_files import need_new_or_own
@@ -128,7 +129,7 @@ def _tell(name: str, findings: Findings) -> None:
         say(f"{name}: no faults found")
         return
     errors, warnings = len(findings.errors), len(findings.told) - len(findings.errors)
-    say(f"{name}: {errors} error{'' if errors == 1 else 's'}, {warnings} warning{'' if warnings == 1 else 's'}")
+    say(f"{name}: {counted(errors, 'error')}, {counted(warnings, 'warning')}")
     for finding in findings:
         say(f"{finding.severity}: {finding.kind}: {finding.message}")
         say(f"  {finding.advice}")

@@ -14,6 +14,7 @@ from bgars.cli.console import owns_process, print_json, say
 from bgars.cli.options import JsonOption
 from bgars.cli.plain_cells import distinct_names, plain, text_of
 from bgars.errors import InputError
+from bgars.files.counted import counted
 from bgars.files.csv_cells import harmless
 from bgars.io.result_file import read_result
 from bgars.store import open_store
@@ -198,7 +199,7 @@ def _say_table(names: list[str], rows: list[list[Any]]) -> None:
         say("  ".join(padded).rstrip())
     is_cut = any(len(cell) == MOST_WIDE and cell.endswith("...") for row in cells for cell in row)
     hint = "; texts are shortened, --csv prints them whole" if is_cut else ""
-    say(f"({len(rows)} row{'' if len(rows) == 1 else 's'}{hint})")
+    say(f"({counted(len(rows), 'row')}{hint})")
 
 
 def _csv_cell(value: Any) -> Any:  # noqa: ANN401 - whatever was asked for

@@ -12,6 +12,7 @@ from bgars.cli.console import print_json, say, stage_progress, warn
 from bgars.cli.options import StationOption
 from bgars.cli.station_output import need_different
 from bgars.errors import InputError
+from bgars.files.counted import counted
 from bgars.inspection.judge import OWN_PITCH
 from bgars.io.atomic import atomic_file
 from bgars.records.same_images import refuse_seen
@@ -73,8 +74,7 @@ def teach(
         f"{taught.name}: {taught.rows} x {taught.cols} places, {len(taught.depopulated)} of them empty"
         f"{f' ({empty})' if empty else ''}, pitch {taught.pitch_um:.1f} um,"
     )
-    parts = f"{taught.parts} part{'' if taught.parts == 1 else 's'}"
-    say(f"balls of {taught.diameter_um:.1f} um, {taught.height_um:.1f} um high, from {parts}.")
+    say(f"balls of {taught.diameter_um:.1f} um, {taught.height_um:.1f} um high, from {counted(taught.parts, 'part')}.")
     for words in taught.doubts:
         say(f"Accepted although in doubt: {words}")
     say(f"Written: {output}. Check its limits before you use it.")

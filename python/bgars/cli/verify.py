@@ -14,10 +14,11 @@ from bgars.cli.calibrate_station import said_values
 from bgars.cli.console import print_json, say, stage_progress, utc_now
 from bgars.cli.station_output import need_different, need_places, shown_severity, write_pages
 from bgars.errors import InputError
+from bgars.files.counted import counted
 from bgars.io.station_file import read_station
 from bgars.records.remark import Remark
 from bgars.records.same_images import refuse_seen
-from bgars.station.verify import READINGS, counted, read_known
+from bgars.station.verify import READINGS, read_known
 from bgars.station.verify import verify as compare
 
 if TYPE_CHECKING:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from bgars.files.counted import counted
 from bgars.inspection.decision import decide
 from bgars.inspection.judge_ball import NO_LIMITS, UNCLEAR
 from bgars.records.ball_result import BallResult
@@ -101,16 +102,16 @@ def part_reasons(
     unclear = [ball.name for ball in balls if not ball.present and UNCLEAR in ball.reasons]
     if not is_seen:
         count = sum(ball.present for ball in balls)
-        seen = "no ball was found" if count == 0 else f"only {_count(count, 'ball')} of {len(balls)} were found"
+        seen = "no ball was found" if count == 0 else f"only {counted(count, 'ball')} of {len(balls)} were found"
         reasons.append(f"{seen}: {LOOK_AT}")
     extra = [ball.name for ball in balls if ball.kind == "extra"]
     failing = [ball for ball in balls if ball.verdict == "fail" and ball.present and ball.kind == "ball"]
     if missing:
-        reasons.append(f"{_count(len(missing), 'ball')} missing: {_listed(missing)}")
+        reasons.append(f"{counted(len(missing), 'ball')} missing: {_listed(missing)}")
     if unclear:
-        reasons.append(f"{_count(len(unclear), 'place')} not clear, neither ball nor empty: {_listed(unclear)}")
+        reasons.append(f"{counted(len(unclear), 'place')} not clear, neither ball nor empty: {_listed(unclear)}")
     if extra:
-        reasons.append(f"{_count(len(extra), 'ball')} where none should be: {_listed(extra)}")
+        reasons.append(f"{counted(len(extra), 'ball')} where none should be: {_listed(extra)}")
     joined = {name for pair in bridges for name in pair}
     lone = [ball.name for ball in balls if ball.kind == "bridged" and ball.name not in joined]
     pairs = [f"{one}-{two}" for one, two in bridges] + lone
@@ -118,7 +119,7 @@ def part_reasons(
         reasons.append(f"bridged: {_listed(pairs)}")
     if failing:
         worst = [f"{ball.name} ({_broken(ball)})" for ball in failing]
-        reasons.append(f"{_count(len(failing), 'ball')} outside limits: {_listed(worst, ';', MAX_TOLD)}")
+        reasons.append(f"{counted(len(failing), 'ball')} outside limits: {_listed(worst, ';', MAX_TOLD)}")
     reasons += [check.reason for check in checks if check.verdict == "fail"]
     why = []
     for ball in balls:
@@ -128,15 +129,11 @@ def part_reasons(
     if why:
         # Without limits every ball is undecided: these are in doubt besides.
         state = "undecided" if has_limits else "in doubt"
-        reasons.append(f"{_count(len(why), 'ball')} {state}: {_listed(why, ';', MAX_TOLD)}")
+        reasons.append(f"{counted(len(why), 'ball')} {state}: {_listed(why, ';', MAX_TOLD)}")
     reasons += [check.reason for check in checks if check.verdict == "undecided"]
     if not has_limits:
         reasons.append(HOW_TO_LIMIT)
     return tuple(reasons)
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def _broken(ball: BallResult) -> str:

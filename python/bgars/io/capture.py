@@ -34,7 +34,7 @@ from bgars.io.masks import opaque_everywhere, read_mask
 from bgars.io.recipe import RECIPE_NAME, CaptureRecipe, read_recipe
 from bgars.records.capture import Capture
 from bgars.records.plain_arrays import every_pixel
-from bgars.records.rig import LightRig
+from bgars.records.rig import STAND_IN_DEG, LightRig
 from bgars.records.scalar_checks import thread_count
 from bgars.records.station_apply import with_station
 
@@ -177,7 +177,7 @@ def _tell(folder: Path, notes: list[str]) -> None:
 def _stand_in(count: int) -> LightRig:
     """Lights of which nothing is known: that they are a ring is no statement to hold against what is found."""
     rig = LightRig.ring(max(count, 3))
-    return replace(rig, u_deg=np.full(len(rig), 90.0))
+    return replace(rig, u_deg=np.full(len(rig), STAND_IN_DEG))
 
 
 def _by_order(rig: LightRig, source: str) -> Lights:

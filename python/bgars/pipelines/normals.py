@@ -12,6 +12,7 @@ import numpy as np
 from bgars import _bgars
 from bgars.balls import find_balls
 from bgars.errors import InputError
+from bgars.files.counted import counted
 from bgars.normals.given import given_field, within
 from bgars.normals.methods import DEFAULT_METHOD, TABLE, Method, added_method
 from bgars.normals.pixelwise import PIXELWISE_METHODS, PixelwiseMethod, capture_of, combined_mask, pixelwise_normals
@@ -233,7 +234,7 @@ def _by_reflectance(
         progress=part(0.5, 1.0),
     )
     balls = len(circles_px)
-    source = "given" if material is not None else f"fitted on {balls} ball{'s' if balls != 1 else ''} {given}"
+    source = "given" if material is not None else f"fitted on {counted(balls, 'ball')} {given}"
     fit = field.reflectance
     if fit is not None and not fit.accepted:
         reason = f"the material {source} does not explain the balls: {fit.refusal}"

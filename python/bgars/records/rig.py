@@ -20,9 +20,11 @@ from bgars.records.short import Short
 if TYPE_CHECKING:
     from os import PathLike
 
-__all__ = ["LightRig", "directions_from_angles"]
+__all__ = ["STAND_IN_DEG", "LightRig", "directions_from_angles"]
 
 MIN_LIGHTS = 3
+STAND_IN_DEG = 90.0
+"""Uncertainty of lights that stand in for a rig that was not described."""
 MOST_SHOWN = 10**20
 """Numbers from here on have too many digits for a message."""
 

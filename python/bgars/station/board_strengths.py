@@ -88,8 +88,7 @@ def board_strengths(capture: Capture, levels: Levels, circles_px: Array, solutio
     if u is None:
         return BoardStrengths(None, None, few)
     # What tilts all lights alike leaves their ratios.
-    u_deg = np.sqrt(np.maximum(solution.u_deg**2 - solution.u_distance_deg**2, solution.u_own_deg**2))
-    tilt = np.radians(u_deg) * np.hypot(*solution.directions[:, :2].T) / solution.directions[:, 2]
+    tilt = np.radians(solution.u_at_ball_deg) * np.hypot(*solution.directions[:, :2].T) / solution.directions[:, 2]
     return BoardStrengths(np.exp(strengths), np.sqrt(u**2 + tilt**2 + MATT**2))
 
 

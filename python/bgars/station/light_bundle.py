@@ -93,6 +93,12 @@ class LightSolution:
         """(L,) the part of each light alone."""
         return np.minimum(_u_deg(self.own), self.u_deg)
 
+    @property
+    def u_at_ball_deg(self) -> Array:
+        """(L,) without the part of the lamps' distance, which tilts all lights alike: as the ball sees them."""
+        u_deg: Array = np.sqrt(np.maximum(self.u_deg**2 - self.u_distance_deg**2, self.u_own_deg**2))
+        return u_deg
+
 
 def solve_lights(
     places_px: Array,

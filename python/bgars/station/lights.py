@@ -15,7 +15,7 @@ from bgars.files.light_names import light_name
 from bgars.records.capture import Capture
 from bgars.records.light_calibration import BallView, LightCalibration
 from bgars.records.remark import Remark
-from bgars.records.rig import LightRig
+from bgars.records.rig import STAND_IN_DEG, LightRig
 from bgars.records.same_images import refuse_repeated, refuse_shared
 from bgars.records.scalar_checks import check_pitch
 from bgars.records.whole_capture import need_whole
@@ -49,8 +49,6 @@ WORTH_DEG = 0.1
 """Uncertainty of all lights together below which no second photograph is worth its work."""
 UNSURE_DEG = 2.0
 """Standard uncertainty of a direction that is worth a word."""
-UNKNOWN_DEG = 90.0
-"""Uncertainty of lights that stand in for a rig that was not described."""
 FAR_DEG = 15.0
 """Turn of a light against the rig that the capture brings, from which on the order of the images is doubted."""
 ONE_PLACE_DEG, ONE_PLACE_SIGMAS = (0.2, 1.0), 3.0
@@ -192,7 +190,7 @@ def _lamps(balls: list[SeenBall], near: bool | None, rig: LightRig, side_px: flo
     if len(learnt):
         return learnt_distance(learnt[:, 0] / learnt[:, 2], learnt[:, 1] / learnt[:, 2])
     # A capture that gives its lights as directions states that they are distant, as to every other command.
-    stated = rig.positions_um is None and (rig.u_deg is None or float(np.min(rig.u_deg)) < UNKNOWN_DEG)
+    stated = rig.positions_um is None and (rig.u_deg is None or float(np.min(rig.u_deg)) < STAND_IN_DEG)
     return None if near is False or (near is None and stated) else unknown_distance(side_px)
 
 
@@ -245,7 +243,7 @@ def _judge(solution: LightSolution, balls: list[SeenBall], captures: list[Captur
                 Remark("doubt", message, "light-off", float(size[index]), OFF_SIGMAS * usual, "px", int(index))
             )
     # What comes from an unknown distance is alike in all lights, and said once.
-    u_deg = np.sqrt(np.maximum(solution.u_deg**2 - solution.u_distance_deg**2, solution.u_own_deg**2))
+    u_deg = solution.u_at_ball_deg
     for index in np.flatnonzero(u_deg > UNSURE_DEG):
         message = f"{light_name(int(index), files)}: its direction is known to {u_deg[index]:.1f} deg only"
         found.append(Remark("doubt", message, "unsure", float(u_deg[index]), UNSURE_DEG, "deg", int(index)))
@@ -290,7 +288,6 @@ def _judge_lens(solution: LightSolution, balls: list[SeenBall]) -> list[Remark]:
     """What a camera of which nothing is stated does to the result."""
     found: list[Remark] = []
     u_lens, u_distance = float(np.median(solution.u_lens_deg)), float(np.median(solution.u_distance_deg))
-    u_rest = float(np.median(np.sqrt(np.maximum(solution.u_deg**2 - solution.u_distance_deg**2, 0.0))))
     if balls[0].near is None and u_distance > max(LENS_SHARE * float(np.median(solution.u_deg)), WORTH_DEG):
         message = (
             f"nothing is known of the lamps' distance, which leaves {u_distance:.2f} deg of the "
@@ -298,7 +295,7 @@ def _judge_lens(solution: LightSolution, balls: list[SeenBall]) -> list[Remark]:
             "image); photograph the ball at three places, or state --distant if they stand at 100 sides or more"
         )
         found.append(Remark("note", message, "distance-unknown", u_distance, None, "deg"))
-    if u_lens > LENS_SHARE * u_rest:
+    if u_lens > LENS_SHARE * float(np.median(solution.u_at_ball_deg)):
         message = (
             f"nothing is stated of the camera: a lens that is not telecentric leaves {u_lens:.2f} deg of the "
             f"{float(np.median(solution.u_deg)):.2f} deg of uncertainty; state camera in capture.toml, or --camera"

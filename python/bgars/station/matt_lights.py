@@ -138,7 +138,8 @@ def shading_on(capture: Capture, levels: Levels, outline: Outline, camera_px: fl
         # Of a lamp's own distance the shading is tilted, and the parallax from the ball's middle to the board is wrong.
         tilt = (TILT + math.hypot(*direction[:2])) * near.spread
         own[light] += (UNEVEN * board / strength) ** 2 * np.eye(2) + np.diag([0.0, tilt**2])
-        general, left = monotone_law(normals, values, used, direction)
+        is_noise = residual <= MISSED * levels.noise
+        general, left = (direction, residual) if is_noise else monotone_law(normals, values, used, direction)
         if residual > min(MISSED * max(left, levels.noise), EXPLAINED * levels.noise):
             # Two laws that explain the ball as badly: the truth is as likely nearer to either of them.
             half = 0.5 * _across(direction) @ (general - direction)

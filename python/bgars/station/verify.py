@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from bgars.errors import CalibrationError, FileFormatError, InputError
+from bgars.files.counted import counted
 from bgars.files.safe_files import read_text
 from bgars.records.remark import Remark
 from bgars.records.station import Verification
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
     from bgars.records.part_result import PartResult
 
-__all__ = ["Known", "counted", "read_known", "verify"]
+__all__ = ["Known", "read_known", "verify"]
 
 Quantity = Literal["height", "diameter"]
 READINGS: dict[Quantity, str] = {"height": "top_um", "diameter": "diameter_um"}
@@ -167,11 +168,6 @@ def verify(
     wanted = [name for name, size in known.items() if math.isfinite(getattr(size, f"{quantity}_um"))]
     unread = [name for turn in range(len(results)) for name in wanted if (turn, name) not in read_of]
     return found, (*_judge(found, names, error, u_known), *_unread(unread, found))
-
-
-def counted(count: int, what: str) -> str:
-    """Return a number and its noun."""
-    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def _unread(names: list[str], found: Verification) -> list[Remark]:

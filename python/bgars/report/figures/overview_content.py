@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bgars.files.counted import counted
 from bgars.files.light_names import light_name
 from bgars.report.color_ramp import cividis
 from bgars.report.figures.prior import prior_label, prior_legend, prior_overlay, prior_pixels, stripes
@@ -151,7 +152,7 @@ def _title(result: Reconstruction) -> str:
     title = (
         f"{capture.name}: {len(capture.rig)} lights, {capture.images.shape[2]} x {capture.images.shape[1]} px, "
         f"{scale}; "
-        f"method {result.field.method}; {parts} connected part{'s' if parts != 1 else ''}"
+        f"method {result.field.method}; {counted(parts, 'connected part')}"
     )
     choice = textwrap.wrap(f"Normals: {result.field.method_reason}", TITLE_WIDTH) if result.field.method_reason else []
     return "\n".join([title, *choice])
